@@ -20,10 +20,10 @@ from batch_sections import Plan
 from cyclopts import Parameter, run
 from figures_file import write_figures
 
+from dermis.base.atomic_write import check_output
+from dermis.base.errors import DermisError
 from dermis.cli.console import note, print_lines
 from dermis.cli.options import parse_size
-from dermis.errors import DermisError
-from dermis.outputs import check_output
 
 PARTS = ("steps", "new", "moving", "dask", "disk")
 _DIGITS = 4

@@ -14,15 +14,15 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from dermis.batch.distributed import Cluster
-from dermis.batch.entries import entries
-from dermis.batch.processes import Processes
-from dermis.batch.run import Crew, Progress, run
-from dermis.batch.scenes import SceneMaker
-from dermis.batch.seats import Seating, available_cores
-from dermis.batch.spec import Spec, example_text, spec_of
-from dermis.batch.worker import Work
-from dermis.extras import needed
+from dermis.apps.batch.distributed import Cluster
+from dermis.apps.batch.entries import entries
+from dermis.apps.batch.processes import Processes
+from dermis.apps.batch.run import Crew, Progress, run
+from dermis.apps.batch.scenes import SceneMaker
+from dermis.apps.batch.seats import Seating, available_cores
+from dermis.apps.batch.spec import Spec, example_text, spec_of
+from dermis.apps.batch.worker import Work
+from dermis.base.extras import needed
 from dermis.frame.renderer import Renderer
 
 OUTPUTS, LANDMARKS = ("depth", "normal", "label"), ("ibug-68",)

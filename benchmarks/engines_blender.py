@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from engines_blender_head import heads, picture
 
-from dermis.export.deviation import deviation
-from dermis.export.lobe import fit_d
-from dermis.export.subject import subject_of
-from dermis.export.targets.blender import TARGET
-from dermis.reference.blender_process import Errand, run_blender
+from dermis.apps.export.deviation import deviation
+from dermis.apps.export.lobe import fit_d
+from dermis.apps.export.subject import subject_of
+from dermis.apps.export.targets.blender import TARGET
+from dermis.apps.validation.truths.blender_process import Errand, run_blender
 
 RESULTS = Path(__file__).with_name("results") / "engines_blender.json"
 SCRIPT = Path(__file__).with_name("engines_blender_script.py")

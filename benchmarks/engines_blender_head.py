@@ -13,13 +13,13 @@ import numpy as np
 from PIL import Image
 from scipy.ndimage import distance_transform_edt, maximum_filter
 
-from dermis.export.run import export_skin
-from dermis.export.subject import Subject, subject_of
-from dermis.export.textures import painted
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.textures import painted
+from dermis.apps.validation.truths.metrics import relative_rmse
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb
 from dermis.images.io import read_image
-from dermis.reference.metrics import relative_rmse
 from dermis.scene.settings import Settings
 
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "engines_blender.webp"

@@ -24,9 +24,9 @@ from engines_blender_head import compared, drawn, rendered
 from figures_file import write_figures
 from PIL import Image
 
-from dermis.export.run import export_skin
-from dermis.export.subject import Subject, subject_of
-from dermis.export.textures import painted
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.textures import painted
 from dermis.images.colour import decode_srgb, encode_srgb
 from dermis.scene.lights import DirectionalLight
 
@@ -97,7 +97,7 @@ def in_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
 
 def in_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
     """The exported scene by several seeds; where the head is, as ours says."""
-    from dermis.reference.mitsuba_scene import load_mitsuba, variant_of
+    from dermis.apps.validation.truths.mitsuba_scene import load_mitsuba, variant_of
 
     mi = load_mitsuba()
     with TemporaryDirectory() as place, variant_of(mi, "scalar_rgb"):

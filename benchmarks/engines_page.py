@@ -7,10 +7,10 @@ from pathlib import Path
 
 import engines_tables
 
-from dermis.export.registry import TARGETS
-from dermis.export.run import judged
-from dermis.export.subject import subject_of
-from dermis.outputs import replacing
+from dermis.apps.export.registry import TARGETS
+from dermis.apps.export.run import judged
+from dermis.apps.export.subject import subject_of
+from dermis.base.atomic_write import replacing
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "engines.md"
 SKINS = "skin1", "skin2", "dj3", "medium"

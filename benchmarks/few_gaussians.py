@@ -12,14 +12,14 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter, run
 
-from dermis.benchmark.cases import Case, scenes_of, settings_of
-from dermis.benchmark.measure import ON_CPU, Effort, stage_ms
+from dermis.apps.validation.benchmarks.cases import Case, scenes_of, settings_of
+from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, stage_ms
+from dermis.base.atomic_write import check_output, replacing
 from dermis.cli.console import print_json
 from dermis.frame.renderer import Renderer
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.frame.techniques.texture_space import TextureSpace
 from dermis.mesh.head import Head
-from dermis.outputs import check_output, replacing
 from dermis.scene.heads import load_head
 from dermis.scene.techniques import TECHNIQUES
 

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from dermis.outputs import replacing
+from dermis.base.atomic_write import replacing
 
 
 def write_figures(path: Path, told: dict[str, Any], digits: int) -> None:

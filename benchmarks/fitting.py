@@ -18,8 +18,8 @@ from figures_file import write_figures
 from fitting_scenes import SCENES, Case, case, photograph
 from numpy.typing import NDArray
 
-from dermis.fitting.fit import fit
-from dermis.fitting.fitted import Fitted
+from dermis.apps.inverse.fitting.fit import fit
+from dermis.apps.inverse.fitting.fitted import Fitted
 from dermis.frame.renderer import Renderer
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments

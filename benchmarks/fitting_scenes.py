@@ -16,14 +16,14 @@ from tempfile import gettempdir
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.comparison.person import traced
-from dermis.comparison.person_paint import paint_of
+from dermis.apps.validation.comparisons.person import traced
+from dermis.apps.validation.comparisons.person_paint import paint_of
+from dermis.apps.validation.truths.half_space import diffuse_albedo, reflected_radiance
+from dermis.apps.validation.truths.path_traced import PathTraced, Variant
 from dermis.environment.panorama import directions
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.images.exr import encode_exr
-from dermis.reference.half_space import diffuse_albedo, reflected_radiance
-from dermis.reference.path_traced import PathTraced, Variant
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight

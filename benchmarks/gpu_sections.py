@@ -16,13 +16,13 @@ from typing import Any
 
 from other_program import lasted_s
 
-from dermis.benchmark.cases import FRAGMENTS, PRESETS, Case, scenes_of
-from dermis.benchmark.lobe_cost import lobe_cost_ns
-from dermis.benchmark.measure import Effort, row_ms, stage_ms
-from dermis.benchmark.report import as_json
-from dermis.benchmark.run import run
+from dermis.apps.validation.benchmarks.cases import FRAGMENTS, PRESETS, Case, scenes_of
+from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
+from dermis.apps.validation.benchmarks.measure import Effort, row_ms, stage_ms
+from dermis.apps.validation.benchmarks.report import as_json
+from dermis.apps.validation.benchmarks.run import run
+from dermis.base.errors import DermisError
 from dermis.cli.console import note
-from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.images.writer import ImageWriter
 from dermis.mesh.head import Head

@@ -21,10 +21,10 @@ from figures_file import write_figures
 from gpu_sections import Plan, plan_of, quick_plan
 
 import dermis
+from dermis.base.atomic_write import check_output
+from dermis.base.errors import DermisError
 from dermis.cli.console import note
-from dermis.errors import DermisError
 from dermis.mesh.samples import cached
-from dermis.outputs import check_output
 
 PARTS = ("bench", "lobes", "sequences", "lights", "options", "start", "viewer", "film")
 """What matters most first; lobes while the device is at work, for an idle one is three times as slow."""

@@ -18,14 +18,14 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter, run
 
-from dermis.benchmark.cases import Case, scenes_of, settings_of
-from dermis.benchmark.measure import ON_CPU, Effort, row_ms, stage_ms
-from dermis.benchmark.rigged import pose_at, rigged
+from dermis.apps.validation.benchmarks.cases import Case, scenes_of, settings_of
+from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, row_ms, stage_ms
+from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
+from dermis.base.atomic_write import check_output, replacing
 from dermis.cli.console import print_json
 from dermis.frame.renderer import Renderer
 from dermis.gpu.memory import held_bytes
 from dermis.mesh.head import Head
-from dermis.outputs import check_output, replacing
 from dermis.scene import Pose, Scene, Settings, Skin
 from dermis.scene.heads import load_head
 

@@ -24,12 +24,12 @@ from peers_measured import METHODS, Measured, Plan, measure
 from peers_page import place_text, scene_text
 
 import dermis
+from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
+from dermis.apps.validation.truths.blender_process import blender_python
+from dermis.apps.validation.truths.mitsuba_scene import load_mitsuba
+from dermis.base.atomic_write import check_output, replacing
+from dermis.base.errors import DermisError, refuse
 from dermis.cli.console import note, print_lines, progress
-from dermis.comparison.scenes import LIGHTS as SCENES
-from dermis.errors import DermisError, refuse
-from dermis.outputs import check_output, replacing
-from dermis.reference.blender_process import blender_python
-from dermis.reference.mitsuba_scene import load_mitsuba
 
 ROOT = Path(__file__).resolve().parent
 RESULTS = ROOT / "results" / "peers.json"

@@ -20,6 +20,11 @@ from figures_file import write_figures
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from dermis.apps.inverse.unmixing.model import FACE, SkinModel, Third, skin_model
+from dermis.apps.inverse.unmixing.on_device import Unmixer
+from dermis.apps.inverse.unmixing.solve import solve, weights_of
+from dermis.apps.inverse.unmixing.unmix import unmix
+from dermis.apps.validation.truths.slab_mc import counted_profile
 from dermis.gpu import Device, Frame, open_device
 from dermis.gpu.textures import texture_from
 from dermis.images.difference import delta_e_2000
@@ -28,11 +33,6 @@ from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.pigments.skin import SkinParameters, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.tissue import load_tissue
-from dermis.reference.slab_mc import counted_profile
-from dermis.unmixing.model import FACE, SkinModel, Third, skin_model
-from dermis.unmixing.on_device import Unmixer
-from dermis.unmixing.solve import solve, weights_of
-from dermis.unmixing.unmix import unmix
 
 RESULTS = Path(__file__).parent / "results" / "unmixing.json"
 Floats = NDArray[np.float64]

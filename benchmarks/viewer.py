@@ -28,10 +28,10 @@ from viewer_memory import endured
 from viewer_page import through_the_page
 from viewer_tables import tables
 
+from dermis.base.atomic_write import check_output, replacing
 from dermis.cli.console import note, print_lines
 from dermis.cli.options import parse_size
 from dermis.gpu import Device, open_device
-from dermis.outputs import check_output, replacing
 
 RESULTS = Path(__file__).resolve().parent / "results" / "viewer.json"
 _PACKAGES = ("dermis", "wgpu", "rendercanvas", "numpy", "pillow")

@@ -11,7 +11,7 @@ import numpy as np
 from viewer_clock import Clock
 from viewer_input import FEWEST, MOTIONS, STEP, InputDriver, Plan, counted
 
-from dermis.viewer.navigation import orbit
+from dermis.apps.viewer.navigation import orbit
 
 _PATIENCE = 100  # frames
 _PIXELS = 6.0  # of a drag between two frames

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from viewer_clock import Clock
 
-from dermis.benchmark.rigged import pose_at, rigged
+from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
+from dermis.apps.viewer.navigation import drag_light, orbit
+from dermis.apps.viewer.pace import Pace
+from dermis.apps.viewer.state import ViewerState, changed
+from dermis.apps.viewer.viewer import Viewer
 from dermis.scene.heads import load_head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
-from dermis.viewer.navigation import drag_light, orbit
-from dermis.viewer.pace import Pace
-from dermis.viewer.state import ViewerState, changed
-from dermis.viewer.viewer import Viewer
 
 Change = Callable[[ViewerState, int], ViewerState]
 _SETTLING = 2  # frames before any is counted

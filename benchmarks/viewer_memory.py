@@ -11,12 +11,12 @@ import numpy as np
 from viewer_input import InputDriver, Plan
 from viewer_page import resident_mb
 
+from dermis.apps.viewer.controls import CAMERAS
+from dermis.apps.viewer.navigation import dolly, drag_light, orbit, pan
+from dermis.apps.viewer.state import ViewerState
 from dermis.gpu.memory import held_bytes
 from dermis.scene.environment import Environment
 from dermis.scene.lights import light_presets
-from dermis.viewer.controls import CAMERAS
-from dermis.viewer.navigation import dolly, drag_light, orbit, pan
-from dermis.viewer.state import ViewerState
 
 Kind = Callable[[ViewerState, random.Random], ViewerState]
 _SAMPLES = 60  # of the memory, over all the time

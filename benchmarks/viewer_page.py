@@ -18,7 +18,7 @@ from viewer_delays import spread
 from viewer_input import Plan
 from viewer_server import served
 
-from dermis.viewer.browser.canvas import encoded
+from dermis.apps.viewer.browser.canvas import encoded
 
 _QUIET_S, _PATIENCE_S = 0.6, 120.0
 _MOVES_PER_S = 50.0  # what rendercanvas' page sends at most

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from web_page import FLAGS, SOFTWARE, STATE
 
 import dermis
+from dermis.apps.export.web.build import Asked, built
+from dermis.apps.export.web.maps import smaller
+from dermis.apps.export.web.page import web_page
 from dermis.cli.console import print_lines
-from dermis.export.web.build import Asked, built
-from dermis.export.web.maps import smaller
-from dermis.export.web.page import web_page
 from dermis.frame.taping import renderer_for
 
 ATLAS, MAP = 512, 1024  # as exported

@@ -20,12 +20,12 @@ from figures_file import write_figures
 from numpy.typing import NDArray
 
 import dermis
+from dermis.apps.inverse.unmixing.model import skin_model
+from dermis.apps.inverse.unmixing.unmix import unmix
+from dermis.apps.inverse.unmixing.widths import widths_of
+from dermis.apps.validation.truths.two_media import exchange
 from dermis.frame.renderer import Renderer
 from dermis.images.io import write_png
-from dermis.reference.two_media import exchange
-from dermis.unmixing.model import skin_model
-from dermis.unmixing.unmix import unmix
-from dermis.unmixing.widths import widths_of
 
 RESULTS = Path(__file__).parent / "results" / "widths.json"
 Floats = NDArray[np.float64]

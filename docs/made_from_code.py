@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import dermis
-from dermis import cite
-from dermis.batch.correlation import Correlated
-from dermis.batch.distributions import Distribution
-from dermis.batch.spec import Spec
-from dermis.batch.tables import (
+from dermis.apps.batch.correlation import Correlated
+from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.spec import Spec
+from dermis.apps.batch.tables import (
     BackgroundTable,
     CameraTable,
     EnvironmentTable,
@@ -22,10 +21,11 @@ from dermis.batch.tables import (
     PersonTable,
     TurnTable,
 )
+from dermis.apps.gallery.script import Script, find_scripts
+from dermis.base import citations as cite
 from dermis.cli.head_options import HEAD
 from dermis.cli.options import is_option, option_name
 from dermis.cli.scene_options import AROUND
-from dermis.gallery.script import Script, find_scripts
 from dermis.scene import Camera, Environment, Settings, Skin
 from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.lights import LIGHTS

@@ -39,6 +39,6 @@ def _read(app: Any, page: str, source: list[str]) -> None:
 def _finished(app: Any, fault: Exception | None) -> None:
     head = app.config.turning_head
     if fault is None and head and app.builder.format == "html":
-        from dermis.export.run import export_skin
+        from dermis.apps.export.run import export_skin
 
         export_skin(head, "web", Path(app.outdir) / FILE)

@@ -9,7 +9,7 @@ Sources: dEonLuebke2007, Dudash2007
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 
 def draw(studio):

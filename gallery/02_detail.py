@@ -11,7 +11,7 @@ Slider: mesh alone | with its maps
 from dataclasses import replace
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 from dermis.scene.camera import cheek
 
 

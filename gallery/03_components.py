@@ -9,7 +9,7 @@ Sources: Dudash2007, Tuchin2000
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 PARTS = {"reflected": "specular", "scattered": "diffuse", "both": "all"}
 

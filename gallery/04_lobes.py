@@ -10,7 +10,7 @@ Columns: 5
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 from dermis.scene.camera import cheek
 
 MODELS = ("phong", "blinn-phong", "torrance-sparrow", "kelemen", "two-lobe")

@@ -11,7 +11,7 @@ Sources: Schlick1994
 import numpy as np
 
 import dermis
-from dermis.gallery.picture import main, plotted
+from dermis.apps.gallery.picture import main, plotted
 from dermis.specular.fresnel import dielectric, schlick
 
 

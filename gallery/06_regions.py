@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 ALONE = {"parts": "specular", "exposure": 3}
 

@@ -9,7 +9,7 @@ Slider: white, as it is | tinted, as it is not
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 
 def draw(studio):

@@ -10,7 +10,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 SEEN = {"background": "environment", "background_blur": 0.05}
 

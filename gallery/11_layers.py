@@ -8,7 +8,7 @@ Sources: Jensen2001, DonnerJensen2005, dEonLuebke2007
 """
 
 import dermis
-from dermis.gallery.picture import main, plotted
+from dermis.apps.gallery.picture import main, plotted
 
 MODELS = {"one layer (skin1)": ("skin1", "dipole"), "three layers (dj3)": ("dj3", "multipole")}
 INKS = ("#ff6b5e", "#58d68d", "#5dade2")

@@ -11,8 +11,8 @@ Sources: DonnerJensen2005, Wang1995
 import numpy as np
 
 import dermis
-from dermis.gallery.picture import main
-from dermis.reference.slab_mc import counted_profile
+from dermis.apps.gallery.picture import main
+from dermis.apps.validation.truths.slab_mc import counted_profile
 
 HALF_MM, EXPOSED_MM, PHOTONS = 4.0, 1.0, 400_000
 

@@ -11,7 +11,7 @@ Sources: dEonLuebke2007, DonnerJensen2005
 from functools import partial
 
 import dermis
-from dermis.gallery.picture import main, plotted
+from dermis.apps.gallery.picture import main, plotted
 from dermis.optics.fits.gaussian import single_gaussian
 
 INKS = {"red": "#ff6b5e", "green": "#58d68d", "blue": "#5dade2"}

@@ -10,7 +10,7 @@ Sources: Borshukov2003, Green2004, dEonLuebke2007
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 LEVELS = {"light that enters": 0, "blurred, third level": 3, "blurred, widest level": 5}
 

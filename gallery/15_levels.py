@@ -11,7 +11,7 @@ Columns: 4
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 VIEWS = ("irradiance", "blur 1", "blur 2", "blur 3", "blur 4", "blur 5", "diffuse", "picture")
 

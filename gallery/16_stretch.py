@@ -11,7 +11,7 @@ Columns: 4
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 WAYS = {"uniform": "none", "corrected along u and v": "axes", "full metric": "full"}
 

@@ -12,7 +12,7 @@ Columns: 6
 import numpy as np
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 REMEDIES = ("none", "clear-colour", "stretch-map", "alpha", "multi-uv", "stitch")
 

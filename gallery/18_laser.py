@@ -11,8 +11,8 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from dermis.comparison.compare import compare
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
+from dermis.apps.validation.comparisons.compare import compare
 
 
 def draw(studio):

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib import colormaps
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 TERMS = ("none", "published", "full")
 

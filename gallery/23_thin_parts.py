@@ -10,7 +10,7 @@ Columns: 2
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 
 def draw(studio):

@@ -10,8 +10,8 @@ Sources: Borshukov2003, Green2004, dEonLuebke2007, Jimenez2015, Penner2011, Jens
 Columns: 4
 """
 
-from dermis.comparison.compare import compare
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
+from dermis.apps.validation.comparisons.compare import compare
 from dermis.scene.techniques import TECHNIQUES
 
 

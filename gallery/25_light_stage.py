@@ -11,7 +11,7 @@ Sources: Debevec2000
 import numpy as np
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 from dermis.scene.light_stage import light_stage, stage_weights
 
 ROOM = dermis.Environment(name="lebombo")

@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.profiles import write_profile
 

@@ -8,7 +8,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 
 def draw(studio):

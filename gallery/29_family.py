@@ -7,7 +7,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 AFRICAN = {"african": 1, "asian": 0, "caucasian": 0}
 ASIAN = {"african": 0, "asian": 1, "caucasian": 0}

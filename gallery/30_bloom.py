@@ -9,7 +9,7 @@ Slider: without | a tenth of the light
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 
 def draw(studio):

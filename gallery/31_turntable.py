@@ -9,7 +9,7 @@ Sources: dEonLuebke2007
 import math
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 FRAMES = 36
 

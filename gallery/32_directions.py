@@ -11,8 +11,8 @@ Sources: Chandrasekhar1960, Jensen2001, Jakob2022
 
 from importlib.util import find_spec
 
-from dermis.comparison.compare import compare
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
+from dermis.apps.validation.comparisons.compare import compare
 
 TECHNIQUE = "texture-space"
 

@@ -9,7 +9,7 @@ Sources: Ekman1971
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 
 WOMAN = dermis.Human(caucasian=0.5, african=0, asian=0.5, age=40)
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 from dermis.mesh.eyes import EyeLook
 
 BESIDE = (-0.75, 0.1, 1.0)

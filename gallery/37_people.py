@@ -8,7 +8,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 from dermis.scene.gaze import looking_at
 
 SMILE = {f"{name}{side}": 0.35 for name in ("mouthSmile", "cheekSquint") for side in ("Left", "Right")}

@@ -12,7 +12,7 @@ Columns: 2
 import math
 
 import dermis
-from dermis.gallery.picture import main
+from dermis.apps.gallery.picture import main
 from dermis.human.hair.look import HairLook
 
 PEOPLE = {

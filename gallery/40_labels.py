@@ -8,9 +8,9 @@ Columns: 3
 """
 
 import dermis
-from dermis.gallery.marks import marked
-from dermis.gallery.output_colours import coloured
-from dermis.gallery.picture import main
+from dermis.apps.gallery.marks import marked
+from dermis.apps.gallery.output_colours import coloured
+from dermis.apps.gallery.picture import main
 
 SET = "face-synthetics-70"
 PEOPLE = {

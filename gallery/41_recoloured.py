@@ -11,8 +11,8 @@ Sources: DonnerJensen2006, Jacques1998
 from dataclasses import replace
 
 import dermis
-from dermis.gallery.picture import main
-from dermis.unmixing.change import Change, Share
+from dermis.apps.gallery.picture import main
+from dermis.apps.inverse.unmixing.change import Change, Share
 
 SKINS = {
     "as scanned": Change(),

@@ -12,8 +12,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import dermis
-from dermis.gallery.picture import main
-from dermis.unmixing import change, widths
+from dermis.apps.gallery.picture import main
+from dermis.apps.inverse.unmixing import change, widths
 
 
 def draw(studio):

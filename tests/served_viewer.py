@@ -12,7 +12,7 @@ from typing import Any
 
 from offscreen_input import ADAPTER
 
-from dermis.viewer.state import ViewerState
+from dermis.apps.viewer.state import ViewerState
 
 
 @contextmanager
@@ -20,9 +20,9 @@ def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[A
     """The viewer, in a thread of its own; `viewer.url` is its page."""
     from rendercanvas.http import asgi
 
-    from dermis.viewer.browser.canvas import PageCanvas
-    from dermis.viewer.browser.server import bind, server
-    from dermis.viewer.viewer import Viewer
+    from dermis.apps.viewer.browser.canvas import PageCanvas
+    from dermis.apps.viewer.browser.server import bind, server
+    from dermis.apps.viewer.viewer import Viewer
 
     listener, address = bind("127.0.0.1", 0)
     made: list[Any] = []

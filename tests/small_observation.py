@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dermis.batch.entries import entries
-from dermis.batch.shards import Shard, ShardWriter, shards_of
-from dermis.batch.spec import Spec, spec_of
+from dermis.apps.batch.entries import entries
+from dermis.apps.batch.shards import Shard, ShardWriter, shards_of
+from dermis.apps.batch.spec import Spec, spec_of
 from dermis.frame.observation import Landmarks, Observation
 from dermis.frame.outputs import OUTPUTS
 from dermis.scene.opencv import OpenCvCamera

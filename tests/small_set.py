@@ -7,10 +7,10 @@ from pathlib import Path
 
 from small_head import obj_text
 
-from dermis.batch.processes import Processes, Seat
-from dermis.batch.run import Report, run
-from dermis.batch.spec import Spec, load_spec
-from dermis.batch.worker import Work
+from dermis.apps.batch.processes import Processes, Seat
+from dermis.apps.batch.run import Report, run
+from dermis.apps.batch.spec import Spec, load_spec
+from dermis.apps.batch.worker import Work
 
 COUNT = 10
 SHARD_SIZE = 2

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import dermis
-from dermis import cite
-from dermis.errors import DermisError
+from dermis.base import citations as cite
+from dermis.base.errors import DermisError
 
 SOURCE = Path(dermis.__file__).parent
 _BRACKETS = re.compile(r"\[([^\[\]]+)\]")

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis import disk
 from dermis.atlas import cached
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_atlas
-from dermis.disk import cached_array
+from dermis.base import disk
+from dermis.base.disk import cached_array
 from dermis.mesh.cached import Rigged, cached_rigged
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import plane, uv_sphere
@@ -368,7 +368,7 @@ def test_two_processes_at_once_leave_whole_files(tmp_path: Path) -> None:
 import sys
 import numpy as np
 from dermis import disk
-from dermis.private import cache_folder
+from dermis.base.private import cache_folder
 for k in range(60):
     for name in "ab":
         expected = np.full(3000, ord(name) + k % 3)

@@ -25,7 +25,7 @@ BARE = re.compile(r"`(\w+\.(?:py|wgsl))`")
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 FOLDERS = ("src", "gallery", "tools", "benchmarks", "docs", "tests")
 NAMES = {path.name for folder in FOLDERS for path in (ROOT / folder).rglob("*.*")}
-MADE_UP = {"src/dermis/viewer/panel/sections/name.py"}  # an example's name
+MADE_UP = {"src/dermis/apps/viewer/panel/sections/name.py"}  # an example's name
 
 
 def commands(page: Path) -> list[str]:

@@ -13,8 +13,8 @@ from moving_head import write_moving_head
 from png_bytes import png
 from small_head import write_head
 
-from dermis.errors import DermisError
-from dermis.extras import EXTRAS, distribution, needed
+from dermis.base.errors import DermisError
+from dermis.base.extras import EXTRAS, distribution, needed
 from dermis.images.codecs import decode_with_pillow, encode_png
 from dermis.images.io import read_image
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from dermis.base.tables import read_rows
 from dermis.human.labels.classes import label_classes
 from dermis.human.landmarks.sets import SETS
-from dermis.tables import read_rows
 
 PAGE = (Path(__file__).parents[1] / "docs" / "labels.md").read_text("utf-8")
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis import disk
-from dermis.errors import DermisWarning
-from dermis.private import make_private, open_private, stranger
+from dermis.base import disk
+from dermis.base.errors import DermisWarning
+from dermis.base.private import make_private, open_private, stranger
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="owners and modes are POSIX's")
 _NOBODY = 54321

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
-from dermis.quantities import numbers
+from dermis.base.errors import DermisError
+from dermis.base.quantities import numbers
 
 
 def test_an_array_of_the_shape_is_taken() -> None:

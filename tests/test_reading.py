@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dermis.errors import DermisError
-from dermis.reading import parse_json, read_file, read_text, read_toml
+from dermis.base.errors import DermisError
+from dermis.base.reading import parse_json, read_file, read_text, read_toml
 
 _MOST = 1000
 

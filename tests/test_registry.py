@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import pytest
 
-from dermis.errors import DermisError
-from dermis.registry import Named, Registry
+from dermis.base.errors import DermisError
+from dermis.base.registry import Named, Registry
 from dermis.scene.findings import ImpossibleError
 from dermis.scene.plain import Plain, choices_of, help_of
 from dermis.scene.settings import Settings

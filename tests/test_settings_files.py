@@ -12,7 +12,7 @@ import pytest
 from small_head import write_head
 
 import dermis
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.human.person_file import read_person
 from dermis.human.regions.labels import load_landmarks
 from dermis.human.regions.table import load_table

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import dermis
+from dermis.base.summary import summary
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.summary import summary
 
 
 @pytest.fixture(scope="module")

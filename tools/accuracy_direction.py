@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.comparison.compare import compare
-from dermis.comparison.report import cells
-from dermis.comparison.scenes import usual_region
-from dermis.comparison.truths import Truth
+from dermis.apps.validation.comparisons.compare import compare
+from dermis.apps.validation.comparisons.report import cells
+from dermis.apps.validation.comparisons.scenes import usual_region
+from dermis.apps.validation.comparisons.truths import Truth
+from dermis.apps.validation.truths.metrics import energy_ratio, relative_rmse
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.scene import Settings
 
 HEAD = """|  |  |  | relative RMSE | in red, green, blue | FLIP | energy ratio | in red, green, blue |

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from dermis.comparison.compare import subject_of
-from dermis.comparison.scenes import usual_region
-from dermis.comparison.truths import (
+from dermis.apps.validation.comparisons.compare import subject_of
+from dermis.apps.validation.comparisons.scenes import usual_region
+from dermis.apps.validation.comparisons.truths import (
     Subject,
     Truth,
     heat_around,
@@ -16,13 +16,13 @@ from dermis.comparison.truths import (
     positions,
     surface_integral,
 )
+from dermis.apps.validation.truths.metrics import energy_ratio, relative_rmse
+from dermis.apps.validation.truths.surface_integral import GaussianSum as Profile
+from dermis.apps.validation.truths.surface_integral import integrate
 from dermis.frame.surface_points import surface_points
 from dermis.human.regions.labels import known_landmarks
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
-from dermis.reference.metrics import energy_ratio, relative_rmse
-from dermis.reference.surface_integral import GaussianSum as Profile
-from dermis.reference.surface_integral import integrate
 from dermis.scene.settings import Settings
 
 LIGHTS = ("front", "back", "laser")

@@ -12,11 +12,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.validation.truths.half_space import reflected_radiance
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.optics.directions import directional_albedo, directions, mean_of_once, refracted
 from dermis.optics.media import media
-from dermis.reference.half_space import reflected_radiance
 from dermis.scene import Scene, Settings, Skin
 from dermis.scene.heads import load_head
 

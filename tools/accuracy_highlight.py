@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 import dermis
+from dermis.apps.validation.truths.cycles import cycles_passes
+from dermis.apps.validation.truths.cycles_scene import Facets
 from dermis.atlas.build import build_atlas
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.reference.cycles import cycles_passes
-from dermis.reference.cycles_scene import Facets
 from dermis.scene import PointLight, Scene, Settings, Skin, load_camera
 from dermis.specular.two_lobe import NARROW, SHARE_OF_NARROW, WIDE
 

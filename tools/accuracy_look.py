@@ -17,12 +17,12 @@ from accuracy_person import sheet_bytes
 from numpy.typing import NDArray
 
 import dermis
+from dermis.apps.validation.truths.cycles import cycles_passes
+from dermis.apps.validation.truths.cycles_scene import Coated
 from dermis.atlas.build import build_atlas
 from dermis.frame.painted import with_painted_maps
 from dermis.mesh.head import Head
 from dermis.optics.profiles import load_profile
-from dermis.reference.cycles import cycles_passes
-from dermis.reference.cycles_scene import Coated
 from dermis.scene import Scene, Settings, Skin
 from dermis.scene.camera import PRESETS
 

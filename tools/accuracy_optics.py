@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from dermis.apps.validation.truths.slab_mc import counted_profile, trace_medium
 from dermis.optics.diffusion.models import Model, cut, through_gaussians, through_slab
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.fits.burley import fit_burley
@@ -16,7 +17,6 @@ from dermis.optics.media import SKIN_ETA, media
 from dermis.optics.profiles import load_profile
 from dermis.optics.radial import RadialProfile
 from dermis.optics.tissue import Tissue, load_tissue
-from dermis.reference.slab_mc import counted_profile, trace_medium
 
 PHOTONS, SPECTRAL_PHOTONS = 4_000_000, 400_000
 TISSUES = ("skin1", "skin2", "dj3", "light", "medium", "dark")

@@ -14,15 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.comparison.person import Pair, compare_person
-from dermis.comparison.person_iris import iris_of
-from dermis.comparison.person_paint import paint_of
-from dermis.comparison.person_views import EYE_MM, VIEWS, scene_of
+from dermis.apps.gallery.picture import sheet
+from dermis.apps.gallery.run import encode_webp
+from dermis.apps.gallery.script import Panels
+from dermis.apps.validation.comparisons.person import Pair, compare_person
+from dermis.apps.validation.comparisons.person_iris import iris_of
+from dermis.apps.validation.comparisons.person_paint import paint_of
+from dermis.apps.validation.comparisons.person_views import EYE_MM, VIEWS, scene_of
+from dermis.apps.validation.truths.metrics import Estimate
 from dermis.frame.renderer import Renderer
-from dermis.gallery.picture import sheet
-from dermis.gallery.run import encode_webp
-from dermis.gallery.script import Panels
-from dermis.reference.metrics import Estimate
 from dermis.scene.heads import load_head
 
 DOCS = Path(__file__).parent.parent / "docs"

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import dermis
+from dermis.apps.validation.truths.slab import ScatteringLayer
+from dermis.apps.validation.truths.slab_mc import trace_slab
 from dermis.gpu import download
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -24,8 +26,6 @@ from dermis.optics.forward import forward_directions
 from dermis.optics.media import Medium, media
 from dermis.optics.profiles import TERMS, write_profile
 from dermis.optics.slabs import NODES, leaving_deep, slabs
-from dermis.reference.slab import ScatteringLayer
-from dermis.reference.slab_mc import trace_slab
 from dermis.scene import DirectionalLight, Scene, Settings, Skin
 
 Array = np.ndarray

@@ -16,14 +16,14 @@ import accuracy_surface as surface
 import numpy as np
 
 import dermis
-from dermis.comparison.compare import Comparison, Row, compare
-from dermis.comparison.profile_models import ModelName
-from dermis.comparison.report import cells
-from dermis.comparison.scenes import comparison_scene, usual_region
+from dermis.apps.validation.comparisons.compare import Comparison, Row, compare
+from dermis.apps.validation.comparisons.profile_models import ModelName
+from dermis.apps.validation.comparisons.report import cells
+from dermis.apps.validation.comparisons.scenes import comparison_scene, usual_region
+from dermis.apps.validation.truths.half_space import directional_albedo
 from dermis.frame.surface_points import irradiance_at, surface_points
 from dermis.mesh.head import Head
 from dermis.optics.media import media
-from dermis.reference.half_space import directional_albedo
 from dermis.scene import DirectionalLight, Settings
 from dermis.scene.techniques import TECHNIQUES
 

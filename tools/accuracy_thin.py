@@ -11,6 +11,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import dermis
+from dermis.apps.validation.truths import surface_integral
+from dermis.apps.validation.truths.irradiance_samples import Places
 from dermis.gpu import download
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -19,8 +21,6 @@ from dermis.mesh.primitives import wedge
 from dermis.optics.diffusion.models import through_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
-from dermis.reference import surface_integral
-from dermis.reference.irradiance_samples import Places
 from dermis.scene import DirectionalLight, Scene, Settings, Skin
 
 Array = np.ndarray

@@ -1,4 +1,4 @@
-"""Walks as Cycles takes them through a half-space: writes `export/data/cycles_walk.csv`.
+"""Walks as Cycles takes them through a half-space: writes `apps/export/data/cycles_walk.csv`.
 
     python tools/cycles_walk.py [PHOTONS]   # a minute for 4 million
 
@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.machine_code import compiled
-from dermis.reference.photon import Words, deflect, uniform
+from dermis.apps.validation.truths.photon import Words, deflect, uniform
+from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
 ROOTS = (0.01, 0.02, 0.04, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.48, 0.56, 0.64, 0.72, 0.8, 0.8945)

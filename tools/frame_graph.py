@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import dermis
-from dermis.benchmark.rigged import pose_at, rigged
+from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
 from dermis.gpu.listing import Listed, Listing
 from dermis.mesh.samples import cached
 

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.machine_code import compiled
-from dermis.outputs import replacing
-from dermis.reference.photon import deflect, refract, uniform
+from dermis.apps.validation.truths.photon import deflect, refract, uniform
+from dermis.base.atomic_write import replacing
+from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]

@@ -8,8 +8,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from dermis.base.atomic_write import replacing
 from dermis.environment.mirror_fits import LOBES, MIRROR_ROUGHNESSES, MIRROR_VIEWS, fitted_mirrors
-from dermis.outputs import replacing
 from dermis.specular.models import MODELS
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "environment" / "data" / "mirrors.csv"

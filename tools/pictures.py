@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from dermis.gallery.picture import sheet
-from dermis.gallery.run import encode_webp
-from dermis.gallery.script import find_scripts
-from dermis.gallery.studio import Studio
+from dermis.apps.gallery.picture import sheet
+from dermis.apps.gallery.run import encode_webp
+from dermis.apps.gallery.script import find_scripts
+from dermis.apps.gallery.studio import Studio
 
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
 WIDEST = 1600

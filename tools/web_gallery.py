@@ -7,7 +7,7 @@ import re
 import sys
 from pathlib import Path
 
-from dermis.export.run import export_skin
+from dermis.apps.export.run import export_skin
 from dermis.mesh.samples import cached
 
 HEADS = {"human": "the human", "human-7": "human:7", "human-12": "human:12", "scan": "lee_perry_smith"}

@@ -11,10 +11,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dermis.batch.dataset import read_dataset
-    from dermis.errors import DermisError
-    from dermis.export.run import export_skin
-    from dermis.fitting.fit import fit
+    from dermis.apps.batch.dataset import read_dataset
+    from dermis.apps.export.run import export_skin
+    from dermis.apps.inverse.fitting.fit import fit
+    from dermis.apps.inverse.unmixing.unmix import unmix
+    from dermis.apps.viewer.windows import view
+    from dermis.base.errors import DermisError
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer, render
     from dermis.human.person import Human
@@ -44,8 +46,6 @@ if TYPE_CHECKING:
     from dermis.scene.pose import Pose
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
-    from dermis.unmixing.unmix import unmix
-    from dermis.viewer.windows import view
 
 _HOME = {
     "Head": "mesh.head",
@@ -53,7 +53,7 @@ _HOME = {
     "Human": "human.person",
     "human_targets": "human.published",
     "with_regions": "human.regions.apply",
-    "DermisError": "errors",
+    "DermisError": "base.errors",
     "write_image": "images.io",
     "MovieWriter": "images.movie",
     "load_profile": "optics.profiles",
@@ -82,11 +82,11 @@ _HOME = {
     "Pose": "scene.pose",
     "Settings": "scene.settings",
     "Skin": "scene.skin",
-    "export_skin": "export.run",
-    "fit": "fitting.fit",
-    "read_dataset": "batch.dataset",
-    "unmix": "unmixing.unmix",
-    "view": "viewer.windows",
+    "export_skin": "apps.export.run",
+    "fit": "apps.inverse.fitting.fit",
+    "read_dataset": "apps.batch.dataset",
+    "unmix": "apps.inverse.unmixing.unmix",
+    "view": "apps.viewer.windows",
 }
 
 __all__ = [

@@ -38,7 +38,7 @@ def check_finite(value: Any, where: str) -> None:
 
 def check_picture(path: Path) -> None:
     """Raise `FoundError` for a written picture that cannot be read, or has pixels that are no radiance."""
-    from dermis.errors import DermisError
+    from dermis.base.errors import DermisError
     from dermis.images.io import read_image
 
     try:

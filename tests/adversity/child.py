@@ -22,7 +22,7 @@ from adversity.case import FoundError, Plan
 from adversity.hostile import NAMES, NUMBERS, PIPE
 from adversity.kind import Kind
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 
 FORM = re.compile(r".+?: expected .+, but .+\. \S.+[.?]", re.DOTALL)
 _CACHE = "cache"

@@ -41,7 +41,7 @@ from adversity.options import options_of_commands
 from adversity.report import as_json, as_text
 from adversity.trees import changed_tree, json_text, toml_text
 
-from dermis.errors import DermisError, refuse
+from dermis.base.errors import DermisError, refuse
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are watched through /proc")
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER, Atlas
 from dermis.atlas.build import build_atlas
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere

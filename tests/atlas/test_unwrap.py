@@ -17,7 +17,7 @@ from dermis.atlas.unwrap.stretch import singular_values
 from dermis.atlas.unwrap.untangle import untangle
 from dermis.atlas.unwrap.unwrap import PADDING, Layout, unwrap
 from dermis.atlas.unwrap.validity import crossed, faults
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.primitives import plane, uv_sphere

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from small_set import contents, drawn, read, write_spec
 
-from dermis.batch.spec import Spec
+from dermis.apps.batch.spec import Spec
 
 
 @pytest.fixture(scope="package")

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dermis.batch.agreement import agreements, compared
-from dermis.batch.distributions import Distribution
-from dermis.batch.index import INDEX
-from dermis.batch.spec import Spec, example_text, load_spec, spec_of
-from dermis.batch.stated import stated
-from dermis.errors import DermisError
-from dermis.extras import needed
+from dermis.apps.batch.agreement import agreements, compared
+from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.index import INDEX
+from dermis.apps.batch.spec import Spec, example_text, load_spec, spec_of
+from dermis.apps.batch.stated import stated
+from dermis.base.errors import DermisError
+from dermis.base.extras import needed
 
 COUNT = 2000
 LAWS: dict[str, tuple[Any, Any]] = {

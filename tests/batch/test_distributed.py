@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 from small_set import COUNT, SHARDS, contents, read, write_spec
 
-from dermis.batch import distributed as module
-from dermis.batch.distributed import Cluster
-from dermis.batch.run import Progress, Report, run
-from dermis.batch.spec import Spec
-from dermis.batch.worker import Work
-from dermis.errors import DermisError
+from dermis.apps.batch import distributed as module
+from dermis.apps.batch.distributed import Cluster
+from dermis.apps.batch.run import Progress, Report, run
+from dermis.apps.batch.spec import Spec
+from dermis.apps.batch.worker import Work
+from dermis.base.errors import DermisError
 
 Files = dict[str, bytes]
 pytestmark = pytest.mark.filterwarnings("ignore")  # dask's own

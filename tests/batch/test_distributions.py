@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dermis.batch.distributions import Distribution
-from dermis.batch.sampling import rounded, uniform
-from dermis.batch.stated import stated
+from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.sampling import rounded, uniform
+from dermis.apps.batch.stated import stated
 
 COUNT = 5000
 SHARES = [uniform(3, k, "tests") for k in range(COUNT)]

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from dermis.batch.encoding import Encoders
-from dermis.batch.faults import LostProcessError
-from dermis.errors import DermisError
+from dermis.apps.batch.encoding import Encoders
+from dermis.apps.batch.faults import LostProcessError
+from dermis.base.errors import DermisError
 
 
 def encode(number: int, array: np.ndarray) -> tuple[int, dict[str, bytes]]:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from small_observation import OUTPUT_NAMES, observation, small_spec
 
-from dermis.batch.encodings import Encoding, decode_output, encode_output, file_kind, stored_as
-from dermis.batch.entries import entries
-from dermis.batch.samples import decoded
-from dermis.errors import DermisError
+from dermis.apps.batch.encodings import Encoding, decode_output, encode_output, file_kind, stored_as
+from dermis.apps.batch.entries import entries
+from dermis.apps.batch.samples import decoded
+from dermis.base.errors import DermisError
 from dermis.frame.outputs import OUTPUTS
 
 ALL = tuple(OUTPUTS.names)

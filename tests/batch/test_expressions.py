@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dermis.batch.expressions import mixed, mixture, package_expressions, performed, targets_of
-from dermis.batch.sampling import uniform
+from dermis.apps.batch.expressions import mixed, mixture, package_expressions, performed, targets_of
+from dermis.apps.batch.sampling import uniform
 from dermis.human.person import Human
 
 MANY = 3000

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from small_observation import observation, small_spec, write_all, write_shard
 
-from dermis.batch.datasheet import write_datasheet
-from dermis.batch.entries import entries
-from dermis.batch.index import write_index
-from dermis.batch.shards import ShardWriter, shards_of
-from dermis.batch.spec import Spec
-from dermis.errors import DermisError
-from dermis.extras import needed
+from dermis.apps.batch.datasheet import write_datasheet
+from dermis.apps.batch.entries import entries
+from dermis.apps.batch.index import write_index
+from dermis.apps.batch.shards import ShardWriter, shards_of
+from dermis.apps.batch.spec import Spec
+from dermis.base.errors import DermisError
+from dermis.base.extras import needed
 
 FIRST = ["number", "key", "shard", "camera.K", "camera.R", "camera.t", "head_pose", "gaze"]
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.batch.preview import dry_run, parameter_rows, table_lines
-from dermis.batch.spec import spec_of
+from dermis.apps.batch.preview import dry_run, parameter_rows, table_lines
+from dermis.apps.batch.spec import spec_of
 
 ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
 SPEC = """

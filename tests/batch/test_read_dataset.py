@@ -17,12 +17,12 @@ import pytest
 from small_observation import OUTPUT_NAMES, observation, small_spec, write_all
 
 import dermis
-from dermis.batch.encodings import encode_output
-from dermis.batch.entries import entries
-from dermis.batch.index import write_index
-from dermis.batch.samples import decoded
-from dermis.errors import DermisError
-from dermis.extras import needed
+from dermis.apps.batch.encodings import encode_output
+from dermis.apps.batch.entries import entries
+from dermis.apps.batch.index import write_index
+from dermis.apps.batch.samples import decoded
+from dermis.base.errors import DermisError
+from dermis.base.extras import needed
 from dermis.frame.observation import Landmarks
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "dataset_files.md"

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.batch.cameras import face_points
-from dermis.batch.lighting import colour_of, lights_of
-from dermis.batch.scenes import SceneMaker, drawn_person
-from dermis.batch.spec import Spec, example_text, spec_of
-from dermis.errors import DermisError
+from dermis.apps.batch.cameras import face_points
+from dermis.apps.batch.lighting import colour_of, lights_of
+from dermis.apps.batch.scenes import SceneMaker, drawn_person
+from dermis.apps.batch.spec import Spec, example_text, spec_of
+from dermis.base.errors import DermisError
 from dermis.human.person import Human
 from dermis.human.person_file import write_numbers
 from dermis.mesh.turns import angles_matrix

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from dermis.batch import seats
-from dermis.batch.ranks import taken_rank
-from dermis.batch.seats import Seating
+from dermis.apps.batch import seats
+from dermis.apps.batch.ranks import taken_rank
+from dermis.apps.batch.seats import Seating
 
 
 def pretend(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbers: int) -> None:

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from small_observation import observation, small_spec, write_all, write_shard
 
-from dermis.batch.entries import entries
-from dermis.batch.settling import settle
-from dermis.batch.shards import (
+from dermis.apps.batch.entries import entries
+from dermis.apps.batch.settling import settle
+from dermis.apps.batch.shards import (
     Shard,
     ShardWriter,
     is_there,
@@ -24,8 +24,8 @@ from dermis.batch.shards import (
     shards_of,
     stamp_of,
 )
-from dermis.batch.spec import Spec
-from dermis.errors import DermisError
+from dermis.apps.batch.spec import Spec
+from dermis.base.errors import DermisError
 
 FORMATS = "webdataset", "folder"
 
@@ -180,7 +180,7 @@ def test_a_full_disk_ends_cleanly_with_what_is_whole_kept(
     for name in ("TarWriter.add", "FolderWriter.add", "take_name"):
         home = {"TarWriter.add": "tar_files.", "FolderWriter.add": "folder_files."}.get(name, "shards.")
         with monkeypatch.context() as patch:
-            patch.setattr(f"dermis.batch.{home}{name}", full)
+            patch.setattr(f"dermis.apps.batch.{home}{name}", full)
             if name.startswith("Tar") != (spec.format == "webdataset") and name != "take_name":
                 continue
             with pytest.raises(DermisError, match=r"shard-00001.*No space left.*with space left"):

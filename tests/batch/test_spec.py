@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 import dermis
-from dermis.batch.drawing import Parameters
-from dermis.batch.spec import Spec, example_text, load_spec, spec_of
-from dermis.errors import DermisError
+from dermis.apps.batch.drawing import Parameters
+from dermis.apps.batch.spec import Spec, example_text, load_spec, spec_of
+from dermis.base.errors import DermisError
 
 COUNT = 5000
 REFUSED = {
@@ -179,7 +179,7 @@ def test_images_share_people_as_many_as_are_stated() -> None:
 
 def test_other_processes_draw_the_same(example: Spec) -> None:
     code = (
-        "import json, tomllib; from dermis.batch.spec import example_text, spec_of; "
+        "import json, tomllib; from dermis.apps.batch.spec import example_text, spec_of; "
         "spec = spec_of(tomllib.loads(example_text()) | {'count': 5000}); "
         "print(json.dumps([spec.text(), *(spec.parameters(k) for k in (4999, 0, 17))]))"
     )

@@ -8,13 +8,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.benchmark import run as running
-from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3, PRESETS, Case, scenes_of, settings_of, with_terms
-from dermis.benchmark.floor import copy_rate, moved_by, stage_bytes
-from dermis.benchmark.measure import ON_CPU, Effort, Row, measure
-from dermis.benchmark.report import COLUMNS, as_json, cells, left_out_lines, stage_table, write_report
-from dermis.benchmark.run import Benchmark, LeftOut, run
-from dermis.errors import DermisError
+from dermis.apps.validation.benchmarks import run as running
+from dermis.apps.validation.benchmarks.cases import (
+    FRAGMENTS,
+    GPU_GEMS_3,
+    PRESETS,
+    Case,
+    scenes_of,
+    settings_of,
+    with_terms,
+)
+from dermis.apps.validation.benchmarks.floor import copy_rate, moved_by, stage_bytes
+from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, Row, measure
+from dermis.apps.validation.benchmarks.report import (
+    COLUMNS,
+    as_json,
+    cells,
+    left_out_lines,
+    stage_table,
+    write_report,
+)
+from dermis.apps.validation.benchmarks.run import Benchmark, LeftOut, run
+from dermis.base.errors import DermisError
 from dermis.frame.passes.surface_texels import SURFACE_BYTES
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from setups import front_camera, head_of, scene_of, settings_of
 from tolerances import HALVES
 
-from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3
-from dermis.benchmark.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
+from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
+from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download
 from dermis.mesh.geometry import build_mesh

@@ -55,7 +55,7 @@ def test_memory_is_told_by_images() -> None:
     from batch_page import page
     from batch_sections import Clock
 
-    from dermis.batch.run import Progress
+    from dermis.apps.batch.run import Progress
 
     clock = Clock(workers=2)
     for images in range(1, 50):

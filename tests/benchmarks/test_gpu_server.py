@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu import Device
 
 

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import dermis
-from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3
-from dermis.errors import DermisError, refuse
+from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
+from dermis.apps.validation.truths.cycles import CyclesPass
+from dermis.apps.validation.truths.path_traced import PathTraced
+from dermis.base.errors import DermisError, refuse
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.reference.cycles import CyclesPass
-from dermis.reference.path_traced import PathTraced
 
 BALL = Head("ball", uv_sphere(100.0, 24, 12), Maps())
 SIDE, OURS, BIAS, NOISE = 64, 0.2, 0.1, 0.4

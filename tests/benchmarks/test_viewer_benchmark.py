@@ -14,8 +14,8 @@ import pytest
 from offscreen_input import ADAPTER
 from small_head import write_head
 
+from dermis.base.errors import DermisError
 from dermis.cli.options import parse_size
-from dermis.errors import DermisError
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
@@ -152,7 +152,7 @@ def test_all_kinds_of_change_are_drawn_and_the_memory_is_watched(
 def test_each_kind_of_change_makes_another_state(driver: Any) -> None:
     from viewer_memory import KINDS
 
-    from dermis.viewer.state import same
+    from dermis.apps.viewer.state import same
 
     for kind in KINDS.values():
         assert any(not same(kind(driver.first, random.Random(seed)), driver.first) for seed in range(6))

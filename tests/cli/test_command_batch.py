@@ -55,7 +55,7 @@ def test_a_dry_run_writes_a_sheet_alone(run: Run, spec: Path) -> None:
 
 
 def test_the_example_is_a_spec(run: Run, tmp_path: Path) -> None:
-    from dermis.batch.spec import load_spec
+    from dermis.apps.batch.spec import load_spec
 
     ended = run("batch", "--example")
     assert (ended.code, ended.stderr) == (0, "")

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from dermis.benchmark import cases
-from dermis.benchmark.cases import Case, Preset
-from dermis.benchmark.measure import Effort, measure
-from dermis.errors import DermisError
+from dermis.apps.validation.benchmarks import cases
+from dermis.apps.validation.benchmarks.cases import Case, Preset
+from dermis.apps.validation.benchmarks.measure import Effort, measure
+from dermis.base.errors import DermisError
 
 Run = Callable[..., Any]
 BRIEF = Effort(warming=0, between=0, timed=1, row=1)
@@ -34,8 +34,8 @@ def bench(run: Run, folder: Path, opened: None, device: Any, monkeypatch: pytest
     )
     for name in cases.PRESETS:
         monkeypatch.setitem(cases.PRESETS, name, tiny)
-    monkeypatch.setattr("dermis.benchmark.run.ON_CPU", BRIEF)
-    monkeypatch.setattr("dermis.benchmark.run.Effort", lambda: BRIEF)
+    monkeypatch.setattr("dermis.apps.validation.benchmarks.run.ON_CPU", BRIEF)
+    monkeypatch.setattr("dermis.apps.validation.benchmarks.run.Effort", lambda: BRIEF)
     return lambda *words: run("bench", "--head", "head.obj", "--adapter", device.adapter.name, *words)
 
 
@@ -85,7 +85,7 @@ def test_interrupted_it_leaves_nothing(bench: Run, monkeypatch: pytest.MonkeyPat
             raise KeyboardInterrupt
         return measure(renderer, case, *rest)
 
-    monkeypatch.setattr("dermis.benchmark.run.measure", interrupted)
+    monkeypatch.setattr("dermis.apps.validation.benchmarks.run.measure", interrupted)
     ended = bench("--preset", "cpu", "--json", "-o", "report.html")
     assert ended.code == 130 and ended.stdout == ""
     assert set(tmp_path.rglob("*")) == before
@@ -97,7 +97,7 @@ def test_a_report_that_fails_at_the_end_takes_no_figures_along(
     def full(path: Path, made: Any) -> None:
         raise DermisError(f"{path}: the disk is full")
 
-    monkeypatch.setattr("dermis.benchmark.report.write_report", full)
+    monkeypatch.setattr("dermis.apps.validation.benchmarks.report.write_report", full)
     ended = bench("--preset", "cpu", "--json", "-o", "report.html")
     assert ended.code == 2 and "the disk is full" in ended.stderr
     assert len(json.loads(ended.stdout)["rows"]) == 3

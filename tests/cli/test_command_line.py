@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-import dermis.cite
+from dermis.base.citations import parse_bibtex
 
 Run = Callable[..., Any]
 
@@ -101,7 +101,7 @@ def test_version(run: Run) -> None:
 def test_cite_prints_the_works_behind_the_technique(run: Run) -> None:
     ended = run("cite")
     assert (ended.code, ended.stderr) == (0, "")
-    keys = set(dermis.cite.parse_bibtex(ended.stdout))
+    keys = set(parse_bibtex(ended.stdout))
     assert {"dEonLuebke2007", "JensenBuhler2002", "Kelemen2001", "Beckmann1963", "DonnerJensen2005"} <= keys
     assert {"Schlick1994", "OlanoBaker2010", "Williams1978"} <= keys
     assert not {"Penner2011", "Jimenez2015", "Green2004", "Karis2013", "Baum1989"} & keys
@@ -138,7 +138,7 @@ def test_cite_names_what_is_in_use(
     )
     ended = run("cite", *words)
     assert (ended.code, ended.stderr) == (0, "")
-    keys = set(dermis.cite.parse_bibtex(ended.stdout))
+    keys = set(parse_bibtex(ended.stdout))
     assert has <= keys and not lacks & keys
 
 
@@ -155,19 +155,19 @@ def test_cite_refuses_options_without_effect(run: Run, words: tuple[str, ...], s
 
 
 def test_cite_adds_the_works_behind_a_profile(run: Run) -> None:
-    keys = list(dermis.cite.parse_bibtex(run("cite", "--profile", "light").stdout))
+    keys = list(parse_bibtex(run("cite", "--profile", "light").stdout))
     assert keys[0] == "dEonLuebke2007"
     assert {"DonnerJensen2006", "Kienle1998"} <= set(keys)
 
 
 def test_cite_names_the_surface_model_in_use(run: Run) -> None:
-    keys = list(dermis.cite.parse_bibtex(run("cite", "--specular", "torrance-sparrow-smith").stdout))
+    keys = list(parse_bibtex(run("cite", "--specular", "torrance-sparrow-smith").stdout))
     assert {"TorranceSparrow1967", "Smith1967"} <= set(keys) and "Beckmann1963" not in keys
 
 
 def test_cite_prints_the_works_asked_for(run: Run) -> None:
     ended = run("cite", "Kelemen2001", "Donner2008")
-    assert list(dermis.cite.parse_bibtex(ended.stdout)) == ["Kelemen2001", "Donner2008"]
+    assert list(parse_bibtex(ended.stdout)) == ["Kelemen2001", "Donner2008"]
 
 
 def test_cite_refuses_an_unknown_key(run: Run) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dermis.apps.inverse.unmixing.model import skin_model
 from dermis.images.io import read_image, write_image
-from dermis.unmixing.model import skin_model
 
 Run = Callable[..., Any]
 

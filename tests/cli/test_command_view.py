@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 from rigged_head import write_rigged_head, write_take
 
+from dermis.apps.viewer.state import ViewerState
 from dermis.scene import Scene
-from dermis.viewer.state import ViewerState
 
 Run = Callable[..., Any]
 
@@ -67,7 +67,7 @@ def test_who_exposes_the_page_is_warned(capfd: pytest.CaptureFixture[str]) -> No
 
 def test_the_package_imports_without_the_extra() -> None:
     missing = ("imgui_bundle", "rendercanvas", "glfw", "uvicorn", "websockets")
-    code = f"import sys; sys.modules.update(dict.fromkeys({missing})); import dermis.viewer.windows"
+    code = f"import sys; sys.modules.update(dict.fromkeys({missing})); import dermis.apps.viewer.windows"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -123,7 +123,7 @@ def test_one_signal_ends_the_page(folder: Path, number: int, code: int) -> None:
 
 def test_the_options_make_the_state(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Any] = []
-    monkeypatch.setattr("dermis.viewer.windows.show_window", lambda *given, **_: seen.append(given))
+    monkeypatch.setattr("dermis.apps.viewer.windows.show_window", lambda *given, **_: seen.append(given))
     words = ("--lights", "window", "--camera", "ear", "--samples", "2", "--size", "300x200")
     assert run("view", "head.obj", *words, "--adapter", "cpu").code == 0
     state, adapter, size = seen[0]
@@ -141,7 +141,7 @@ def test_a_scene_keeps_its_pose_and_a_motion_comes_with_it(
         f"[head]\nname = {str(file)!r}\n[pose.weights]\njawOpen = 0.5\n[pose.bones]\nneck = [0, 20, 0]\n"
     )
     monkeypatch.setattr(
-        "dermis.viewer.windows.show_window", lambda *given, **more: seen.append((given, more))
+        "dermis.apps.viewer.windows.show_window", lambda *given, **more: seen.append((given, more))
     )
     take = write_take(folder / "take.csv", 0.0, 0.5, 1.0)
     words = ("--motion", take.name, "--motion-fps", "10", "--adapter", "cpu")
@@ -163,8 +163,8 @@ def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.M
     pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
+    from dermis.apps.viewer.windows import view
     from dermis.scene.heads import load_head
-    from dermis.viewer.windows import view
 
     class Canvas(OffscreenRenderCanvas):  # type: ignore[misc]
         def _repr_mimebundle_(self, **options: Any) -> dict[str, str]:
@@ -172,7 +172,7 @@ def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.M
 
     for name in ("anywidget", "rendercanvas.anywidget"):
         monkeypatch.setitem(sys.modules, name, ModuleType(name))
-    monkeypatch.setattr("dermis.viewer.windows._notebook_canvas", lambda backend: Canvas)
+    monkeypatch.setattr("dermis.apps.viewer.windows._notebook_canvas", lambda backend: Canvas)
     state = ViewerState(Scene(load_head(folder / "head.obj"))).with_settings(atlas=64, samples=1)
     widget = view(state, "cpu", (64, 48))
     assert widget._repr_mimebundle_() == {"text/plain": "shown"}

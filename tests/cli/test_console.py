@@ -15,7 +15,7 @@ import dermis
 SLOW = """
 import sys, time
 from dermis.cli import console
-from dermis.preparing import preparing
+from dermis.base.progress import preparing
 
 console.TOLD_AFTER_S = 0.2
 with console.working_on("loading"):

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from small_head import obj_text
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 
 Run = Callable[..., Any]
 
@@ -36,7 +36,7 @@ def test_compare_takes_the_unit(run: Run, in_cm: str, monkeypatch: pytest.Monkey
         heads.append(head)
         raise DermisError("seen")
 
-    monkeypatch.setattr("dermis.comparison.compare.compare", compared)
+    monkeypatch.setattr("dermis.apps.validation.comparisons.compare.compare", compared)
     assert "a forgotten unit?" in run("compare", in_cm).stderr
     assert "seen" in run("compare", in_cm, "--unit-mm", "10").stderr
     (head,) = heads
@@ -49,7 +49,7 @@ def test_compare_without_a_head_refuses_them(run: Run) -> None:
 
 
 def test_bench_takes_unit_and_maps(run: Run, in_cm: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from dermis.benchmark import run as measured
+    from dermis.apps.validation.benchmarks import run as measured
 
     heads: list[Any] = []
 

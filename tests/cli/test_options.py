@@ -13,10 +13,10 @@ from cyclopts import App
 from pydantic import Field
 
 import dermis.cli
+from dermis.base.errors import DermisError
 from dermis.cli.head_options import HEAD
 from dermis.cli.options import check, options_of
 from dermis.cli.scene_options import AROUND
-from dermis.errors import DermisError
 from dermis.scene import Camera, Environment, Settings, Skin, files
 from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.plain import Plain, choices_of, help_of, range_of, slider

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.comparison.compare import Comparison, compare
-from dermis.comparison.report import write_report
-from dermis.comparison.scenes import LIGHTS, REGIONS, comparison_scene
-from dermis.comparison.truths import TRUTHS
-from dermis.errors import DermisError
+from dermis.apps.validation.comparisons.compare import Comparison, compare
+from dermis.apps.validation.comparisons.report import write_report
+from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, comparison_scene
+from dermis.apps.validation.comparisons.truths import TRUTHS
+from dermis.base.errors import DermisError
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from tolerances import COUNTED_TOTAL
 
-from dermis.comparison import profile_models
-from dermis.comparison.profile_models import ModelName
-from dermis.comparison.scenes import medium_scene
+from dermis.apps.validation.comparisons import profile_models
+from dermis.apps.validation.comparisons.profile_models import ModelName
+from dermis.apps.validation.comparisons.scenes import medium_scene
+from dermis.apps.validation.truths.half_space import directional_albedo
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import media
-from dermis.reference.half_space import directional_albedo
 
 BALL = Head("ball", uv_sphere(100.0, 12, 6), Maps())
 BODY = media()["skin1"].with_eta(1.0)

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from dermis.comparison.compare import Comparison, compare
+from dermis.apps.validation.comparisons.compare import Comparison, compare
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

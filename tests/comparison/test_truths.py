@@ -9,13 +9,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dermis.comparison.compare import subject_of
-from dermis.comparison.truths import Subject, heat_around, irradiance_samples, surface_integral
+from dermis.apps.validation.comparisons.compare import subject_of
+from dermis.apps.validation.comparisons.truths import (
+    Subject,
+    heat_around,
+    irradiance_samples,
+    surface_integral,
+)
+from dermis.apps.validation.truths.metrics import energy_ratio, relative_rmse
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.optics.gaussians import GaussianSum
-from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.scene.settings import Settings
 
 BALL = Head("ball", uv_sphere(60.0, 96, 48), Maps())

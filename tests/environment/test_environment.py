@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from tolerances import PREFILTERED
 
+from dermis.base.errors import DermisError
 from dermis.environment.harmonics import analyse, synthesise, zonal
 from dermis.environment.panorama import (
     directions,
@@ -26,7 +27,6 @@ from dermis.environment.prefilter import (
     prefilter,
     round_lobe,
 )
-from dermis.errors import DermisError
 from dermis.images.colour import luminance
 from dermis.images.io import write_exr, write_png
 

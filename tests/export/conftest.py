@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dermis.export.subject import Subject, subject_of
+from dermis.apps.export.subject import Subject, subject_of
 
 
 @pytest.fixture(scope="session")

@@ -12,16 +12,15 @@ import numpy as np
 import pytest
 from small_head import write_head
 
-from dermis.errors import DermisError
-from dermis.export.deviation import deviation
-from dermis.export.lobe import fit_d
-from dermis.export.run import export_skin
-from dermis.export.subject import Subject, subject_of
-from dermis.export.target import numbers_of
-from dermis.export.targets.blender import TARGET
-from dermis.export.targets.blender_scene import surroundings
-from dermis.export.targets.blender_text import script_text
-from dermis.export.targets.blender_walks import (
+from dermis.apps.export.deviation import deviation
+from dermis.apps.export.lobe import fit_d
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.target import numbers_of
+from dermis.apps.export.targets.blender import TARGET
+from dermis.apps.export.targets.blender_scene import surroundings
+from dermis.apps.export.targets.blender_text import script_text
+from dermis.apps.export.targets.blender_walks import (
     albedo,
     burley_stretch,
     burley_within,
@@ -29,11 +28,12 @@ from dermis.export.targets.blender_walks import (
     skin_stretch,
     walk_within,
 )
+from dermis.apps.validation.truths.half_space import diffuse_albedo, directional_albedo
+from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.optics.media import media
-from dermis.reference.half_space import diffuse_albedo, directional_albedo
 from dermis.scene import Camera, PointLight, Scene
 
 RADIUS = "Subsurface Radius"

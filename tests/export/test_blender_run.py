@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from small_head import write_head
 
-from dermis.errors import DermisError
-from dermis.export.run import export_skin
-from dermis.export.subject import subject_of
-from dermis.export.targets.blender import TARGET
-from dermis.reference.blender_process import PYTHON_VARIABLE
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.subject import subject_of
+from dermis.apps.export.targets.blender import TARGET
+from dermis.apps.validation.truths.blender_process import PYTHON_VARIABLE
+from dermis.base.errors import DermisError
 
 PYTHON = os.environ.get(PYTHON_VARIABLE, "")
 MEASURING = Path(__file__).parents[2] / "benchmarks" / "engines_blender_script.py"

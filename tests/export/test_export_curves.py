@@ -7,11 +7,11 @@ import time
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
-from dermis.export.deviation import deviation
-from dermis.export.equivalent import homogeneous
-from dermis.export.lobe import fit_d, lobe
-from dermis.export.subject import Subject, subject_of
+from dermis.apps.export.deviation import deviation
+from dermis.apps.export.equivalent import homogeneous
+from dermis.apps.export.lobe import fit_d, lobe
+from dermis.apps.export.subject import Subject, subject_of
+from dermis.base.errors import DermisError
 from dermis.optics.curve import Curve
 from dermis.optics.half_space import albedo_of, half_space
 

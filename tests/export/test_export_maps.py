@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
-from dermis.export.run import export_skin
-from dermis.export.subject import subject_of
-from dermis.export.targets.maps_encoding import with_green
-from dermis.export.targets.maps_files import check_side, resampled
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.subject import subject_of
+from dermis.apps.export.targets.maps_encoding import with_green
+from dermis.apps.export.targets.maps_files import check_side, resampled
+from dermis.base.errors import DermisError
 from dermis.frame.baking import Baked, bake
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import decode_srgb_levels

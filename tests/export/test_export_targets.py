@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import yaml
 
-from dermis.errors import DermisError
-from dermis.export.lobe import fit_d
-from dermis.export.registry import TARGETS
-from dermis.export.run import export_skin, judged
-from dermis.export.subject import Subject, subject_of
-from dermis.export.target import numbers_of
-from dermis.export.targets.unity import asset_text
+from dermis.apps.export.lobe import fit_d
+from dermis.apps.export.registry import TARGETS
+from dermis.apps.export.run import export_skin, judged
+from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.target import numbers_of
+from dermis.apps.export.targets.unity import asset_text
+from dermis.base.errors import DermisError
 
 LOBES = ["unity", "unreal", "renderman"]
 KNOWN = """

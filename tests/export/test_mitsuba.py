@@ -9,17 +9,17 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from dermis.export.deviation import deviation
-from dermis.export.run import export_skin
-from dermis.export.subject import Subject, subject_of
-from dermis.export.target import numbers_of
-from dermis.export.targets.mitsuba import TARGET, medium_for
-from dermis.export.targets.mitsuba_colours import Colours
-from dermis.export.targets.mitsuba_painted import divided
-from dermis.export.targets.mitsuba_words import Bitmap, Transform, Words, element
+from dermis.apps.export.deviation import deviation
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.target import numbers_of
+from dermis.apps.export.targets.mitsuba import TARGET, medium_for
+from dermis.apps.export.targets.mitsuba_colours import Colours
+from dermis.apps.export.targets.mitsuba_painted import divided
+from dermis.apps.export.targets.mitsuba_words import Bitmap, Transform, Words, element
+from dermis.apps.validation.truths.mitsuba_scene import variant_of
 from dermis.optics.curve import Curve
 from dermis.optics.media import media
-from dermis.reference.mitsuba_scene import variant_of
 
 EDGE_NOISE = 0.05
 """Of an edge response by 12,000 paths; its standard error is a third of this."""

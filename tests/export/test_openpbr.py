@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.export.deviation import deviation
-from dermis.export.run import export_skin, judged
-from dermis.export.subject import subject_of
-from dermis.export.target import numbers_of
-from dermis.export.targets.openpbr import TARGET, radii_mm
-from dermis.export.targets.openpbr_document import OPEN_PBR
-from dermis.export.targets.openpbr_fit import fitted_mm
+from dermis.apps.export.deviation import deviation
+from dermis.apps.export.run import export_skin, judged
+from dermis.apps.export.subject import subject_of
+from dermis.apps.export.target import numbers_of
+from dermis.apps.export.targets.openpbr import TARGET, radii_mm
+from dermis.apps.export.targets.openpbr_document import OPEN_PBR
+from dermis.apps.export.targets.openpbr_fit import fitted_mm
+from dermis.apps.validation.truths.half_space import diffuse_albedo
 from dermis.optics.van_de_hulst import albedo_of_colour
-from dermis.reference.half_space import diffuse_albedo
 
 pytest.importorskip("MaterialX")
 import MaterialX

@@ -9,10 +9,10 @@ import pytest
 from pbrt_grammar import Directive, read
 from rigged_head import write_rigged_head
 
-from dermis.errors import DermisWarning
-from dermis.export.run import export_skin, judged
-from dermis.export.subject import Subject, subject_of
-from dermis.export.targets.pbrt import TARGET
+from dermis.apps.export.run import export_skin, judged
+from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.targets.pbrt import TARGET
+from dermis.base.errors import DermisWarning
 from dermis.mesh.load import load_mesh
 from dermis.optics.tissue import load_tissue
 from dermis.scene.environment import Environment

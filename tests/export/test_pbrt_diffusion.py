@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.export.targets.pbrt_diffusion import diffusion_table
+from dermis.apps.export.targets.pbrt_diffusion import diffusion_table
+from dermis.apps.validation.truths.slab_mc import trace_medium
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.media import Layer, Medium
-from dermis.reference.slab_mc import trace_medium
 
 ETA = 1.4
 DIFFUSION = 0.02  # of what leaves: diffusion against photons counted one by one

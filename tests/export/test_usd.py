@@ -13,8 +13,8 @@ pytest.importorskip("pxr")
 pytest.importorskip("MaterialX")
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
-from dermis.export.run import export_skin
-from dermis.export.target import numbers_of
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.target import numbers_of
 
 
 def surface(stage: Any, name: str = "skin") -> Any:

@@ -20,11 +20,11 @@ from rigged_head import write_rigged_head
 from small_head import write_head
 
 import dermis
-from dermis.export.inlining import hash_of
-from dermis.export.run import export_skin
-from dermis.export.web.build import Asked, Built, built
-from dermis.export.web.dials import Dial, dials_of
-from dermis.export.web.page import MODULES, player, web_page
+from dermis.apps.export.inlining import hash_of
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.web.build import Asked, Built, built
+from dermis.apps.export.web.dials import Dial, dials_of
+from dermis.apps.export.web.page import MODULES, player, web_page
 from dermis.frame.renderer import Renderer
 
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]

@@ -11,15 +11,15 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis import DermisError, DirectionalLight, Environment, Human, Renderer, Scene, Settings
-from dermis.fitting import sky
-from dermis.fitting.files import save
-from dermis.fitting.fit import fit
-from dermis.fitting.fitted import Fitted
-from dermis.fitting.landmarks import read_landmarks
-from dermis.fitting.linear import strengths_of
-from dermis.fitting.photograph import read_photograph
-from dermis.fitting.place import placed
-from dermis.fitting.subject import subject_of
+from dermis.apps.inverse.fitting import sky
+from dermis.apps.inverse.fitting.files import save
+from dermis.apps.inverse.fitting.fit import fit
+from dermis.apps.inverse.fitting.fitted import Fitted
+from dermis.apps.inverse.fitting.landmarks import read_landmarks
+from dermis.apps.inverse.fitting.linear import strengths_of
+from dermis.apps.inverse.fitting.photograph import read_photograph
+from dermis.apps.inverse.fitting.place import placed
+from dermis.apps.inverse.fitting.subject import subject_of
 from dermis.human.landmarks.points import landmark_points
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.directions import fibonacci_sphere

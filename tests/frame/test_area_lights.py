@@ -13,7 +13,7 @@ from tolerances import AREA_LIGHT, LIT, TWIN
 from twins import surface
 
 from dermis.atlas.cached import cached_atlas
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.fine_light import TEXEL_AREA
 from dermis.frame.lights import light_records, light_views
 from dermis.frame.lights.rectangle import KIND, facing_irradiance

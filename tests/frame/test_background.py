@@ -11,8 +11,8 @@ from setups import front_camera, frontal, head_of, scene_of, settings_of
 from strand_setups import hairy
 from tolerances import TWIN
 
+from dermis.base.errors import DermisError
 from dermis.environment.panorama import directions
-from dermis.errors import DermisError
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb8

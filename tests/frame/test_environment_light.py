@@ -15,10 +15,10 @@ from tolerances import FURNACE, PANORAMA, PREFILTERED
 from twins import DEFAULT_COLOUR, surface, surface_albedo
 
 from dermis.atlas.cached import cached_atlas
+from dermis.base.errors import DermisError
 from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import directions, solid_angles
 from dermis.environment.prefilter import SMOOTHEST, prefilter
-from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from

@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from small_head import write_head
 
 import dermis
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.scene.findings import bounds_of, number_fields
 from dermis.scene.lights import LIGHTS

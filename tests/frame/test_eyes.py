@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from setups import frontal, head_of, probe, run_frame, scene_of, settings_of
 
 from dermis import Human
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu.textures import texture_from
 from dermis.mesh.eyeball import CORNEA_MM, apex_mm, cornea_centre_mm, iris_mm

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from setups import head_of
 
 import dermis
-from dermis.errors import DermisError
+from dermis.apps.validation.truths.described import check_lens
+from dermis.apps.viewer.navigation import pick
+from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.frame.surface_points import surface_points
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import uv_sphere
-from dermis.reference.described import check_lens
 from dermis.scene.settings import Settings
-from dermis.viewer.navigation import pick
 
 SIZE = (96, 64)
 K = np.array([[210.0, 0.0, 61.3], [0.0, 260.0, 20.6], [0.0, 0.0, 1.0]])  # fx != fy, far off the middle

@@ -10,7 +10,7 @@ import pytest
 from observed import around, labelled, marks
 from setups import head_of
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.observation import Observation
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head

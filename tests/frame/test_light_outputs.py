@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, place, scene_of, settings_of
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.mesh.primitives import plane, uv_sphere, wedge

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from setups import head_of, place, scene_of
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.lights import light_views
 from dermis.frame.projection import axes_of
 from dermis.mesh.primitives import uv_sphere

@@ -14,9 +14,9 @@ from test_shape import anew, bent, words
 from tolerances import FLAT, HARMONIC, POSED
 
 from dermis import Pose
+from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.benchmark.rigged import pose_at, rigged
 from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.geometry import upload_geometry
 from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels

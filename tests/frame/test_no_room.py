@@ -11,7 +11,7 @@ import wgpu
 from setups import frontal, head_of, scene_of, settings_of
 from test_memory import Held
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame import limits
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere

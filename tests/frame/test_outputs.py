@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, place, scene_of, settings_of
 from strand_setups import hairy
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame import resources
 from dermis.frame.asked import Asked
 from dermis.frame.limits import frame_bytes

@@ -14,11 +14,11 @@ from outside.glow import GLOW, GlowLight
 from setups import frontal, head_of, place, scene_of, settings_of
 from tolerances import FURNACE, TWIN
 
-from dermis.errors import DermisError
+from dermis.apps.validation.truths.lights import lamp
+from dermis.base.errors import DermisError
 from dermis.frame.lights.kind import KINDS
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane
-from dermis.reference.lights import lamp
 from dermis.scene.files import load_lights
 from dermis.scene.lights import LIGHTS
 from dermis.scene.plain import choices_of

@@ -11,7 +11,7 @@ from setups import settings_of
 
 from dermis import Human
 from dermis.atlas.raster import rasterise
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.painted import with_painted_maps
 from dermis.frame.passes.painting import given, paint
 from dermis.frame.renderer import Renderer

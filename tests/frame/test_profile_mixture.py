@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from setups import entered_light, frontal, head_of, run_frame, scene_of, settings_of
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.inputs import Inputs
 from dermis.frame.profile_mixture import load_shares
 from dermis.frame.renderer import Renderer

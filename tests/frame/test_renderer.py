@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from setups import bent_plane, front_camera, frontal, head_of, joined, scene_of, settings_of
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame import resources
 from dermis.frame.renderer import Renderer, render
 from dermis.frame.seams import REMEDIES

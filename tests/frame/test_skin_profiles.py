@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.skin_profiles import SkinProfiles
 from dermis.frame.translucency import shared_width
 from dermis.optics.gaussians import GaussianSum

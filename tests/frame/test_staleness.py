@@ -15,7 +15,7 @@ import pytest
 from pydantic import ValidationError
 from setups import front_camera, head_of, settings_of
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu.listing import Listing
 from dermis.images.io import write_png

@@ -12,7 +12,7 @@ from setups import front_camera, frontal, probe, run_frame, scene_of
 from strand_setups import hairy, shuffled
 from tolerances import FURNACE, LOBE_TWIN, TWIN
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame import strand_space
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download

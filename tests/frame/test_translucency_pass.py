@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tolerances import TWIN
 from translucency_twins import decoded, pairs_on, share_of, surface_of
 
+from dermis.apps.viewer.views import draw_thickness
 from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.cells import divide
 from dermis.frame import passes
@@ -21,7 +22,6 @@ from dermis.frame.translucency import translucency_from
 from dermis.gpu import Constants, Device, Frame, download, make_texture, upload
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
-from dermis.viewer.views import draw_thickness
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]

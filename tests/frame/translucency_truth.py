@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.validation.truths import surface_integral
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import SKIN
 from dermis.optics.gaussians import GaussianSum
-from dermis.reference import surface_integral
 
 Floats = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.gallery.page import _equation, write_page
-from dermis.gallery.picture import sheet
-from dermis.gallery.run import Picture, draw_pictures, encode_webp
-from dermis.gallery.script import Panel, Script, read_script
+from dermis.apps.gallery.page import _equation, write_page
+from dermis.apps.gallery.picture import sheet
+from dermis.apps.gallery.run import Picture, draw_pictures, encode_webp
+from dermis.apps.gallery.script import Panel, Script, read_script
 
 CHROMIUM = Path("/usr/bin/chromium")
 QUIET = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
@@ -54,7 +54,7 @@ def test_equations_have_indices_and_powers() -> None:
 
 
 def test_a_fault_is_told_and_the_others_go_on(tmp_path: Path) -> None:
-    from dermis.errors import refuse
+    from dermis.base.errors import refuse
 
     class Faulty(Script):
         def draw(self, studio: Any) -> Any:

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis import cite
-from dermis.errors import DermisError
-from dermis.gallery.picture import as_bytes, still
-from dermis.gallery.script import Script, find_scripts, read_script
-from dermis.gallery.studio import Studio
+from dermis.apps.gallery.picture import as_bytes, still
+from dermis.apps.gallery.script import Script, find_scripts, read_script
+from dermis.apps.gallery.studio import Studio
+from dermis.base import citations as cite
+from dermis.base.errors import DermisError
 
 SCRIPTS = find_scripts()
-DECK = (resources.files("dermis.gallery") / "deck.csv").read_text(encoding="utf-8").splitlines()
+DECK = (resources.files("dermis.apps.gallery") / "deck.csv").read_text(encoding="utf-8").splitlines()
 ROWS = {row["row"]: row for row in csv.DictReader(line for line in DECK if not line.startswith("#"))}
 
 

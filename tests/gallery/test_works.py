@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from dermis import cite
-from dermis.gallery.page import reference
+from dermis.apps.gallery.page import reference
+from dermis.base import citations as cite
 
 
 @pytest.mark.parametrize("key", sorted(cite.keys()))

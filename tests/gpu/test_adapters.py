@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu import adapters as module
 from dermis.gpu import list_adapters, open_device
 from dermis.gpu.adapters import INSTALL_HINT, WANTED_FEATURES, alike_adapters, fitting_adapters

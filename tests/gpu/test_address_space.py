@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu import address_space
 
 resource = pytest.importorskip("resource", reason="Windows limits no address space")

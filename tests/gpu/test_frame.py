@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
 from dermis.gpu.by_resources import ByResources, key_of
 from dermis.gpu.failures import gpu_failures

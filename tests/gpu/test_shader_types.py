@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dermis
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
 from dermis.gpu.shader_types import bindings, struct_dtype
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu import Device, download, make_texture, upload
 from dermis.gpu.textures import _FORMATS, texture_from
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu import ComputeProgram, Device
 from dermis.gpu.wgsl_source import Member, ShaderFolder, compose
 

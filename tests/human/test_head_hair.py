@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis import Human, Pose
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.human.hair import groom, hairy_skin
 from dermis.human.hair.head_hair import MOST_PER_CM2
 from dermis.human.hair.look import HairLook

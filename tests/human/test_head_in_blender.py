@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from dermis import Human, Pose, load_head
+from dermis.apps.validation.truths.cycles import PYTHON_VARIABLE
 from dermis.frame.painted import painted_head
 from dermis.gpu import open_device
 from dermis.human.head_file import write_person
 from dermis.images.io import read_image
 from dermis.mesh.head import Head
-from dermis.reference.cycles import PYTHON_VARIABLE
 
 SCRIPT = Path(__file__).with_name("opened_in_blender.py")
 PERSON = Human.drawn(7)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dermis import Human, load_head
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.human.person_file import read_person, write_numbers
 
 

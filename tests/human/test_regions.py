@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from dermis.atlas.build import build_atlas
+from dermis.base.errors import DermisError
 from dermis.cli.scene_options import SceneOptions, assemble
-from dermis.errors import DermisError
 from dermis.human.person import Human
 from dermis.human.regions import apply
 from dermis.human.regions.apply import soften, with_regions

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.images.codecs import encode_png, png_size
 from dermis.images.frame_files import FrameFiles
 from dermis.images.io import write_exr, write_png

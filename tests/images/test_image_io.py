@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.images.colour import encode_srgb
 from dermis.images.io import check_output, read_image, write_exr, write_image, write_png
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.images import writer as writing
 from dermis.images.codecs import decode_with_pillow, encode_png
 from dermis.images.io import read_image

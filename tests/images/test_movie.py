@@ -11,7 +11,7 @@ import av
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.images.movie import MovieWriter, check_movie, exact_rate
 
 SIZE = (64, 48)

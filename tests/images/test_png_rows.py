@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from png_bytes import png
 
-from dermis.extras import needed
+from dermis.base.extras import needed
 from dermis.images.codecs import encode_png
 from dermis.images.png_rows import decode_rows
 from dermis.images.sizes import TooLargeError

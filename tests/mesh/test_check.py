@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.check import check_head_height, check_mesh
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Material, Mesh

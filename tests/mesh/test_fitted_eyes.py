@@ -10,7 +10,7 @@ import pytest
 from eyed_head import EYE_MM, MIRROR, ball, ball_with_cornea, write_head
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.eye_names import names_eye
 from dermis.mesh.fitted_eyes.lids import lids_before
 from dermis.mesh.fitted_eyes.spheres import Sphere, corneal_axis, fit_sphere

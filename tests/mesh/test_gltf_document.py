@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gltf_file import SQUARE, GltfFile, add_mesh
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.gltf.document import read_document
 from dermis.mesh.gltf.geometry import read_gltf
 from dermis.mesh.gltf.nodes import read_nodes

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from encoded_glb import encode_glb
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.images.codecs import encode_png
 from dermis.images.io import Picture, read_image
 from dermis.mesh.gltf.pictures import embedded_maps

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gltf_file import SQUARE, SQUARE_TRIANGLES, GltfFile, add_mesh
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.cached import Rigged
 from dermis.mesh.load import load_rigged
 from dermis.mesh.rig import Rig

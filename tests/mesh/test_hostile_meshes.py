@@ -15,7 +15,7 @@ import pytest
 from gltf_file import GltfFile, add_mesh
 from small_head import obj_text
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.images.codecs import encode_png
 from dermis.mesh.frames import FrameReader
 from dermis.mesh.gltf.clips import read_clip

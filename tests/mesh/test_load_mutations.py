@@ -10,7 +10,7 @@ from gltf_file import GltfFile, add_mesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.gltf.clips import read_clip
 from dermis.mesh.load import load_mesh, load_rigged
 from dermis.mesh.primitives import uv_sphere

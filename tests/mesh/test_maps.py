@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.images.filters import mip_chain, without_steps
 from dermis.images.io import read_image, write_exr, write_png
 from dermis.mesh import map_pixels

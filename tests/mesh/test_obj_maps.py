@@ -11,7 +11,7 @@ from encoded_glb import encode_glb
 from small_head import obj_text
 
 import dermis
-from dermis.errors import DermisError, DermisWarning
+from dermis.base.errors import DermisError, DermisWarning
 from dermis.gpu.device import Device
 from dermis.images.codecs import encode_png
 from dermis.images.io import write_png

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh import samples
 from dermis.mesh.samples import SAMPLES, Sample, SampleFile, cached, fetch
 

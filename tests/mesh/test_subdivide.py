@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.check import check_mesh
 from dermis.mesh.geometry import build_mesh, edges, weld
 from dermis.mesh.mesh import Material, Mesh

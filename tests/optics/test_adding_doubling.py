@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dermis.apps.validation.truths.slab import ScatteringLayer
+from dermis.apps.validation.truths.slab_mc import trace_slab
 from dermis.optics.directions import directional_albedo, refracted
 from dermis.optics.slabs import doubled_slabs, slabs
-from dermis.reference.slab import ScatteringLayer
-from dermis.reference.slab_mc import trace_slab
 
 PHOTONS = 40_000
 

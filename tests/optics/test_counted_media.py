@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from tolerances import COUNTED_FLESH, COUNTED_RINGS, COUNTED_TOTAL
 
-from dermis.errors import DermisError
+from dermis.apps.validation.truths.half_space import directional_albedo
+from dermis.apps.validation.truths.slab_mc import counted_profile
+from dermis.base.errors import DermisError
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.flesh import medium_of
 from dermis.optics.media import Layer, Medium, media
 from dermis.optics.profiles import fit_profile, fit_radial, load_profile, write_profile
 from dermis.optics.tissue import Tissue, load_tissue
-from dermis.reference.half_space import directional_albedo
-from dermis.reference.slab_mc import counted_profile
 
 
 def of(name: str, eta: float = 1.4) -> Tissue:

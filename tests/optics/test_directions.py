@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from walk import fresnel, returned
 
+from dermis.apps.validation.truths import half_space
 from dermis.optics.directions import ROWS, directional_albedo, directions, h_function, mean_of_once
-from dermis.reference import half_space
 
 COSINES = np.array([0.0, 0.03, 0.2, 0.5, 0.8, 1.0])
 MU, WEIGHT = (0.5 * (np.polynomial.legendre.leggauss(64)[0] + 1.0), np.polynomial.legendre.leggauss(64)[1])

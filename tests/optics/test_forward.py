@@ -7,14 +7,14 @@ import pytest
 from tolerances import FORWARD_AMOUNT, FORWARD_CONTINUOUS
 from walk import fresnel, returned
 
+from dermis.apps.validation.truths.slab import ScatteringLayer
+from dermis.apps.validation.truths.slab_mc import trace_slab
 from dermis.optics.directions import ROWS, Directions, directional_albedo, directions, mean_of_once
 from dermis.optics.forward import forward_directions
 from dermis.optics.media import media
 from dermis.optics.phase import phase
 from dermis.optics.slabs import NODES, doubled_slabs, leaving_deep, slabs
 from dermis.optics.thin_parts import thin_parts
-from dermis.reference.slab import ScatteringLayer
-from dermis.reference.slab_mc import trace_slab
 
 G = 0.8
 PHOTONS = 60_000

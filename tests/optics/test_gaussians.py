@@ -12,7 +12,7 @@ from scipy.integrate import quad, trapezoid
 from scipy.special import j0
 from tolerances import CLOSED_FORM, PUBLISHED
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.optics.gaussians import MOST_GAUSSIANS, GaussianSum
 from dermis.optics.profiles import load_profile
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
+from dermis.base.reading import read_toml
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Layer, Medium, media, medium_from_toml
 from dermis.optics.tissue import load_tissue
-from dermis.reading import read_toml
 
 ONE = np.array([1.0])
 

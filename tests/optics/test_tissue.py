@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
+from dermis.base.reading import read_toml
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 from dermis.optics.profiles import find_table, load_profile, preset_names, write_profile
 from dermis.optics.tissue import load_tissue, names
-from dermis.reading import read_toml
 
 SKIN = "[skin]\nstructure = 'biospec'\nmelanin = 0.03\n"
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.validation.truths.path_traced import PathTraced, path_trace
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import SKIN, plane
 from dermis.optics.media import Layer, Medium
-from dermis.reference.path_traced import PathTraced, path_trace
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from dermis.apps.validation.truths.person.subject import Paint, Person
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.reference.person.subject import Paint, Person
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene

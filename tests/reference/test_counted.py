@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dermis.apps.validation.truths.slab_mc import counted_profile
 from dermis.optics.media import Layer, Medium, media
 from dermis.optics.tissue import load_tissue
-from dermis.reference.slab_mc import counted_profile
 
 
 def test_per_entering_light_in_rings() -> None:

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from lit_balls import BALL, LIGHTS, ball_scene
 
-from dermis.errors import DermisError
+from dermis.apps.validation.truths.cycles import PYTHON_VARIABLE, Method, cycles_passes, cycles_render
+from dermis.apps.validation.truths.cycles_scene import Coated, describe
+from dermis.apps.validation.truths.half_space import diffuse_albedo
+from dermis.apps.validation.truths.path_traced import Lambertian, path_trace
+from dermis.base.errors import DermisError
 from dermis.optics.media import media
-from dermis.reference.cycles import PYTHON_VARIABLE, Method, cycles_passes, cycles_render
-from dermis.reference.cycles_scene import Coated, describe
-from dermis.reference.half_space import diffuse_albedo
-from dermis.reference.path_traced import Lambertian, path_trace
 from dermis.scene.environment import Environment
 from dermis.scene.settings import Settings
 

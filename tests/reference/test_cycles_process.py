@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from lit_balls import LIGHTS, ball_scene
 
-from dermis.errors import DermisError
+from dermis.apps.validation.truths import cycles
+from dermis.apps.validation.truths.cycles import CyclesRendered, cycles_render, read_passes
+from dermis.base.errors import DermisError
 from dermis.images.io import write_image
 from dermis.optics.media import media
-from dermis.reference import cycles
-from dermis.reference.cycles import CyclesRendered, cycles_render, read_passes
 from dermis.scene.settings import Settings
 
 SKIN1 = media()["skin1"].with_eta(1.0)

@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
-from dermis.reference.half_space import diffuse_albedo, directional_albedo, h_function, reflected_radiance
+from dermis.apps.validation.truths.half_space import (
+    diffuse_albedo,
+    directional_albedo,
+    h_function,
+    reflected_radiance,
+)
+from dermis.base.errors import DermisError
 
 # Normal incidence by adding-doubling, to four digits.
 NORMAL = {0.3: 0.0572, 0.5: 0.1152, 0.8: 0.2853, 0.9: 0.4150, 0.95: 0.5355, 0.99: 0.7527, 0.999: 0.9129}

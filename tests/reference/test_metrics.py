@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
-from dermis.images.colour import encode_srgb
-from dermis.reference.metrics import (
+from dermis.apps.validation.truths.metrics import (
     Estimate,
     energy_ratio,
     flip,
     relative_rmse,
     signed_difference,
 )
+from dermis.base.errors import DermisError
+from dermis.images.colour import encode_srgb
 
 Floats = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ import pytest
 from lit_balls import COLOUR, DRY, LIGHTS, ball_scene
 from numpy.typing import NDArray
 
+from dermis.apps.validation.truths.path_traced import Lambertian, PathTraced, path_trace
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.optics.profiles import load_profile
-from dermis.reference.path_traced import Lambertian, PathTraced, path_trace
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.environment import Environment
 from dermis.scene.heads import load_head

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from half_spaces import pan
 
-from dermis.errors import DermisError
+from dermis.apps.validation.truths.mitsuba_solid import Solid, inwards, skin_solid
+from dermis.base.errors import DermisError
 from dermis.mesh.geometry import build_mesh, edges
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
-from dermis.reference.mitsuba_solid import Solid, inwards, skin_solid
 
 
 def is_closed(solid: Solid) -> bool:

@@ -10,14 +10,14 @@ import pytest
 from half_spaces import mean_and_error, pan, traced
 from tolerances import STANDARD_ERRORS
 
-from dermis.errors import DermisError
+from dermis.apps.validation.truths.half_space import directional_albedo, reflected_radiance
+from dermis.apps.validation.truths.path_traced import Lambertian, path_trace
+from dermis.apps.validation.truths.slab_mc import ScatteringLayer, trace_slab
+from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.media import Layer, Medium, media
-from dermis.reference.half_space import directional_albedo, reflected_radiance
-from dermis.reference.path_traced import Lambertian, path_trace
-from dermis.reference.slab_mc import ScatteringLayer, trace_slab
 from dermis.scene.camera import Camera
 from dermis.scene.lights import PointLight
 from dermis.scene.model import Scene

@@ -8,9 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.reference.mitsuba_scene import load_mitsuba, variant_of
-from dermis.reference.person.hairs import COLOURS, control_points, groups, hair_shapes, write_curves
-from dermis.reference.person.subject import Hairs
+from dermis.apps.validation.truths.mitsuba_scene import load_mitsuba, variant_of
+from dermis.apps.validation.truths.person.hairs import (
+    COLOURS,
+    control_points,
+    groups,
+    hair_shapes,
+    write_curves,
+)
+from dermis.apps.validation.truths.person.subject import Hairs
 from dermis.specular.hair import fibre, scattered
 
 pytest.importorskip("mitsuba")

@@ -11,13 +11,13 @@ import pytest
 from painted_ball import ball, paint
 from painted_ball import scene as ball_scene
 
-from dermis.errors import DermisError
+from dermis.apps.validation.truths.path_traced import PathTraced
+from dermis.apps.validation.truths.person import medium
+from dermis.apps.validation.truths.person.subject import person_of
+from dermis.apps.validation.truths.person.traced import person_key, trace_person
+from dermis.base.errors import DermisError
 from dermis.human.person import Human
 from dermis.mesh.head import Head
-from dermis.reference.path_traced import PathTraced
-from dermis.reference.person import medium
-from dermis.reference.person.subject import person_of
-from dermis.reference.person.traced import person_key, trace_person
 from dermis.scene.camera import portrait
 from dermis.scene.lights import RectangleLight
 from dermis.scene.model import Scene

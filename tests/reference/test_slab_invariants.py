@@ -13,10 +13,16 @@ import pytest
 from scipy.stats import chi2
 from tolerances import CHANCE, STANDARD_ERRORS
 
-from dermis.errors import DermisError
+from dermis.apps.validation.truths.slab_mc import (
+    ScatteringLayer,
+    SlabResult,
+    default_edges,
+    trace_medium,
+    trace_slab,
+)
+from dermis.base.errors import DermisError
 from dermis.optics.diffusion.boundary import fresnel, normal_reflectance
 from dermis.optics.media import Layer, Medium
-from dermis.reference.slab_mc import ScatteringLayer, SlabResult, default_edges, trace_medium, trace_slab
 
 SKIN = (
     ScatteringLayer(0.21, 24.0, 0.25, 0.8),
@@ -221,7 +227,7 @@ def test_bad_input_is_refused(wrong: Callable[[], object], said: str) -> None:
 def test_keys_stop_photons_of_many_hours() -> None:
     code = """
 import os, signal, threading
-from dermis.reference.slab_mc import ScatteringLayer, trace_slab
+from dermis.apps.validation.truths.slab_mc import ScatteringLayer, trace_slab
 trace_slab([ScatteringLayer(0.01, 0.99)], 1)  # compiles
 threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
 trace_slab([ScatteringLayer(0.01, 0.99)], 10**10)
@@ -231,6 +237,6 @@ trace_slab([ScatteringLayer(0.01, 0.99)], 10**10)
 
 
 def test_importing_the_module_leaves_the_compiler_alone() -> None:
-    code = "import sys, dermis.reference.slab_mc; print('numba' in sys.modules)"
+    code = "import sys, dermis.apps.validation.truths.slab_mc; print('numba' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"

@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import chi2, norm
 from tolerances import CHANCE, STANDARD_ERRORS
 
+from dermis.apps.validation.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.optics.media import Floats
-from dermis.reference.slab_mc import ScatteringLayer, trace_slab
 
 MCML_SLAB = (
     ScatteringLayer(0.1, 10.0, 1.0, 0.9, 1.37),

@@ -7,9 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import eval_legendre
 
-from dermis.errors import DermisError
-from dermis.mesh.primitives import plane, uv_sphere
-from dermis.reference.surface_diffusion import (
+from dermis.apps.validation.truths.surface_diffusion import (
     STEPS,
     diffuse_on_surface,
     edge_for,
@@ -19,6 +17,8 @@ from dermis.reference.surface_diffusion import (
     vertex_areas,
     welded,
 )
+from dermis.base.errors import DermisError
+from dermis.mesh.primitives import plane, uv_sphere
 
 Floats = NDArray[np.float64]
 Surface = tuple[Floats, NDArray[np.int64]]

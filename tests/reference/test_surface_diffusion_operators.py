@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dermis.apps.validation.truths.surface_diffusion import vertex_areas, welded
+from dermis.apps.validation.truths.surface_diffusion_operators import delaunay, intrinsic, mass_and_stiffness
 from dermis.mesh.primitives import plane
-from dermis.reference.surface_diffusion import vertex_areas, welded
-from dermis.reference.surface_diffusion_operators import delaunay, intrinsic, mass_and_stiffness
 
 Floats = NDArray[np.float64]
 

@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
-from dermis.mesh.geometry import edges
-from dermis.mesh.primitives import plane, uv_sphere
-from dermis.mesh.tangents import triangle_areas
-from dermis.reference.refine import Patch, refine_patch
-from dermis.reference.surface_diffusion import (
+from dermis.apps.validation.truths.refine import Patch, refine_patch
+from dermis.apps.validation.truths.surface_diffusion import (
     diffuse_on_surface,
     edge_for,
     longest_edge_mm,
@@ -19,6 +15,10 @@ from dermis.reference.surface_diffusion import (
     vertex_areas,
     welded,
 )
+from dermis.base.errors import DermisError
+from dermis.mesh.geometry import edges
+from dermis.mesh.primitives import plane, uv_sphere
+from dermis.mesh.tangents import triangle_areas
 from dermis.scene.heads import load_head
 
 Floats = NDArray[np.float64]

@@ -9,10 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from dermis.errors import DermisError
-from dermis.mesh.primitives import plane, uv_sphere
-from dermis.mesh.tangents import triangle_areas
-from dermis.reference.surface_integral import (
+from dermis.apps.validation.truths.surface_integral import (
     GaussianSum,
     IrradianceSamples,
     Places,
@@ -21,6 +18,9 @@ from dermis.reference.surface_integral import (
     integrate,
     sample_irradiance,
 )
+from dermis.base.errors import DermisError
+from dermis.mesh.primitives import plane, uv_sphere
+from dermis.mesh.tangents import triangle_areas
 
 Floats = NDArray[np.float64]
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
+from dermis.apps.validation.truths.irradiance_samples import IrradianceSamples, Places, sample_irradiance
+from dermis.apps.validation.truths.octree import Tree, build_tree
+from dermis.base.errors import DermisError
 from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Material
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.mesh.tangents import triangle_areas
-from dermis.reference.irradiance_samples import IrradianceSamples, Places, sample_irradiance
-from dermis.reference.octree import Tree, build_tree
 
 Floats = NDArray[np.float64]
 

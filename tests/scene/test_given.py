@@ -9,7 +9,7 @@ import pytest
 from small_head import write_head
 
 import dermis
-from dermis.errors import DermisWarning
+from dermis.base.errors import DermisWarning
 from dermis.mesh.head import Head
 from dermis.scene.camera import cheek
 

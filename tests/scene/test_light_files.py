@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_head import write_head
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.scene import (
     Environment,
     RectangleLight,

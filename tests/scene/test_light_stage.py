@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dermis.base.errors import DermisError
 from dermis.environment.panorama import solid_angles
-from dermis.errors import DermisError
 from dermis.images.io import write_exr
 from dermis.scene.environment import Environment
 from dermis.scene.light_stage import light_stage, stage_weights

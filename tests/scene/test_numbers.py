@@ -11,7 +11,7 @@ import pytest
 from pydantic.fields import FieldInfo
 
 import dermis
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
@@ -49,7 +49,7 @@ LEAST = 5e-324  # which is 0 in single precision
 def _models(kind: type[Plain] = Plain) -> Iterator[type[Plain]]:
     """All but those of data sets, whose numbers are distributions with bounds of their own (tests/batch)."""
     for one in kind.__subclasses__():
-        ours = one.__module__.startswith("dermis.") and not one.__module__.startswith("dermis.batch.")
+        ours = one.__module__.startswith("dermis.") and not one.__module__.startswith("dermis.apps.batch.")
         if ours and not one.__name__.startswith("_"):
             yield one
         yield from _models(one)

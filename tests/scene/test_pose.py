@@ -9,7 +9,7 @@ import pytest
 from random_rig import random_rig
 from scipy.spatial.transform import Rotation
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

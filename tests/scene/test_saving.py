@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from random_rig import random_rig
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

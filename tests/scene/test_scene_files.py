@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_head import HEIGHT_MM, write_head
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.human.regions.zones import REGIONS
 from dermis.images.io import write_png
 from dermis.scene import (

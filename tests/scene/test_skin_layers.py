@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.skin_profiles import SkinProfiles
 from dermis.optics.profiles import load_profile
 from dermis.scene.findings import ImpossibleError

@@ -9,8 +9,8 @@ import pytest
 from small_head import write_head
 
 import dermis
+from dermis.base.errors import DermisError
 from dermis.cli.scene_options import SceneOptions, assemble, note_levels
-from dermis.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

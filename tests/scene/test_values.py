@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.scene import Camera, DirectionalLight, Environment, PointLight, Settings, Skin, SpotLight
 from dermis.scene.findings import ImpossibleError
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis import cite
+from dermis.base import citations as cite
 from dermis.specular.hair import (
     ROUGH_ALONG,
     absorption_per_mm,

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from tolerances import PUBLISHED, RECIPROCAL
 
-from dermis import cite
+from dermis.base import citations as cite
 from dermis.specular.beckmann import beckmann
 from dermis.specular.comparison import peak, reciprocity_error
 from dermis.specular.cosines import Cosines, cosines

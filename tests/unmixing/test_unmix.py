@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
+from dermis.apps.inverse.unmixing.change import Change, Share, share_of
+from dermis.apps.inverse.unmixing.model import FACE, Third, skin_model
+from dermis.apps.inverse.unmixing.on_device import Unmixer
+from dermis.apps.inverse.unmixing.solve import solve, weights_of
+from dermis.apps.inverse.unmixing.unmix import unmix
+from dermis.base.errors import DermisError
 from dermis.gpu import failures
 from dermis.gpu.device import Device
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.pigments.skin import spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
-from dermis.unmixing.change import Change, Share, share_of
-from dermis.unmixing.model import FACE, Third, skin_model
-from dermis.unmixing.on_device import Unmixer
-from dermis.unmixing.solve import solve, weights_of
-from dermis.unmixing.unmix import unmix
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.apps.inverse.unmixing.model import skin_model
+from dermis.apps.inverse.unmixing.unmix import unmix
+from dermis.apps.inverse.unmixing.widths import CORNERS, save_widths, widths_of
+from dermis.base.errors import DermisError
 from dermis.frame.profile_mixture import load_shares
 from dermis.optics.profiles import load_profile
-from dermis.unmixing.model import skin_model
-from dermis.unmixing.unmix import unmix
-from dermis.unmixing.widths import CORNERS, save_widths, widths_of
 
 
 def test_profiles_follow_melanin_and_blood(tmp_path: Path) -> None:

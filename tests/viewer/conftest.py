@@ -13,11 +13,11 @@ from rigged_head import write_rigged_head
 from served_viewer import served
 from small_head import write_head
 
+from dermis.apps.viewer.player import MotionFile
+from dermis.apps.viewer.state import ViewerState
 from dermis.mesh.head import Head
 from dermis.scene.heads import load_head
 from dermis.scene.model import Scene
-from dermis.viewer.player import MotionFile
-from dermis.viewer.state import ViewerState
 
 
 @pytest.fixture(scope="session")
@@ -72,7 +72,7 @@ def make_driver(head: Head, head_file: Path) -> Callable[..., InputDriver]:
     pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
-    from dermis.viewer.viewer import Viewer
+    from dermis.apps.viewer.viewer import Viewer
 
     def make(state: ViewerState | None = None, motion: MotionFile | None = None) -> InputDriver:
         canvas = OffscreenRenderCanvas(size=(400, 480))

@@ -12,12 +12,12 @@ import pytest
 import wgpu
 from offscreen_input import InputDriver
 
-from dermis.errors import DermisError
+from dermis.apps.viewer.chart import ATLAS
+from dermis.apps.viewer.windows import _raise_failure
+from dermis.base.errors import DermisError
 from dermis.frame import renderer as renderer_module
 from dermis.gpu import Device
 from dermis.gpu.memory import held_bytes
-from dermis.viewer.chart import ATLAS
-from dermis.viewer.windows import _raise_failure
 
 SIZE, ON_HEAD = (400, 480), (300.0, 240.0)
 PICTURE = slice(0, 380), slice(205, 400)  # neither the panel nor the text at the lower edge
@@ -27,7 +27,7 @@ FEW_BYTES = 1.02  # of what was held: a picture of another size may have taken t
 @pytest.fixture(autouse=True)
 def steady(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures in motion that are alike, and take the same memory, on quick and on busy machines."""
-    monkeypatch.setattr("dermis.viewer.pace.Pace.note", lambda *_: None)
+    monkeypatch.setattr("dermis.apps.viewer.pace.Pace.note", lambda *_: None)
 
 
 def resized(driver: InputDriver, width: int, height: int) -> None:
@@ -152,7 +152,7 @@ def test_a_device_that_never_works_again_closes_the_window(
     def fail(*_: Any) -> Any:
         raise wgpu.GPUError("lost")
 
-    monkeypatch.setattr("dermis.viewer.studio.Studio.pictures", fail)
+    monkeypatch.setattr("dermis.apps.viewer.studio.Studio.pictures", fail)
     for _ in range(6):
         if not driver.canvas.get_closed():
             driver.viewer.draw()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from offscreen_input import ADAPTER, InputDriver
 
+from dermis.apps.viewer.chart import ATLAS, Chart
+from dermis.apps.viewer.state import ViewerState
+from dermis.apps.viewer.studio import Studio
 from dermis.gpu import download
-from dermis.viewer.chart import ATLAS, Chart
-from dermis.viewer.state import ViewerState
-from dermis.viewer.studio import Studio
 
 SIDE = 128  # of the tests' atlas
 

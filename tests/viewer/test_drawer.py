@@ -51,7 +51,7 @@ def test_the_drawer_opens_over_the_picture_and_has_the_pointer_there(phone: Inpu
     [((360, 640), True), ((430, 800), True), ((360, 300), True), ((640, 360), False), ((400, 480), False)],
 )
 def test_phones_have_a_drawer_and_desks_a_panel(size: tuple[int, int], drawer: bool) -> None:
-    from dermis.viewer.panel.panel import is_drawer
+    from dermis.apps.viewer.panel.panel import is_drawer
 
     assert is_drawer(size) is drawer
 

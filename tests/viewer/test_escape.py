@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from offscreen_input import InputDriver
 
-from dermis.viewer.state import ViewerState
+from dermis.apps.viewer.state import ViewerState
 
 
 def escape(driver: InputDriver) -> None:

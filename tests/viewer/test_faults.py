@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from offscreen_input import InputDriver
 
-from dermis.viewer.session import Session
+from dermis.apps.viewer.session import Session
 
 SIZE = 400, 480
 PANEL, PICTURE = np.s_[:470, :195], np.s_[:380, 205:]  # without the messages at the lower edge
@@ -56,7 +56,7 @@ def test_a_section_that_fails_spares_the_others(
 ) -> None:
     from imgui_bundle import imgui
 
-    from dermis.viewer.panel.sections import SECTIONS
+    from dermis.apps.viewer.panel.sections import SECTIONS
 
     def fail(session: Session) -> None:
         imgui.push_style_var(int(imgui.StyleVar_.alpha), 0.2)
@@ -67,7 +67,7 @@ def test_a_section_that_fails_spares_the_others(
 
     before, session = calm.settled(), calm.viewer.session
     first, *others = SECTIONS
-    monkeypatch.setattr("dermis.viewer.panel.panel.SECTIONS", (first._replace(draw=fail), *others))
+    monkeypatch.setattr("dermis.apps.viewer.panel.panel.SECTIONS", (first._replace(draw=fail), *others))
     session.positions.clear()
     for _ in range(3):
         calm.frame()

@@ -17,8 +17,8 @@ from page_client import PATIENCE_S, Page, difference, visit
 
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 
-from dermis.viewer.browser import connections
-from dermis.viewer.browser.server import HEADERS
+from dermis.apps.viewer.browser import connections
+from dermis.apps.viewer.browser.server import HEADERS
 
 RESIZE = '{"type": "resize", "timestamp": 1, "width": 1, "height": 1, "pwidth": 400, "pheight": 300, '
 BAD = [
@@ -168,7 +168,7 @@ def test_only_so_many_connections_are_open(shown: Any, monkeypatch: pytest.Monke
 def test_only_so_many_pages_are_shown(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from websockets.exceptions import InvalidStatus
 
-    monkeypatch.setattr("dermis.viewer.browser.guard.MOST_PAGES", 2)
+    monkeypatch.setattr("dermis.apps.viewer.browser.guard.MOST_PAGES", 2)
     with contextlib.ExitStack() as crowd:
         for _ in range(2):
             crowd.enter_context(visit(shown))

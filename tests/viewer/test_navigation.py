@@ -7,13 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dermis.mesh.head import Head
-from dermis.mesh.turns import angles_matrix
-from dermis.scene import Camera, Environment, Scene
-from dermis.scene.camera import PRESETS, preset
-from dermis.scene.lights import DirectionalLight, SpotLight
-from dermis.scene.pose import Pose
-from dermis.viewer.navigation import (
+from dermis.apps.viewer.navigation import (
     Easing,
     axes,
     between,
@@ -25,7 +19,13 @@ from dermis.viewer.navigation import (
     pan,
     pick,
 )
-from dermis.viewer.state import ViewerState
+from dermis.apps.viewer.state import ViewerState
+from dermis.mesh.head import Head
+from dermis.mesh.turns import angles_matrix
+from dermis.scene import Camera, Environment, Scene
+from dermis.scene.camera import PRESETS, preset
+from dermis.scene.lights import DirectionalLight, SpotLight
+from dermis.scene.pose import Pose
 
 CAMERA = Camera(position=(0.0, 0.0, 1000.0), target=(0.0, 0.0, 0.0), frame_mm=300.0)
 

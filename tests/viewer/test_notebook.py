@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from offscreen_input import ADAPTER
 
 import dermis
+from dermis.apps.viewer.state import ViewerState, state_of
+from dermis.apps.viewer.windows import view
 from dermis.mesh.head import Head
 from dermis.scene.camera import preset
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
-from dermis.viewer.state import ViewerState, state_of
-from dermis.viewer.windows import view
 
 pytest.importorskip("anywidget", reason="the extra `notebook` is not installed")
 pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")

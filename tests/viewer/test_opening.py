@@ -20,13 +20,13 @@ import pytest
 from offscreen_input import ADAPTER
 from page_client import PATIENCE_S, SIZE, Page, visit
 
-from dermis.errors import DermisError, refuse
-from dermis.viewer.state import ViewerState
+from dermis.apps.viewer.state import ViewerState
+from dermis.base.errors import DermisError, refuse
 
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 
-from dermis.viewer.browser import opening, server
-from dermis.viewer.windows import serve
+from dermis.apps.viewer.browser import opening, server
+from dermis.apps.viewer.windows import serve
 
 Start = Callable[[Callable[[], Any]], Any]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dermis.apps.viewer.pace import QUALITY_LEVELS, Pace
 from dermis.scene.settings import Settings
-from dermis.viewer.pace import QUALITY_LEVELS, Pace
 
 WANTED = Settings(atlas=2048, samples=4, shadow_size=2048)
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
-from dermis.viewer.browser.guard import MOST_PAGES, Guard, is_local
-from dermis.viewer.browser.server import Address, bind
+from dermis.apps.viewer.browser.guard import MOST_PAGES, Guard, is_local
+from dermis.apps.viewer.browser.server import Address, bind
+from dermis.base.errors import DermisError
 
 HOST = "127.0.0.1:8765"
 
@@ -197,7 +197,7 @@ def test_frames_are_jpeg_while_moving_and_exact_when_still() -> None:
     from PIL import Image
 
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
-    from dermis.viewer.browser.canvas import encoded
+    from dermis.apps.viewer.browser.canvas import encoded
 
     array = np.random.default_rng(1).integers(0, 255, (8, 12, 4), dtype=np.uint8)
     exact = np.array(Image.open(io.BytesIO(encoded(array, lossless=True))))

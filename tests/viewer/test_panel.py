@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from offscreen_input import InputDriver
 
-from dermis.viewer.panel.plots import CHANNELS, stage_series
+from dermis.apps.viewer.panel.plots import CHANNELS, stage_series
 
 PANEL = np.s_[:, :190]
 

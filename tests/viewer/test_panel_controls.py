@@ -12,13 +12,13 @@ import pytest
 from offscreen_input import InputDriver
 from pydantic import Field
 
+from dermis.apps.viewer.panel.sections import SECTIONS
+from dermis.apps.viewer.state import ViewerState, same
 from dermis.scene.environment import Environment
 from dermis.scene.plain import Plain, help_of, slider
 from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
-from dermis.viewer.panel.sections import SECTIONS
-from dermis.viewer.state import ViewerState, same
 
 BUTTONS = {"undo", "redo", "help", "hide", "save", "load", "screenshot", "reset", "freeze"}
 BUTTONS |= {"open", "search", "bones", "size", "head", "seed", "dice", "path", "open file"}

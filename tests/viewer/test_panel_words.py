@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 from offscreen_input import InputDriver
 
+from dermis.apps.viewer.panel import words
+from dermis.apps.viewer.panel.fields import Style
 from dermis.optics.profiles import preset_names
 from dermis.scene.lights import LIGHTS
 from dermis.scene.plain import Plain, choices_of
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin, TissueLayer
-from dermis.viewer.panel import words
-from dermis.viewer.panel.fields import Style
 
 KINDS = {
     Skin: words.SURFACE | words.ALBEDO,

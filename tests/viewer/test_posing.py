@@ -8,14 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.mesh.head import Head
-from dermis.mesh.rig import Rig
-from dermis.mesh.turns import angles_matrix
-from dermis.scene import Scene
-from dermis.scene.heads import load_head
-from dermis.scene.pose import Pose
-from dermis.viewer.history import History
-from dermis.viewer.posing import (
+from dermis.apps.viewer.history import History
+from dermis.apps.viewer.posing import (
     angles_of,
     at_rest,
     matching,
@@ -26,7 +20,13 @@ from dermis.viewer.posing import (
     with_moves,
     with_weight,
 )
-from dermis.viewer.state import ViewerState, load_state, same, save_state
+from dermis.apps.viewer.state import ViewerState, load_state, same, save_state
+from dermis.mesh.head import Head
+from dermis.mesh.rig import Rig
+from dermis.mesh.turns import angles_matrix
+from dermis.scene import Scene
+from dermis.scene.heads import load_head
+from dermis.scene.pose import Pose
 
 
 def test_a_slider_changes_its_own_weight(rigged_head: Head) -> None:

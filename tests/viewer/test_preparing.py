@@ -12,11 +12,11 @@ import pytest
 from offscreen_input import InputDriver
 from rigged_head import write_rigged_head
 
-from dermis.errors import DermisError
+from dermis.apps.viewer.session import Session
+from dermis.apps.viewer.state import ViewerState
+from dermis.apps.viewer.studio import Studio
+from dermis.base.errors import DermisError
 from dermis.scene.heads import load_head
-from dermis.viewer.session import Session
-from dermis.viewer.state import ViewerState
-from dermis.viewer.studio import Studio
 
 PICTURE = np.s_[:380, 205:]  # neither the panel nor the messages
 

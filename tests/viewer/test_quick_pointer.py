@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from offscreen_input import InputDriver
 
-from dermis.viewer.state import ViewerState
+from dermis.apps.viewer.state import ViewerState
 
 
 def in_one_frame(driver: InputDriver, *path: tuple[float, float]) -> None:

@@ -13,6 +13,10 @@ from offscreen_input import ADAPTER
 from PIL import Image
 from rigged_head import write_rigged_head
 
+from dermis.apps.viewer.navigation import orbit
+from dermis.apps.viewer.session import apply_regions
+from dermis.apps.viewer.state import ViewerState, load_state, save_state
+from dermis.apps.viewer.studio import Studio
 from dermis.cli import main
 from dermis.human.regions.zones import REGIONS
 from dermis.images.io import read_image
@@ -20,10 +24,6 @@ from dermis.scene import Environment, Scene
 from dermis.scene.heads import load_head
 from dermis.scene.pose import Pose
 from dermis.scene.skin import TissueLayer
-from dermis.viewer.navigation import orbit
-from dermis.viewer.session import apply_regions
-from dermis.viewer.state import ViewerState, load_state, save_state
-from dermis.viewer.studio import Studio
 
 SIZE = 72, 64
 _LAYERS = [

@@ -14,10 +14,10 @@ from offscreen_input import SETTINGS
 from page_client import PATIENCE_S, SIZE, Page, difference, visit
 from served_viewer import served
 
+from dermis.apps.viewer.player import MotionFile
+from dermis.apps.viewer.state import ViewerState
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
-from dermis.viewer.player import MotionFile
-from dermis.viewer.state import ViewerState
 
 pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
 pytest.importorskip("websockets", reason="the extra `viewer` is not installed")
@@ -63,7 +63,7 @@ def test_confirming_frames_that_were_not_sent_opens_no_flood(viewer: Any) -> Non
 def test_a_lossless_frame_keeps_nothing_waiting_and_is_not_sent_late(
     viewer: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from dermis.viewer.browser import canvas
+    from dermis.apps.viewer.browser import canvas
 
     begun, gate, encoded = threading.Event(), threading.Event(), canvas.encoded
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from dermis.errors import DermisError
+from dermis.apps.viewer.history import History
+from dermis.apps.viewer.state import ViewerState, load_state, same, save_state
+from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.scene import Environment, Scene, load_scene
 from dermis.scene.files import preset_lights
 from dermis.scene.skin import Pigments
-from dermis.viewer.history import History
-from dermis.viewer.state import ViewerState, load_state, same, save_state
 
 
 def full_state(state: ViewerState) -> ViewerState:

@@ -11,9 +11,9 @@ import pytest
 
 pytest.importorskip("rendercanvas", reason="the extra `viewer` is not installed")
 
-from dermis.viewer.browser import uploads
-from dermis.viewer.browser.guard import Guard
-from dermis.viewer.browser.uploads import Uploads
+from dermis.apps.viewer.browser import uploads
+from dermis.apps.viewer.browser.guard import Guard
+from dermis.apps.viewer.browser.uploads import Uploads
 
 
 async def _app(scope: Any, receive: Any, send: Any) -> None:

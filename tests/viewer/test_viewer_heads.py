@@ -12,10 +12,10 @@ import pytest
 from offscreen_input import InputDriver
 from small_head import write_head
 
+from dermis.apps.viewer import heads
+from dermis.apps.viewer.heads import Heads
+from dermis.apps.viewer.state import ViewerState
 from dermis.mesh.head import Head
-from dermis.viewer import heads
-from dermis.viewer.heads import Heads
-from dermis.viewer.state import ViewerState
 
 
 @pytest.fixture

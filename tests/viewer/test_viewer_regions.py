@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dermis.errors import DermisError
+from dermis.apps.viewer.session import apply_regions
+from dermis.apps.viewer.state import ViewerState
+from dermis.base.errors import DermisError
 from dermis.human.regions.zones import REGIONS
 from dermis.scene.head_table import AUTO
 from dermis.scene.skin import Skin
-from dermis.viewer.session import apply_regions
-from dermis.viewer.state import ViewerState
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dermis.atlas.atlas import REACH_MM, Atlas
 from dermis.atlas.raster import build_own_layout
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.mesh import Mesh
 
 LAYOUTS = ("mesh", "stitched", "unwrapped")

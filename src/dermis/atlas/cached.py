@@ -10,9 +10,9 @@ import numpy as np
 
 from dermis.atlas.atlas import GUTTER, REACH_MM, Atlas
 from dermis.atlas.build import build_atlas
-from dermis.disk import Array, Arrays, stored
+from dermis.base.disk import Array, Arrays, stored
+from dermis.base.progress import preparing
 from dermis.mesh.mesh import Mesh
-from dermis.preparing import preparing
 
 _FORM = 6  # increment when `build_atlas` gives other results for the same mesh
 

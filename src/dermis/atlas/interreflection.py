@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.disk import stored
+from dermis.base.disk import stored
+from dermis.base.progress import preparing
 from dermis.mesh.mesh import Mesh
-from dermis.preparing import preparing
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -56,9 +56,9 @@ def _run() -> int:
     """The exit status of the command that was typed."""
     from cyclopts import App, CycloptsError
 
+    from dermis.base.errors import DermisError
     from dermis.cli.help_text import reflowed
     from dermis.cli.misuse import explain
-    from dermis.errors import DermisError
 
     app = App(
         name="dermis",
@@ -90,7 +90,7 @@ def _run() -> int:
 
 def _show_notes() -> None:
     """Print the package's own warnings as notes, each once."""
-    from dermis.errors import DermisWarning
+    from dermis.base.errors import DermisWarning
 
     usual = warnings.showwarning
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.base.errors import refuse
 from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.options import Adapter, Json, Whole, given, parse_size
 from dermis.cli.rate import rate_of_images
-from dermis.errors import refuse
 
 if TYPE_CHECKING:
-    from dermis.batch.run import Crew, Report
-    from dermis.batch.spec import Spec
+    from dermis.apps.batch.run import Crew, Report
+    from dermis.apps.batch.spec import Spec
 
 _MOST_PROCESSES = 1024
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
@@ -98,7 +98,7 @@ def batch(
         Print one JSON object: counts, seconds, images/s, shards, what was skipped and what was left out.
     """
     if example:
-        from dermis.batch.spec import example_text
+        from dermis.apps.batch.spec import example_text
 
         print_lines(example_text().rstrip("\n"))
         return 0
@@ -121,7 +121,7 @@ def batch(
 
 
 def _spec(path: Path, values: dict[str, Any]) -> Spec:
-    from dermis.batch.spec import load_spec
+    from dermis.apps.batch.spec import load_spec
 
     with working_on("reading the spec"):
         return load_spec(path, **values)
@@ -145,8 +145,8 @@ def _crew(
     adapter: str, adapters: str | None, workers: int | None, per_gpu: int | None, encoders: int | None
 ) -> tuple[Crew, int]:
     """Processes of this machine, and how many encoders each has."""
-    from dermis.batch.processes import Processes
-    from dermis.batch.seats import Seating
+    from dermis.apps.batch.processes import Processes
+    from dermis.apps.batch.seats import Seating
 
     if workers is not None and per_gpu is not None:
         refuse("--workers-per-gpu", "no such option beside --workers", "it came", "Leave one of them out")
@@ -172,7 +172,7 @@ def _numbers(adapter: str, adapters: str | None) -> tuple[int, ...]:
 
 
 def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: dict[str, Any]) -> Crew:
-    from dermis.batch.distributed import Cluster
+    from dermis.apps.batch.distributed import Cluster
 
     if address is not None and file is not None:
         refuse("--cluster", "no such option beside --scheduler", "it came", "Leave one of them out")
@@ -185,8 +185,8 @@ def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: di
 def _drawn(
     spec: Spec, out: Path, crew: Crew, encoders: int | None, part: tuple[int, int], keep_going: bool
 ) -> Report:
-    from dermis.batch.run import run
-    from dermis.batch.worker import Work
+    from dermis.apps.batch.run import run
+    from dermis.apps.batch.worker import Work
 
     with rate_of_images() as told:
         return run(
@@ -214,7 +214,7 @@ def _tell(report: Report, out: Path, as_json: bool) -> None:
 
 
 def _dry_run(spec: Spec, adapter: str, sheet: Path, as_json: bool) -> int:
-    from dermis.batch.preview import dry_run, table_lines
+    from dermis.apps.batch.preview import dry_run, table_lines
     from dermis.images.io import check_output, write_png
 
     check_output(sheet)

@@ -10,7 +10,7 @@ from dermis.cli.head_options import HEAD, FileOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, Output, refuse_options
 
 if TYPE_CHECKING:
-    from dermis.benchmark.run import Benchmark
+    from dermis.apps.validation.benchmarks.run import Benchmark
 
 
 def bench(
@@ -50,13 +50,13 @@ def bench(
     output:
         HTML report with plots.
     """
-    from dermis.benchmark.cases import PRESETS
-    from dermis.benchmark.report import as_json as to_json
-    from dermis.benchmark.report import write_report
-    from dermis.benchmark.run import run
-    from dermis.extras import needed
+    from dermis.apps.validation.benchmarks.cases import PRESETS
+    from dermis.apps.validation.benchmarks.report import as_json as to_json
+    from dermis.apps.validation.benchmarks.report import write_report
+    from dermis.apps.validation.benchmarks.run import run
+    from dermis.base.atomic_write import check_output
+    from dermis.base.extras import needed
     from dermis.gpu.adapters import fitting_adapters
-    from dermis.outputs import check_output
 
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
@@ -86,7 +86,7 @@ def _head(name: str) -> str:
 
 
 def _lines(made: Benchmark) -> list[str]:
-    from dermis.benchmark.report import (
+    from dermis.apps.validation.benchmarks.report import (
         COLUMNS,
         cells,
         left_out_lines,

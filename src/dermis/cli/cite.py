@@ -49,7 +49,7 @@ def cite(
     against:
         A truth of compare, instead of a picture: it, the measure of difference and the techniques.
     """
-    from dermis.cite import bibtex
+    from dermis.base.citations import bibtex
 
     options = {**({"scene": scene} if scene else {}), **settings, **skin}
     if keys:
@@ -65,7 +65,7 @@ def cite(
 
 
 def _of_comparison(against: str, technique: str | None) -> tuple[str, ...]:
-    from dermis.comparison.sources import comparison_sources
+    from dermis.apps.validation.comparisons.sources import comparison_sources
     from dermis.scene.techniques import TECHNIQUES
 
     return comparison_sources(against, [technique] if technique else TECHNIQUES)

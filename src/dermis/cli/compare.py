@@ -7,12 +7,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dermis.apps.validation.comparisons.profile_models import ModelName
+from dermis.base.errors import refuse
 from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.eye_options import note_eyes
 from dermis.cli.head_options import ShapeOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, given, option_name, options_of
-from dermis.comparison.profile_models import ModelName
-from dermis.errors import refuse
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
@@ -22,7 +22,7 @@ _SIZES = {"size": (256, 256), "atlas": 1024}
 _DIRECTION = {"direction": "that of the truth's skin"}
 
 if TYPE_CHECKING:
-    from dermis.comparison.compare import Comparison
+    from dermis.apps.validation.comparisons.compare import Comparison
 
     SizeOptions = dict[str, Any]
     SkinOptions = dict[str, Any]
@@ -119,8 +119,8 @@ def _check_used(what: str, chosen: Mapping[str, Any]) -> None:
 
 
 def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, Any]:
-    """What `dermis.comparison.compare` is asked for."""
-    from dermis.comparison.scenes import usual_region
+    """What `dermis.apps.validation.comparisons.compare` is asked for."""
+    from dermis.apps.validation.comparisons.scenes import usual_region
 
     names = [name.strip() for name in chosen.get("techniques", ",".join(TECHNIQUES)).split(",")]
     for name in names:
@@ -143,9 +143,9 @@ def _compare_techniques(
     head: str, shape: Mapping[str, Any], chosen: dict[str, Any], output: Path | None, as_json: bool
 ) -> None:
     """Render a head with each technique, judge it by a truth, print and write what came of it."""
-    from dermis.comparison import compare as comparison
-    from dermis.comparison.report import write_report
-    from dermis.outputs import check_output
+    from dermis.apps.validation.comparisons import compare as comparison
+    from dermis.apps.validation.comparisons.report import write_report
+    from dermis.base.atomic_write import check_output
     from dermis.scene.heads import load_head
 
     check_head(head, shape)
@@ -174,7 +174,7 @@ def _report(made: Comparison) -> dict[str, Any]:
 
 
 def _lines(made: Comparison) -> Sequence[str]:
-    from dermis.comparison.report import cells
+    from dermis.apps.validation.comparisons.report import cells
 
     lines = [
         f"{made.title}; times on {made.adapter}",

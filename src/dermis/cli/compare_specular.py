@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from dermis.base.atomic_write import refuse_output, replacing
+from dermis.base.extras import needed
 from dermis.cli.console import print_json, print_lines, working_on
-from dermis.extras import needed
-from dermis.outputs import refuse_output, replacing
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS
@@ -35,7 +35,7 @@ def compare_specular(output: Path | None, roughness: float, adapter: str, as_jso
 
 def _specular(adapter: str) -> dict[str, Any]:
     """All findings as one JSON-ready object."""
-    from dermis.benchmark.lobe_cost import lobe_cost_ns
+    from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
     from dermis.gpu.failures import on_device
     from dermis.specular.comparison import albedo_rows, reciprocity_error
     from dermis.specular.fresnel import FRESNEL, hemispherical_reflectance

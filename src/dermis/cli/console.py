@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from dermis.preparing import LOGGER
+from dermis.base.progress import LOGGER
 
 TOLD_AFTER_S = 2.0
 

@@ -6,9 +6,9 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from dermis.base.errors import DermisError
 from dermis.cli.console import print_json, print_lines
 from dermis.cli.options import Adapter, Json
-from dermis.errors import DermisError
 
 _LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "OpenEXR", "pillow")
 
@@ -34,9 +34,9 @@ def doctor(*, adapter: Adapter = "auto", as_json: Json = False) -> int:
 
 def examine(wanted: str) -> dict[str, Any]:
     """All findings as one JSON-ready object."""
+    from dermis.base.private import cache_folder
     from dermis.gpu.adapters import WANTED_FEATURES, list_adapters
     from dermis.mesh.samples import SAMPLES, cached
-    from dermis.private import cache_folder
 
     found = [
         {"number": a.number, "name": a.name, "driver": a.driver, "kind": a.kind, "backend": a.backend}

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.apps.export.registry import TARGETS
+from dermis.base.errors import refuse
 from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.head_options import HeadOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, given
-from dermis.errors import refuse
-from dermis.export.registry import TARGETS
 
 if TYPE_CHECKING:
     TargetName = str
@@ -88,7 +88,7 @@ def export(
     naive:
         Also print what one would type without knowing what the numbers mean there.
     """
-    from dermis.export.run import export_skin
+    from dermis.apps.export.run import export_skin
 
     check_head(what, head)
     if diffuse_transmission:

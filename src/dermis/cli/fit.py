@@ -11,7 +11,7 @@ from dermis.cli.console import print_json, print_lines, progress
 from dermis.cli.options import Adapter, Json
 
 if TYPE_CHECKING:
-    from dermis.fitting.fitted import Fitted
+    from dermis.apps.inverse.fitting.fitted import Fitted
 
 
 def fit(
@@ -75,10 +75,10 @@ def fit(
     adapter:
         Which adapter computes: auto, cpu or part of a name.
     """
+    from dermis.apps.inverse.fitting.files import SUMMARY, save
+    from dermis.apps.inverse.fitting.fit import fit as fitted
+    from dermis.base.atomic_write import check_folder
     from dermis.cli.options import parse_colour
-    from dermis.fitting.files import SUMMARY, save
-    from dermis.fitting.fit import fit as fitted
-    from dermis.outputs import check_folder
 
     given: Any = white if white == "specular" else parse_colour(white, "--white")
     check_folder(output, SUMMARY)

@@ -27,8 +27,8 @@ class FrameLandmarks:
         self.names: tuple[str, ...] = ()
         self.path = image.with_name(f"{image.stem}.landmarks.json")
         if typed is not None:
+            from dermis.base.atomic_write import check_output
             from dermis.frame.landmark_space import asked_landmarks
-            from dermis.outputs import check_output
 
             self.names = asked_landmarks([name.strip() for name in typed.split(",")])
             check_output(self.path, (self.path.suffix,))
@@ -45,7 +45,7 @@ class FrameLandmarks:
         """Write them, if any are asked."""
         if not self.names:
             return
-        from dermis.outputs import replacing
+        from dermis.base.atomic_write import replacing
 
         seen = next(renderer.observe([scene], settings, landmarks=self.names))
         text = json.dumps(_told(seen), indent=1) + "\n"

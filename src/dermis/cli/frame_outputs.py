@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.base.errors import refuse
 from dermis.cli.console import note
-from dermis.errors import refuse
 from dermis.frame.outputs import OUTPUTS, asked_outputs
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class FrameOutputs:
         if not self.names:
             self.paths: dict[str, Path] = {}
             return
-        from dermis import outputs
+        from dermis.base import atomic_write as outputs
         from dermis.frame.output_files import beside, check_formats
 
         check_formats(self.names, kind or "exr")

@@ -11,7 +11,7 @@ from dermis.cli.console import note, print_json, print_lines, progress
 from dermis.cli.options import Adapter, Json, Whole
 
 if TYPE_CHECKING:
-    from dermis.gallery.run import Picture
+    from dermis.apps.gallery.run import Picture
 
 _SIZE = 448
 
@@ -48,12 +48,12 @@ def gallery(
     output:
         Folder for pictures and page; made if it is not there.
     """
-    from dermis.errors import refuse
-    from dermis.gallery.page import write_page
-    from dermis.gallery.run import draw_pictures, write_panels
-    from dermis.gallery.script import find_scripts
-    from dermis.gallery.studio import Studio
-    from dermis.outputs import refuse_output
+    from dermis.apps.gallery.page import write_page
+    from dermis.apps.gallery.run import draw_pictures, write_panels
+    from dermis.apps.gallery.script import find_scripts
+    from dermis.apps.gallery.studio import Studio
+    from dermis.base.atomic_write import refuse_output
+    from dermis.base.errors import refuse
 
     side = _SIZE if size is None else size
     if not 32 <= side <= 2048:

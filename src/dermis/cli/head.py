@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from cyclopts import Parameter
 
+from dermis.base.errors import refuse
 from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.options import Adapter, Json, Whole, given
 from dermis.cli.pose_options import parse_weights
-from dermis.errors import refuse
 
 if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook
@@ -126,10 +126,10 @@ def head(
     list_targets:
         Print the names of the published targets, and write nothing.
     """
+    from dermis.base.atomic_write import check_output
     from dermis.frame.painted import painted_head
     from dermis.gpu.failures import on_device
     from dermis.human.person_file import write_numbers
-    from dermis.outputs import check_output
 
     if list_targets:
         return _list_targets(as_json)

@@ -24,7 +24,7 @@ def lights(name: str = "", /, *, as_json: Json = False) -> int:
     as_json:
         Print one JSON object instead: under "lights" those of the rig, or under "rigs" what each is.
     """
-    from dermis.errors import refuse
+    from dermis.base.errors import refuse
     from dermis.scene.lights import NO_LIGHTS, light_presets, preset_lights, preset_text
 
     rigs = {one: _summary(preset_text(one)) for one in light_presets() if one != NO_LIGHTS}

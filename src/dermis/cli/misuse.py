@@ -15,7 +15,7 @@ from cyclopts.exceptions import (
     UnusedCliTokensError,
 )
 
-from dermis.errors import shortened, shown_value
+from dermis.base.errors import shortened, shown_value
 
 _LONGEST = 400  # letters
 _TYPES = {float: "a number", int: "a whole number", NoneType: ""}

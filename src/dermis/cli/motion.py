@@ -9,8 +9,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dermis.errors import refuse
-from dermis.quantities import number
+from dermis.base.errors import refuse
+from dermis.base.quantities import number
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head

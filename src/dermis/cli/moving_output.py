@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 
 Write = Callable[[int, Any], None]
 """Takes the number of a frame and its picture."""

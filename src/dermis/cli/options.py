@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, get_args
 
 from cyclopts import Parameter, Token
 
-from dermis.errors import DermisError, refuse
-from dermis.quantities import number
+from dermis.base.errors import DermisError, refuse
+from dermis.base.quantities import number
 
 if TYPE_CHECKING:
     from dermis.scene.plain import Plain

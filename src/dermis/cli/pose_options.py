@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from dermis.errors import DermisError, refuse
+from dermis.base.errors import DermisError, refuse
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.base.errors import refuse
+from dermis.base.quantities import number, whole_number
 from dermis.cli.console import note, print_json, print_lines, progress
 from dermis.cli.options import NOTHING, Json, Output, Whole, option_name, options_of, parse_lengths
-from dermis.errors import refuse
-from dermis.quantities import number, whole_number
 from dermis.scene.skin import Pigments
 
 _NAMES = {"structure": "skin"}
@@ -147,7 +147,7 @@ def profile(
 
 
 def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
-    from dermis.outputs import check_output
+    from dermis.base.atomic_write import check_output
 
     if output is not None:
         check_output(output, (".toml",), "Give it the suffix .toml")
@@ -194,7 +194,7 @@ def _spectrum(tissue: Tissue, model: Model | None, clamp: Any) -> Floats | None:
 def _profile(tissue: Tissue, model: Model | None, clamp: Any, light: dict[str, Any]) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
-    from dermis.reference.slab_mc import counted_profile
+    from dermis.apps.validation.truths.slab_mc import counted_profile
 
     with progress("tracing photons") as report:
         return counted_profile(tissue.medium, tissue.rgb, report=report, **light)

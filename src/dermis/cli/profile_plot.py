@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dermis.extras import needed
+from dermis.base.atomic_write import replacing
+from dermis.base.extras import needed
 from dermis.optics.fits.burley import BurleyFit
-from dermis.outputs import replacing
 
 if TYPE_CHECKING:
     from dermis.cli.profile_report import Report

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.base.errors import refuse
 from dermis.cli.console import note
 from dermis.cli.eye_options import EYE, EyeLooks, note_eyes
 from dermis.cli.head_options import HEAD, HeadOptions, check_head
@@ -23,7 +24,6 @@ from dermis.cli.pose_options import (
     parse_weights,
     pose_given,
 )
-from dermis.errors import refuse
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, names_regions
 from dermis.scene.settings import PHOTOGRAPHED, Settings

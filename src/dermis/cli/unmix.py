@@ -12,8 +12,8 @@ from dermis.cli.console import print_json, print_lines, progress
 from dermis.cli.options import Adapter, Json
 
 if TYPE_CHECKING:
-    from dermis.unmixing.change import Change
-    from dermis.unmixing.unmix import Unmixed
+    from dermis.apps.inverse.unmixing.change import Change
+    from dermis.apps.inverse.unmixing.unmix import Unmixed
 
 _Share = Annotated[str | None, Parameter(show_default=False)]
 
@@ -88,11 +88,11 @@ def unmix(
     """
     from dataclasses import replace
 
+    from dermis.apps.inverse.unmixing.files import SUMMARY, save
+    from dermis.apps.inverse.unmixing.model import FACE
+    from dermis.apps.inverse.unmixing.unmix import unmix as unmixed
+    from dermis.base.atomic_write import check_folder
     from dermis.cli.options import given
-    from dermis.outputs import check_folder
-    from dermis.unmixing.files import SUMMARY, save
-    from dermis.unmixing.model import FACE
-    from dermis.unmixing.unmix import unmix as unmixed
 
     started = time.perf_counter()
     check_folder(output, SUMMARY)
@@ -117,7 +117,7 @@ def unmix(
 
 
 def _save_widths(folder: Path, found: Unmixed) -> list[Path]:
-    from dermis.unmixing.widths import save_widths, widths_of
+    from dermis.apps.inverse.unmixing.widths import save_widths, widths_of
 
     return save_widths(folder, widths_of(found))
 
@@ -126,8 +126,8 @@ def _change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
 ) -> Change | None:
     """What is to be recoloured, None for nothing."""
-    from dermis.quantities import number
-    from dermis.unmixing.change import Change, share_of
+    from dermis.apps.inverse.unmixing.change import Change, share_of
+    from dermis.base.quantities import number
 
     if melanin is None and blood is None and oxygen is None and eumelanin is None:
         return None

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from dermis.base.errors import refuse
 from dermis.cli.console import note, print_lines, working_on
 from dermis.cli.options import Adapter, Whole
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
-from dermis.errors import refuse
 
 if TYPE_CHECKING:
-    from dermis.viewer.player import MotionFile
-    from dermis.viewer.state import ViewerState
+    from dermis.apps.viewer.player import MotionFile
+    from dermis.apps.viewer.state import ViewerState
 
 _HOST, _PORT, _WINDOW = "127.0.0.1", 8765, (1280, 800)
 _SOFTWARE_ATLAS = 1024  # a still frame of the usual one takes a processor several seconds
@@ -76,7 +76,7 @@ def view(
         refuse("--port", "a number from 0 to 65535", f"{port} came", "Choose another")
     if motion_fps is not None and motion is None:
         refuse("--motion-fps", "a motion with it", "there is none", "Add --motion")
-    from dermis.viewer.windows import serve, show_window
+    from dermis.apps.viewer.windows import serve, show_window
 
     def load() -> tuple[ViewerState, MotionFile | None]:
         state = _state(head, scene, adapter)
@@ -94,9 +94,9 @@ def view(
 
 def _state(name: str, given: SceneOptions, adapter: str) -> ViewerState:
     """The scene that the options describe."""
+    from dermis.apps.viewer.state import opened
     from dermis.gpu.adapters import fitting_adapters
     from dermis.scene.files import head_table, with_whole_names
-    from dermis.viewer.state import opened
 
     is_scene = Path(name).suffix.lower() == ".toml"
     scene, settings = assemble(name, given)
@@ -111,7 +111,7 @@ def _motion(file: str | None, fps: float | None, state: ViewerState) -> MotionFi
     """The motion for the head, read before a window opens."""
     if file is None:
         return None
-    from dermis.viewer.player import MotionFile
+    from dermis.apps.viewer.player import MotionFile
 
     motion = MotionFile(file, fps)
     if text := motion.clip(state.scene.head).note:

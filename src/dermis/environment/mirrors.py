@@ -7,6 +7,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.progress import preparing
+from dermis.base.tables import numbers, read_rows
 from dermis.environment.mirror_fits import (
     LOBES,
     MIRROR_ROUGHNESSES,
@@ -15,9 +17,7 @@ from dermis.environment.mirror_fits import (
     VIEWS,
     fitted_mirrors,
 )
-from dermis.preparing import preparing
 from dermis.specular.models import MODELS
-from dermis.tables import numbers, read_rows
 
 Floats = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.reading import is_file
 from dermis.images.colour import luminance
 from dermis.images.io import read_image
 from dermis.mesh.samples import SAMPLES, fetch
-from dermis.reading import is_file
 
 Floats = NDArray[np.float64]
 UNIFORM = "uniform"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.progress import preparing
 from dermis.environment.harmonics import analyse, synthesise, zonal
 from dermis.environment.panorama import Sun, load_panorama, split_suns
-from dermis.preparing import preparing
 from dermis.specular.beckmann import beckmann
 
 Floats = NDArray[np.float64]

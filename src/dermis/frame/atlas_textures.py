@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER, MOST_SHEAR, Atlas
 from dermis.atlas.stitched.walk import INNER, INWARD
-from dermis.disk import cached_arrays
+from dermis.base.disk import cached_arrays
 from dermis.frame.coarser import SAME_PLACE, Sheet, halved
 from dermis.frame.levels import MOST_HALVINGS
 from dermis.frame.seams import FEATHER_MM, REMEDIES, Remedy

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.raster import cross, rasterise, texel_corners
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.frame.baked_numbers import CHANNELS, COUNT
 from dermis.frame.curvature import make_curvature
 from dermis.frame.inputs import Inputs

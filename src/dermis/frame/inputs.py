@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.curvature import Curvature
 from dermis.frame.geometry import HeadResources

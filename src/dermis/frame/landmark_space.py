@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse, shown_value
+from dermis.base.errors import refuse, shown_value
 from dermis.gpu import Device
 from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landmark_points
 from dermis.mesh.head import Head

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dermis.errors import DermisError, refuse
+from dermis.base.errors import DermisError, refuse
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.passes.outputs import thickness

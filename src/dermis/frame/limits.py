@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.frame.asked import Asked
 from dermis.frame.passes.shadows import SHADOW_BYTES
 from dermis.frame.passes.surface_texels import SURFACE_BYTES

@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.summary import Summarised
 from dermis.frame.passes.pack import Leaving
 from dermis.gpu.memo import same
 from dermis.scene.head_pose import gaze, head_pose
 from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.settings import Settings
-from dermis.summary import Summarised
 
 _MISSING: Any = object()
 

@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis import outputs as files
-from dermis.errors import refuse
+from dermis.base import atomic_write as files
+from dermis.base.errors import refuse
 from dermis.frame.outputs import OUTPUTS, Output
 from dermis.images.codecs import encode_png
 from dermis.images.io import encode_exr_parts

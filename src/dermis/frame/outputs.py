@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from dermis.errors import refuse, shown_value
-from dermis.registry import Registry
+from dermis.base.errors import refuse, shown_value
+from dermis.base.registry import Registry
 
 _WORDS = {"float32": "f32", "int32": "i32", "uint8": "u32"}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.frame.passes.painting import paint
 from dermis.frame.passes.painting.eye_pictures import eye_pictures
 from dermis.gpu import Device

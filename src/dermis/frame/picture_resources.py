@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.frame import surroundings
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import EyesSeen, Inputs, Resources, camera_views, pinhole, seen_by

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.reading import named_path
 from dermis.frame.levels import FLOATS, HALVES, Levels
 from dermis.gpu import Device, make_texture, upload
 from dermis.images.filters import mip_chain
 from dermis.mesh.map_pixels import share_map
-from dermis.reading import named_path
 
 _KEPT = 4
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.outline import Outline
 from dermis.scene.camera import Window
 from dermis.scene.lights import PointLight

@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.summary import Summarised
 from dermis.frame.outputs import OUTPUTS
 from dermis.frame.passes.meter import Meter, read_meter
 from dermis.frame.passes.outputs.planes import OutputResources
@@ -17,7 +18,6 @@ from dermis.frame.passes.pack import Leaving
 from dermis.frame.passes.post import Picture
 from dermis.gpu import Device, download
 from dermis.scene.settings import Settings
-from dermis.summary import Summarised
 
 T = TypeVar("T")
 _MOST = 255

@@ -11,7 +11,8 @@ from typing import Any, Literal, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse, shown_value
+from dermis.base.errors import refuse, shown_value
+from dermis.base.quantities import whole_number
 from dermis.frame.in_flight import arriving
 from dermis.frame.landmark_space import asked_landmarks
 from dermis.frame.observation import Observation, observed_frames
@@ -24,7 +25,6 @@ from dermis.gpu import Device, open_device
 from dermis.gpu.failures import KeptOpen
 from dermis.gpu.frame import Timed
 from dermis.mesh.head import Head
-from dermis.quantities import whole_number
 from dermis.scene.given import given_plain
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.frame.profile_mixture import load_shares
 from dermis.optics.fits.shared import shared_gaussians
 from dermis.optics.gaussians import GaussianSum

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_occlusion
+from dermis.base.progress import preparing
 from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import Sun, load_panorama
 from dermis.environment.prefilter import prefilter
@@ -21,7 +22,6 @@ from dermis.gpu import ComputeProgram, Device, Memo, make_texture, upload
 from dermis.gpu.program import Resources
 from dermis.gpu.textures import texture_from
 from dermis.mesh.head import Head
-from dermis.preparing import preparing
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.translucency.cells import Cells, divide
+from dermis.base.progress import preparing
 from dermis.frame.atlas_layout import PairBuffers, Translucency
 from dermis.frame.levels import LEAST_WEIGHT
 from dermis.frame.passes.pair_search.passes import CellTables, cell_tables
@@ -21,7 +22,6 @@ from dermis.frame.passes.translucency_weights import source_level, weighing
 from dermis.gpu import Device, Memo, make_texture, scratch, upload
 from dermis.gpu.program import Resources
 from dermis.optics.thin_parts import ThinParts
-from dermis.preparing import preparing
 
 Floats = NDArray[np.float64]
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5

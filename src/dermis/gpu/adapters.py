@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.gpu.address_space import check_listing
 from dermis.gpu.native_types import tell_wgpus_types
 

@@ -7,7 +7,7 @@ import math
 import os
 from pathlib import Path
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 
 _GROUPS = Path("/sys/fs/cgroup")
 _LISTING = 0.5e9, 0.15e9

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 
 DEFAULT_LIMITS = {
     "max-texture-dimension-1d": 8192,

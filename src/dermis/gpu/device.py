@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu.adapters import Adapter, fitting_adapters
 from dermis.gpu.address_space import check_software
 from dermis.gpu.default_limits import check_limits, limits_within

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TypeVar
 
-from dermis.errors import DermisError, notify
+from dermis.base.errors import DermisError, notify
 from dermis.gpu.device import Device, open_device
 
 T = TypeVar("T")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.gpu.address_space import room
 from dermis.gpu.device import Device
 from dermis.gpu.no_room import NoRoomError

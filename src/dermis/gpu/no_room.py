@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 
 _REMEDY = "Lower --size, --samples or --atlas, close other programs that use the GPU, or try --adapter cpu"
 _SAID = "out of memory", "not enough memory"  # by the library, whose class of error differs

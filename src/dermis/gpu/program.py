@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu.access import Access, new_number, slot_of
 from dermis.gpu.bind_groups import UNIFORM, make_group
 from dermis.gpu.by_resources import ByResources, key_of

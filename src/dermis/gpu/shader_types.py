@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 
 _COMMENT = re.compile(r"//[^\n]*")
 _STRUCT = re.compile(r"struct\s+(\w+)\s*\{([^}]*)\}")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.gpu.device import Device
 from dermis.gpu.no_room import room_for
 

@@ -18,7 +18,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 
 _DIRECTIVE = re.compile(
     r'^(?P<indent>\s*)//#(?:include "(?P<file>[\w./]+)"|include <(?P<files>\w+)>'

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.quantities import whole_number
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.usual import drawn_hair, shaved_shows, usual_hair, usual_recession
 from dermis.human.published import OLD, YOUNG, human_targets
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.usual import Origin, drawn_eyes, drawn_look
-from dermis.quantities import whole_number
 
 _MOST_SEED = 2**32 - 1
 _BEARDED = 0.6  # shadow of shaved hair below a beard

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.build import SMALLEST, build_atlas
+from dermis.base.atomic_write import replacing
 from dermis.human.person import Human
 from dermis.human.person_file import numbers_of
 from dermis.mesh.eye_layout import EyePictures
 from dermis.mesh.gltf.write import encode_head
 from dermis.mesh.head import Head
-from dermis.outputs import replacing
 
 _STRETCH = 1024
 """Side of the atlas that tells how long texels are, which changes little from one to the next."""

@@ -10,7 +10,8 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse, shown_value
+from dermis.base.errors import refuse, shown_value
+from dermis.base.quantities import check_numbers, number
 from dermis.human.drawing import drawn
 from dermis.human.hair.groom import groomed
 from dermis.human.hair.look import HairLook
@@ -25,7 +26,6 @@ from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import levels_of
-from dermis.quantities import check_numbers, number
 
 _RANGES = {
     "african": (0.0, 1.0),

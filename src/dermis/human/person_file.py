@@ -8,14 +8,14 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.errors import DermisError, about, refuse, shown_value
+from dermis.base.atomic_write import replacing
+from dermis.base.errors import DermisError, about, refuse, shown_value
+from dermis.base.reading import parse_json, read_text
 from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.human.published import check_targets
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eyes import EyeLook
-from dermis.outputs import replacing
-from dermis.reading import parse_json, read_text
 
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
 

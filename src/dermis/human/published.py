@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse, shown_value
+from dermis.base.errors import refuse, shown_value
 
 Points = NDArray[np.float64]
 

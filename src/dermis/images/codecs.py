@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.extras import needed
+from dermis.base.extras import needed
 from dermis.images.png_rows import PNG_START, decode_rows, png_parts
 from dermis.images.sizes import MOST_PIXELS, check_size
 

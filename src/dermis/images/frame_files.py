@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dermis import outputs
-from dermis.errors import DermisError, refuse
+from dermis.base import atomic_write as outputs
+from dermis.base.errors import DermisError, refuse
+from dermis.base.reading import read_file
 from dermis.images.codecs import png_size
 from dermis.images.exr import decode_exr
 from dermis.images.io import OUTPUT_SUFFIXES, check_output, read_bytes
-from dermis.reading import read_file
 
 _NUMBER = re.compile(r"%(?:0(\d+))?d")
 

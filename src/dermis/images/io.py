@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis import outputs
-from dermis.errors import DermisError, refuse
+from dermis.base import atomic_write as outputs
+from dermis.base.errors import DermisError, refuse
+from dermis.base.reading import read_file
 from dermis.images.codecs import PILLOW_STARTS, Pixels, decode_with_pillow, encode_png, pillow_size
 from dermis.images.colour import encode_srgb8
 from dermis.images.exr import EXR_START, decode_exr, exr_size
 from dermis.images.radiance import RADIANCE_START, decode_radiance, radiance_size
 from dermis.images.sizes import MOST_BYTES, TooLargeError
-from dermis.reading import read_file
 
 OUTPUT_SUFFIXES = (".png", ".exr")
 _Codec = Callable[[bytes], Any]

@@ -15,10 +15,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis import outputs
-from dermis.errors import refuse, shown_value
-from dermis.extras import needed
-from dermis.quantities import numbers, whole_number
+from dermis.base import atomic_write as outputs
+from dermis.base.errors import refuse, shown_value
+from dermis.base.extras import needed
+from dermis.base.quantities import numbers, whole_number
 
 SUFFIX = ".mp4"
 DEFAULT_CRF = 18

@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.images.io import check_output, write_exr, write_png
 
 _FAST = 1  # effort of compression

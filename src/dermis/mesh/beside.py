@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path, PureWindowsPath
 from urllib.parse import unquote
 
-from dermis.errors import refuse
-from dermis.reading import is_file
+from dermis.base.errors import refuse
+from dermis.base.reading import is_file
 
 _LONGEST = 4096  # characters of a path; some systems take their time to say so
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.disk import Arrays, stored
+from dermis.base.disk import Arrays, stored
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.formats import Part, default_unit_mm
 from dermis.mesh.geometry import edges
 from dermis.mesh.limits import MOST_TRIANGLES, MOST_VERTICES

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.summary import Summarised
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm, clearance_mm
-from dermis.summary import Summarised
 
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]

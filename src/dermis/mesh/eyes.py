@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.quantities import check_numbers
+from dermis.base.summary import Summarised
 from dermis.mesh.eye_limits import LIMITS
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm
 from dermis.mesh.rig import Motion, Rig
-from dermis.quantities import check_numbers
-from dermis.summary import Summarised
 
 Doubles = NDArray[np.float64]
 

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.reading import read_file
 from dermis.mesh.limits import MOST_BYTES
 from dermis.mesh.mtl import read_materials
 from dermis.mesh.obj_text import face_sides, joined_lines, numbered, read_obj_text
 from dermis.mesh.ply_header import check_ply
 from dermis.mesh.quads import find_pairs, ply_sides
-from dermis.reading import read_file
 
 Colour = tuple[float, float, float]
 Array = NDArray[np.float64]

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.reading import BROKEN, is_file, read_file, understood
 from dermis.mesh.check import check_arrays
 from dermis.mesh.formats import Index, default_unit_mm, obj_model
 from dermis.mesh.geometry import compacted
 from dermis.mesh.joined import joined
 from dermis.mesh.limits import MOST_BYTES
 from dermis.mesh.load import Up, check_options, read_model, upright
-from dermis.reading import BROKEN, is_file, read_file, understood
 
 Floats = NDArray[np.float32]
 

@@ -12,7 +12,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.progress import preparing
+from dermis.base.reading import BROKEN, is_file, read_file, understood
 from dermis.mesh.cached import Rigged, cached_rigged
 from dermis.mesh.check import UV_TOLERANCE, check_amount, check_arrays, check_mesh, check_rig
 from dermis.mesh.eye_names import names_eye
@@ -23,8 +25,6 @@ from dermis.mesh.joined import joined, taken
 from dermis.mesh.limits import MOST_BYTES
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.rigging import build_rig, part_points
-from dermis.preparing import preparing
-from dermis.reading import BROKEN, is_file, read_file, understood
 
 Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.images.codecs import strips
 from dermis.images.colour import decode_srgb_levels
 from dermis.images.filters import without_steps

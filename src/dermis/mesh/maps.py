@@ -12,7 +12,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.summary import Summarised
 from dermis.images.io import read_bytes, read_size
 from dermis.images.sizes import MOST_PIXELS
 from dermis.mesh.map_pixels import (
@@ -25,7 +26,6 @@ from dermis.mesh.map_pixels import (
     plain_map,
     slope_map,
 )
-from dermis.summary import Summarised
 
 Load = Callable[[PathLike], NDArray[Any]]
 
@@ -136,7 +136,7 @@ def _kept(path: PathLike | None, how: str, load: Load) -> Any:
     data = read_bytes(path)
     if len(data) < _LARGE:
         return finite(path, load(path))
-    from dermis.disk import cached_array
+    from dermis.base.disk import cached_array
 
     source = np.frombuffer(data, np.uint8)
     return cached_array(source, f"map {_FORM} {how}", lambda: finite(path, load(path)))

@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.summary import Summarised
 from dermis.mesh.outline import Outline, hull
 from dermis.mesh.tangents import tangents
-from dermis.summary import Summarised
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]

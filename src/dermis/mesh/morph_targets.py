@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.summary import Summarised
+from dermis.base.summary import Summarised
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]

@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from dermis.base.reading import read_file
 from dermis.mesh.beside import beside
 from dermis.mesh.limits import MOST_LIBRARIES, MOST_MTL_BYTES
 from dermis.mesh.obj_text import libraries
-from dermis.reading import read_file
 
 _ROLES = {"map_kd": "colour", "map_ks": "specular", "map_pr": "roughness", "norm": "normal"}
 _ROLES |= {"map_bump": "bump", "bump": "bump"}

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dermis.errors import DermisError, refuse
+from dermis.base.errors import DermisError, refuse
 from dermis.images.io import read_image, read_size
 from dermis.images.sizes import MOST_TOGETHER
 from dermis.mesh.beside import beside

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.reading import read_file
 from dermis.mesh.limits import MOST_BYTES, MOST_CORNERS, MOST_GROUPS, MOST_TRIANGLES, MOST_VERTICES
-from dermis.reading import read_file
 
 Index = NDArray[np.int64]
 

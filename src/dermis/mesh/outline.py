@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.summary import Summarised
+from dermis.base.summary import Summarised
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.limits import MOST_TRIANGLES, MOST_VERTICES
 
 _MOST_HEADER = 1 << 16  # bytes

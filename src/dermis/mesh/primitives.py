@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Ints, Material, Mesh
 

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.disk import cached_array
+from dermis.base.disk import cached_array
+from dermis.base.summary import Summarised
 from dermis.mesh.contact import Contact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.rig_outline import RigOutline, corners_of, outline_of, outline_points
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
 from dermis.mesh.turns import rigid_motion
-from dermis.summary import Summarised
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.summary import Summarised
 from dermis.mesh.directions import fibonacci_sphere
 from dermis.mesh.morph_targets import MorphTargets
 from dermis.mesh.outline import hull_points
 from dermis.mesh.skeleton import Floats, Skeleton
-from dermis.summary import Summarised
 
 Index = NDArray[np.intp]
 

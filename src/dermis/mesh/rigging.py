@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.formats import Array, Bones, Index, Part
 from dermis.mesh.mesh import Floats, Ints
 from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets

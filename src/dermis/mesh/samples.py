@@ -14,8 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NoReturn
 
-from dermis.errors import DermisError, refuse
-from dermis.private import cache_folder, make_private
+from dermis.base.errors import DermisError, refuse
+from dermis.base.private import cache_folder, make_private
 
 DATA_VARIABLE = "DERMIS_DATA"
 

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.summary import Summarised
 from dermis.mesh.turns import angles_matrix
-from dermis.summary import Summarised
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.summary import Summarised
 from dermis.mesh.columns import crosses, dots
 from dermis.mesh.mesh import Floats, Ints, Mesh
-from dermis.summary import Summarised
 
 Doubles = NDArray[np.float64]
 _LEAST = 1e-9

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dermis.disk import Arrays, cached_arrays
-from dermis.errors import refuse, shown_value
+from dermis.base.disk import Arrays, cached_arrays
+from dermis.base.errors import refuse, shown_value
+from dermis.base.progress import preparing
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Floats, Ints, Mesh
 from dermis.mesh.quads import halves, polygons
 from dermis.mesh.rig import Stencils
 from dermis.mesh.subdivision_rules import Cage, catmull_clark_limit, refine_catmull_clark, refine_loop
-from dermis.preparing import preparing
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 
 Floats = NDArray[np.float64]
 MOST_GAUSSIANS = 24

@@ -9,9 +9,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dermis.base.tables import read_rows
 from dermis.optics.curve import Curve, between
 from dermis.optics.media import SKIN_ETA, Floats
-from dermis.tables import read_rows
 
 Kind = Literal["skin", "matched", "walk"]
 """A smooth surface of index 1.4 lit at right angles, an index-matched one, and an index-matched one that

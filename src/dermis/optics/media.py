@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
-from dermis.quantities import number, numbers
-from dermis.tables import read_rows
+from dermis.base.errors import refuse
+from dermis.base.quantities import number, numbers
+from dermis.base.tables import read_rows
 
 Floats = NDArray[np.float64]
 

@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.atomic_write import replacing
+from dermis.base.errors import refuse
+from dermis.base.quantities import numbers
+from dermis.base.reading import named_path, read_text, read_toml
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.fits.targets import Rings
 from dermis.optics.gaussians import MOST_WEIGHT, WIDEST_MM2, GaussianSum
 from dermis.optics.media import Floats
 from dermis.optics.radial import RadialProfile
 from dermis.optics.tissue import Tissue, load_tissue, names
-from dermis.outputs import replacing
-from dermis.quantities import numbers
-from dermis.reading import named_path, read_text, read_toml
 
 PUBLISHED = "gpu-gems-3"
 TERMS = 6

@@ -10,7 +10,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.errors import DermisError, refuse, shown_value
+from dermis.base.errors import DermisError, refuse, shown_value
+from dermis.base.reading import named_path, read_toml
 from dermis.optics.counted import COUNTED, is_counted, tabulated_profile
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import Model, diffusion_profile, diffusion_rings, through_slab
@@ -21,7 +22,6 @@ from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium, media, medium_f
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.radial import RadialProfile
-from dermis.reading import named_path, read_toml
 
 SPECTRAL = "spectral"
 _STRUCTURE: Structure = "dj2006"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.head import Head
 from dermis.scene.findings import Because
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics

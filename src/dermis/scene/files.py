@@ -7,11 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.errors import about, refuse
+from dermis.base.errors import about, refuse
+from dermis.base.reading import is_file, named_path, read_toml
 from dermis.human.regions.apply import with_regions
 from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
-from dermis.reading import is_file, named_path, read_toml
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
 from dermis.scene.findings import ImpossibleError

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from dermis.errors import DermisError, shortened, shown_value
+from dermis.base.errors import DermisError, shortened, shown_value
 
 _BOUNDS = {"greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number"}
 _NUMBERS = {"float_type", "float_parsing", "int_type", "int_parsing", "int_from_float", "int_parsing_size"}

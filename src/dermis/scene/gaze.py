@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.quantities import numbers
 from dermis.human.movement import gaze
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Rig, Turn
 from dermis.mesh.turns import angles_matrix
-from dermis.quantities import numbers
 from dermis.scene.clips.names import matched
 from dermis.scene.pose import FARTHEST_MM, Pose
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from dermis.errors import notify, refuse, shown_value
+from dermis.base.errors import notify, refuse, shown_value
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera, preset
 from dermis.scene.environment import Environment

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from dermis.errors import refuse, shown_value
+from dermis.base.errors import refuse, shown_value
 from dermis.scene.findings import ImpossibleError
 from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable
 

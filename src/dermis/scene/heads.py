@@ -9,7 +9,9 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
-from dermis.errors import notify, refuse, shown_value
+from dermis.base.errors import notify, refuse, shown_value
+from dermis.base.progress import preparing
+from dermis.base.reading import is_file
 from dermis.human.regions.usual import with_usual_regions
 from dermis.mesh.check import check_head_height
 from dermis.mesh.eyes import EyeLook
@@ -23,8 +25,6 @@ from dermis.mesh.maps import Maps, load_maps
 from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
-from dermis.preparing import preparing
-from dermis.reading import is_file
 from dermis.scene.head_checks import check_given, check_options, check_relief, named
 from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin
 from dermis.scene.smoothness import Levels, Subdivide, chosen_levels

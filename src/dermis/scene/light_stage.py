@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.quantities import whole_number
+from dermis.base.quantities import whole_number
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight
 

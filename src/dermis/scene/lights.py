@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from dermis.registry import Registry
+from dermis.base.registry import Registry
 from dermis.scene.findings import Because
 from dermis.scene.plain import Colour, Direction, Plain, Vector, slider
 
@@ -185,7 +185,7 @@ LIGHTS: Registry[type[Light]] = Registry(
     },
 )
 """The kinds by their word in scene files. How each is drawn stands in `dermis.frame.lights`, what Mitsuba and
-Cycles take in its place in `dermis.reference.lights`."""
+Cycles take in its place in `dermis.apps.validation.truths.lights`."""
 
 
 NO_LIGHTS = "none"

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.errors import refuse, shown_value
-from dermis.quantities import numbers
+from dermis.base.errors import refuse, shown_value
+from dermis.base.quantities import numbers
 
 Doubles = NDArray[np.float64]
 _CORNER = 0.5  # from the middle of the first pixel, which is OpenCV's origin, to the picture's corner [pixel]

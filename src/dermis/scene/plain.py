@@ -11,8 +11,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from dermis.errors import refuse, shown_value
-from dermis.registry import Named
+from dermis.base.errors import refuse, shown_value
+from dermis.base.registry import Named
 from dermis.scene.findings import (
     Because,
     ImpossibleError,

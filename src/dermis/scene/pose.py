@@ -10,11 +10,11 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.errors import DermisError, refuse, shown_value
+from dermis.base.errors import DermisError, refuse, shown_value
+from dermis.base.quantities import number, numbers
+from dermis.base.summary import Summarised
 from dermis.mesh.rig import Motion, Rig
 from dermis.mesh.skeleton import Skeleton
-from dermis.quantities import number, numbers
-from dermis.summary import Summarised
 
 MOST_WEIGHT = 100.0
 MOST_DEGREES = 1e5

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dermis.errors import refuse
-from dermis.outputs import replacing
-from dermis.reading import is_file
+from dermis.base.atomic_write import replacing
+from dermis.base.errors import refuse
+from dermis.base.reading import is_file
 from dermis.scene.head_table import names_regions
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from dermis.registry import Named
+from dermis.base.registry import Named
 from dermis.scene.findings import Because, Words
 from dermis.scene.plain import Colour, Plain, slider
 from dermis.scene.techniques import TECHNIQUES

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dermis.errors import refuse, shown_value
+from dermis.base.errors import refuse, shown_value
 from dermis.scene.findings import Because
 from dermis.scene.plain import Plain, slider
 from dermis.specular.models import EnergyName, FresnelName, SpecularName

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.head import Head
 from dermis.mesh.silhouette import MOST_TRIANGLES, silhouette, smooth_levels
 from dermis.mesh.subdivide import MAX_LEVELS

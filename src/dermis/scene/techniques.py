@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dermis.registry import Registry
+from dermis.base.registry import Registry
 
 _HOME = "dermis.frame.techniques"
 

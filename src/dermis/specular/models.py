@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
-from dermis.registry import Named, Registry
+from dermis.base.registry import Named, Registry
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -27,7 +27,7 @@ def _made() -> dict[str, Any]:
 
 def _fill() -> None:
     """All caches, as they are filled on a first run."""
-    from dermis.disk import cached_arrays
+    from dermis.base.disk import cached_arrays
     from dermis.scene.heads import load_head
 
     cached_arrays(_SOURCE, "campaign", list(_made()), _made)
@@ -68,7 +68,7 @@ def _take(plan: Plan) -> None:
 
 
 def _check_arrays() -> None:
-    from dermis.disk import cached_arrays
+    from dermis.base.disk import cached_arrays
 
     arrays = cached_arrays(_SOURCE, "campaign", list(_made()), _made)
     for name, truth in _made().items():

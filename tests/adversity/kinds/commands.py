@@ -19,7 +19,7 @@ from adversity.kinds import clips, meshes, pictures, scenes
 from adversity.options import options_of_commands
 from moving_head import CAPTURE
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 
 _SMALL = ("--size", "64x64", "--atlas", "64", "--samples", "1", "--shadow-size", "64", "--adapter", "cpu")
 _MOVING = ("head.glb", *_SMALL, "--to", "0.1", "--output", "frames/%03d.exr")
@@ -38,8 +38,12 @@ _BEGINNINGS: dict[str, tuple[str, ...]] = {
 }
 _DRAWN = {"render": 6, "animate": 2}  # how much oftener than others
 _LONG_WORK = (
-    *("dermis.viewer.windows.serve", "dermis.viewer.windows.show_window", "dermis.benchmark.run.run"),
-    *("dermis.gallery.run.draw_pictures", "dermis.comparison.compare.compare"),
+    *(
+        "dermis.apps.viewer.windows.serve",
+        "dermis.apps.viewer.windows.show_window",
+        "dermis.apps.validation.benchmarks.run.run",
+    ),
+    *("dermis.apps.gallery.run.draw_pictures", "dermis.apps.validation.comparisons.compare.compare"),
 )
 _OUTPUTS = ["out.", "frames", "gallery", "person.json"]
 _KEPT = ["frames/"]  # numbered pictures, each of which is whole

@@ -68,7 +68,7 @@ def _take(plan: Plan) -> None:
 
 def _take_whole(plan: Plan) -> None:
     """Go on where it was: a shard that counts as whole is as it was written."""
-    from dermis.batch.shards import is_whole, shards_of
+    from dermis.apps.batch.shards import is_whole, shards_of
 
     spec = small_spec(count=2, format=plan["form"], encoding="png")
     if is_whole(Path(), shards_of(spec)[0], spec):

@@ -31,7 +31,7 @@ def _sound(rng: Random) -> Input:
 
 def _take(plan: Plan) -> None:
     """Go on where it was: what is kept is whole, and the record is as it must be."""
-    from dermis.errors import DermisError
+    from dermis.base.errors import DermisError
     from dermis.images.frame_files import FrameFiles
     from dermis.images.io import read_image
 

@@ -27,7 +27,7 @@ def _harmonic(count: int) -> float:
 
 def _computed() -> float:
     """What its machine code gives, found on disk or made, as in a new process."""
-    from dermis.machine_code import compiled
+    from dermis.base.compiled import compiled
 
     return float(compiled(FunctionType(_harmonic.__code__, globals()))(_COUNT))
 

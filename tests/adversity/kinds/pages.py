@@ -61,7 +61,7 @@ def _damaged() -> list[str]:
 
 def _passed(texts: list[str]) -> list[dict[str, Any]]:
     """The events that a server's guard lets through of what a page sends."""
-    from dermis.viewer.browser.guard import Guard
+    from dermis.apps.viewer.browser.guard import Guard
 
     got = list[dict[str, Any]]()
     coming = [{"type": "websocket.receive", "text": text} for text in texts]
@@ -86,10 +86,10 @@ def _take_events(plan: Plan) -> None:
     from rendercanvas.http import HttpRenderCanvas
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
+    from dermis.apps.viewer.state import ViewerState
+    from dermis.apps.viewer.viewer import Viewer
     from dermis.scene.heads import load_head
     from dermis.scene.model import Scene
-    from dermis.viewer.state import ViewerState
-    from dermis.viewer.viewer import Viewer
 
     Path("head.obj").write_text(obj_text())
     canvas = OffscreenRenderCanvas(size=_SIZE)
@@ -133,8 +133,8 @@ def _upload(rng: Random) -> Input:
 
 def _take_upload(plan: Plan) -> None:
     """A file that is taken lies in the server's folder and nowhere else."""
-    from dermis.viewer.browser.guard import Guard
-    from dermis.viewer.browser.uploads import Uploads
+    from dermis.apps.viewer.browser.guard import Guard
+    from dermis.apps.viewer.browser.uploads import Uploads
 
     folder, got, answers = Path("files"), list[Path](), list[Any]()
     folder.mkdir()

@@ -36,7 +36,7 @@ _IMAGES = 8
 @cache
 def _texts() -> tuple[str, ...]:
     """The package's example, one with what that leaves out, and its whole text."""
-    from dermis.batch.spec import example_text, spec_of
+    from dermis.apps.batch.spec import example_text, spec_of
 
     return example_text(), _MORE, spec_of({"seed": 3}).text()
 
@@ -51,7 +51,7 @@ def _take_spec(plan: Plan) -> None:
     import tomllib
     from pathlib import Path
 
-    from dermis.batch.spec import load_spec, spec_of
+    from dermis.apps.batch.spec import load_spec, spec_of
 
     spec = load_spec(plan["file"])
     for k in range(min(spec.count, _IMAGES)):

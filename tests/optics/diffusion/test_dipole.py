@@ -9,7 +9,7 @@ import pytest
 from slabs import case, slab, table
 from tolerances import CLOSED_FORM
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.optics.diffusion import dipole
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.diffusion.models import diffusion_profile

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from slabs import slab, table
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.optics.diffusion.models import cut, through_gaussians, through_slab
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import media

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.special import j0
 from tolerances import CLOSED_FORM
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.optics.fits.burley import (
     BurleyProfile,
     fit_burley,

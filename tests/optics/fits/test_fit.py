@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.optics.fits import gaussian as fit_module
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 from dermis.optics.fits.targets import Points, Rings, ring_error

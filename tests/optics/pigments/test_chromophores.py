@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import ArrayLike
 from tolerances import PUBLISHED
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.optics.media import Floats
 from dermis.optics.pigments import chromophores
 

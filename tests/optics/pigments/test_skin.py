@@ -8,8 +8,8 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from dermis import cite
-from dermis.errors import DermisError
+from dermis.base import citations as cite
+from dermis.base.errors import DermisError
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.media import Floats, Layer
 from dermis.optics.pigments.chromophores import baseline, blood, donner_jensen_2006, jacques_1998, melanosome

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Medium
 from dermis.optics.pigments.chromophores import jacques_1998

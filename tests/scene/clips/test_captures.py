@@ -12,7 +12,7 @@ from random_rig import random_rig
 from scipy.spatial.transform import Rotation
 
 import dermis
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

@@ -11,7 +11,7 @@ from gltf_file import SQUARE, GltfFile, add_mesh
 from scipy.spatial.transform import Rotation, Slerp
 
 import dermis
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.gltf.clips import clip_names
 from dermis.mesh.head import Head
 from dermis.mesh.load import load_rigged

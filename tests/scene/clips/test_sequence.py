@@ -9,7 +9,7 @@ import pytest
 from small_head import obj_text
 
 import dermis
-from dermis.errors import DermisError
+from dermis.base.errors import DermisError
 from dermis.mesh.frames import FrameReader
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

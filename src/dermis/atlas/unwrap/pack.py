@@ -8,7 +8,7 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.atlas.unwrap.pack import pack
 from dermis.atlas.unwrap.seams import border_sides
 from dermis.atlas.unwrap.settle import Flat, Surface, lay_flat
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.tangents import triangle_areas
 
 Index = NDArray[np.int64]

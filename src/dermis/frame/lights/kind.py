@@ -6,10 +6,10 @@ import inspect
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from dermis.base.registry import Registry
 from dermis.frame.projection import Triple, axes_of, between
 from dermis.gpu.wgsl_source import Member
 from dermis.mesh.head import Head
-from dermis.registry import Registry
 from dermis.scene.lights import LIGHTS, Light, PointLight
 
 L = TypeVar("L", bound=Light)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.errors import refuse
 from dermis.environment.panorama import Sun
-from dermis.errors import refuse
 from dermis.frame.lights.kind import KINDS, override_of
 from dermis.frame.projection import (
     ShadowView,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.frame.lights.kind import Kind, facing
 from dermis.frame.projection import Triple, place_of
 from dermis.mesh.head import Head

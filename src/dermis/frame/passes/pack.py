@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.frame.passes import program
 from dermis.frame.passes.outputs.planes import OutputResources
 from dermis.frame.passes.post import Picture, encoding_of

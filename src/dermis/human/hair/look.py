@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
-from dermis.errors import refuse, shown_value
-from dermis.quantities import check_numbers
+from dermis.base.errors import refuse, shown_value
+from dermis.base.quantities import check_numbers
 
 Style = Literal["none", "cropped", "short"]
 STYLES: tuple[Style, ...] = get_args(Style)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
-from dermis.tables import read_rows
+from dermis.base.tables import read_rows
 
 
 class LabelClass(NamedTuple):

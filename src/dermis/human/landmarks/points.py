@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse, shown_value
+from dermis.base.errors import refuse, shown_value
+from dermis.base.quantities import whole_number
+from dermis.base.reading import named_path, read_text, understood
+from dermis.base.tables import Rows, parse_rows, read_rows
 from dermis.human.landmarks.sets import SETS
 from dermis.human.regions.average import average_head, is_human
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, corners, finer_roots, weights
-from dermis.quantities import whole_number
-from dermis.reading import named_path, read_text, understood
-from dermis.tables import Rows, parse_rows, read_rows
 
 _MOST = 10_000
 _EXPECTED = "landmarks in CSV: rows of name,vertex"

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.tables import read_rows
 from dermis.human.model import MATERIALS
 from dermis.human.person import Human
 from dermis.human.regions.zones import Doubles, region_of
 from dermis.mesh.head import Head
-from dermis.tables import read_rows
 
 AVERAGE = Human(sex=0.5, age=35.0)
 _LEVELS = 2  # of subdivision: triangles of about a millimetre

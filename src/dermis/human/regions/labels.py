@@ -12,7 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.quantities import numbers
+from dermis.base.reading import read_text, understood
+from dermis.base.tables import parse_rows
 from dermis.human.regions.average import (
     average_head,
     average_skin,
@@ -26,9 +29,6 @@ from dermis.human.regions.table import RegionTable
 from dermis.human.regions.zones import REGIONS, Doubles
 from dermis.mesh.head import Head
 from dermis.mesh.maps import load_labels
-from dermis.quantities import numbers
-from dermis.reading import read_text, understood
-from dermis.tables import parse_rows
 
 Place = tuple[float, float, float]
 Places = Mapping[str, Place]

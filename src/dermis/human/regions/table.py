@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse, shown_value
+from dermis.base.errors import refuse, shown_value
+from dermis.base.quantities import number
+from dermis.base.reading import read_toml
 from dermis.human.regions.zones import REGIONS
-from dermis.quantities import number
-from dermis.reading import read_toml
 
 DEFAULT = "default"
 """Name of the package's own table, of artist's values."""

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from dermis.disk import Array, Arrays, cached_arrays
-from dermis.errors import DermisError
+from dermis.base.disk import Array, Arrays, cached_arrays
+from dermis.base.errors import DermisError
+from dermis.base.progress import preparing
 from dermis.human.regions.apply import SIZE, with_regions
 from dermis.human.regions.labels import known_landmarks
 from dermis.human.regions.table import DEFAULT, load_table
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.preparing import preparing
 
 _FORM = 2  # increment when `with_regions` gives other maps for the same head
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.tables import numbers, read_rows
 from dermis.human.skin.movements import MOVEMENTS
-from dermis.tables import numbers, read_rows
 
 Floats = NDArray[np.float32]
 

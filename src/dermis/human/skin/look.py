@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from dermis.quantities import check_numbers
+from dermis.base.quantities import check_numbers
 
 RANGES = {"seed": (0, 2**32 - 1)}
 """Least and greatest values of fields that do not go from 0 to 1."""

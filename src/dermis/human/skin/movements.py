@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.tables import read_rows
+from dermis.base.tables import read_rows
 
 Floats = NDArray[np.float32]
 

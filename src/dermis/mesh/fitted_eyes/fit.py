@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.progress import preparing
 from dermis.mesh import globe
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, plane_mm
 from dermis.mesh.eyes import EyeLook, Eyes
@@ -20,7 +21,6 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.quads import halves
 from dermis.mesh.rig import Stencils
-from dermis.preparing import preparing
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.reading import BROKEN, understood
 from dermis.mesh.curves import Curve
 from dermis.mesh.formats import Array
 from dermis.mesh.gltf.document import Document, Tree, numbered, read_document
 from dermis.mesh.gltf.nodes import Nodes, read_nodes
 from dermis.mesh.gltf.targets import target_names
 from dermis.mesh.limits import MOST_CHANNELS
-from dermis.reading import BROKEN, understood
 
 _WIDTH = {"translation": 3, "rotation": 4, "scale": 3}
 _KINDS = ("STEP", "LINEAR", "CUBICSPLINE")

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.reading import BROKEN, parse_json, read_file, understood
 from dermis.mesh.beside import named_by_uri
 from dermis.mesh.formats import Array, fractions
 from dermis.mesh.limits import MOST_BYTES, MOST_JSON, MOST_NUMBERS
-from dermis.reading import BROKEN, parse_json, read_file, understood
 
 Tree = dict[str, Any]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.formats import GREY, Array, Group, Index, Model, Part, colour_of, fractions
 from dermis.mesh.gltf.document import Document, Tree, read_document
 from dermis.mesh.gltf.nodes import Nodes, read_nodes

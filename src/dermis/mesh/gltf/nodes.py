@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.formats import Array
 from dermis.mesh.gltf.document import Document, Tree, numbered
 from dermis.mesh.limits import DEEPEST_NODE, MOST_NODES

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import fields
 from pathlib import Path
 
-from dermis.errors import about
+from dermis.base.errors import about
+from dermis.base.reading import BROKEN, understood
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.gltf.document import read_document
-from dermis.reading import BROKEN, understood
 
 
 def told_eyes(path: Path) -> EyeLook:

@@ -6,13 +6,13 @@ import base64
 from pathlib import Path
 from typing import Any
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.reading import BROKEN, is_file, understood
 from dermis.images.io import Picture, read_size
 from dermis.images.sizes import MOST_TOGETHER
 from dermis.mesh.beside import named_by_uri
 from dermis.mesh.gltf.document import Document, read_document
 from dermis.mesh.limits import MOST_RELIEF_MM
-from dermis.reading import BROKEN, is_file, understood
 
 _READABLE = {"image/png", "image/jpeg"}
 ROLES = ("normal", "height", "specular", "roughness", "region")

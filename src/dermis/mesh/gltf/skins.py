@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.formats import Array, Bones, Index, fractions
 from dermis.mesh.gltf.document import Document, Tree, numbered
 from dermis.mesh.gltf.nodes import Nodes, node_names

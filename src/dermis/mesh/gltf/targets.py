@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.formats import Array, Index
 from dermis.mesh.gltf.document import Document, Tree
 from dermis.mesh.gltf.nodes import Nodes

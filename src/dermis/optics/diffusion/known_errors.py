@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 
+from dermis.base.tables import numbers, read_rows
 from dermis.optics.media import Floats
 from dermis.optics.radial import RadialProfile
-from dermis.tables import numbers, read_rows
 
 
 @dataclass(frozen=True)

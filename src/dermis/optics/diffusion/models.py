@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
 from dermis.optics.diffusion.boundary import mismatch, normal_reflectance
 from dermis.optics.diffusion.multipole import Clamp

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.optics.fits.targets import Rings, ring_error
 from dermis.optics.media import Floats
 

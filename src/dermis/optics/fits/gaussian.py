@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.optics.fits.targets import Points, Rings
 from dermis.optics.fits.variable_projection import STILL, Design, Fit, descend
 from dermis.optics.gaussians import WIDEST_MM2, GaussianSum

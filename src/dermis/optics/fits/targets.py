@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.optics.media import Floats
 
 

@@ -9,7 +9,8 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from dermis.errors import refuse, shown_value
+from dermis.base.errors import refuse, shown_value
+from dermis.base.quantities import number
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
 from dermis.optics.pigments.chromophores import (
     DERMIS_SHARE,
@@ -20,7 +21,6 @@ from dermis.optics.pigments.chromophores import (
     melanosome,
 )
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, visible
-from dermis.quantities import number
 
 Structure = Literal["dj2006", "donner2008", "biospec"]
 

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.tables import numbers, read_rows
 from dermis.optics.media import Floats
-from dermis.tables import numbers, read_rows
 
 SHORTEST_NM, LONGEST_NM = 380.0, 780.0
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dermis.quantities import number
+from dermis.base.quantities import number
+from dermis.base.summary import Summarised
 from dermis.scene.pose import Pose
-from dermis.summary import Summarised
 
 _SHOWN = 8  # names in a note
 LONGEST_S = 86_400.0

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.curves import Curve
 from dermis.mesh.gltf.clips import Track, read_clip
 from dermis.mesh.head import Head

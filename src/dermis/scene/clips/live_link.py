@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.reading import read_text, understood
 from dermis.mesh.head import Head
 from dermis.mesh.turns import angles_matrix, matrix_quaternion
-from dermis.reading import read_text, understood
 from dermis.scene.clips.clip import Clip
 from dermis.scene.clips.sampled import MOST_CLIP, Samples, check_size, check_weights, sampled_clip
 from dermis.scene.clips.turning import TurningBones, head_turns, steady, turning_bones

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
+from dermis.base.reading import is_file, named_path
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.head import Head
-from dermis.reading import is_file, named_path
 from dermis.scene.clips.clip import Clip, check_rate
 from dermis.scene.clips.gltf_clip import load_gltf_clip
 from dermis.scene.clips.live_link import load_live_link

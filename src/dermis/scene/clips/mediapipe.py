@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis import quantities
-from dermis.errors import refuse, shown_value
+from dermis.base import quantities
+from dermis.base.errors import refuse, shown_value
+from dermis.base.reading import parse_json, read_text
 from dermis.mesh.head import Head
-from dermis.reading import parse_json, read_text
 from dermis.scene.clips.clip import Clip
 from dermis.scene.clips.sampled import MOST_CLIP, Samples, check_size, check_weights, sampled_clip
 from dermis.scene.clips.turning import head_turns, matrix_turns, turning_bones

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.head import Head
 from dermis.scene.clips.clip import Clip
 from dermis.scene.clips.names import matched

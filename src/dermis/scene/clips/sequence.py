@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.mesh.frames import FrameReader, Vertices
 from dermis.mesh.head import Head
 from dermis.mesh.load import Up

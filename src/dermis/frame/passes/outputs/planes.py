@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.base.errors import refuse
 from dermis.frame.outputs import OUTPUTS
 from dermis.frame.passes import program
 from dermis.frame.passes.visibility_buffer import Layers

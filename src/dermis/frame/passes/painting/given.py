@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.disk import array_key
-from dermis.errors import refuse
+from dermis.base.disk import array_key
+from dermis.base.errors import refuse
 from dermis.frame.passes import PASSES, shader_folders
 from dermis.gpu.program import source_of
 from dermis.gpu.shader_types import record_of, struct_dtype

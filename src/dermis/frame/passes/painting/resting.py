@@ -7,14 +7,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from dermis.disk import Arrays, find, stored
+from dermis.base.disk import Arrays, find, stored
+from dermis.base.progress import preparing
 from dermis.frame.levels import HALVES
 from dermis.frame.passes import each, map_mips, program
 from dermis.frame.passes.painting.given import OWNER, SKIN, Given, key_of
 from dermis.gpu import Device, Frame, make_texture, upload
 from dermis.gpu.textures import download
 from dermis.human.skin.surface import Painting
-from dermis.preparing import preparing
 
 _FOLDER = "painted"
 _WORD = 4  # bytes

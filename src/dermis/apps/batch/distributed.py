@@ -1,0 +1,119 @@
+"""Workers of dask.distributed, on this machine or many: each of them draws on an adapter of its own."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dermis.apps.batch.shards import Shard
+from dermis.apps.batch.told import Told
+from dermis.apps.batch.worker import Work
+from dermis.base.errors import DermisError, refuse
+from dermis.base.extras import needed
+
+_RETRIES = 2  # of a shard whose worker says that it failed; dask itself counts those that die
+_WAIT_S = 60.0  # for a scheduler, and for its first worker
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A crew of dask's workers; each draws one shard at a time.
+
+    address : of the scheduler; None with a file
+    file : that the scheduler wrote
+    adapter : as of `Seating`; the workers of a host take those that fit in turn
+    """
+
+    address: str | None
+    file: Path | None
+    adapter: str = "auto"
+
+    def draw(self, work: Work, shards: Sequence[Shard]) -> Iterator[Told]:
+        """Draw the shards, each as a task.
+
+        Raises DermisError where no worker is reached, where one sees another disk, and for what no worker
+        can mend.
+        """
+        needed("distributed", "--scheduler and --cluster")
+        from dermis.apps.batch.dask_worker import Drawing
+
+        name = f"dermis-{secrets.token_hex(6)}"
+        with self._client() as client:
+            client.register_plugin(Drawing.of(work, self.adapter), name=name)
+            try:
+                with _mark(work.out) as mark:
+                    _check_disks(client, mark)
+                yield from _told(client, name, shards)
+            finally:
+                with suppress(OSError, TimeoutError):  # the scheduler is gone
+                    client.unregister_worker_plugin(name)
+
+    @contextmanager
+    def _client(self) -> Iterator[Any]:
+        from distributed import Client
+
+        if self.file is not None and not self.file.is_file():
+            refuse(self.file, "the file that dask's scheduler wrote", "it is not there", "Start it first")
+        where = {"address": self.address} if self.file is None else {"scheduler_file": str(self.file)}
+        culprit = self.address or self.file
+        try:
+            client = Client(**where, timeout=_WAIT_S, set_as_default=False)
+        except (OSError, ValueError) as fault:
+            refuse(culprit, "a scheduler of dask.distributed", f"none answers ({fault})", "Start it first")
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=_WAIT_S)
+            except TimeoutError:
+                refuse(culprit, "a scheduler with workers", "it has none", "Start them with dask worker")
+            yield client
+
+
+@contextmanager
+def _mark(out: Path) -> Iterator[Path]:
+    """A file that all who share the disk can see."""
+    place = out.resolve() / f".dermis-{secrets.token_hex(6)}"
+    place.touch()
+    try:
+        yield place
+    finally:
+        place.unlink()
+
+
+def _check_disks(client: Any, mark: Path) -> None:
+    """Refuse a folder that is not the same for all workers."""
+    from dermis.apps.batch.dask_worker import sees
+
+    blind = [address for address, found in client.run(sees, str(mark)).items() if not found]
+    if blind:
+        came = f"{blind[0]} does not see it"
+        refuse(mark.parent, "a folder on a disk that all workers share", came, "Choose another one")
+
+
+def _told(client: Any, name: str, shards: Sequence[Shard]) -> Iterator[Told]:
+    """What becomes of the shards."""
+    from distributed import as_completed
+
+    from dermis.apps.batch.dask_worker import draw_shard
+
+    tasks = {
+        client.submit(draw_shard, name, shard, key=f"{name}-{shard.index}", retries=_RETRIES): shard
+        for shard in shards
+    }
+    try:
+        for done in as_completed(list(tasks), loop=client.loop):
+            shard = tasks.pop(done)
+            if done.status != "finished":
+                raise DermisError(
+                    f"shard {shard.index}: expected a worker of dask's to draw it, but they failed: "
+                    f"{done.exception()}. What is whole is kept; give the command again to go on."
+                )
+            told: Told = done.result()
+            if told.refusal:
+                raise DermisError(told.refusal)
+            yield told
+    finally:
+        client.cancel(list(tasks))

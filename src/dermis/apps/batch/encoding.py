@@ -1,0 +1,140 @@
+"""Processes that encode what a worker has drawn: a few images ahead, in their order."""
+
+from __future__ import annotations
+
+import pickle
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Self
+
+from dermis.apps.batch.children import Child, shared_bytes, start
+from dermis.apps.batch.faults import LostProcessError
+from dermis.base.errors import DermisError
+
+Encoded = tuple[int, dict[str, bytes]]
+Job = tuple[Any, ...]
+_AHEAD = 2  # jobs that one of them has and has not given back
+_PAGE = 4096
+_SPARE = 1 << 18  # bytes by which a job may be larger than the first one
+
+
+class Encoders:
+    """Processes that all do one thing, `encode(*job)`, in turn.
+
+    count : how many of them; 0 does it here
+    encode : can be pickled
+    """
+
+    def __init__(self, count: int, encode: Callable[..., Encoded]) -> None:
+        self._count, self._encode, self._size = count, encode, 0
+        self._lanes: list[_Lane] = []
+
+    def encoded(self, jobs: Iterable[Job]) -> Iterator[Encoded]:
+        """What `encode` returns for each job, in their order; jobs are asked for a few ahead.
+
+        Raises LostProcessError where one of the processes ends, and what `encode` refuses.
+        """
+        if not self._count:
+            yield from (self._encode(*job) for job in jobs)
+            return
+        waiting: deque[_Lane] = deque()
+        try:
+            for turn, job in enumerate(jobs):
+                parts = _apart(job)
+                if (size := sum(_padded(part.nbytes) for part in parts)) > self._size or not self._lanes:
+                    while waiting:
+                        yield waiting.popleft().take()
+                    self._open(size + _SPARE)
+                if len(waiting) == _AHEAD * self._count:
+                    yield waiting.popleft().take()
+                lane = self._lanes[turn % self._count]
+                waiting.append(lane)
+                lane.give(parts)
+            while waiting:
+                yield waiting.popleft().take()
+        finally:
+            if waiting:  # nobody will take what they still have
+                self.close()
+
+    def close(self) -> None:
+        """End the processes; others are started when they are needed again."""
+        while self._lanes:
+            self._lanes.pop().child.end()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _open(self, size: int) -> None:
+        """Start the processes, for jobs of at most that many bytes."""
+        self.close()
+        self._size = size
+        for _ in range(self._count):
+            self._lanes.append(_Lane(size, self._encode))
+
+
+class _Lane:
+    """One process, and memory for the jobs that it has: the pipe carries only where they lie.
+
+    Were they to go through the pipe, both ends could wait for each other to read.
+    """
+
+    def __init__(self, size: int, encode: Callable[..., Encoded]) -> None:
+        memory = shared_bytes(_AHEAD * size)
+        self._size, self._turn, self._memory = size, 0, memoryview(memory).cast("B")
+        self.child: Child = start(_serve, memory, encode)
+
+    def give(self, parts: list[memoryview]) -> None:
+        begin, spans = self._turn % _AHEAD * self._size, []
+        self._turn += 1
+        for part in parts:
+            spans.append((begin, begin + part.nbytes))
+            self._memory[begin : begin + part.nbytes] = part
+            begin += _padded(part.nbytes)
+        try:
+            self.child.pipe.send(spans)
+        except OSError as fault:
+            raise self._lost() from fault
+
+    def take(self) -> Encoded:
+        try:
+            encoded, refusal = self.child.pipe.recv()
+        except (EOFError, OSError) as fault:
+            raise self._lost() from fault
+        if encoded is None:
+            raise DermisError(refusal)
+        found: Encoded = encoded
+        return found
+
+    def _lost(self) -> LostProcessError:
+        return LostProcessError(f"a process that encodes images: {self.child.fate()}")
+
+
+def _apart(job: Job) -> list[memoryview]:
+    """A job without the numbers of its arrays, and these."""
+    arrays: list[pickle.PickleBuffer] = []
+    head = pickle.dumps(job, protocol=5, buffer_callback=arrays.append)
+    return [memoryview(head), *(array.raw() for array in arrays)]
+
+
+def _padded(size: int) -> int:
+    return -(-size // _PAGE) * _PAGE
+
+
+def _serve(pipe: Any, memory: Any, encode: Callable[..., Encoded]) -> None:
+    """What such a process does."""
+    view = memoryview(memory).cast("B")
+    while True:
+        try:
+            head, *arrays = [view[begin:end] for begin, end in pipe.recv()]
+        except EOFError:
+            return
+        job = pickle.loads(head, buffers=arrays)
+        answer: tuple[Encoded | None, str]
+        try:
+            answer = encode(*job), ""
+        except DermisError as fault:
+            answer = None, str(fault)
+        pipe.send(answer)

@@ -1,0 +1,133 @@
+"""A run: which shards are missing, who draws them, and what is written when all are there."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from dermis.apps.batch.datasheet import write_datasheet
+from dermis.apps.batch.index import write_index
+from dermis.apps.batch.settling import settle
+from dermis.apps.batch.shards import Shard, is_there, is_whole, remove_leftovers, shards_of
+from dermis.apps.batch.spec import Spec
+from dermis.apps.batch.told import Told
+from dermis.apps.batch.worker import Failure, Work
+from dermis.base.atomic_write import refuse_output
+from dermis.base.errors import notify, refuse
+from dermis.base.reading import read_text
+
+SPEC_FILE = "spec.toml"
+"""Name of the spec in the folder of its data set: another one is refused there."""
+
+
+class Crew(Protocol):
+    """Who draws: `Processes` of this machine, or those of a `Cluster`."""
+
+    def draw(self, work: Work, shards: Sequence[Shard]) -> Iterator[Told]:
+        """Draw the shards, each whole or not at all; what happens is told as it does."""
+        ...
+
+
+@dataclass
+class Progress:
+    """How far a run is.
+
+    images : drawn, of those to be drawn
+    to_draw : images of the shards that were missing at the start
+    """
+
+    images: int = 0
+    to_draw: int = 0
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a run did.
+
+    images : of the shards that it wrote, less those that were left out
+    seconds : that it took
+    shards : that it wrote
+    skipped : shards that were there and whole
+    failed : images that were left out
+    is_whole : whether all shards of the data set are there, and with them index and datasheet
+    """
+
+    images: int
+    seconds: float
+    shards: int
+    skipped: int
+    failed: tuple[Failure, ...] = field(default=())
+    is_whole: bool = False
+
+
+def run(
+    work: Work,
+    crew: Crew,
+    part: tuple[int, int] = (0, 1),
+    told: Callable[[Progress], None] = lambda progress: None,
+) -> Report:
+    """Draw the missing shards of a data set, or of a part of it.
+
+    part : (i, n) for every n-th shard from the i-th on, i from 0: n runs, on any machines, make the data set
+    told : called whenever images were drawn
+
+    Raises DermisError for what the spec, the disk or the machine is at fault for; what is whole stays.
+    """
+    began = time.monotonic()
+    claim(work.out, work.spec)
+    every = shards_of(work.spec)
+    mine = every[part[0] :: part[1]]
+    missing = [shard for shard in mine if not is_whole(work.out, shard, work.spec)]
+    remove_leftovers(work.out, mine)
+    try:
+        images, failed = _drawn(crew, work, missing, told)
+    finally:
+        remove_leftovers(work.out, mine)
+    whole = all(is_there(work.out, shard, work.spec) for shard in every)
+    if whole:  # whoever sees it writes the same bytes
+        write_index(work.out, work.spec)
+        write_datasheet(work.out, work.spec)
+    seconds = time.monotonic() - began
+    return Report(images, seconds, len(missing), len(mine) - len(missing), failed, whole)
+
+
+def claim(out: Path, spec: Spec) -> None:
+    """Make the folder of a data set, or find it begun with the same spec.
+
+    Raises DermisError for a folder of another one, and where nothing can be written.
+    """
+    place = out / SPEC_FILE
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        there = place.exists()
+    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
+        refuse_output(out, fault)
+    if there:
+        if read_text(place, "the spec of a data set") != spec.text():
+            remedy = "Choose another folder, or give the spec that it was begun with"
+            refuse(out, "a folder for this data set", f"{SPEC_FILE} in it is another's", remedy)
+        return
+    settle(place, lambda path: path.write_text(spec.text(), encoding="utf-8"))
+
+
+def _drawn(
+    crew: Crew, work: Work, missing: Sequence[Shard], told: Callable[[Progress], None]
+) -> tuple[int, tuple[Failure, ...]]:
+    """How many images are in the shards that were drawn, and what was left out of them."""
+    progress = Progress(0, sum(shard.stop - shard.first for shard in missing))
+    failed: list[Failure] = []
+    notes = set[str]()
+    for news in crew.draw(work, missing) if missing else ():
+        if news.note and news.note not in notes:
+            notes.add(news.note)
+            notify(news.note)
+        if news.again:
+            notify(f"{news.again}; its shard is drawn again")
+        failed += news.failed
+        if news.images:
+            progress.images += news.images
+            told(progress)
+    return progress.to_draw - len(failed), tuple(sorted(failed))

@@ -1,0 +1,184 @@
+"""Shards: the unit in which a data set is drawn, written and found again."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from dermis.apps.batch.folder_files import FolderWriter, folder_sha256
+from dermis.apps.batch.settling import leftovers, remove, take_name, unfinished_name
+from dermis.apps.batch.spec import Spec
+from dermis.apps.batch.stamps import MOST_BYTES, NAME, Stamp, made_with, read_stamp
+from dermis.apps.batch.tar_files import TarWriter, tar_sha256, tar_stamp
+from dermis.base.atomic_write import refuse_output
+from dermis.base.errors import DermisError, refuse, shortened
+from dermis.base.reading import opened, read_file, understood
+
+EXPECTED = "a shard of a data set"
+_SHARD_NAME = re.compile(r"shard-(\d{5,9})(\.tar)?")
+_LONGEST_REASON = 200  # letters
+
+
+@dataclass(frozen=True, order=True)
+class Shard:
+    """Images from `first` to before `stop`."""
+
+    index: int
+    first: int
+    stop: int
+
+
+def shards_of(spec: Spec) -> list[Shard]:
+    """All shards of a data set, the last one with the images that are left."""
+    starts = range(0, spec.count, spec.shard_size)
+    return [Shard(k, first, min(first + spec.shard_size, spec.count)) for k, first in enumerate(starts)]
+
+
+def shard_path(out: Path, shard: Shard, spec: Spec) -> Path:
+    """Its tar file or folder."""
+    return out / f"shard-{shard.index:05d}{'.tar' if spec.format == 'webdataset' else ''}"
+
+
+def shard_index(path: Path) -> int | None:
+    """The number of a shard by its name, None for what is none."""
+    found = _SHARD_NAME.fullmatch(path.name)
+    return int(found[1]) if found else None
+
+
+def key_of(number: int) -> str:
+    """How the names of an image's files begin."""
+    return f"{number:09d}"
+
+
+class ShardWriter:
+    """Writes a shard under another name, which becomes its own when the context is left and it is whole.
+
+    adapter : what draws it, for the data sheet
+
+    Raises DermisError when it cannot be written, with nothing left of it.
+    """
+
+    def __init__(self, out: Path, shard: Shard, spec: Spec, adapter: str = "") -> None:
+        self._target, self._shard, self._spec = shard_path(out, shard, spec), shard, spec
+        self._unfinished, self._adapter = unfinished_name(self._target), adapter
+        self._next = shard.first
+        self._written, self._left_out = 0, dict[int, str]()
+
+    def __enter__(self) -> Self:
+        kind = TarWriter if self._spec.format == "webdataset" else FolderWriter
+        try:
+            self._files: TarWriter | FolderWriter = kind(self._unfinished)
+        except OSError as fault:
+            refuse_output(self._target, fault)
+        return self
+
+    def add(self, number: int, entries: Mapping[str, bytes]) -> None:
+        """Write the files of an image, by suffix; images come in the order of their numbers."""
+        if not self._next <= number < self._shard.stop:
+            raise ValueError(f"image {number} comes after {self._next - 1}, in {self._shard}")
+        self._next, self._written = number + 1, self._written + 1
+        try:
+            for suffix in sorted(entries):
+                self._files.add(f"{key_of(number)}.{suffix}", entries[suffix])
+        except OSError as fault:
+            refuse_output(self._target, fault)
+
+    def leave_out(self, number: int, reason: str) -> None:
+        """Record an image that could not be made."""
+        self._left_out[number] = shortened(reason, _LONGEST_REASON)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if error is None:
+                self._files.finish(self._stamp())
+                take_name(self._unfinished, self._target)
+        except OSError as fault:
+            refuse_output(self._target, fault)
+        finally:
+            with contextlib.suppress(OSError):  # a full disk says so again
+                self._files.close()
+            remove(self._unfinished)
+
+    def _stamp(self) -> bytes:
+        shard, spec = self._shard, self._spec
+        if self._written + len(self._left_out) != shard.stop - shard.first:
+            raise ValueError(f"{self._written} images and {len(self._left_out)} left out are not {shard}")
+        left_out = tuple(sorted(self._left_out.items()))
+        digest, made = self._files.sha256(), made_with(self._adapter)
+        stamp = Stamp(spec.digest(), shard.index, shard.first, shard.stop, left_out, digest, made).data()
+        if len(stamp) > MOST_BYTES:
+            came = f"{len(left_out)} could not be made, such as: {left_out[0][1]}"
+            refuse(self._target, "a shard of images most of which can be made", came, "Correct the spec")
+        return stamp
+
+
+def stamp_of(path: Path) -> Stamp:
+    """What a shard says of itself; its other bytes are not read.
+
+    Raises DermisError where it is not whole, as far as its end tells.
+    """
+    if path.is_dir():
+        return read_stamp(read_file(path / NAME, EXPECTED, MOST_BYTES), path)
+    with opened(path, EXPECTED) as file, understood(path, EXPECTED):
+        return read_stamp(tar_stamp(file)[1], path)
+
+
+def is_there(out: Path, shard: Shard, spec: Spec) -> bool:
+    """Whether a shard stands under its name, which it gets when it is whole.
+
+    Raises DermisError for a shard of another data set.
+    """
+    path = shard_path(out, shard, spec)
+    try:
+        stamp = stamp_of(path)
+    except DermisError:
+        return False
+    if stamp.spec != spec.digest() or (stamp.index, stamp.first, stamp.stop) != (
+        shard.index,
+        shard.first,
+        shard.stop,
+    ):
+        remedy = "Choose another folder, or give the spec that it was begun with"
+        refuse(path, "a shard of this data set", "it belongs to that of another spec", remedy)
+    return True
+
+
+def is_whole(out: Path, shard: Shard, spec: Spec) -> bool:
+    """Whether a shard is there with every byte as it was written: all of it is read.
+
+    Raises DermisError for a shard of another data set.
+    """
+    path = shard_path(out, shard, spec)
+    if not is_there(out, shard, spec):
+        return False
+    try:
+        return _sha256(path) == stamp_of(path).sha256
+    except DermisError:
+        return False
+
+
+def remove_leftovers(out: Path, shards: Collection[Shard] | None = None) -> None:
+    """Remove what killed runs left unfinished.
+
+    shards : of which no other run is at work; all where None
+    """
+    mine = None if shards is None else {shard.index for shard in shards}
+    for path, name in leftovers(out).items():
+        index = shard_index(Path(name))
+        if mine is None or index is None or index in mine:
+            remove(path)
+
+
+def _sha256(path: Path) -> str:
+    """Of what lies in a shard before its stamp."""
+    if path.is_dir():
+        return folder_sha256(path, sorted(one.name for one in path.iterdir() if one.name != NAME))
+    with opened(path, EXPECTED) as file, understood(path, EXPECTED):
+        return tar_sha256(file, tar_stamp(file)[0])

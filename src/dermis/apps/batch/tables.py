@@ -1,0 +1,183 @@
+"""The tables of a spec: what each of them draws."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from dermis.apps.batch.distributions import Choice, Constant, Distribution, Uniform
+from dermis.apps.batch.drawn import Anything, OneOf, Within
+from dermis.human.published import OLD, YOUNG
+from dermis.scene.lights import light_presets
+from dermis.scene.plain import Plain
+
+RIG = "rig"
+MIXTURE = "mixture"
+NONE = "none"
+CAMERA, ANGLES = "camera", "angles"
+BACKGROUNDS = "none", "gradient", "environment", "colour"
+_TURN = Within(-180, 180, "degrees")
+_LEAN = Within(-85, 85, "degrees: straight above there is no side")
+_SHARE = Within(0, 1)
+_AGE = Within(YOUNG, OLD, "years: the ages of the published people")
+_TREND = Within(-1, 1, "0 is the average")
+_MELANIN = Within(0, 10, "0.3 is blond, 8 black")
+_AWAY = Within(150, 20_000, "mm: before the nose, and not across a street")
+_STOPS = Within(0, 100, "light is not negative")
+_Dials = dict[str, Annotated[Distribution, Anything()]]
+
+
+def _choice(*names: str) -> Choice:
+    return Choice(tuple(map(Constant, names)), (1.0,) * len(names))
+
+
+class PersonTable(Plain):
+    """Who is seen: people drawn by a seed, or heads by name. What is left out is as the seed draws it."""
+
+    head: Annotated[Distribution | None, OneOf()] = None
+    """Heads instead of drawn people: names that `dermis render` takes, files of people (.json), of meshes
+    (.glb, .obj, .ply) or of scenes (.toml), whose head and skin are taken."""
+    age: Annotated[Distribution | None, _AGE] = None
+    """Age; skin and hair follow it [years]."""
+    sex: Annotated[Distribution | None, _SHARE] = None
+    """From 0, female, to 1, male."""
+    african: Annotated[Distribution | None, _SHARE] = None
+    """Share of the ancestry; the ratios of the three count, those left out are 0."""
+    asian: Annotated[Distribution | None, _SHARE] = None
+    """Share of the ancestry."""
+    caucasian: Annotated[Distribution | None, _SHARE] = None
+    """Share of the ancestry."""
+    weight: Annotated[Distribution | None, _TREND] = None
+    """From -1, least, to 1, most."""
+    muscle: Annotated[Distribution | None, _TREND] = None
+    """From -1, least, to 1, most."""
+    hair_eumelanin: Annotated[Distribution | None, _MELANIN] = None
+    """Of the hair as it grew: 0.3 is blond, 1.3 brown, 8 black."""
+    hair_pheomelanin: Annotated[Distribution | None, _MELANIN] = None
+    """Of the hair as it grew: 2 with little of the other is red."""
+    skin: _Dials = Field(default_factory=dict)
+    """Numbers of `SkinLook`: melanin, blood, freckles, spots, oil ..."""
+    eyes: _Dials = Field(default_factory=dict)
+    """Numbers of `EyeLook`: eumelanin, pupil_mm, redness."""
+    hair: _Dials = Field(default_factory=dict)
+    """Of `HairLook`: style, length_mm, density, curl, grey, beard_mm ..."""
+    targets: _Dials = Field(default_factory=dict)
+    """Weights of published targets by name, see `dermis head --list-targets`."""
+
+
+class ExpressionTable(Plain):
+    """What the face does: a named expression, or muscles at random."""
+
+    name: Annotated[Distribution, OneOf()] = Constant("neutral")
+    """Of the package's, of the spec's own under [expressions.NAME], or "mixture": in each part of the face
+    one movement or none, so that none works against another."""
+    intensity: Annotated[Distribution, Within(0, 1.5, "beyond it faces come apart")] = Constant(1.0)
+    """Factor of all weights."""
+    asymmetry: Annotated[Distribution, Within(-1, 1, "at 1 the right side rests")] = Constant(0.0)
+    """How much more the left side moves, and how much less the right one."""
+    variation: Annotated[Distribution, _SHARE] = Constant(0.0)
+    """How much each movement differs from what the expression says: standard deviation of the logarithm."""
+
+
+class TurnTable(Plain):
+    """How the head is turned by the neck."""
+
+    yaw_deg: Annotated[Distribution, Within(-60, 60, "degrees that a neck turns")] = Constant(0.0)
+    """Turn to the head's left [degrees]."""
+    pitch_deg: Annotated[Distribution, Within(-40, 40, "degrees that a neck turns")] = Constant(0.0)
+    """Nod downwards [degrees]."""
+    roll_deg: Annotated[Distribution, Within(-35, 35, "degrees that a neck turns")] = Constant(0.0)
+    """Tilt to the head's right shoulder [degrees]."""
+
+
+class GazeTable(Plain):
+    """Where the eyes look."""
+
+    at: Annotated[Distribution, OneOf(lambda: (CAMERA, ANGLES))] = Constant(CAMERA)
+    """The camera, or by the two angles."""
+    yaw_deg: Annotated[Distribution, Within(-36, 36, "degrees that eyes turn")] = Constant(0.0)
+    """To the head's left, from where the face points [degrees]."""
+    pitch_deg: Annotated[Distribution, Within(-30, 30, "degrees that eyes turn")] = Constant(0.0)
+    """Downwards [degrees]."""
+
+
+class CameraTable(Plain):
+    """From where the face is seen. Whatever is drawn, the whole face is in the picture."""
+
+    distance_mm: Annotated[Distribution, _AWAY] = Constant(1100.0)
+    """From the middle of the face [mm]."""
+    yaw_deg: Annotated[Distribution, _TURN] = Constant(0.0)
+    """Around the head, to its left [degrees]."""
+    pitch_deg: Annotated[Distribution, _LEAN] = Constant(0.0)
+    """Above it [degrees]."""
+    roll_deg: Annotated[Distribution, _TURN] = Constant(0.0)
+    """Turn of the camera about its axis, clockwise as it looks [degrees]."""
+    frame_mm: Annotated[Distribution, Within(50, 10_000, "mm: from a nose to a crowd")] = Constant(340.0)
+    """Height of what the picture shows at the head [mm]."""
+    focal_mm: Annotated[Distribution | None, Within(8, 1200, "mm: lenses for a sensor 24 mm high")] = None
+    """Focal length of a lens before a sensor 24 mm high, instead of frame_mm [mm]."""
+    offset_x: Annotated[Distribution, _TREND] = Constant(0.0)
+    """How far the face is right of the picture's middle, of half its width [-]."""
+    offset_y: Annotated[Distribution, _TREND] = Constant(0.0)
+    """How far the face is above the picture's middle, of half its height [-]."""
+
+
+class LampTable(Plain):
+    """A lamp of the rig: an even square that faces the head."""
+
+    yaw_deg: Annotated[Distribution, _TURN] = Constant(0.0)
+    """Around the head, to its left, from where it faces [degrees]."""
+    pitch_deg: Annotated[Distribution, _LEAN] = Constant(0.0)
+    """Above it [degrees]."""
+    distance_mm: Annotated[Distribution, Within(400, 20_000, "mm: not in the face")] = Constant(1300.0)
+    """From the middle of the head [mm]."""
+    size_mm: Annotated[Distribution, Within(10, 3000, "mm: from a flashlight to a wall")] = Constant(500.0)
+    """Length of its sides [mm]."""
+    strength: Annotated[Distribution, _STOPS] = Constant(1.0)
+    """Irradiance over pi where the head is."""
+    kelvin: Annotated[Distribution, Within(1700, 20_000, "K: from a candle to a blue sky")] = Constant(6500.0)
+    """Colour temperature, white at 6500 [K]."""
+
+
+class LightTable(Plain):
+    """Lamps: a rig of the package, or one of three lamps at random."""
+
+    kind: Annotated[Distribution, OneOf(lambda: [RIG, *light_presets()])] = Constant("studio")
+    """Of the package's rigs, or "rig": key, fill and rim as their tables say."""
+    turn_deg: Annotated[Distribution, _TURN] = Constant(0.0)
+    """Turn of all lamps about the upward axis, to the head's left [degrees]."""
+    strength: Annotated[Distribution, _STOPS] = Constant(1.0)
+    """Factor of all lamps: what they have beside the environment."""
+    key: LampTable = LampTable(yaw_deg=Uniform(-70, 70), pitch_deg=Uniform(-5, 60))
+    """The lamp that draws the face."""
+    fill: LampTable = LampTable(yaw_deg=Uniform(-60, 60), size_mm=Constant(900), strength=Constant(0.2))
+    """The lamp that lights its shadows."""
+    rim: LampTable = LampTable(yaw_deg=Uniform(120, 180), pitch_deg=Constant(25), strength=Constant(0.4))
+    """The lamp behind the head."""
+
+
+class EnvironmentTable(Plain):
+    """Light from all around."""
+
+    name: Annotated[Distribution, OneOf()] = Constant(NONE)
+    """"none", "uniform", a sample (royal_esplanade, lebombo; fetched once) or files (.hdr, .exr)."""
+    turn_deg: Annotated[Distribution, _TURN] = Uniform(-180, 180)
+    """Turn about the upward axis, counter-clockwise as seen from above [degrees]."""
+    strength: Annotated[Distribution, _STOPS] = Constant(1.0)
+    """Factor of its radiance."""
+
+
+class BackgroundTable(Plain):
+    """What is behind the head, which sheds no light."""
+
+    kind: Annotated[Distribution, OneOf(lambda: BACKGROUNDS)] = Constant("gradient")
+    """"none" for alpha, "gradient", "colour", or the "environment", where there is one, else the gradient."""
+    red: Annotated[Distribution, _SHARE] = Uniform(0, 0.6)
+    """Of the colour, linear Rec. 709."""
+    green: Annotated[Distribution, _SHARE] = Uniform(0, 0.6)
+    """Of the colour, linear Rec. 709."""
+    blue: Annotated[Distribution, _SHARE] = Uniform(0, 0.6)
+    """Of the colour, linear Rec. 709."""
+    blur: Annotated[Distribution, _SHARE] = Constant(0.0)
+    """Roughness of the mirror in which the environment behind the head is seen."""

@@ -1,0 +1,70 @@
+"""Eyes, teeth and tongue as fine triangles with a colour at each corner: they have no maps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.export.targets.mitsuba_ply import ply
+from dermis.frame.baking import baked_colours
+from dermis.frame.renderer import Renderer
+from dermis.mesh.head import Head
+from dermis.scene.model import Scene
+
+_FINER = 4  # times, along a side
+
+
+class Divided(NamedTuple):
+    """Triangles that are divided evenly.
+
+    triangle : (n,) in which each corner lies
+    weights : (n, 3) of that triangle's corners
+    corners : (m, 3) of the smaller triangles
+    """
+
+    triangle: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    corners: NDArray[np.int64]
+
+
+def divided(triangles: NDArray[np.integer], finer: int = _FINER) -> Divided:
+    """Each of some triangles as finer^2 smaller ones, which share no corners with those of others.
+
+    triangles : (t,) numbers
+    """
+    places = [(i, j) for i in range(finer + 1) for j in range(finer + 1 - i)]
+    at = {place: index for index, place in enumerate(places)}
+    upright = [(at[i, j], at[i + 1, j], at[i, j + 1]) for i in range(finer) for j in range(finer - i)]
+    turned = [
+        (at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]) for i in range(finer) for j in range(finer - i - 1)
+    ]
+    second, third = np.array(places, np.float64).T / finer
+    weights = np.stack([1.0 - second - third, second, third], axis=1)
+    first = len(places) * np.arange(len(triangles))[:, None, None]
+    corners = (first + np.array(upright + turned)).reshape(-1, 3)
+    return Divided(np.repeat(triangles, len(places)), np.tile(weights, (len(triangles), 1)), corners)
+
+
+def painted_meshes(renderer: Renderer, scene: Scene) -> dict[int, bytes]:
+    """Files of all materials but the skin, by their indices; the head about its centre [mm]."""
+    mesh = scene.head.mesh
+    opaque = [k for k, material in enumerate(mesh.materials) if material.kind != "skin"]
+    parts = {k: divided(np.flatnonzero(mesh.material == k)) for k in opaque if (mesh.material == k).any()}
+    if not parts:
+        return {}
+    triangle, weights = (np.concatenate([one[i] for one in parts.values()]) for i in (0, 1))
+    colours = baked_colours(renderer, scene, triangle, weights[:, 1:])
+    ends = np.cumsum([len(one.triangle) for one in parts.values()])[:-1]
+    each = zip(parts.items(), np.split(colours, ends), strict=True)
+    return {k: _file(scene.head, part, colour) for (k, part), colour in each}
+
+
+def _file(head: Head, part: Divided, colours: NDArray[np.float32]) -> bytes:
+    mesh, corners = head.mesh, head.mesh.triangles[part.triangle]
+    between = part.weights[:, :, None]
+    places = (between * mesh.positions[corners]).sum(axis=1) - np.array(head.centre_mm)
+    normals = (between * mesh.normals[corners]).sum(axis=1)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return ply(part.corners, places, normals, None, np.clip(colours, 0.0, 1.0))

@@ -1,0 +1,156 @@
+"""A scene in pbrt's own words (version 4): millimetres, relative to the head's centre."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from dermis.apps.validation.truths.lights import facing_irradiance
+from dermis.base.errors import notify
+from dermis.base.registry import Registry
+from dermis.environment.panorama import UNIFORM
+from dermis.mesh.mesh import Mesh
+from dermis.scene.camera import Camera
+from dermis.scene.environment import Environment
+from dermis.scene.lights import (
+    LIGHTS,
+    DirectionalLight,
+    Light,
+    PointLight,
+    RectangleLight,
+    SphereLight,
+    SpotLight,
+    StripeLight,
+)
+
+Parameters = Mapping[str, Any]
+Lines = list[str]
+SIDE, SAMPLES = 1024, 256
+_MOST_BOUNCES = 100
+
+
+def directive(word: str, kind: str, parameters: Parameters | None = None) -> str:
+    """A line such as `Material "subsurface" "float eta" [ 1.4 ]`.
+
+    parameters : values by type and name; text, a truth, numbers, or arrays of them
+    """
+    told = [f'"{key}" [ {_told(value)} ]' for key, value in (parameters or {}).items()]
+    return " ".join([word, f'"{kind}"', *told])
+
+
+def _told(value: Any) -> str:
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "_").replace('"', "_") + '"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    return " ".join(f"{number:.7g}" for number in np.ravel(np.asarray(value)).tolist())
+
+
+def view_of(camera: Camera, file: str) -> Lines:
+    """Camera, film and integrator: all before the world begins."""
+    places = np.concatenate([camera.position, camera.target, camera.up])
+    half, shift = camera.window(1.0)
+    screen = [(end + shift[axis]) * half[axis] for axis in (0, 1) for end in (-1.0, 1.0)]
+    return [
+        "Scale -1 1 1  # pbrt's coordinates are left-handed",
+        f"LookAt {_told(places)}",
+        directive("Camera", "perspective", {"float fov": 90.0, "float screenwindow": screen}),
+        directive("Sampler", "zsobol", {"integer pixelsamples": SAMPLES}),
+        directive("Integrator", "volpath", {"integer maxdepth": _MOST_BOUNCES}),
+        directive(
+            "Film", "rgb", {"string filename": file, "integer xresolution": SIDE, "integer yresolution": SIDE}
+        ),
+    ]
+
+
+def lights_of(lights: Iterable[Light], environment: Environment | None) -> Lines:
+    """What shines; what pbrt has not is told in a note and left out."""
+    lines: Lines = []
+    for number, light in enumerate(lights, start=1):
+        if PBRT[light.kind] is _no_light:
+            notify(f"pbrt has no {light.kind} light: light {number} is left out")
+            continue
+        lines += ["AttributeBegin", *PBRT[light.kind](light), "AttributeEnd"]
+    if environment is not None and environment.name != UNIFORM:
+        notify(f"the panorama {environment.name} is left out: pbrt wants another projection")
+    elif environment is not None:
+        lines.append(directive("LightSource", "infinite", {"rgb L": [environment.exposure] * 3}))
+    return lines
+
+
+def part_of(mesh: Mesh, faces: Any, centre_mm: Sequence[float]) -> bytes:
+    """A binary PLY file of some triangles, with normals and uv whose v is upwards."""
+    vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
+    columns = [mesh.positions[vertex] - np.asarray(centre_mm), mesh.normals[vertex], mesh.uv[vertex]]
+    table = np.concatenate(columns, axis=1).astype("<f4")
+    table[:, 7] = 1.0 - table[:, 7]
+    rows = np.empty(len(corner) // 3 if corner.ndim == 1 else len(corner), [("n", "u1"), ("v", "<i4", 3)])
+    rows["n"], rows["v"] = 3, corner.reshape(-1, 3)
+    names = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz", "u", "v"))
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertex)}\n{names}"
+        f"element face {len(rows)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    return header.encode() + table.tobytes() + rows.tobytes()
+
+
+def _distance(light: PointLight) -> float:
+    return float(np.linalg.norm(np.subtract(light.target, light.position)))
+
+
+def _intensity(light: PointLight) -> Any:
+    return np.multiply(light.irradiance, _distance(light) ** 2)
+
+
+def _point(light: PointLight) -> Lines:
+    told = {"point3 from": light.position, "rgb I": _intensity(light)}
+    return [directive("LightSource", "point", told)]
+
+
+def _spot(light: SpotLight) -> Lines:
+    cone = {"float coneangle": light.outer_degrees}
+    cone["float conedeltaangle"] = light.outer_degrees - light.inner_degrees
+    places = {"point3 from": light.position, "point3 to": light.target}
+    return [directive("LightSource", "spot", {**places, "rgb I": _intensity(light), **cone})]
+
+
+def _rectangle(light: RectangleLight) -> Lines:
+    forward = np.subtract(light.target, light.position) / _distance(light)
+    across = np.cross(forward, (0.0, 1.0, 0.0))
+    if np.linalg.norm(across) < 1e-6:
+        across = np.array([1.0, 0.0, 0.0])
+    across = across / np.linalg.norm(across)
+    above = np.cross(across, forward)
+    # Seen along the light the second side lies left of the first: the normal then points to the target.
+    first, second = -0.5 * light.width_mm * across, 0.5 * light.height_mm * above
+    corners = [np.add(light.position, a * first + b * second) for b in (-1, 1) for a in (-1, 1)]
+    given = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
+    return [
+        directive("AreaLightSource", "diffuse", {"rgb L": np.divide(light.irradiance, given)}),
+        directive("Shape", "bilinearmesh", {"point3 P": corners}),
+    ]
+
+
+def _sphere(light: SphereLight) -> Lines:
+    given = np.pi * (light.radius_mm / _distance(light)) ** 2
+    return [
+        f"Translate {_told(light.position)}",
+        directive("AreaLightSource", "diffuse", {"rgb L": np.divide(light.irradiance, given)}),
+        directive("Shape", "sphere", {"float radius": light.radius_mm}),
+    ]
+
+
+def _directional(light: DirectionalLight) -> Lines:
+    told = {"point3 from": (0.0, 0.0, 0.0), "point3 to": light.direction, "rgb L": light.irradiance}
+    return [directive("LightSource", "distant", told)]
+
+
+def _no_light(light: StripeLight) -> Lines:
+    return []
+
+
+_OWN = (_point, _spot, _rectangle, _sphere, _directional, _no_light)
+PBRT: Registry[Callable[[Any], Lines]] = Registry("light of pbrt", dict(zip(LIGHTS, _OWN, strict=True)))
+"""What writes a kind of light for pbrt."""

@@ -1,0 +1,123 @@
+"""A head's geometry in a USD stage: one mesh with a subset for each material, and hairs as curves; metres."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.extras import needed
+from dermis.mesh.eye_layout import eye_uv
+from dermis.mesh.gltf.moved_points import MovedPoints
+from dermis.mesh.head import Head
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import Strands, points_of
+
+Floats = NDArray[np.float32]
+Ints = NDArray[np.int32]
+TASK = "writing USD"
+METRES = 1e-3
+"""Of a millimetre."""
+
+
+class Faces(NamedTuple):
+    """Polygons: quads first, then triangles that are no half of one.
+
+    sides : (f,) corners of each
+    corner : (n,) vertices of the mesh, face after face
+    material : (f,)
+    """
+
+    sides: Ints
+    corner: Ints
+    material: Ints
+
+
+def faces_of(mesh: Mesh) -> Faces:
+    """The polygons of a mesh whose quads are in halves."""
+    halves, triangles = mesh.quads, mesh.triangles
+    alone = np.delete(np.arange(len(triangles)), halves.ravel())
+    quads = np.column_stack([triangles[halves[:, 0]], triangles[halves[:, 1]][:, 1]])
+    return Faces(
+        np.concatenate([np.full(len(halves), 4), np.full(len(alone), 3)]).astype(np.int32),
+        np.concatenate([quads.ravel(), triangles[alone].ravel()]).astype(np.int32),
+        np.concatenate([mesh.material[halves[:, 0]], mesh.material[alone]]),
+    )
+
+
+def corner_of_point(mesh: Mesh) -> NDArray[np.intp]:
+    """(p,) a vertex of each point."""
+    return np.unique(mesh.point, return_index=True)[1]
+
+
+def add_mesh(stage: Any, path: Any, head: Head, moved: MovedPoints) -> dict[int, Any]:
+    """Write the mesh at rest; the subset's prim of each material that is used.
+
+    moved : the head's vertices with all morph targets at 0
+    """
+    geometry, vt = needed("pxr.UsdGeom", TASK), needed("pxr.Vt", TASK)
+    mesh, faces = head.mesh, faces_of(head.mesh)
+    one = corner_of_point(mesh)
+    made = geometry.Mesh.Define(stage, path)
+    points = vt.Vec3fArray.FromNumpy(metres(moved.positions_mm[one]))
+    made.CreatePointsAttr(points)
+    made.CreateExtentAttr(geometry.PointBased.ComputeExtent(points))
+    made.CreateFaceVertexCountsAttr(vt.IntArray.FromNumpy(faces.sides))
+    made.CreateFaceVertexIndicesAttr(vt.IntArray.FromNumpy(mesh.point[faces.corner].astype(np.int32)))
+    made.CreateNormalsAttr(vt.Vec3fArray.FromNumpy(np.ascontiguousarray(moved.normals[one])))
+    made.SetNormalsInterpolation(geometry.Tokens.vertex)
+    made.CreateSubdivisionSchemeAttr(geometry.Tokens.none)
+    _add_uv(made, texture_coordinates(head), faces)
+    subsets = {}
+    for kind in np.unique(faces.material).tolist():
+        own = vt.IntArray.FromNumpy(np.flatnonzero(faces.material == kind).astype(np.int32))
+        subsets[kind] = geometry.Subset.CreateGeomSubset(
+            made, f"part_{kind}", geometry.Tokens.face, own, "materialBind"
+        )
+    geometry.Subset.SetFamilyType(made, "materialBind", geometry.Tokens.partition)
+    return subsets
+
+
+def texture_coordinates(head: Head) -> Floats:
+    """(v, 2) of the vertices, v downwards: eyes of true shape by the layout of their picture."""
+    mesh, found = head.mesh, head.mesh.uv.copy()
+    if head.eyes is not None:
+        frames = head.eyes.frames(head.control, head.control.rest)
+        for material, frame in zip(head.eyes.material, frames, strict=True):
+            own = np.unique(mesh.triangles[mesh.material == material])
+            found[own] = eye_uv(mesh.positions[own] @ frame[:3, :3].T + frame[:3, 3])
+    return found
+
+
+def _add_uv(made: Any, uv: Floats, faces: Faces) -> None:
+    """Texture coordinates (v, 2) with v upwards, one for each vertex of ours."""
+    geometry, sdf, vt = (needed(f"pxr.{name}", TASK) for name in ("UsdGeom", "Sdf", "Vt"))
+    upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
+    primvar = geometry.PrimvarsAPI(made).CreatePrimvar(
+        "st", sdf.ValueTypeNames.TexCoord2fArray, geometry.Tokens.faceVarying
+    )
+    primvar.Set(vt.Vec2fArray.FromNumpy(upwards))
+    primvar.SetIndices(vt.IntArray.FromNumpy(faces.corner))
+
+
+def add_hairs(stage: Any, path: Any, head: Head, strands: Strands) -> Any:
+    """Write hairs at rest as lines with a width at each knot."""
+    geometry, vt = needed("pxr.UsdGeom", TASK), needed("pxr.Vt", TASK)
+    places = strands.places_mm(head.mesh, points_of(head.mesh))
+    made = geometry.BasisCurves.Define(stage, path)
+    count = np.full(len(places), places.shape[1], np.int32)
+    points = vt.Vec3fArray.FromNumpy(metres(places.reshape(-1, 3)))
+    widths = vt.FloatArray.FromNumpy((2.0 * METRES * strands.radius_mm.ravel()).astype(np.float32))
+    made.CreateTypeAttr(geometry.Tokens.linear)
+    made.CreateCurveVertexCountsAttr(vt.IntArray.FromNumpy(count))
+    made.CreatePointsAttr(points)
+    made.CreateWidthsAttr(widths)
+    made.SetWidthsInterpolation(geometry.Tokens.vertex)
+    made.CreateExtentAttr(geometry.Curves.ComputeExtent(points, widths))
+    return made
+
+
+def metres(places_mm: NDArray[Any]) -> Floats:
+    """Of places in mm."""
+    return np.ascontiguousarray(METRES * places_mm.astype(np.float64), np.float32)

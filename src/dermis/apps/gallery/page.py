@@ -1,0 +1,178 @@
+"""The gallery as a self-contained HTML file that needs no network."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import html
+import re
+import unicodedata
+from collections.abc import Iterator, Sequence
+from importlib import resources
+from pathlib import Path
+from string import Template
+
+from dermis.apps.gallery.run import Picture
+from dermis.base import citations as cite
+from dermis.base.atomic_write import replacing
+
+_FIELD = re.compile(r"(\w+)\s*=\s*\{")
+_ACCENT = re.compile(r"\\(['\"`^~])\s*(\w)")
+_ABOVE = {"'": "\u0301", '"': "\u0308", "`": "\u0300", "^": "\u0302", "~": "\u0303"}
+_SIGNS = {
+    r"$\mu$": "µ",
+    r"\&": "&",
+    r"\AA": "Å",
+    "; others": " and others",
+    "---": "—",
+    "--": "–",
+    "``": "“",
+    "''": "”",
+}
+
+
+def write_page(path: Path, pictures: Sequence[Picture], head: str, adapter: str) -> None:
+    """Write the page; the file is complete or not there.
+
+    head, adapter : what the pictures show, and what drew them
+
+    Raises DermisError when it cannot be written.
+    """
+    page = Template(_resource("page.html")).substitute(
+        style=_resource("page.css"),
+        script=_resource("page.js"),
+        head=html.escape(head),
+        adapter=html.escape(adapter),
+        contents="".join(_entry(picture) for picture in pictures),
+        pictures="\n".join(_section(picture) for picture in pictures),
+        deck=_deck(pictures),
+        works=_works(pictures),
+    )
+    with replacing(path) as trial:
+        trial.write_text(page, encoding="utf-8")
+
+
+def _entry(picture: Picture) -> str:
+    return f'<li><a href="#{picture.script.name}">{html.escape(picture.script.title)}</a></li>'
+
+
+def _section(picture: Picture) -> str:
+    script = picture.script
+    equation = f'<p class="equation">{_equation(script.equation)}</p>' if script.equation else ""
+    return (
+        f'<section id="{script.name}"><h2>{html.escape(script.title)}</h2>'
+        f"<p>{html.escape(script.caption)}</p>{equation}{_panels(picture)}"
+        f'<p class="facts">{_facts(picture)}</p></section>'
+    )
+
+
+def _equation(text: str) -> str:
+    """HTML of an equation in one line: _ begins a subscript, ^ a superscript."""
+    low = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
+    return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", low)
+
+
+def _panels(picture: Picture) -> str:
+    if picture.fault:
+        return f'<p class="fault">Not made: {html.escape(picture.fault)}</p>'
+    slider, panels = picture.script.slider, dict(picture.panels)
+    laid_over = _slider(slider, [panels.pop(name) for name in slider]) if slider else ""
+    if not panels:
+        return laid_over
+    columns = picture.script.columns or min(len(panels), 4)
+    figures = "".join(_figure(caption, file) for caption, file in panels.items())
+    return f'{laid_over}<div class="panels" style="--columns: {columns}">{figures}</div>'
+
+
+def _slider(captions: tuple[str, str], files: Sequence[bytes]) -> str:
+    before, after = (html.escape(caption) for caption in captions)
+    below, above = (_source(file) for file in files)
+    said = f"{before} on the left, {after} on the right"
+    return (
+        f'<figure class="slider"><img src="{above}" alt="{after}">'
+        f'<img class="before" src="{below}" alt="{before}">'
+        f'<input type="range" min="0" max="100" value="50" aria-label="{said}">'
+        f"<figcaption><span>{before}</span><span>{after}</span></figcaption></figure>"
+    )
+
+
+def _figure(caption: str, file: bytes) -> str:
+    text = html.escape(caption)
+    return f'<figure><img src="{_source(file)}" alt="{text}"><figcaption>{text}</figcaption></figure>'
+
+
+def _source(file: bytes) -> str:
+    return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
+
+
+def _facts(picture: Picture) -> str:
+    script = picture.script
+    width, height = picture.size
+    facts = [f"<code>dermis gallery --only {script.name}</code>"]
+    facts += [f"{width}×{height}"] if width else []
+    facts += [f"{_rounded(picture.frame_ms)} ms a frame"] if picture.frame_ms else []
+    facts += [f"{picture.seconds:.0f} s in all"]
+    facts += [f'<a href="#{row}" title="row {row[1:]} of the talk, below">{row}</a>' for row in script.deck]
+    facts += [f'<a href="#{key}">{key}</a>' for key in script.sources]
+    return " · ".join(facts)
+
+
+def _rounded(value: float) -> str:
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def _deck(pictures: Sequence[Picture]) -> str:
+    """Rows of the talk with the pictures that show them and the commands that make these."""
+    rows = csv.DictReader(line for line in _resource("deck.csv").splitlines() if not line.startswith("#"))
+    return "".join(_deck_row(row, pictures) for row in rows)
+
+
+def _deck_row(row: dict[str, str], pictures: Sequence[Picture]) -> str:
+    shown = [picture.script for picture in pictures if row["row"] in picture.script.deck]
+    links = ", ".join(f'<a href="#{script.name}">{html.escape(script.title)}</a>' for script in shown)
+    command = row["command"] or " ".join(["dermis gallery", *(f"--only {one.name}" for one in shown)])
+    return (
+        f'<tr id="{row["row"]}"><td>{row["row"]}</td><td>{html.escape(row["shows"])}</td><td>{links}</td>'
+        f"<td><code>{html.escape(command)}</code></td></tr>"
+    )
+
+
+def _works(pictures: Sequence[Picture]) -> str:
+    keys = sorted({key for picture in pictures for key in picture.script.sources})
+    return "".join(f'<dt id="{key}">{key}</dt><dd>{html.escape(reference(key))}</dd>' for key in keys)
+
+
+def _resource(name: str) -> str:
+    return (resources.files("dermis.apps.gallery") / name).read_text(encoding="utf-8")
+
+
+def reference(key: str) -> str:
+    """A work in one line: authors, title, year.
+
+    Raises DermisError for a key that is not in the bibliography.
+    """
+    fields = dict(_fields(cite.bibtex([key])))
+    if "author" in fields:
+        fields["author"] = "; ".join(re.split(r"\s+and\s+", fields["author"]))
+    known = [_plain(fields[name]).rstrip(".") for name in ("author", "title", "year") if name in fields]
+    return ". ".join(known)
+
+
+def _fields(entry: str) -> Iterator[tuple[str, str]]:
+    """Names and values, which may span lines and contain braces."""
+    at = 0
+    while found := _FIELD.search(entry, at):
+        at, depth = found.end(), 1
+        while depth:
+            depth += {"{": 1, "}": -1}.get(entry[at], 0)
+            at += 1
+        yield found[1].lower(), entry[found.end() : at - 1]
+
+
+def _plain(value: str) -> str:
+    """A value without TeX markup."""
+    text = value.replace("{", "").replace("}", "")
+    for sign, meant in _SIGNS.items():
+        text = text.replace(sign, meant)
+    text = _ACCENT.sub(lambda accent: unicodedata.normalize("NFC", accent[2] + _ABOVE[accent[1]]), text)
+    return " ".join(text.split())

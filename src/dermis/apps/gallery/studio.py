@@ -1,0 +1,112 @@
+"""What gallery scripts draw with: one renderer and one head for all of them."""
+
+from __future__ import annotations
+
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.frame.painted import with_painted_maps
+from dermis.frame.rendered import Rendered
+from dermis.frame.renderer import Renderer
+from dermis.mesh.head import Head
+from dermis.mesh.samples import cached
+from dermis.scene.heads import HUMAN, load_head
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+_SCAN = "lee_perry_smith"
+
+
+class Studio:
+    """A renderer, and the head that pictures show.
+
+    name : head to show; by default the scan if it is downloaded, else the human
+    side : of a panel [pixel]
+    settings : fields of `Settings` that override a script's
+    """
+
+    def __init__(
+        self, name: str | None = None, side: int = 448, adapter: str = "auto", **settings: Any
+    ) -> None:
+        self.name = name or (_SCAN if cached(_SCAN) else HUMAN)
+        self.side = side
+        self.adapter, self._settings = adapter, settings
+        self.frames_ms: list[float] = []
+        self._load = cache(load_head)
+
+    @cached_property
+    def renderer(self) -> Renderer:
+        """The renderer, opened on first use."""
+        return Renderer(self.adapter)
+
+    def head(self, name: str | None = None, **options: Any) -> Head:
+        """The head to show, or another one; subdivided once.
+
+        options : of `load_head`
+        """
+        return self._load(name or self.name, subdivide=1, **options)
+
+    def coloured_head(self) -> Head:
+        """The head to show with its colours in a picture, also where the device paints them."""
+        head = self.head()
+        return with_painted_maps(self.renderer.device, head, 1024) if head.maps.painted else head
+
+    def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
+        """(h, w, 3) sRGB bytes.
+
+        scale : of the panel's side
+        settings : fields of `Settings`
+        """
+        return self._draw(scene, scale, settings).srgb8()
+
+    def linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
+        """(h, w, 3) linear Rec. 709: `render` before encoding."""
+        return self._draw(scene, scale, settings).linear()
+
+    def view(self, scene: Scene, view: str, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
+        """(h, w, 3) sRGB bytes of an intermediate result as the viewer shows it.
+
+        view : as named by the viewer, such as "blur 3"
+        """
+        from dermis.apps.viewer.state import PARTS
+        from dermis.apps.viewer.views import Views
+        from dermis.gpu import download
+
+        if view in ("picture", *PARTS):
+            return self.render(scene, scale, parts=PARTS.get(view, "all"), **settings)
+
+        def seen() -> NDArray[np.uint8]:
+            self._draw(scene, scale, settings)
+            texture = Views(self.renderer).draw(scene, self.settings(scale, **settings), view)
+            return np.asarray(download(self.renderer.device, texture), np.uint8)[..., :3]
+
+        return self.renderer.kept_open.run(seen)
+
+    def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
+        """(n, n, 3) light on the atlas, irradiance over pi: level 0 as it enters, higher levels blurred."""
+        from dermis.gpu import download
+
+        def light() -> NDArray[np.float32]:
+            self._draw(scene, 1.0, settings)
+            inputs = self.renderer.prepare(scene, self.settings(**settings))
+            levels, blur = inputs.resources.levels, inputs.blurs[0]
+            layer = blur.own[level]
+            halved = blur.halvings[layer]
+            found = download(self.renderer.device, levels.stacks[halved], layer=layer - levels.first[halved])
+            return np.asarray(found, np.float32)[..., :3] / np.float32(blur.scale)
+
+        return self.renderer.kept_open.run(light)
+
+    def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
+        """A panel's settings."""
+        side = round(scale * self.side)
+        chosen: dict[str, Any] = {"size": (side, side), "atlas": 1024}
+        return Settings(**(chosen | settings | self._settings))
+
+    def _draw(self, scene: Scene, scale: float, settings: dict[str, Any]) -> Rendered:
+        rendered = self.renderer.draw(scene, self.settings(scale, **settings))
+        self.frames_ms.append(rendered.frame_ms)
+        return rendered

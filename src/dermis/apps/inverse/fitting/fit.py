@@ -1,0 +1,153 @@
+"""From a photograph of a face to its light and skin, by frames of the renderer itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dermis.apps.inverse.fitting.certainty import certainty_of
+from dermis.apps.inverse.fitting.fitted import Fitted
+from dermis.apps.inverse.fitting.frames import Frames
+from dermis.apps.inverse.fitting.photograph import Photograph, read_photograph
+from dermis.apps.inverse.fitting.place import placed
+from dermis.apps.inverse.fitting.solve import ROBUST, Problem, State, solve, tint
+from dermis.apps.inverse.fitting.start import Start, suns_around, suns_to_try
+from dermis.apps.inverse.fitting.subject import subject_of
+from dermis.apps.inverse.fitting.unknowns import usual_point
+from dermis.base.errors import refuse, shown_value
+from dermis.base.quantities import number, numbers, whole_number
+from dermis.frame.renderer import Renderer
+from dermis.scene.settings import Settings
+
+Floats = NDArray[np.float64]
+NOISE = 0.02
+SIDE, ATLAS, SHADOWS = 128, 256, 512
+_LEAST_PIXELS = 200
+White = Sequence[float] | Literal["specular"]
+
+
+def fit(
+    photo: str | Path | ArrayLike,
+    head: object = "human",
+    *,
+    camera: object = None,
+    landmarks: str | Path | None = None,
+    suns: int = 1,
+    exposure: float = 1.0,
+    white: White = (1.0, 1.0, 1.0),
+    noise: float = NOISE,
+    robust: float = ROBUST,
+    side: int = SIDE,
+    atlas: int = ATLAS,
+    adapter: str = "auto",
+    told: Callable[[int, int], None] = lambda done, of: None,
+) -> Fitted:
+    """Light and skin of a photograph of a head whose shape and camera are known.
+
+    photo : a file (PNG, JPEG or TIFF in sRGB, EXR linear), or pixels (h, w, 3): bytes in sRGB, floats linear
+    head : a scene or its file (.toml), a head or what `load_head` takes, a `Human`
+    camera : a camera, a preset's name or a file; the scene's own when left out
+    landmarks : file of landmarks in the photograph, by which camera and the human's shape are found
+    suns : lights from one direction beside the light from all around, 0 to 2
+    exposure : factor from radiance to the photograph
+    white : colour of the light in the photograph, or "specular" to find it from what the surface mirrors
+    noise : relative standard deviation of a pixel
+    robust : standard deviations from which a pixel that cannot be explained counts less
+    side : pixels along the longer side at which it is fitted
+    atlas : side of the renderer's atlas [texel]
+    told : steps done of how many
+
+    All light has one colour. Its strength is found, and exposure is one number with it: a photograph cannot
+    tell the two apart.
+
+    Raises DermisError for what is no picture, numbers that cannot be, pictures without skin, and as
+    `dermis.Renderer`.
+    """
+    began = time.perf_counter()
+    whole_number("suns", suns, 0, 2)
+    exposure = number("exposure", exposure, 1e-6, 1e6, "20 stops either way")
+    noise, robust = number("noise", noise, 1e-4, 1.0), number("robust", robust, 0.5, 1e12)
+    given = _white(white)
+    whole = read_photograph(photo)
+    small = whole.within(whole_number("side", side, 32, 1024, "pixels"))
+    subject = subject_of(head, camera)
+    if landmarks is not None:
+        subject = placed(subject, landmarks, whole.size)
+    settings = Settings(
+        size=small.size, atlas=atlas, shadow_size=SHADOWS, samples=4, strands=False, technique="texture-space"
+    )
+    with TemporaryDirectory() as folder:
+        frames = Frames(Renderer(adapter, depth=2), subject.scene, settings, Path(folder))
+        state, slopes, problem = _solved(
+            frames, small, (given * exposure, noise, robust, white == "specular"), suns, told
+        )
+        picture = _picture(frames, state, given * exposure)
+    known = certainty_of(problem, state, slopes)
+    off = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
+    return Fitted(
+        subject,
+        state.point,
+        state.strengths,
+        given * tint(state.point),
+        exposure,
+        whole.size,
+        known,
+        small.linear,
+        picture,
+        frames.mask,
+        float(np.median(off)),
+        frames.drawn,
+        time.perf_counter() - began,
+    )
+
+
+def _solved(
+    frames: Frames,
+    photo: Photograph,
+    how: tuple[Floats, float, float, bool],
+    suns: int,
+    told: Callable[[int, int], None],
+) -> tuple[State, Floats, Problem]:
+    """The best state with the derivatives there."""
+    scale, noise, robust, free_white = how
+    camera = frames.scene.camera
+    way = np.subtract(camera.position, camera.target)
+    tried = usual_point(suns_to_try(way / np.linalg.norm(way)))
+    frames.find_mask(tried, photo.trusted)
+    lit = photo.linear.max(axis=2) > 0.0
+    frames.mask &= lit
+    if frames.mask.sum() < _LEAST_PIXELS:
+        came = f"{int(frames.mask.sum())} pixels of it are neither clipped nor black"
+        refuse("photo", "skin where the head is", came, "Check camera and exposure, or take a larger side")
+    target = photo.linear[frames.mask] / scale
+    problem = Problem(frames, target, noise, free_white, robust)
+    first = problem.weights(target.mean(axis=1, keepdims=True) * np.ones(3))
+    start = Start(frames, tried, target, first).best(suns)
+    if suns:
+        nearer = replace(start, suns=suns_around(start.suns))
+        start = Start(frames, nearer, target, first).best(suns)
+    state, slopes = solve(problem, start, told)
+    return state, slopes, problem
+
+
+def _picture(frames: Frames, state: State, scale: Floats) -> Floats:
+    """(h, w, 3) of the fit, as the photograph is."""
+    return frames.picture(frames.lit(state.point, state.strengths)) * scale * tint(state.point)
+
+
+def _white(white: Any) -> Floats:
+    """(3,) with green 1."""
+    if isinstance(white, str):
+        if white != "specular":
+            came = f"{shown_value(white)} came"
+            refuse("white", '"specular" or red, green and blue', came, "Write white=(1, 1, 1)")
+        return np.ones(3)
+    found = numbers("white", white, (3,), 0.01, 100.0)
+    return np.asarray(found / found[1], np.float64)

@@ -1,0 +1,128 @@
+"""Frames of a face, one for each light: a photograph is a sum of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.inverse.fitting import sky
+from dermis.apps.inverse.fitting.unknowns import Point, skinned, suns_of
+from dermis.base.atomic_write import replacing
+from dermis.frame.rendered import Rendered
+from dermis.frame.renderer import Renderer
+from dermis.images.exr import encode_exr
+from dermis.scene.environment import Environment
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_SKIN = 1, 2  # classes of labels: face and scalp, nose
+_GRAZING = 0.3
+"""Cosine between normal and view below which pixels do not count: what skin and its surface do there is where
+the frame is least right."""
+_COVERED = 0.999
+
+
+@dataclass(eq=False)
+class Frames:
+    """Renders a scene's head in any light with any skin, and keeps the pixels that count.
+
+    scene : head, camera and pose; its lights and environment are none
+    folder : for panoramas
+    drawn : how many frames there were
+    """
+
+    renderer: Renderer
+    scene: Scene
+    settings: Settings
+    folder: Path
+    mask: Mask = field(init=False)
+    drawn: int = 0
+
+    def find_mask(self, point: Point, trusted: Floats) -> None:
+        """Find the pixels of skin, of which the photograph can be trusted (h, w)."""
+        scene = skinned(self._lit(()), point)
+        scene = replace(scene, lights=suns_of(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))
+        shown = self._draw(scene, "mask", ("label", "normal_camera", "alpha"))
+        label, alpha = shown.output("label"), shown.output("alpha")
+        towards = np.abs(shown.output("normal_camera")[..., 2])
+        skin = np.isin(label, _SKIN) & (alpha > _COVERED) & (towards > _GRAZING)
+        self.mask = _within(skin) & (trusted > _COVERED)
+
+    def basis(self, point: Point) -> Floats:
+        """(9 + k, p, 3) radiance of the pixels in each lobe of radiance 1 and each sun of irradiance 1."""
+        return np.stack([self._image(scene, view) for scene, view in self._apart(point)])
+
+    def parts(self, point: Point) -> tuple[Floats, Floats]:
+        """The same apart: from below the skin, and off its surface."""
+        found = []
+        for scene, view in self._apart(point):
+            shown = self._draw(scene, view, ("diffuse", "specular"))
+            found.append([shown.output(name)[self.mask] for name in ("diffuse", "specular")])
+        both = np.asarray(found, np.float64)
+        return both[:, 0], both[:, 1]
+
+    def together(self, point: Point, strengths: Floats, name: str) -> Floats:
+        """(p, 3) radiance in all lights at once.
+
+        strengths : (9 + k,)
+        name : of the panorama
+        """
+        return self._image(self.lit(point, strengths, name), "together")
+
+    def lit(self, point: Point, strengths: Floats, name: str = "light") -> Scene:
+        """The scene with this skin in these lights, its panorama in the folder."""
+        suns = suns_of(point.suns, strengths[sky.BASIS :], np.ones(3))
+        radiance = sky.panorama(strengths[: sky.BASIS])
+        lights = [one for one in suns if max(one.irradiance) > 0.0]
+        around = self._environment(name, radiance) if radiance.max() > 0.0 else None
+        return skinned(replace(self._lit(lights), environment=around), point)
+
+    def picture(self, scene: Scene) -> Floats:
+        """(h, w, 3) radiance of a whole frame."""
+        return np.asarray(self._draw(scene, "together").linear(), np.float64)
+
+    def _apart(self, point: Point) -> list[tuple[Scene, str]]:
+        """A scene for each light, with the name of its view."""
+        base = skinned(self._lit(()), point)
+        found = []
+        for k in range(sky.BASIS):
+            strengths = np.eye(sky.BASIS)[k]
+            path = self.folder / f"lobe_{k}.exr"
+            around = (
+                Environment(name=str(path))
+                if path.exists()
+                else self._environment(f"lobe_{k}", sky.panorama(strengths))
+            )
+            found.append((replace(base, environment=around), f"lobe {k}"))
+        for k, sun in enumerate(suns_of(point.suns, np.ones(len(point.suns)), np.ones(3))):
+            found.append((replace(base, lights=(sun,)), f"sun {k}"))
+        return found
+
+    def _environment(self, name: str, radiance: Floats) -> Environment:
+        path = self.folder / f"{name}.exr"
+        with replacing(path) as trial:
+            trial.write_bytes(encode_exr(np.repeat(radiance[..., None], 3, axis=2).astype(np.float32)))
+        return Environment(name=str(path))
+
+    def _lit(self, lights: Sequence[object]) -> Scene:
+        return replace(self.scene, lights=tuple(lights), environment=None)  # type: ignore[arg-type]
+
+    def _image(self, scene: Scene, view: str) -> Floats:
+        return np.asarray(self._draw(scene, view).linear()[self.mask], np.float64)
+
+    def _draw(self, scene: Scene, view: str, outputs: tuple[str, ...] = ()) -> Rendered:
+        self.drawn += 1
+        return self.renderer.draw(scene, self.settings, timed=False, view=view, outputs=outputs)
+
+
+def _within(mask: Mask) -> Mask:
+    """Pixels whose neighbours are in the mask too."""
+    padded = np.pad(mask, 1)
+    rows = padded[:-2] & padded[1:-1] & padded[2:]
+    return np.asarray(rows[:, :-2] & rows[:, 1:-1] & rows[:, 2:])

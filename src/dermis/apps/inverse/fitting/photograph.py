@@ -1,0 +1,81 @@
+"""Photographs as light: linear pixels, and which of them can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dermis.base.errors import refuse
+from dermis.images.colour import decode_srgb_levels
+from dermis.images.io import Picture, read_image
+
+Floats = NDArray[np.float64]
+_CLIPPED = 0.985  # of what bytes can show, in the picture's own encoding
+_LEAST_SIDE = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Photograph:
+    """A photograph, or a smaller one of it.
+
+    linear : (h, w, 3) linear Rec. 709 as the file has it, exposure and white balance in it
+    trusted : (h, w) share of the pixel that no channel's end of scale cuts off
+    """
+
+    linear: Floats
+    trusted: Floats
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [pixel]."""
+        return self.linear.shape[1], self.linear.shape[0]
+
+    def within(self, side: int) -> Photograph:
+        """The same with a longer side of at most so many pixels: means of what each of them covers."""
+        width, height = self.size
+        if max(width, height) <= side:
+            return self
+        scale = side / max(width, height)
+        size = max(1, round(width * scale)), max(1, round(height * scale))
+        return Photograph(_averaged(self.linear, size), _averaged(self.trusted[..., None], size)[..., 0])
+
+
+def read_photograph(given: str | Path | Picture | ArrayLike) -> Photograph:
+    """A photograph of a file (PNG, JPEG or TIFF in sRGB; EXR and HDR linear) or of pixels.
+
+    given : a file, (h, w, 3) bytes in sRGB, or floats, linear Rec. 709
+
+    Raises DermisError for what is no picture in colour.
+    """
+    image = read_image(given) if isinstance(given, str | Path | Picture) else np.asarray(given)
+    name = given if isinstance(given, str | Path | Picture) else "photo"
+    if image.ndim != 3 or image.shape[2] not in (3, 4) or min(image.shape[:2]) < _LEAST_SIDE:
+        expected = f"a picture (h, w, 3) in colour of {_LEAST_SIDE} pixels a side at least"
+        refuse(name, expected, f"shape {image.shape} came", "Save it as RGB")
+    if image.dtype.kind != "f" and image.dtype not in (np.uint8, np.uint16):
+        refuse(name, "sRGB bytes or linear floats", f"{image.dtype} came", "Convert it")
+    image = image[..., :3]
+    if image.dtype.kind == "f":
+        if not np.isfinite(image).all() or image.min() < 0.0 or image.max() <= 0.0:
+            refuse(name, "light, from 0", "some is negative, infinite or no number", "Export it again")
+        return Photograph(image.astype(np.float64), np.ones(image.shape[:2]))
+    levels: NDArray[np.uint8] | NDArray[np.uint16] = np.asarray(image)
+    most = np.iinfo(levels.dtype).max
+    trusted = (levels.max(axis=2) < _CLIPPED * most).astype(np.float64)
+    return Photograph(decode_srgb_levels(levels).astype(np.float64), trusted)
+
+
+def _averaged(image: Floats, size: tuple[int, int]) -> Floats:
+    """(h, w, c) of means over each pixel's part of a larger picture; edges count by their shares."""
+    for axis, count in ((0, size[1]), (1, size[0])):
+        sums = np.cumsum(image, axis=axis)
+        sums = np.concatenate([np.zeros_like(np.take(sums, [0], axis)), sums], axis=axis)
+        edges = np.linspace(0.0, image.shape[axis], count + 1)
+        whole = np.minimum(edges.astype(int), image.shape[axis] - 1)
+        part = (edges - whole).reshape([-1 if k == axis else 1 for k in range(3)])
+        reached = np.take(sums, whole, axis) + part * np.take(image, whole, axis)
+        image = np.diff(reached, axis=axis) * (count / image.shape[axis])
+    return image

@@ -1,0 +1,166 @@
+"""Camera, focal length and identity by landmarks: least squares of where they are seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.inverse.fitting.landmarks import read_landmarks
+from dermis.apps.inverse.fitting.subject import Subject, subject_of
+from dermis.human.landmarks.points import LandmarkPoints, landmark_points
+from dermis.human.person import Human
+from dermis.human.published import OLD, YOUNG, human_targets
+from dermis.mesh.head import Head
+from dermis.scene.camera import Camera
+
+Floats = NDArray[np.float64]
+_NOISE = 0.004
+"""Of landmarks, of the photograph's height: how well they are placed."""
+_FOCAL_SPREAD = 0.3
+"""Of the logarithm of the focal length, around that of a portrait."""
+_MACRO = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
+_MACRO_SPREAD = 0.3
+_TARGET_SPREAD = 0.15
+_FOLDERS = ("head/", "forehead/", "eyes/", "nose/", "mouth/", "cheek/", "chin/")
+_ENDS = ("-incr", "-up", "-out", "-forward", "-convex")
+_ROUNDS = 2
+_BEFORE_MM = 1100.0
+_FRAME_MM = 300.0
+
+
+def placed(subject: Subject, landmarks: str | Path, size: tuple[int, int]) -> Subject:
+    """The subject before the camera that sees its landmarks where the photograph has them.
+
+    The human gets the identity that they tell: ancestry, sex, age, weight, muscle and details of the face,
+    each believed to be near the person given. Other heads, as they are, need a table of their own landmarks.
+
+    Raises DermisError for files without landmarks, and for heads without those.
+    """
+    name, seen = read_landmarks(landmarks, size)
+    person, head = subject.person, subject.scene.head
+    shape = _Shape.of(person, head, name, seen)
+    pixels = np.array([seen[one] for one in shape.names])
+    found = np.concatenate([np.zeros(6), [np.log(size[1] * _BEFORE_MM / _FRAME_MM)], np.zeros(shape.count)])
+    found[:3], found[5] = (np.pi, 0.0, 0.0), _BEFORE_MM
+    for _ in range(_ROUNDS if person else 1):
+        found = _solved(shape, pixels, size, found)
+        if person is not None:
+            person = shape.person(found[7:])
+            shape = _Shape.of(person, head, name, seen)
+            found[7:] = 0.0
+    if person is not None:
+        subject = subject_of(person)
+        found = _solved(replace(shape, slopes=shape.slopes[:0]), pixels, size, found[:7])
+    return replace(subject, scene=replace(subject.scene, camera=_camera(found, size)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """Where landmarks lie on a head, and how they move with its identity.
+
+    places : (n, 3) from the head's centre [mm]
+    slopes : (u, n, 3) by the unknowns of the identity in units of what is believed
+    """
+
+    names: tuple[str, ...]
+    places: Floats
+    slopes: Floats
+    given: Human | None
+    details: tuple[str, ...]
+
+    @classmethod
+    def of(cls, person: Human | None, head: Head, name: str, seen: dict[str, Floats]) -> _Shape:
+        """Of a person, or of a head as it is."""
+        plain = head if person is None else replace(person, targets={}).head(subdivide=0)
+        points = landmark_points(plain, name)
+        chosen = np.array([k for k, one in enumerate(points.names) if one in seen])
+        names = tuple(points.names[k] for k in chosen)
+        if person is None:
+            places = _at(points, chosen, plain.positions_mm.astype(np.float64)) - plain.centre_mm
+            return cls(names, places, np.zeros((0, *places.shape)), None, ())
+        centre = np.array(person.head(subdivide=0).centre_mm)
+        details = tuple(one for one in human_targets() if one.startswith(_FOLDERS) and one.endswith(_ENDS))
+        own = cls(names, np.zeros((0, 3)), np.zeros((0, 0, 3)), person, details)
+
+        def places_of(other: Human) -> Floats:
+            return np.asarray(_at(points, chosen, other.positions_mm.astype(np.float64)) - centre)
+
+        base, count = places_of(person), len(_MACRO) + len(details)
+        slopes = np.stack([_slope(own, places_of, base, k, count) for k in range(count)])
+        return replace(own, places=base, slopes=slopes)
+
+    @property
+    def count(self) -> int:
+        """How many numbers the identity has."""
+        return len(self.slopes)
+
+    def person(self, identity: Floats) -> Human:
+        """The person given, changed by so many times what is believed of each number."""
+        assert self.given is not None
+        macro: dict[str, Any] = {
+            name: float(np.clip(getattr(self.given, name) + _spread(name) * step, *_limits(name)))
+            for name, step in zip(_MACRO, identity, strict=False)
+        }
+        targets = dict(self.given.targets)
+        for name, step in zip(self.details, identity[len(_MACRO) :], strict=True):
+            targets[name] = float(np.clip(targets.get(name, 0.0) + _TARGET_SPREAD * step, -1.0, 1.0))
+        return replace(self.given, **macro, targets=targets, skin=self.given.look)
+
+
+def _slope(shape: _Shape, places_of: Callable[[Human], Floats], base: Floats, k: int, count: int) -> Floats:
+    """(n, 3) by one number of the identity, away from its limit."""
+    step = np.zeros(count)
+    step[k] = 0.2
+    change = places_of(shape.person(step)) - base
+    if not change.any():
+        step[k] = -0.2
+        change = places_of(shape.person(step)) - base
+    return np.asarray(change / step[k])
+
+
+def _spread(name: str) -> float:
+    return _MACRO_SPREAD * (OLD - YOUNG if name == "age" else 1.0)
+
+
+def _limits(name: str) -> tuple[float, float]:
+    return {"age": (YOUNG, OLD), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(name, (0.01, 1.0))
+
+
+def _at(points: LandmarkPoints, chosen: NDArray[np.int64], places: Floats) -> Floats:
+    return np.asarray(np.einsum("nk,nkc->nc", points.share[chosen], places[points.corner[chosen]]))
+
+
+def _solved(shape: _Shape, pixels: Floats, size: tuple[int, int], start: Floats) -> Floats:
+    """Turn, shift, logarithm of the focal length and identity of least squares."""
+    from scipy.optimize import least_squares
+
+    usual = np.log(size[1] * _BEFORE_MM / _FRAME_MM)
+
+    def faults(x: Floats) -> Floats:
+        places = shape.places + np.einsum("u,unc->nc", x[7:], shape.slopes)
+        off = (_seen(x, places, size) - pixels) / (_NOISE * size[1])
+        return np.concatenate([off.ravel(), [(x[6] - usual) / _FOCAL_SPREAD], x[7:]])
+
+    scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(shape.count)])
+    return np.asarray(least_squares(faults, start, x_scale=scale, loss="soft_l1").x, np.float64)
+
+
+def _seen(x: Floats, places: Floats, size: tuple[int, int]) -> Floats:
+    """(n, 2) pixels of places."""
+    from scipy.spatial.transform import Rotation
+
+    there = places @ Rotation.from_rotvec(x[:3]).as_matrix().T + x[3:6]
+    return np.asarray(np.exp(x[6]) * there[:, :2] / there[:, 2:] + (np.array(size) - 1.0) / 2.0)
+
+
+def _camera(x: Floats, size: tuple[int, int]) -> Camera:
+    from scipy.spatial.transform import Rotation
+
+    focal, (cx, cy) = float(np.exp(x[6])), (np.array(size) - 1.0) / 2.0
+    K = [[focal, 0.0, cx], [0.0, focal, cy], [0.0, 0.0, 1.0]]
+    return Camera.from_opencv(K, Rotation.from_rotvec(x[:3]).as_matrix(), x[3:6], size)

@@ -1,0 +1,180 @@
+"""Skin and light of a photograph by least squares over frames: strengths of lights linearly, the rest by
+Gauss-Newton's steps with Levenberg's damping."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.inverse.fitting import sky
+from dermis.apps.inverse.fitting.frames import Frames
+from dermis.apps.inverse.fitting.linear import strengths_of
+from dermis.apps.inverse.fitting.unknowns import SKIN, TURN_SPREAD, TURN_STEP, WHITE_SPREAD, Point
+
+Floats = NDArray[np.float64]
+_FLOOR = 0.03
+"""Of the median of the photograph: what darker pixels are known to, as noise does not fall with them."""
+ROBUST = 3.0
+"""Standard deviations from which a residual counts less [Huber1964]."""
+_MAD = 1.4826
+_MOST_STEPS = 8
+_DONE = 0.01
+_LEAST_GAIN = 1e-4
+_DAMPING = 1e-3
+_TRIALS = 3
+_LONGEST = 0.7  # step of a logarithm or a direction
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A point with the strengths that fit best there.
+
+    basis : (9 + k, p, 3) radiance in each light alone
+    weight : (p, 3) one over the standard deviation of each pixel, robust ones
+    """
+
+    point: Point
+    strengths: Floats
+    basis: Floats
+    residual: Floats
+    weight: Floats
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A photograph to be fitted.
+
+    target : (p, 3) radiance of the pixels that count, the given white taken out
+    noise : relative standard deviation of a pixel
+    free_white : whether the colour of the light is looked for
+    """
+
+    frames: Frames
+    target: Floats
+    noise: float
+    free_white: bool
+    robust: float = ROBUST
+
+    def weights(self, shown: Floats) -> Floats:
+        """(p, 3) one over the standard deviation of pixels that are this bright."""
+        return np.asarray(1.0 / (self.noise * (shown + _FLOOR * float(np.median(self.target)))))
+
+    def state(self, point: Point, weight: Floats) -> State:
+        """The best light at a point."""
+        basis = self.frames.basis(point) * tint(point)
+        A = (basis * weight).reshape(len(basis), -1).T
+        x = strengths_of(A, (self.target * weight).ravel())
+        residual = self.target - np.einsum("a,apc->pc", x, basis)
+        cost = float(((residual * weight) ** 2).sum()) + self._believed(point)
+        return State(point, x, basis, residual, weight, cost)
+
+    def reweighed(self, state: State) -> State:
+        """The same with weights of what the model shows, and less for what it cannot explain."""
+        plain = self.weights(np.maximum(self.target - state.residual, 0.0))
+        scaled = np.abs(state.residual * plain)
+        limit = self.robust * max(_MAD * float(np.median(scaled)), 1.0)
+        weight = plain * np.sqrt(limit / np.maximum(scaled, limit))
+        A = (state.basis * weight).reshape(len(state.basis), -1).T
+        x = strengths_of(A, (self.target * weight).ravel())
+        residual = self.target - np.einsum("a,apc->pc", x, state.basis)
+        cost = float(((residual * weight) ** 2).sum()) + self._believed(state.point)
+        return State(state.point, x, state.basis, residual, weight, cost)
+
+    def slopes(self, state: State, name: str) -> Floats:
+        """(p, 3, u) derivatives of the picture by finite differences of frames in all lights at once."""
+        point, count = state.point, 2 * len(state.point.suns)
+        middle = self.frames.together(point, state.strengths, name)
+        found = []
+        for k, step in enumerate(self.steps(count)):
+            change = np.zeros(len(SKIN) + count + 2)
+            change[k] = step if k >= len(SKIN) or point.logs[k] + step < np.log(SKIN[k].high) else -step
+            other = self.frames.together(point.moved(change), state.strengths, name)
+            found.append((other - middle) / change[k])
+        shown, white = middle * tint(point), np.zeros((2, *middle.shape))
+        white[0, :, 0], white[1, :, 2] = shown[:, 0], shown[:, 2]
+        slopes = np.concatenate([np.asarray(found) * tint(point), white])
+        return np.moveaxis(slopes, 0, -1)
+
+    def steps(self, turns: int) -> list[float]:
+        """Of finite differences."""
+        return [one.step for one in SKIN] + [TURN_STEP] * turns
+
+    def believed(self, turns: int) -> Floats:
+        """(u,) standard deviations of what is believed of each number before."""
+        white = WHITE_SPREAD if self.free_white else 1e-6
+        return np.array([one.spread for one in SKIN] + [TURN_SPREAD] * turns + [white] * 2)
+
+    def far(self, point: Point) -> Floats:
+        """(u,) how far the numbers are from what is usual; directions have no usual."""
+        skin = point.logs - np.log([one.usual for one in SKIN])
+        return np.concatenate([skin, np.zeros(2 * len(point.suns)), point.white])
+
+    def _believed(self, point: Point) -> float:
+        return float(((self.far(point) / self.believed(2 * len(point.suns))) ** 2).sum())
+
+
+def tint(point: Point) -> Floats:
+    """(3,) colour of the light over the given white, green 1."""
+    return np.array([np.exp(point.white[0]), 1.0, np.exp(point.white[1])])
+
+
+def solve(
+    problem: Problem, start: Point, told: Callable[[int, int], None] = lambda done, of: None
+) -> tuple[State, Floats]:
+    """The best state, and derivatives (p, 3, u) from one step before it at most.
+
+    By variable projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975]: light follows skin.
+    """
+    first = problem.weights(problem.target.mean(axis=1, keepdims=True) * np.ones(3))
+    state = problem.reweighed(problem.state(start, first))
+    damping = _DAMPING
+    for turn in range(_MOST_STEPS):
+        told(turn, _MOST_STEPS)
+        slopes = problem.slopes(state, f"light_{turn}")
+        better, step, damping = _improved(problem, state, slopes, damping)
+        if better is None:
+            return state, slopes
+        gain = 1.0 - better.cost / state.cost
+        state = problem.reweighed(better)
+        if np.abs(step).max() < _DONE or gain < _LEAST_GAIN:
+            break
+    return state, slopes
+
+
+def _improved(
+    problem: Problem, state: State, slopes: Floats, damping: float
+) -> tuple[State | None, Floats, float]:
+    """A better state, the step to it and the damping for the next."""
+    H, g = _system(problem, state, slopes)
+    for _ in range(_TRIALS):
+        step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
+        step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), 1e-12))
+        if np.abs(step).max() < 0.1 * _DONE:
+            break
+        trial = problem.state(state.point.moved(step), state.weight)
+        if trial.cost < state.cost:
+            return trial, step, max(0.2 * damping, 1e-6)
+        damping = max(30.0 * damping, 0.03)
+    return None, np.zeros(len(g)), damping
+
+
+def _system(problem: Problem, state: State, slopes: Floats) -> tuple[Floats, Floats]:
+    """Curvature and downward slope of half the cost, where lights follow."""
+    J = (slopes * state.weight[..., None]).reshape(-1, slopes.shape[-1])
+    A = _active(state)
+    Q = np.linalg.qr(A)[0]
+    J = J - Q @ (Q.T @ J)
+    r = (state.residual * state.weight).ravel()
+    spread = problem.believed(2 * len(state.point.suns))
+    H = J.T @ J + np.diag(spread**-2.0)
+    return H, J.T @ r - problem.far(state.point) / spread**2
+
+
+def _active(state: State) -> Floats:
+    """(m, a) weighed frames of the lights that are free to follow: suns at 0 are not."""
+    free = [k for k in range(len(state.basis)) if k < sky.BASIS or state.strengths[k] > 0.0]
+    return (state.basis[free] * state.weight).reshape(len(free), -1).T

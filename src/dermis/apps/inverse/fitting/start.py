@@ -1,0 +1,99 @@
+"""Where a fit starts: the sun and the pigments that fit best among a few of each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.inverse.fitting import sky
+from dermis.apps.inverse.fitting.frames import Frames
+from dermis.apps.inverse.fitting.linear import fault_by, strengths_by
+from dermis.apps.inverse.fitting.unknowns import SKIN, Point, tangents
+from dermis.human.skin.colours import EPIDERMIS_MM, colours
+from dermis.mesh.directions import fibonacci_sphere
+
+Floats = NDArray[np.float64]
+_AROUND = 28
+_BEHIND = -0.35  # along z: suns farther behind leave the face dark
+_MELANIN, _BLOOD = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
+_STRENGTH = 0.5, 0.75, 1.0
+_RINGS, _RING = (9.0, 18.0), 6  # degrees, and directions on each; those tried first are 35 degrees apart
+
+
+def suns_to_try(towards_camera: Floats) -> Floats:
+    """(k, 3) directions around a camera from which a sun may be seen on the face.
+
+    towards_camera : (3,) unit vector
+    """
+    every = fibonacci_sphere(_AROUND)
+    return every[every @ towards_camera > _BEHIND]
+
+
+def suns_around(towards: Floats) -> Floats:
+    """(k, 3) the directions themselves, and others about them: half as far as those tried first are apart."""
+    turn = np.linspace(0.0, 2.0 * np.pi, _RING, endpoint=False)
+    ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    off = np.concatenate([[[0.0, 0.0]], *(np.tan(np.radians(angle)) * ring for angle in _RINGS)])
+    found = towards[:, None] + np.einsum("nt,ktc->knc", off, tangents(towards))
+    return np.asarray((found / np.linalg.norm(found, axis=2, keepdims=True)).reshape(-1, 3))
+
+
+class Start:
+    """Products of what each light alone makes of the face, below its surface and off it.
+
+    frames, point : the face, its `suns` being those to try
+    target : (p, 3) the photograph's radiance
+    weight : (p, 3)
+    """
+
+    def __init__(self, frames: Frames, point: Point, target: Floats, weight: Floats) -> None:
+        self.point = point
+        below, off = frames.parts(point)
+        both = np.concatenate([below, off]) * weight
+        wanted = target * weight
+        self._grams = np.einsum("apc,bpc->cab", both, both, optimize=True)
+        self._rights = np.einsum("apc,pc->ca", both, wanted)
+        self._total = float((wanted**2).sum())
+        self._lights = len(below)
+        pigments = frames.scene.skin.pigments
+        self._table = colours(pigments.eumelanin, pigments.oxygen, EPIDERMIS_MM)  # type: ignore[union-attr, arg-type]
+
+    def best(self, count: int) -> Point:
+        """The best of all, with so many suns."""
+        every = list(product(np.log(_MELANIN), np.log(_BLOOD), np.log(_STRENGTH)))
+        at, suns = self.point.logs, self._nearest(self.point.logs, count)
+        for _ in range(2):
+            trials = [np.array([m, b, at[2], s]) for m, b, s in every]
+            at = trials[int(np.argmin([self._fault(one, suns) for one in trials]))]
+            suns = self._nearest(at, count)
+        return replace(self.point, logs=at, suns=self.point.suns[suns])
+
+    def _nearest(self, logs: Floats, count: int) -> list[int]:
+        """The suns that together leave least, found one after the other."""
+        found: list[int] = []
+        for _ in range(count):
+            left = [k for k in range(len(self.point.suns)) if k not in found]
+            found.append(min(left, key=lambda k: self._fault(logs, [*found, k])))
+        return found
+
+    def _fault(self, logs: Floats, suns: list[int]) -> float:
+        """Squares left over: what leaves below the skin is as bright as its colour, what leaves off it as its
+        strength."""
+        chosen = np.array([*range(sky.BASIS), *(sky.BASIS + k for k in suns)])
+        n, strength = self._lights, float(np.exp(logs[3] - self.point.logs[3]))
+        ratio = self._colour(logs) / self._colour(self.point.logs)
+        gram, right = np.zeros((len(chosen),) * 2), np.zeros(len(chosen))
+        for c in range(3):
+            G, r, s = self._grams[c], self._rights[c], ratio[c]
+            below, off = np.ix_(chosen, chosen), np.ix_(n + chosen, n + chosen)
+            across = G[np.ix_(chosen, n + chosen)]
+            gram += s**2 * G[below] + s * strength * (across + across.T) + strength**2 * G[off]
+            right += s * r[chosen] + strength * r[n + chosen]
+        return fault_by(gram, right, self._total, strengths_by(gram, right))
+
+    def _colour(self, logs: Floats) -> Floats:
+        shares = np.exp(logs[: len(SKIN)])
+        return np.asarray(self._table.read(shares[:1], shares[1:2])[0], np.float64)

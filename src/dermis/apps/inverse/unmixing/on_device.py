@@ -1,0 +1,141 @@
+"""Pictures unmixed and recoloured on a device, strip by strip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.inverse.unmixing.model import BLOOD_SPREAD, DARKEST, USUAL_BLOOD, SkinModel
+from dermis.apps.inverse.unmixing.solve import FLOOR
+from dermis.gpu import ComputeProgram, Device, Frame, compiled, download, make_texture
+from dermis.gpu.program import declared
+from dermis.gpu.textures import texture_from, upload
+
+Pixels = NDArray[np.float32]
+Told = Callable[[int, int], None]
+_FOLDER = Path(__file__).parent
+_SIDE = 96  # of the grid of first guesses
+_STEPS = 8
+_STRIP = 1 << 22  # texels, of 16 bytes each in five textures
+_TEXEL = "rgba32float"
+
+
+class Unmixer:
+    """Turns colours into melanin and blood on a device.
+
+    noise : standard deviation of a channel, relative [-]
+    """
+
+    def __init__(self, device: Device, model: SkinModel, noise: float) -> None:
+        self.device, self.model, self.noise = device, model, noise
+        self._table = _table_of(device, model)
+        self._found: tuple[Any, Any] | None = None
+        self._starts = device.space(8 * _SIDE**2, "first guesses")
+        shader = _program(device, "unmix_start", model)
+        frame = Frame(device, timed=False)
+        frame.compute("start", shader, self._bound(shader, 0), (_SIDE, _SIDE))
+        frame.submit()
+
+    def unmix(self, colours: Pixels, told: Told = lambda done, of: None) -> tuple[Pixels, Pixels, Pixels]:
+        """Of colours (h, w, 3): melanin, blood and the third number (h, w, 3), standard deviations of the
+        first two (h, w, 2), and the residual (h, w, 3).
+        """
+        height, width = colours.shape[:2]
+        made, unsure, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
+        for rows in strips(height, width):
+            textures = self.strip(texture_from(self.device, _four(colours[rows]), _TEXEL, "colours"))
+            shares, left = (download(self.device, texture) for texture in textures)
+            made[rows, :, :2], unsure[rows] = shares[..., :2], shares[..., 2:]
+            made[rows, :, 2], residual[rows] = left[..., 3], left[..., :3]
+            told(rows.stop, height)
+        return made, unsure, residual
+
+    def strip(self, colours: Any) -> tuple[Any, Any]:
+        """Two textures of what a texture's colours are made of: see `record`."""
+        frame = Frame(self.device, timed=False)
+        made = self.record(frame, colours)
+        frame.submit()
+        return made
+
+    def record(self, frame: Frame, colours: Any) -> tuple[Any, Any]:
+        """Record the pass that finds, of a texture's colours, melanin, blood and their standard deviations,
+        and the residual with the third number; in textures that the next of the same size takes again.
+        """
+        size = colours.size[:2]
+        shader = _program(self.device, "unmix", self.model)
+        if self._found is None or self._found[0].size[:2] != size:
+            self._found = make_texture(self.device, size, _TEXEL), make_texture(self.device, size, _TEXEL)
+        shares, residual = self._found
+        bound = {"colours": colours, "shares": shares, "residual": residual}
+        frame.compute("unmix", shader, bound | self._bound(shader, _STEPS), size)
+        return shares, residual
+
+    def _bound(self, shader: ComputeProgram, steps: int) -> dict[str, Any]:
+        record = _record(shader, self.model, self.noise, steps)
+        return {"model": record, "table": self._table, "starts": self._starts}
+
+
+def recoloured(
+    device: Device, model: SkinModel, made: Pixels, residual: Pixels, factors: Any, added: Any
+) -> Pixels:
+    """Colours (h, w, 3) of the model's skins with a residual (h, w, 3).
+
+    made : (h, w, 3) melanin, blood and the third number
+    factors, added : (3,) what each of them is multiplied by, and what is then added to it
+    """
+    table, shader = _table_of(device, model), _program(device, "recolour", model)
+    change = shader.record("Change", factors=factors, added=added)
+    found = np.empty(residual.shape, np.float32)
+    for rows in strips(*made.shape[:2]):
+        images = (texture_from(device, _four(one[rows]), _TEXEL, "maps") for one in (made, residual))
+        first, second = images
+        texture = make_texture(device, first.size[:2], _TEXEL)
+        bound = {"model": _record(shader, model, 1.0, 0), "table": table, "change": change}
+        bound |= {"made": first, "residual": second, "recoloured": texture}
+        frame = Frame(device, timed=False)
+        frame.compute("recolour", shader, bound, first.size[:2])
+        frame.submit()
+        found[rows] = download(device, texture)[..., :3]
+    return found
+
+
+def strips(height: int, width: int) -> Iterator[slice]:
+    """Rows that go over a picture, few enough for a device's memory."""
+    rows = max(1, _STRIP // width)
+    return (slice(first, min(first + rows, height)) for first in range(0, height, rows))
+
+
+def _four(colours: Pixels) -> Pixels:
+    padded = np.ones((*colours.shape[:2], 4), np.float32)
+    padded[..., :3] = colours
+    return padded
+
+
+def _table_of(device: Device, model: SkinModel) -> Any:
+    layers = [_four(layer.astype(np.float32)) for layer in model.logs]
+    texture = make_texture(device, layers[0].shape[1::-1], _TEXEL, layers=len(layers), use="map")
+    for number, layer in enumerate(layers):
+        upload(device, texture, layer, layer=number)
+    return texture
+
+
+def _program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
+    thirds, nodes = model.logs.shape[:2]
+    numbers = {"NODES": nodes, "THIRDS": thirds, "SHADE": int(model.third == "shade"), "SIDE": _SIDE}
+    path = _FOLDER / f"{name}.wgsl"
+    constants = declared(path, (), tuple(numbers.items()))
+
+    def make() -> ComputeProgram:
+        return ComputeProgram(device, path, (), constants)
+
+    return compiled(device, ("unmixing", name), tuple(constants.items()), make)
+
+
+def _record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> Any:
+    numbers = {"usual": model.usual, "spread": model.spread, "noise": noise, "floor": FLOOR}
+    believed = {"blood": (USUAL_BLOOD, BLOOD_SPREAD), "darkest": DARKEST}
+    return shader.record("Model", span=model.span, steps=steps, **believed, **numbers)

@@ -1,0 +1,178 @@
+"""From a picture of skin's colour to its melanin and blood."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dermis.apps.inverse.unmixing.change import Change
+from dermis.apps.inverse.unmixing.model import FACE, SkinModel, Third, skin_model
+from dermis.apps.inverse.unmixing.on_device import Unmixer, recoloured
+from dermis.apps.inverse.unmixing.shading import shading_of
+from dermis.base.errors import refuse
+from dermis.base.quantities import number
+from dermis.gpu import Device
+from dermis.gpu.failures import OneDevice
+from dermis.images.difference import delta_e_2000
+from dermis.images.io import Picture
+from dermis.mesh.map_pixels import colour_map
+from dermis.optics.media import Floats
+from dermis.optics.pigments.skin import SkinParameters
+
+Pixels = NDArray[np.float32]
+NOISE = 0.01
+SKIN = 5.0
+"""CIEDE2000 from the model's nearest colour up to which a texel counts as skin."""
+_TOLD = 1.0, 2.0, SKIN
+_JUDGED = 512  # texels along the longer side, for the table
+_NOISE = 1e-4, 0.5
+_BLACK = 1e-3  # as between the charts of a map
+_LIKE_SKIN = 0.15  # largest logarithm of a residual that counts for medians
+
+
+@dataclass(frozen=True, eq=False)
+class Unmixed:
+    """What a picture of skin is made of. All maps are (h, w), row 0 at the top.
+
+    melanin, blood : shares of the volume of epidermis and dermis [-]
+    melanin_sd, blood_sd : standard deviations that noise leaves at least, by the Cramér-Rao bound [-]
+    third : oxygen, the share of haemoglobin that carries it, where that was asked for [-]
+    shading : (h, w) light that was taken out of the colours, where that was asked for [-]
+    residual : (h, w, 3) the colour over that of the model's skin: paint, hair, and all else that is none [-]
+    devices : those that the skin was computed on, by what was asked for; they stay open for more
+    """
+
+    melanin: Pixels
+    blood: Pixels
+    melanin_sd: Pixels
+    blood_sd: Pixels
+    residual: Pixels
+    third: Pixels | None
+    shading: Pixels | None
+    skin: SkinParameters
+    model: SkinModel
+    devices: dict[str, OneDevice] = field(default_factory=dict)
+
+    def maps(self) -> dict[str, Pixels]:
+        """Those that are there, by the names of their files."""
+        named = {
+            name: getattr(self, name) for name in ("melanin", "blood", "melanin_sd", "blood_sd", "residual")
+        }
+        further = {"oxygen": self.third, "shading": self.shading}
+        return named | {name: one for name, one in further.items() if one is not None}
+
+    def summary(self) -> dict[str, Any]:
+        """Medians over the skin, how far the way back is off, and how much is no skin of the model.
+
+        Of every n-th texel, so that 512 are taken along the longer side; what is black is no skin.
+        """
+        apart = max(1, max(self.melanin.shape) // _JUDGED)
+        maps = {name: one[::apart, ::apart].astype(np.float64) for name, one in self.maps().items()}
+        m, b, third = (
+            maps[name].ravel() if name in maps else None for name in ("melanin", "blood", "oxygen")
+        )
+        assert m is not None and b is not None
+        back = self.model.colours(m, b, third)
+        colours = back * maps["residual"].reshape(-1, 3)
+        off = delta_e_2000(back, colours)
+        skin = (off <= SKIN) & (colours.max(axis=-1) > _BLACK)
+        told: dict[str, Any] = {"texels": int(off.size), "skin": float(skin.mean())}
+        if skin.any():
+            told["delta_e"] = _spread(off[skin])
+            told["delta_e"] |= {f"above_{limit:g}": float((off > limit).mean()) for limit in _TOLD}
+            told["melanin"] = _spread(m[skin]) | {"sd": float(np.median(maps["melanin_sd"].ravel()[skin]))}
+            told["blood"] = _spread(b[skin]) | {"sd": float(np.median(maps["blood_sd"].ravel()[skin]))}
+            if third is not None:
+                told["oxygen"] = _spread(third[skin])
+        return told
+
+    def recoloured(self, change: Change, adapter: str = "auto") -> Pixels:
+        """(h, w, 3) the colours, linear Rec. 709, of the same skin with other pigments.
+
+        What the model did not account for stays, as does light that was not taken out of the picture.
+
+        Raises DermisError as `dermis.gpu.open_device`.
+        """
+        kept = self.devices.setdefault(adapter, OneDevice(adapter))
+        return kept.run(lambda device: self._recoloured(device, change))
+
+    def _recoloured(self, device: Device, change: Change) -> Pixels:
+        fixed = self.third is None or change.oxygen is not None
+        target = skin_model(change.of(self.skin), "none") if fixed else self.model
+        usual = np.broadcast_to(np.float32(target.usual), self.melanin.shape)
+        third = usual if fixed or self.third is None else self.third
+        made = np.stack([self.melanin, self.blood, third], axis=-1)
+        factors, added = change.over(self._median(self.melanin), self._median(self.blood))
+        return recoloured(device, target, made, self.residual, factors, added)
+
+    def skin_texels(self) -> NDArray[np.bool_]:
+        """(h, w) whether a texel's colour is near one of the model's."""
+        return np.asarray(np.abs(np.log(np.maximum(self.residual, _BLACK))).max(axis=-1) < _LIKE_SKIN)
+
+    def _median(self, share: Pixels) -> float:
+        """Over the skin of the model."""
+        skin = self.skin_texels()
+        return float(np.median(share[skin] if skin.any() else share))
+
+
+def _spread(values: Floats) -> dict[str, float]:
+    low, middle, high = np.percentile(values, (5.0, 50.0, 95.0))
+    return {"p5": float(low), "median": float(middle), "p95": float(high)}
+
+
+def unmix(
+    picture: str | Path | Picture | ArrayLike,
+    *,
+    skin: SkinParameters = FACE,
+    third: Third = "none",
+    noise: float = NOISE,
+    shading: bool = False,
+    adapter: str = "auto",
+    told: Callable[[int, int], None] = lambda done, of: None,
+) -> Unmixed:
+    """Melanin and blood of a picture of skin's colour: an albedo map, of a scan or by an artist.
+
+    picture : a file (PNG or JPEG in sRGB, EXR linear), or (h, w, 3) diffuse reflectance, linear Rec. 709
+    skin : of the model; its melanin and blood are ignored, its thickness, eumelanin and oxygen are held
+    third : "oxygen" finds that too, as far as colour and what is usual tell: 0.1 of standard deviation around
+        the skin's own; "none" holds it
+    noise : standard deviation of a channel, relative [-]
+    shading : whether to take slow changes of brightness for light, and divide by them
+    told : how many rows are done of how many
+
+    Raises DermisError for what is no picture of colours, numbers that cannot be, and as
+    `dermis.gpu.open_device`.
+    """
+    noise = number("noise", noise, *_NOISE, "relative to each channel")
+    model = skin_model(skin, third)
+    if third == "shade":
+        refuse("third", '"none" or "oxygen"', "'shade' came", "Set shading=True instead")
+    colours = colour_map(picture) if isinstance(picture, str | Path | Picture) else _array(picture)
+
+    def job(device: Device) -> Unmixed:
+        light = shading_of(device, colours, skin, noise) if shading else None
+        even = colours if light is None else colours / light[..., None]
+        made, sd, residual = Unmixer(device, model, noise).unmix(even, told)
+        found = made[..., 2] if third == "oxygen" else None
+        maps = (made[..., 0], made[..., 1], sd[..., 0], sd[..., 1])
+        return Unmixed(*maps, residual, found, light, skin, model, {adapter: kept})
+
+    kept = OneDevice(adapter)
+    return kept.run(job)
+
+
+def _array(colours: ArrayLike) -> Pixels:
+    found = np.asarray(colours)
+    if found.ndim != 3 or found.shape[2] != 3 or not found.size or found.dtype.kind != "f":
+        came = f"shape {found.shape} and type {found.dtype} came"
+        refuse(
+            "colours", "floats (h, w, 3), linear Rec. 709", came, "Decode sRGB first, or give the file's name"
+        )
+    if not (np.isfinite(found).all() and found.min() >= 0.0 and found.max() <= 1.0):
+        refuse("colours", "reflectances from 0 to 1", "some are outside, or no numbers", "Scale them")
+    return found.astype(np.float32, copy=False)

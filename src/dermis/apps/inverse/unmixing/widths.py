@@ -1,0 +1,133 @@
+"""How far light spreads in each texel's skin: three profiles, and a map that mixes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.inverse.unmixing.unmix import Unmixed
+from dermis.base.atomic_write import replacing
+from dermis.base.errors import refuse
+from dermis.images.exr import encode_exr
+from dermis.optics.fits.shared import shared_gaussians
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.media import Floats
+from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.profiles import fit_profile, write_profile
+from dermis.optics.tissue import Tissue, load_tissue
+
+Pixels = NDArray[np.float32]
+CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_dark": (-1, -1)}
+"""Files of the profiles, and which ends of melanin and of blood they have: pale and bloodless, pale with
+blood, dark with blood."""
+MAP = "profile_map"
+_NODES = 4  # along the logarithms of melanin and of blood
+_ENDS = 0.5, 99.5  # percentiles of the skin between which profiles are mixed
+_LEAST, _APART = 1e-3, 1.02  # of a share; of the ends
+_STIFF = 1e4  # of the equation that shares sum to 1
+
+
+@dataclass(frozen=True, eq=False)
+class Widths:
+    """Profiles on the same Gaussians, and where skin has which.
+
+    shares : (h, w, 2) of the second and the third [-]
+    error, alone : (3,) root mean square over the grid of E_b, by channel, of the mixture against each node's
+        own profile, colour aside; and of the one profile at the middle instead [-]
+    """
+
+    profiles: tuple[GaussianSum, ...]
+    shares: Pixels
+    error: Floats
+    alone: Floats
+
+    def summary(self) -> dict[str, Any]:
+        """The errors."""
+        return {"mixed": self.error.tolist(), "one_profile": self.alone.tolist()}
+
+
+def widths_of(found: Unmixed) -> Widths:
+    """Three profiles and their shares by each texel's melanin and blood; beyond their ends the nearest.
+
+    Raises DermisError for a picture without skin.
+    """
+    skin = found.skin_texels()
+    if not skin.any():
+        refuse("widths", "a picture of skin", "no texel is like skin", "Give the skin's albedo")
+    axes = [_axis(one[skin]) for one in (found.melanin, found.blood)]
+    tissues = [_tissue(found.skin, m, b) for m, b in product(*axes)]
+    nodes = np.array([_white(one) for one in tissues])
+    corners = [(m % _NODES) * _NODES + b % _NODES for m, b in CORNERS.values()]
+    shares = _shares(nodes, nodes[corners])
+    middle = nodes[(_NODES // 2) * _NODES + _NODES // 2]
+    mixed = np.einsum("nk,krc->nrc", shares, nodes[corners])
+    profiles = [fit_profile(tissues[k], name) for k, name in zip(corners, CORNERS, strict=True)]
+    over_map = _over_map(shares[:, 1:].reshape(_NODES, _NODES, 2), axes, found)
+    return Widths(shared_gaussians(profiles), over_map, _off(mixed, nodes), _off(middle[None], nodes))
+
+
+def save_widths(folder: Path, widths: Widths) -> list[Path]:
+    """Write the profiles and the map, each whole or not at all.
+
+    Raises DermisError when the disk is full, or the folder cannot be written to.
+    """
+    written = [folder / f"{name}.toml" for name in CORNERS]
+    for path, profile in zip(written, widths.profiles, strict=True):
+        write_profile(path, profile, {})
+    path = folder / f"{MAP}.exr"
+    with replacing(path) as trial:
+        trial.write_bytes(encode_exr(np.dstack([widths.shares, np.zeros_like(widths.shares[..., :1])])))
+    return [*written, path]
+
+
+def _axis(shares: Pixels) -> Floats:
+    low, high = np.maximum(np.percentile(shares, _ENDS), _LEAST)
+    return np.geomspace(low, max(high, _APART * low), _NODES)
+
+
+def _tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:
+    held = {name: getattr(skin, name) for name in ("eumelanin", "oxygen", "epidermis_mm")}
+    return load_tissue("spectral", pigments={"melanin": float(melanin), "blood": float(blood), **held})
+
+
+def _white(tissue: Tissue) -> Floats:
+    """(n, 3) share of what leaves that leaves through each ring."""
+    rings = tissue.rings()
+    return np.asarray(rings.energy / rings.total)
+
+
+def _shares(nodes: Floats, corners: Floats) -> Floats:
+    """(n, k) shares of the corners that come nearest to each node: none below 0, their sum 1."""
+    from scipy.optimize import nnls
+
+    sides = np.vstack([corners.reshape(len(corners), -1).T, np.full((1, len(corners)), _STIFF)])
+    found = np.array([nnls(sides, np.append(node.ravel(), _STIFF))[0] for node in nodes])
+    return np.asarray(found / found.sum(axis=1, keepdims=True))
+
+
+def _off(made: Floats, nodes: Floats) -> Floats:
+    """(3,) root mean square of E_b over all nodes."""
+    squares = ((made - nodes) ** 2).sum(axis=1) / (nodes**2).sum(axis=1)
+    return np.asarray(np.sqrt(squares.mean(axis=0)))
+
+
+def _over_map(shares: Floats, axes: Sequence[Floats], found: Unmixed) -> Pixels:
+    """(h, w, 2) shares between nodes, by the logarithms of melanin and blood."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    between = RegularGridInterpolator([np.log(axis) for axis in axes], shares)
+    made = np.empty((*found.melanin.shape, 2), np.float32)
+    for row, both in enumerate(zip(found.melanin, found.blood, strict=True)):
+        places = [np.log(np.clip(one, a[0], a[-1])) for one, a in zip(both, axes, strict=True)]
+        made[row] = between(np.clip(np.stack(places, axis=-1), *_ends(axes)))
+    return made
+
+
+def _ends(axes: Sequence[Floats]) -> tuple[Floats, Floats]:
+    return np.log([axis[0] for axis in axes]), np.log([axis[-1] for axis in axes])

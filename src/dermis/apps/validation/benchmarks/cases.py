@@ -1,0 +1,174 @@
+"""The frames that are measured, a usual one and others that each differ in one thing, and their scenes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
+from dermis.mesh.head import Head
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.profiles import load_profile
+from dermis.scene.camera import portrait
+from dermis.scene.environment import Environment
+from dermis.scene.lights import PointLight, studio
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
+
+GPU_GEMS_3 = "gpu-gems-3"
+FRAGMENTS = "published-fragments"
+"""The passes of 2007 in the graphics pipeline; `GPU_GEMS_3` has the same in compute."""
+_SWAY_MM = 2.0
+_LEAST_WEIGHT = 1e-3
+_TURN_DEGREES = 25.0  # between one round of the studio's lights and the next
+
+
+@dataclass(frozen=True)
+class Case:
+    """One frame to measure.
+
+    image : (width, height) [pixel]
+    atlas : side of the irradiance map [texel]
+    gaussians : of the profile
+    lights : spots with shadows
+    environment : name of a panorama, "" for none
+    subdivide : levels of subdivision of the head, each with four times the triangles
+    targets : morph targets that all move in each frame, with four bones; 0 for a head that stands still
+    samples : of a pixel
+    technique : of `Settings`, or `FRAGMENTS`
+    varies : how it differs from the usual frame, "" for that itself
+    """
+
+    image: tuple[int, int] = (1920, 1080)
+    atlas: int = 2048
+    gaussians: int = 6
+    lights: int = 3
+    environment: str = ""
+    subdivide: int = 0
+    targets: int = 0
+    samples: int = 4
+    technique: str = "texture-space"
+    varies: str = ""
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A usual frame, and the values that each of its fields takes in turn."""
+
+    usual: Case
+    image: tuple[tuple[int, int], ...]
+    atlas: tuple[int, ...]
+    gaussians: tuple[int, ...]
+    lights: tuple[int, ...]
+    subdivide: tuple[int, ...]
+    targets: tuple[int, ...] = (52,)
+    environment: tuple[str, ...] = ("uniform",)
+    technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENTS)
+
+    def cases(self) -> list[Case]:
+        """The usual frame, then the others."""
+        found = [self.usual]
+        sizes = "image", "atlas", "gaussians", "lights", "environment", "targets", "subdivide"
+        for name in ("technique", *sizes):
+            for value in getattr(self, name):
+                if value != getattr(self.usual, name):
+                    found.append(replace(self.usual, varies=name, **{name: value}))
+        return found
+
+
+PRESETS: dict[str, Preset] = {
+    "film": Preset(
+        Case((3840, 2160), atlas=4096, gaussians=8, lights=5, subdivide=2, samples=16),
+        image=((1920, 1080), (2048, 2048), (3840, 2160)),
+        atlas=(1024, 2048, 4096),
+        gaussians=(1, 4, 6, 8),
+        lights=(1, 3, 5, 8),
+        subdivide=(0, 1, 2, 3),
+    ),
+    "interactive": Preset(
+        Case(),
+        image=((512, 512), (1024, 1024), (1920, 1080), (3840, 2160)),
+        atlas=(512, 1024, 2048, 4096),
+        gaussians=(1, 2, 4, 6, 8),
+        lights=(1, 2, 3, 5, 8),
+        subdivide=(0, 1, 2, 3),
+    ),
+    "cpu": Preset(
+        Case((1024, 1024), atlas=1024),
+        image=((256, 256), (512, 512), (1024, 1024)),
+        atlas=(256, 512, 1024),
+        gaussians=(1, 3, 6, 8),
+        lights=(1, 3, 8),
+        subdivide=(0, 1),
+    ),
+}
+
+
+def settings_of(case: Case) -> Settings:
+    """How the case is rendered."""
+    return Settings(
+        size=case.image,
+        atlas=case.atlas,
+        samples=case.samples,
+        technique=case.technique,
+    )
+
+
+def scenes_of(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
+    """The case at `count` moments: camera, lights and a moving head are never in the same place twice.
+
+    folder : for the profile's file
+    """
+    skin, camera = Skin(profile=str(_profile_file(case.gaussians, folder))), portrait(head)
+    lights = _lights(case.lights)
+    around = Environment(name=case.environment) if case.environment else None
+    head = rigged(head, case.targets) if case.targets else head
+    scenes = []
+    for k in range(count):
+        sway = _SWAY_MM * math.sin(1.0 + k)
+        moved = [light.model_copy(update={"position": _aside(light.position, sway)}) for light in lights]
+        eye = camera.model_copy(update={"position": _aside(camera.position, sway)})
+        pose = pose_at(head, k) if case.targets else None
+        scenes.append(Scene(head, tuple(moved), eye, skin, around, pose))
+    return scenes
+
+
+def _aside(place: tuple[float, float, float], sway: float) -> tuple[float, float, float]:
+    return place[0] + sway, place[1], place[2]
+
+
+def _lights(count: int) -> list[PointLight]:
+    """The studio's spots, then the same ones turned about the head."""
+    rig = [light for light in studio() if isinstance(light, PointLight)]
+    return [_turned(rig[k % len(rig)], _TURN_DEGREES * (k // len(rig))) for k in range(count)]
+
+
+def _turned(light: PointLight, degrees: float) -> PointLight:
+    x, y, z = light.position
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return light.model_copy(update={"position": (c * x + s * z, y, c * z - s * x)})
+
+
+def _profile_file(count: int, folder: Path) -> Path:
+    path = folder / f"{count}.csv"
+    profile = with_terms(load_profile("gpu-gems-3"), count)
+    rows = np.column_stack([profile.variance_mm2, profile.weight])
+    lines = [",".join(repr(float(number)) for number in row) for row in rows]
+    path.write_text("\n".join(["variance_mm2,red,green,blue", *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def with_terms(profile: GaussianSum, count: int) -> GaussianSum:
+    """A stand-in with `count` Gaussians, the same albedo and the same widest Gaussian."""
+    if count == len(profile.variance_mm2):
+        return profile
+    known = np.log(profile.variance_mm2)
+    wanted = np.linspace(known[0], known[-1], count) if count > 1 else known[-1:]
+    channels = [np.interp(wanted, known, channel) + _LEAST_WEIGHT for channel in profile.weight.T]
+    weight = np.stack(channels, axis=1)
+    weight *= profile.albedo / weight.sum(axis=0)
+    return GaussianSum(f"{count} Gaussians", np.exp(wanted), weight)

@@ -1,0 +1,142 @@
+"""A benchmark as JSON, as lines of text, and as a self-contained HTML file."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3, Case
+from dermis.apps.validation.benchmarks.measure import Row
+from dermis.apps.validation.benchmarks.plots import plain
+from dermis.apps.validation.benchmarks.run import Benchmark
+from dermis.base.atomic_write import replacing
+
+
+def as_json(made: Benchmark) -> dict[str, Any]:
+    """The benchmark as one JSON-ready object; times in ms."""
+    return {
+        "head": made.head,
+        "adapter": made.adapter,
+        "driver": made.driver,
+        "versions": made.versions,
+        "date": made.date,
+        "seconds": made.seconds,
+        "copy_gb_s": made.copied / 1e9,
+        "published_ratio": made.ratio(GPU_GEMS_3),
+        "published_fragments_ratio": made.ratio(FRAGMENTS),
+        "rows": [_row(row) for row in made.rows],
+        "left_out": [{**_case(one.case), "reason": one.reason} for one in made.left_out],
+    }
+
+
+def _case(case: Case) -> dict[str, Any]:
+    return asdict(case) | {"image": list(case.image)}
+
+
+def _row(row: Row) -> dict[str, Any]:
+    told = {**_case(row.case), **asdict(row), "floor_ratio": row.floor_ratio}
+    del told["case"]
+    return told
+
+
+_OTHERS = {GPU_GEMS_3: "2007, compute [ms]", FRAGMENTS: "2007, fragments [ms]"}
+_CASE = ("image", "atlas", "Gaussians", "lights", "around", "targets", "triangles", "technique")
+_TIMES = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms]", "image out [ms]")
+COLUMNS = (*_CASE, *_TIMES, "memory [MB]")
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """A row's figures as text, in the order of COLUMNS."""
+    case, device = row.case, (row.gpu_ms["total"], row.floor_ms["total"], row.floor_ratio)
+    return (
+        f"{case.image[0]}x{case.image[1]}",
+        str(case.atlas),
+        str(case.gaussians),
+        str(case.lights),
+        case.environment or "-",
+        str(case.targets or "-"),
+        str(row.triangles),
+        case.technique,
+        *map(plain, (row.frame_ms, *device, row.python_ms, row.image_ms)),
+        f"{row.memory_mb:.0f}",
+    )
+
+
+def stage_table(made: Benchmark) -> list[tuple[str, ...]]:
+    """The usual frame by stage, titles first: device time, floor, their ratio, and the passes of 2007."""
+    if made.usual is None:
+        return []
+    usual = made.usual
+    others = {title: row.gpu_ms for name, title in _OTHERS.items() if (row := made.row_of(name))}
+    table = [("stage", "device [ms]", "floor [ms]", "ratio", *others)]
+    for stage, ms in usual.gpu_ms.items():
+        floor = usual.floor_ms.get(stage)
+        known = (plain(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
+        theirs = (plain(times[stage]) if stage in times else "-" for times in others.values())
+        table.append((stage, plain(ms), *known, *theirs))
+    return table
+
+
+def published_text(made: Benchmark) -> str:
+    """How much longer the passes of 2007 take, if that was measured."""
+    names = {GPU_GEMS_3: "as compute", FRAGMENTS: "as fragments"}
+    found = {said: made.ratio(name) for name, said in names.items()}
+    told = [f"{ratio:.2f} times as long {said}" for said, ratio in found.items() if ratio is not None]
+    return f"With the passes of 2007 it takes {' and '.join(told)}." if told else ""
+
+
+def left_out_lines(made: Benchmark) -> list[str]:
+    """What could not be measured, and why."""
+    return [f"left out: {_told(one.case)}: {one.reason}" for one in made.left_out]
+
+
+def _told(case: Case) -> str:
+    width, height = case.image
+    sizes = f"{width}x{height}, atlas {case.atlas}, {case.gaussians} Gaussians, {case.lights} lights"
+    around = f", environment {case.environment}" if case.environment else ""
+    moving = f", {case.targets} targets" if case.targets else ""
+    return f"{sizes}{around}{moving}, subdivided {case.subdivide} times, {case.technique}"
+
+
+def summary(made: Benchmark) -> str:
+    """The machine, the head, the date and the versions, in one line."""
+    versions = ", ".join(f"{name} {number}" for name, number in made.versions.items())
+    return (
+        f"{made.adapter} ({made.driver}), {made.head}, {made.date}; {versions}; "
+        f"a copy moves {made.copied / 1e9:.4g} GB/s"
+    )
+
+
+def write_report(path: Path, made: Benchmark) -> None:
+    """Write tables and plots; the file is complete or not there.
+
+    Raises DermisError when it cannot be written.
+    """
+    from dermis.apps.validation.benchmarks import plots
+
+    text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
+    page = text.substitute(
+        summary=html.escape(summary(made)),
+        published=published_text(made),
+        rows=_table([COLUMNS, *(cells(row) for row in made.rows)]),
+        left_out="".join(f"<p>{html.escape(line)}</p>" for line in left_out_lines(made)),
+        stages=_table(stage_table(made)),
+        bars=plots.stages(made.usual) if made.usual else "",
+        scaling=plots.scaling(made),
+    )
+    with replacing(path) as trial:
+        trial.write_text(page, encoding="utf-8")
+
+
+def _table(lines: Sequence[tuple[str, ...]]) -> str:
+    """An HTML table whose first line has the titles."""
+    rows = []
+    for number, line in enumerate(lines):
+        tag = "td" if number else "th"
+        rows.append("".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in line))
+    return "<table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"

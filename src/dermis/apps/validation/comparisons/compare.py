@@ -1,0 +1,175 @@
+"""Techniques against one truth: figures and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.validation.comparisons.profile_models import ModelName
+from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, medium_scene
+from dermis.apps.validation.comparisons.truths import TRUTHS, Subject, Truth, check_seen
+from dermis.base.errors import refuse
+from dermis.frame.renderer import Renderer
+from dermis.frame.surface_points import surface_points
+from dermis.images.colour import encode_srgb
+from dermis.mesh.head import Head
+from dermis.optics.media import media
+from dermis.scene.settings import Settings
+from dermis.scene.skin import DirectionName, Skin
+
+Floats = NDArray[np.float64]
+_SHOWN_PERCENTILE = 99.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """A technique's figures, with standard errors where the truth is noisy.
+
+    relrmse, relrmse_se : root mean square error over the root mean square of the truth [-]
+    flip : mean perceived difference [0..1]; None without the package flip-evaluator
+    energy_ratio, energy_ratio_se : light in the image over that in the truth [-]
+    ms : device time of a frame
+    """
+
+    technique: str
+    against: str
+    relrmse: float
+    relrmse_se: float
+    flip: float | None
+    energy_ratio: float
+    energy_ratio_se: float
+    ms: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What was compared, and the results.
+
+    images : linear radiance (h, w, 3) by technique
+    """
+
+    title: str
+    adapter: str
+    truth: Truth
+    against: str
+    rows: tuple[Row, ...]
+    images: dict[str, Floats]
+
+    @property
+    def exposure(self) -> float:
+        """Factor that makes the truth's bright parts nearly white."""
+        bright = np.percentile(self.truth.image[self.truth.mask], _SHOWN_PERCENTILE)
+        return 0.8 / max(float(bright), 1e-9)
+
+    def shown(self, image: Floats) -> Floats:
+        """sRGB (h, w, 3) in 0..1 at the comparison's exposure."""
+        return np.asarray(encode_srgb(np.clip(self.exposure * image, 0.0, 1.0)))
+
+
+def compare(
+    head: Head,
+    against: str,
+    techniques: Sequence[str],
+    *,
+    light: str = "front",
+    region: str = "portrait",
+    medium: str = "skin1",
+    settings: Settings | None = None,
+    direction: DirectionName | None = None,
+    model: ModelName | None = None,
+    samples: int = 64,
+    adapter: str = "auto",
+    report: Callable[[str], None] = lambda doing: None,
+) -> Comparison:
+    """Techniques with the profile's own colour, no surface reflection and no energy term, against a truth.
+
+    against : of TRUTHS
+    light, region : of `scenes.LIGHTS` and `scenes.REGIONS`
+    medium : a named medium, taken as index-matched
+    direction : of the techniques' skin; None for that of the truth's
+    model : of the medium's profile, as the techniques have it; see `gaussians_of` for the default
+    samples : paths through each pixel
+    report : called with what is being done
+
+    Raises DermisError for unknown names, pictures without the head, and what the truth cannot do.
+    """
+    check_choices(against, light, region, medium)
+    settings = settings or Settings(size=(256, 256), atlas=1024)
+    with subject_of(head, light, region, medium, settings, adapter, model) as subject:
+        check_seen(surface_points(subject.renderer, subject.scene, settings).mask)
+        report(f"truth: {against}")
+        truth = TRUTHS[against](subject, samples)
+        check_seen(truth.mask)
+        skin = Skin(**(subject.scene.skin.model_dump() | {"direction": direction or truth.direction}))
+        judged = replace(subject, scene=replace(subject.scene, skin=skin))
+        images, ms = {}, {}
+        for technique in techniques:
+            report(technique)
+            images[technique], ms[technique] = _render(judged, technique, truth)
+        name = subject.renderer.device.adapter.name
+    title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
+    title += f", {skin.direction} skin, profile by {'photons' if subject.profile.counted else 'diffusion'}"
+    made = Comparison(title, name, truth, against, (), images)
+    return replace(made, rows=tuple(_row(made, technique, ms[technique]) for technique in techniques))
+
+
+@contextmanager
+def subject_of(
+    head: Head,
+    light: str,
+    region: str,
+    medium: str,
+    settings: Settings,
+    adapter: str,
+    model: ModelName | None = None,
+) -> Iterator[Subject]:
+    """What a comparison judges, valid within the context; arguments as of `compare`."""
+    body = media()[medium].with_eta(1.0)
+    with medium_scene(head, light, region, body, model) as (scene, profile):
+        yield Subject(Renderer(adapter), scene, profile, body, settings)
+
+
+def check_choices(against: str, light: str, region: str, medium: str) -> None:
+    """Raises DermisError for unknown names; cheap, so call it before long work."""
+    choices: dict[str, tuple[str, Collection[str]]] = {
+        "against": (against, TRUTHS),
+        "light": (light, LIGHTS),
+        "region": (region, REGIONS),
+        "medium": (medium, media()),
+    }
+    for option, (chosen, known) in choices.items():
+        if chosen not in known:
+            refuse(f"--{option}", f"one of {', '.join(known)}", f"{chosen!r} came", "Choose one of them")
+
+
+def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, float]:
+    """Linear radiance of a technique, and the device time of its frame at four samples a pixel [ms]."""
+    without: dict[str, object] = {} if truth.through else {"transmission": "none"}
+    without |= {} if truth.between else {"interreflection": False}
+    chosen = subject.settings.model_dump() | {"technique": technique} | without
+    drawn = subject.renderer.draw(subject.scene, Settings(**(chosen | {"samples": truth.subpixels})))
+    image = drawn.linear().astype(np.float64)
+    timed = subject.renderer.draw_warm(subject.scene, Settings(**(chosen | {"samples": 4})))
+    return image, (timed.gpu_ms or {"total": timed.frame_ms})["total"]
+
+
+def _row(made: Comparison, technique: str, ms: float) -> Row:
+    from dermis.apps.validation.truths.metrics import energy_ratio, relative_rmse
+
+    truth, image = made.truth, made.images[technique]
+    error = relative_rmse(image, truth.image, truth.mask, truth.variance)
+    energy = energy_ratio(image, truth.image, truth.mask, truth.variance)
+    perceived = _flip(made.shown(image), made.shown(truth.image), truth.mask)
+    return Row(technique, made.against, *error, perceived, *energy, ms)
+
+
+def _flip(image: Floats, truth: Floats, mask: NDArray[np.bool_]) -> float | None:
+    from importlib.util import find_spec
+
+    from dermis.apps.validation.truths.metrics import flip
+
+    return flip(image, truth, mask).mean if find_spec("flip_evaluator") else None

@@ -1,0 +1,107 @@
+"""The scenes on which techniques are judged: lit from the front, through the ear, and by a laser's stripe."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from dermis.apps.validation.comparisons.profile_models import ModelName, gaussians_of
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.optics.counted import COUNTED
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.media import Medium
+from dermis.optics.profiles import write_profile
+from dermis.scene.camera import Camera, portrait, three_quarter
+from dermis.scene.lights import Light, SpotLight, StripeLight
+from dermis.scene.model import Scene
+from dermis.scene.skin import Skin
+
+_WHITE = (3.14, 3.14, 3.14)
+_NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, from the head's centre [mm]
+_EARS_MM = 60.0  # above and below the centre; farther below, shoulders are wider
+
+
+def _front(head: Head) -> tuple[Light, ...]:
+    """A key light from the upper left, whose shadow edges cross the face."""
+    return (SpotLight(position=(450.0, 350.0, 750.0), irradiance=_WHITE),)
+
+
+def _back(head: Head) -> tuple[Light, ...]:
+    """A lamp behind the left ear."""
+    ear = _ear(head)
+    return (SpotLight(position=(ear[0] + 150.0, 60.0, -600.0), target=ear, irradiance=(12.0, 12.0, 12.0)),)
+
+
+def _laser(head: Head) -> tuple[Light, ...]:
+    """A vertical sheet of light over the cheek and the ear's front edge."""
+    ear = _ear(head)
+    place = (ear[0] - 12.0, ear[1], ear[2])
+    return (StripeLight(direction=(-0.55, 0.0, -1.0), position=place, irradiance=(30.0, 30.0, 30.0)),)
+
+
+LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {"front": _front, "back": _back, "laser": _laser}
+
+
+def _ear(head: Head) -> tuple[float, float, float]:
+    """The outermost point of the head's left half at the height of its ears."""
+    places = head.mesh.positions - head.centre_mm
+    off = np.abs(places[:, 1])
+    beside = places[off <= max(_EARS_MM, float(off.min()))]
+    x, y, z = (float(c) for c in beside[beside[:, 0].argmax()])
+    return (x, y, z)
+
+
+def _at_ear(head: Head) -> Camera:
+    x, y, z = _ear(head)
+    return Camera(position=(x + 420.0, y + 20.0, z + 420.0), target=(x - 8.0, y, z), frame_mm=95.0)
+
+
+def _at_cheek(head: Head) -> Camera:
+    spot = head.frontmost(40.0, -35.0)
+    return Camera(position=(spot[0] + 250.0, spot[1], spot[2] + 300.0), target=spot, frame_mm=90.0)
+
+
+def _at_nose(head: Head) -> Camera:
+    return Camera(position=(_NOSE[0], _NOSE[1], 900.0), target=_NOSE, frame_mm=90.0)
+
+
+REGIONS: dict[str, Callable[[Head], Camera]] = {
+    "portrait": portrait,
+    "three-quarter": three_quarter,
+    "ear": _at_ear,
+    "cheek": _at_cheek,
+    "nose": _at_nose,
+}
+
+
+def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene:
+    """A head without maps or surface reflection, its skin in the profile's own colour.
+
+    light, region : of LIGHTS and REGIONS
+    profile : name or file
+    """
+    bare = Head(head.name, head.mesh, Maps(), head.attribution)
+    skin = Skin(profile=profile, albedo="profile", specular="none", energy="none", direction="lambertian")
+    return Scene(bare, lights=LIGHTS[light](head), camera=REGIONS[region](head), skin=skin)
+
+
+@contextmanager
+def medium_scene(
+    head: Head, light: str, region: str, body: Medium, model: ModelName | None = None
+) -> Iterator[tuple[Scene, GaussianSum]]:
+    """`comparison_scene` with a medium's profile, kept as a file within the context, and the profile."""
+    profile = gaussians_of(body, model)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "profile.toml"
+        write_profile(file, profile, {"model": COUNTED if profile.counted else "layered"})
+        yield comparison_scene(head, light, region, str(file)), profile
+
+
+def usual_region(light: str) -> str:
+    """Where a light's effect shows most."""
+    return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")

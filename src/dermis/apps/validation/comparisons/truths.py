@@ -1,0 +1,210 @@
+"""Images to judge techniques by, each with its own assumptions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.errors import refuse
+from dermis.frame.renderer import Renderer
+from dermis.frame.surface_points import SurfacePoints, irradiance_at, surface_points
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.media import Medium
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+from dermis.scene.skin import DirectionName
+
+if TYPE_CHECKING:
+    from dermis.apps.validation.truths.cycles import CyclesRendered
+    from dermis.apps.validation.truths.irradiance_samples import IrradianceSamples
+    from dermis.apps.validation.truths.path_traced import PathTraced
+
+Floats = NDArray[np.float64]
+
+_SPACING_MM, _FINEST_MM = 3.0, 0.2  # twice as coarse, a laser's stripe loses 1.5 % of its light
+_HEAT_RADIUS_MM = 10.0
+_LEAST_VARIANCE_MM2 = 0.25  # for narrower Gaussians the surface is as good as flat
+_COVERED = 0.999  # share of a pixel
+SUBPIXELS = 16
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is judged: a scene, its skin's profile and medium, and the settings of its image."""
+
+    renderer: Renderer
+    scene: Scene
+    profile: GaussianSum
+    medium: Medium
+    settings: Settings
+
+
+@dataclass(frozen=True)
+class Truth:
+    """An image and how far it may be trusted.
+
+    image, variance : (h, w, 3) radiance and the variance of its noise
+    mask : (h, w) pixels to judge
+    subpixels : samples of each pixel that a technique's image needs for a fair comparison
+    seconds : that it took
+    notes : for the reader
+    through : whether it includes light through thin parts
+    between : whether it includes light from skin to skin through the air
+    direction : of `Skin`, by which light enters and leaves in it
+    """
+
+    image: Floats
+    variance: Floats
+    mask: NDArray[np.bool_]
+    subpixels: int
+    seconds: float
+    notes: tuple[str, ...] = ()
+    through: bool = True
+    between: bool = True
+    direction: DirectionName = "lambertian"
+
+
+def surface_integral(subject: Subject, samples: int) -> Truth:
+    """The same profile by straight-line distance, integrated over the surface: it shows the error of the map.
+
+    samples : ignored
+    """
+    started = time.perf_counter()
+    seen = surface_points(subject.renderer, subject.scene, subject.settings)
+    lit = irradiance_samples(subject)
+    exitance = _straight(positions(subject, seen), lit, subject.profile.weight, subject.profile.variance_mm2)
+    return _by_pixel(seen, exitance, started, f"{len(lit.positions):,} samples of irradiance")
+
+
+def heat(subject: Subject, samples: int) -> Truth:
+    """The same Gaussians diffused along the surface like heat, around the camera's target.
+
+    samples : ignored
+    """
+    return heat_around(subject, subject.scene.camera.target, _HEAT_RADIUS_MM, irradiance_samples(subject))
+
+
+def heat_around(
+    subject: Subject,
+    place: tuple[float, float, float],
+    radius_mm: float,
+    lit: IrradianceSamples,
+    least_mm2: float = _LEAST_VARIANCE_MM2,
+) -> Truth:
+    """The same Gaussians diffused along the surface like heat, around the visible point nearest to a place.
+
+    place : from the head's centre [mm]
+    lit : of the whole head, see `irradiance_samples`
+    least_mm2 : variance below which Gaussians are integrated by straight-line distance
+    """
+    from dermis.apps.validation.truths.refine import patch_of
+    from dermis.apps.validation.truths.surface_diffusion import diffuse_on_surface
+
+    started = time.perf_counter()
+    narrow = subject.profile.variance_mm2 < least_mm2
+    variances, weight = subject.profile.variance_mm2, subject.profile.weight
+    seen = surface_points(subject.renderer, subject.scene, subject.settings)
+    places = positions(subject, seen)
+    middle = np.array(place) + subject.scene.head.centre_mm
+    centre = places[np.linalg.norm(places - middle, axis=1).argmin()]
+    patch = patch_of(subject.scene.head.mesh, centre, radius_mm, variances[~narrow])
+    entered = _entered(subject, *patch.vertex_places())
+    levels = diffuse_on_surface(patch.positions, patch.triangles, entered, variances[~narrow])
+    fine, weights = patch.find(seen.triangle, seen.barycentric)
+    on = (fine >= 0) & patch.holds(places)
+    spread = np.einsum("knc,kc->nc", levels, weight[~narrow])
+    exitance = patch.interpolate(spread, fine[on], weights[on])
+    exitance += _straight(places[on], lit, weight[narrow], variances[narrow])
+    mask = seen.mask.copy()
+    mask[seen.mask] = on
+    judged = SurfacePoints(mask, seen.triangle[on], seen.barycentric[on])
+    straight = f"{narrow.sum()} Gaussians under {least_mm2:g} mm2 by straight lines"
+    made = _by_pixel(judged, exitance, started, f"{radius_mm:g} mm around the middle; {straight}")
+    return replace(made, through=False)
+
+
+def irradiance_samples(subject: Subject) -> IrradianceSamples:
+    """The light that enters all of the skin, sampled as finely as the truths need it."""
+    from dermis.apps.validation.truths.irradiance_samples import Places, sample_irradiance
+
+    def light(places: Places) -> Floats:
+        return _entered(subject, places.face, places.barycentric)
+
+    return sample_irradiance(subject.scene.head.mesh, light, _SPACING_MM, _FINEST_MM)
+
+
+def path_traced(subject: Subject, samples: int) -> Truth:
+    """Light through the medium itself, free of the errors of the profile and of diffuse surfaces.
+
+    samples : paths through each pixel
+    """
+    from dermis.apps.validation.truths.path_traced import path_trace
+
+    made = path_trace(subject.scene, subject.medium, samples, subject.settings)
+    truth = _rendered(made, made.mask, f"{made.samples} paths a pixel", *made.notes)
+    return replace(truth, direction="half-space")
+
+
+def cycles(subject: Subject, samples: int) -> Truth:
+    """Blender's Cycles with random walks through the medium: a peer, not the truth.
+
+    samples : paths through each pixel
+    """
+    from dermis.apps.validation.truths.cycles import cycles_render
+
+    made = cycles_render(subject.scene, subject.medium, samples, subject.settings)
+    return _rendered(made, made.coverage, f"{made.samples} paths a pixel, random walk")
+
+
+TRUTHS: dict[str, Callable[[Subject, int], Truth]] = {
+    "surface-integral": surface_integral,
+    "heat": heat,
+    "path-traced": path_traced,
+    "cycles": cycles,
+}
+
+
+def _rendered(made: PathTraced | CyclesRendered, coverage: NDArray[np.float32], *notes: str) -> Truth:
+    image, variance = made.image.astype(np.float64), made.variance.astype(np.float64)
+    return Truth(image, variance, coverage > _COVERED, SUBPIXELS, made.seconds, notes)
+
+
+def _entered(subject: Subject, triangle: NDArray[np.int64], barycentric: Floats) -> Floats:
+    return irradiance_at(subject.renderer, subject.scene, subject.settings, triangle, barycentric)
+
+
+def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
+    """(n, 3) radiant exitance at points by Gaussians of the straight-line distance."""
+    from dermis.apps.validation.truths.surface_integral import GaussianSum as Profile
+    from dermis.apps.validation.truths.surface_integral import integrate
+
+    if not len(variance_mm2):
+        return np.zeros_like(points)
+    return integrate(points, lit, Profile(weight, variance_mm2))
+
+
+def positions(subject: Subject, seen: SurfacePoints) -> Floats:
+    """(n, 3) where rays through the pixels' centres meet the head [mm]."""
+    mesh = subject.scene.head.mesh
+    corners = mesh.positions[mesh.triangles[seen.triangle]].astype(np.float64)
+    return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))
+
+
+def _by_pixel(seen: SurfacePoints, exitance: Floats, started: float, note: str) -> Truth:
+    image = np.zeros((*seen.mask.shape, 3))
+    image[seen.mask] = exitance / np.pi
+    return Truth(
+        image, np.zeros_like(image), seen.mask, 1, time.perf_counter() - started, (note,), between=False
+    )
+
+
+def check_seen(mask: NDArray[np.bool_]) -> None:
+    """Raises DermisError when there is no pixel to judge."""
+    if not mask.any():
+        expected = "a pixel that shows nothing but the head"
+        refuse("the picture", expected, "there is none", "Choose a larger size or another region")

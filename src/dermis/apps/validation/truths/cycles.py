@@ -1,0 +1,183 @@
+"""The same head by Cycles, as a Blender user would render it: by random walk or with Burley's profile.
+
+Blender's Python runs `cycles_script.py` as a process of its own on a folder with the described scene.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.validation.truths.blender_process import PYTHON_VARIABLE as PYTHON_VARIABLE
+from dermis.apps.validation.truths.blender_process import Errand, blender_python, run_blender
+from dermis.apps.validation.truths.cycles_scene import FALLOFFS, Below, describe
+from dermis.base.errors import DermisError, refuse
+from dermis.images.io import read_image
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+Floats = NDArray[np.float32]
+Method = Literal["random-walk", "burley"]
+_PASSES = 4
+_ERRAND = Errand("Cycles", "to render the scene", "Try bpy 5.0, which this was made with")
+_START_S, _PATH_S = 300.0, 5e-4
+"""Time limits for the start and for each path: a hundred times what two cores took."""
+
+
+@dataclass(frozen=True, eq=False)
+class CyclesRendered:
+    """An image by Cycles, black where there is no head.
+
+    image : (h, w, 3) radiance, linear Rec. 709
+    variance : (h, w, 3) of each value of the image, from passes with different seeds
+    coverage : (h, w) share of the pixel that the head fills
+    samples : paths through each pixel
+    seconds : that Cycles took, building the scene and the acceleration structure included
+    """
+
+    image: Floats
+    variance: Floats
+    coverage: Floats
+    samples: int
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class CyclesPass:
+    """One rendering by Cycles, black where there is no head.
+
+    image : (h, w, 3) radiance, linear Rec. 709
+    coverage : (h, w) share of the pixel that the head fills
+    samples : paths through each pixel
+    seconds : by the clock; for the first pass with building the scene and the acceleration structure
+    core_seconds : summed over all cores
+    version : Blender's
+    """
+
+    image: Floats
+    coverage: Floats
+    samples: int
+    seconds: float
+    core_seconds: float
+    version: str
+
+
+def cycles_render(
+    scene: Scene,
+    medium: Below,
+    samples: int = 64,
+    settings: Settings | None = None,
+    *,
+    method: Method = "random-walk",
+    python: str | Path | None = None,
+) -> CyclesRendered:
+    """The scene by Cycles on the CPU, as the mean of 4 passes; arguments and errors as of `cycles_passes`.
+
+    samples : at least this many paths through each pixel
+    """
+    _check_samples(samples)
+    each = -(-int(samples) // _PASSES)
+    passes = cycles_passes(scene, medium, [each] * _PASSES, settings, method=method, python=python)
+    images = np.stack([one.image for one in passes]).astype(np.float64)
+    coverage = np.stack([one.coverage for one in passes]).astype(np.float64)
+    return CyclesRendered(
+        images.mean(axis=0).astype(np.float32),
+        (images.var(axis=0, ddof=1) / _PASSES).astype(np.float32),
+        coverage.mean(axis=0).astype(np.float32),
+        each * _PASSES,
+        sum(one.seconds for one in passes),
+    )
+
+
+def cycles_passes(
+    scene: Scene,
+    medium: Below,
+    samples: Sequence[int],
+    settings: Settings | None = None,
+    *,
+    method: Method = "random-walk",
+    seed: int = 0,
+    python: str | Path | None = None,
+) -> list[CyclesPass]:
+    """The scene by Cycles on the CPU, once for each number of samples, in one process.
+
+    There is no clamping, denoising or surface reflection.
+
+    medium : of one layer; its eta is ignored, because Cycles' walks end at an index-matched surface. Its
+        colour in Cycles is its diffuse reflectance, its radius 4 pi mean free paths. Or a `Lambertian`
+        or `Facets`
+    samples : paths through each pixel, for each pass
+    settings : only the size counts
+    seed : of the first pass; each further pass takes the next
+    python : of an environment with `bpy`; by default the one that DERMIS_BLENDER_PYTHON names
+
+    Raises DermisError when there is no such Python, when Cycles fails, and for more than one layer.
+    """
+    for count in samples:
+        _check_samples(count)
+    if method not in FALLOFFS:
+        refuse("method", f"one of {', '.join(FALLOFFS)}", f"{method!r} came", "Correct it")
+    size = (settings or Settings()).size
+    described, arrays = describe(scene, medium, method, size)
+    described["passes"] = [{"samples": int(n), "seed": seed + k} for k, n in enumerate(samples)]
+    interpreter = blender_python(python)
+    with tempfile.TemporaryDirectory(prefix="dermis-cycles-") as name:
+        folder = Path(name)
+        _write_scene(folder, described, arrays)
+        _run_cycles(interpreter, folder, paths=size[0] * size[1] * sum(samples))
+        return read_passes(folder, samples, size)
+
+
+def _check_samples(samples: int) -> None:
+    if not (isinstance(samples, int | np.integer) and samples >= 1):
+        refuse("samples", "a whole number from 1", f"{samples} came", "Correct it")
+
+
+def _write_scene(folder: Path, described: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+    (folder / "scene.json").write_text(json.dumps(described), encoding="utf-8")
+    np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its last parameter is no array
+
+
+def _run_cycles(python: Path, folder: Path, paths: int) -> None:
+    """Render the scene in a folder.
+
+    paths : to be traced, which sets the time limit
+    """
+    script = Path(__file__).with_name("cycles_script.py")
+    run_blender(python, script, [str(folder)], _START_S + _PATH_S * paths, _ERRAND)
+
+
+def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> list[CyclesPass]:
+    """The passes that Cycles left in a folder.
+
+    samples : of each pass
+    size : width and height [pixel]
+
+    Raises DermisError when they are not what was asked for.
+    """
+    try:
+        done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
+        files = [folder / f"pass_{k}.exr" for k in range(len(samples))]
+        pixels = [read_image(file).astype(np.float32, copy=False) for file in files]
+        if any(one.shape != (size[1], size[0], 4) or not np.isfinite(one).all() for one in pixels):
+            raise ValueError("a pass of another size, or with values that are not finite")
+        found = zip(pixels, samples, done["times"], strict=True)
+        return [
+            CyclesPass(
+                one[..., :3], one[..., 3], int(count), float(clock), float(cores), str(done["version"])
+            )
+            for one, count, (clock, cores) in found
+        ]
+    except (OSError, ValueError, KeyError, TypeError, DermisError) as fault:
+        _refuse_render(f"it left something else ({str(fault) or type(fault).__name__})")
+
+
+def _refuse_render(came: str) -> NoReturn:
+    refuse(_ERRAND.who, _ERRAND.task, came, _ERRAND.remedy)

@@ -1,0 +1,244 @@
+"""Renders a described scene with Cycles. Blender's Python runs it by its path: cycles_script.py FOLDER.
+
+FOLDER holds scene.json and arrays.npz as the module `cycles` beside it writes them. The script adds pass_K.exr
+(radiance and coverage) and finally done.json (Blender's version, times of the passes). It imports nothing of
+dermis, which Blender's Python does not have.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import bpy  # type: ignore[import-not-found,unused-ignore]
+import numpy as np
+from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
+
+
+def main(folder: Path) -> None:
+    described = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
+    with np.load(folder / "arrays.npz") as stored:
+        arrays = dict(stored)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.preferences.addon_enable(module="cycles")
+    maps = {name: arrays[name] for name in ("normal_map", "colour_map") if name in arrays}
+    materials = [make_material(one, maps) for one in described["materials"]]
+    add_mesh(arrays, materials)
+    for light in described["lights"]:
+        add_light(light)
+    set_world(described["world"], arrays.get("panorama"))
+    set_camera(described["camera"])
+    set_render(described)
+    times = [render(folder / f"pass_{k}.exr", **one) for k, one in enumerate(described["passes"])]
+    done = {"version": bpy.app.version_string, "times": times}
+    (folder / "done.json").write_text(json.dumps(done), encoding="utf-8")
+
+
+def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
+    places, corners = arrays["positions"], arrays["triangles"]
+    mesh = bpy.data.meshes.new("head")
+    mesh.vertices.add(len(places))
+    mesh.vertices.foreach_set("co", places.ravel())
+    mesh.loops.add(corners.size)
+    mesh.loops.foreach_set("vertex_index", corners.ravel())
+    mesh.polygons.add(len(corners))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, corners.size, 3, dtype=np.int32))
+    for material in materials:
+        mesh.materials.append(material)
+    mesh.polygons.foreach_set("material_index", arrays["material"])
+    if "uv" in arrays:
+        places = arrays["uv"][corners.ravel()] * [1, -1] + [0, 1]  # its first row is the lowest
+        mesh.uv_layers.new(name="uv").uv.foreach_set("vector", places.astype(np.float32).ravel())
+    mesh.update(calc_edges=True)
+    mesh.shade_smooth()
+    mesh.normals_split_custom_set_from_vertices(arrays["normals"].tolist())
+    add_object("head", mesh)
+
+
+def make_material(described: dict[str, Any], maps: dict[str, Any]) -> Any:
+    material = bpy.data.materials.new(described["name"])
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    if described["method"] == "FACETS":
+        shader = nodes.new("ShaderNodeBsdfGlass")  # what it lets through ends there: one bounce
+        shader.distribution = "BECKMANN"
+        shader.inputs["Roughness"].default_value = described["roughness"]
+        shader.inputs["IOR"].default_value = described["ior"]
+        add_normals(nodes, links, maps, shader)
+    elif described["method"] == "COATED":
+        shader = add_coated(nodes, links, maps, described)
+        add_normals(nodes, links, maps, shader)
+    elif described["method"] == "DIFFUSE":
+        shader = nodes.new("ShaderNodeBsdfDiffuse")
+    else:
+        shader = nodes.new("ShaderNodeSubsurfaceScattering")
+        shader.falloff = described["method"]
+        shader.inputs["Scale"].default_value = 1.0
+        shader.inputs["Radius"].default_value = described["radius"]
+        if "Roughness" in shader.inputs:
+            shader.inputs["Roughness"].default_value = 1.0
+    if "Color" in shader.inputs:
+        shader.inputs["Color"].default_value = (*described.get("colour", (1.0, 1.0, 1.0)), 1.0)
+    links.new(shader.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    return material
+
+
+def add_coated(nodes: Any, links: Any, maps: dict[str, Any], described: dict[str, Any]) -> Any:
+    shader = nodes.new("ShaderNodeBsdfPrincipled")
+    shader.distribution = "GGX"
+    shader.subsurface_method = "RANDOM_WALK"
+    numbers = {"Subsurface Weight": 1.0, "Subsurface Scale": 1.0, "Specular IOR Level": 0.5}
+    numbers |= {"IOR": described["ior"], "Roughness": described["roughness"]}
+    for name, value in numbers.items():
+        shader.inputs[name].default_value = value
+    shader.inputs["Subsurface Radius"].default_value = described["radius"]
+    texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeUVMap")
+    node.uv_map = "uv"
+    links.new(node.outputs["UV"], texture.inputs["Vector"])
+    texture.image = packed_image("colours", maps["colour_map"])
+    links.new(texture.outputs["Color"], shader.inputs["Base Color"])
+    return shader
+
+
+def add_normals(nodes: Any, links: Any, maps: dict[str, Any], shader: Any) -> None:
+    if "normal_map" not in maps:
+        return
+    texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeNormalMap")
+    texture.image = packed_image("normals", maps["normal_map"])
+    links.new(texture.outputs["Color"], node.inputs["Color"])
+    node.uv_map = "uv"
+    links.new(node.outputs["Normal"], shader.inputs["Normal"])
+
+
+def packed_image(name: str, rows: Any) -> Any:
+    """Linear numbers (h, w, 3), the highest row first, as a picture in the file."""
+    height, width, _ = rows.shape
+    image = bpy.data.images.new(name, width, height, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    pixels = np.concatenate((rows, np.ones((height, width, 1))), axis=2)[::-1]
+    image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).ravel())
+    image.pack()
+    return image
+
+
+def add_light(described: dict[str, Any]) -> None:
+    light = bpy.data.lights.new("light", described["type"])
+    for name, value in described["set"].items():
+        setattr(light, name, value)
+    if "stripe" in described:
+        paint_stripe(light, described["stripe"])
+    add_object("light", light).matrix_world = Matrix(described["to_world"])
+
+
+def paint_stripe(light: Any, stripe: dict[str, Any]) -> None:
+    """Makes a far point of light a sheet: a Gaussian across, an even line along, by the ray's direction."""
+    light.use_nodes = True
+    nodes, links = light.node_tree.nodes, light.node_tree.links
+
+    def math(operation: str, *inputs: Any) -> Any:
+        node = nodes.new("ShaderNodeMath")
+        node.operation = operation
+        return connected(links, node, inputs)
+
+    def dot(vector: list[float]) -> Any:
+        node = nodes.new("ShaderNodeVectorMath")
+        node.operation = "DOT_PRODUCT"
+        node.inputs[1].default_value = vector
+        links.new(nodes.new("ShaderNodeNewGeometry").outputs["Incoming"], node.inputs[0])
+        return node.outputs["Value"]
+
+    depth = dot(stripe["forward"])
+    across = math("MULTIPLY", math("DIVIDE", dot(stripe["across"]), depth), stripe["distance"])
+    along = math(
+        "ABSOLUTE", math("MULTIPLY", math("DIVIDE", dot(stripe["along"]), depth), stripe["distance"])
+    )
+    gaussian = math("EXPONENT", math("MULTIPLY", math("MULTIPLY", across, across), -2.0))
+    fade = nodes.new("ShaderNodeMapRange")
+    fade.interpolation_type = "SMOOTHSTEP"
+    for name, value in zip(("From Min", "From Max", "To Min", "To Max"), (0.95, 1.0, 1.0, 0.0), strict=True):
+        fade.inputs[name].default_value = value
+    links.new(along, fade.inputs["Value"])
+    emission = next(node for node in nodes if node.type == "EMISSION")
+    links.new(math("MULTIPLY", gaussian, fade.outputs["Result"]), emission.inputs["Strength"])
+
+
+def connected(links: Any, node: Any, inputs: Any) -> Any:
+    for socket, value in zip(node.inputs, inputs, strict=False):
+        if isinstance(value, float):
+            socket.default_value = value
+        else:
+            links.new(value, socket)
+    return node.outputs[0]
+
+
+def set_world(described: dict[str, Any], panorama: Any) -> None:
+    world = bpy.data.worlds.new("world")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    background = next(node for node in nodes if node.type == "BACKGROUND")
+    background.inputs["Strength"].default_value = described["strength"]
+    background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    if panorama is None:
+        return
+    texture, mapping = nodes.new("ShaderNodeTexEnvironment"), nodes.new("ShaderNodeMapping")
+    texture.image = packed_image("panorama", panorama)
+    mapping.inputs["Rotation"].default_value = Matrix(described["turn"]).to_euler()
+    links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], mapping.inputs["Vector"])
+    links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+    links.new(texture.outputs["Color"], background.inputs["Color"])
+
+
+def set_camera(described: dict[str, Any]) -> None:
+    camera = bpy.data.cameras.new("camera")
+    camera.sensor_fit = "VERTICAL"
+    camera.sensor_height = 24.0
+    camera.lens = 12.0 / described["half_tangent"]
+    camera.clip_start, camera.clip_end = 1e-3, 1e5
+    placed = add_object("camera", camera)
+    placed.matrix_world = Matrix(described["to_world"])
+    bpy.context.scene.camera = placed
+
+
+def set_render(described: dict[str, Any]) -> None:
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = described["size"]
+    scene.render.resolution_percentage = 100
+    scene.render.film_transparent = True
+    scene.render.use_persistent_data = True
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_mode = "RGBA"
+    scene.render.image_settings.color_depth = "32"
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.use_adaptive_sampling = cycles.use_denoising = False
+    cycles.pixel_filter_type = "BOX"
+    # Its defaults trade a biased, darker image for less noise.
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.light_sampling_threshold = 0.0
+    if described["direct"]:
+        cycles.max_bounces = 0
+
+
+def render(path: Path, samples: int, seed: int) -> tuple[float, float]:
+    """Seconds on the clock, and of all cores together."""
+    cycles = bpy.context.scene.cycles
+    cycles.samples, cycles.seed = samples, seed
+    bpy.context.scene.render.filepath = str(path)
+    began, worked = time.perf_counter(), time.process_time()
+    bpy.ops.render.render(write_still=True)
+    return time.perf_counter() - began, time.process_time() - worked
+
+
+def add_object(name: str, data: Any) -> Any:
+    made = bpy.data.objects.new(name, data)
+    bpy.context.collection.objects.link(made)
+    return made
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[-1]))

@@ -1,0 +1,144 @@
+"""Places, colours, shapes and surroundings in the words of Mitsuba and of Cycles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.errors import refuse
+from dermis.environment.panorama import UNIFORM, load_panorama
+from dermis.scene.camera import Camera
+from dermis.scene.environment import Environment
+
+Floats = NDArray[np.float64]
+Described = dict[str, Any]
+UNIT_MM = 100.0
+"""Cycles' unit: a head is a few of them, as its sampling expects."""
+
+_TO_CYCLES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+def check_lens(camera: Camera, who: str) -> None:
+    """Refuse a camera that only this package has."""
+    if camera.principal_point != (0.5, 0.5) or camera.pixel_aspect != 1.0:
+        expected = f"a principal point in the middle and square pixels, for {who}"
+        came = f"principal_point {camera.principal_point} and pixel_aspect {camera.pixel_aspect:g} came"
+        refuse("camera", expected, came, "Render with such a camera, and crop or resample the picture")
+
+
+def rgb(values: Any) -> Described:
+    """Three numbers, linear Rec. 709, as Mitsuba reads them."""
+    return {"type": "rgb", "value": [float(value) for value in values]}
+
+
+def mitsuba_looking(mi: Any, origin: Any, target: Any, up: Any = (0.0, 1.0, 0.0)) -> Any:
+    """To world, with +Z from the origin to the target and Y upwards."""
+    forward = np.subtract(target, origin)
+    if np.linalg.norm(np.cross(forward, up)) < 1e-6 * np.linalg.norm(forward) * np.linalg.norm(up):
+        up = (1.0, 0.0, 0.0)
+    return mi.ScalarTransform4f().look_at(*([float(c) for c in v] for v in (origin, target, up)))
+
+
+def mitsuba_shape(kind: str, radiance: Any, **shape: Any) -> Described:
+    """A shape that shines and is not there otherwise: it neither shadows nor reflects other light."""
+    return {
+        "type": kind,
+        **shape,
+        "bsdf": {"type": "null"},
+        "emitter": {"type": "area", "radiance": rgb(radiance)},
+    }
+
+
+def mitsuba_projector(
+    mi: Any, intensity: Floats, cosine: Floats, to_world: Any, half_tangent: float
+) -> Described:
+    """What has an intensity (h, w, 3) through each texel of a slide [irradiance mm2].
+
+    cosine : (h, w) of the angle from the axis
+    half_tangent : of half the angle that the slide spans in x
+    """
+    # Mitsuba takes a slide for what falls on a plane across the axis, over pi.
+    slide = intensity * cosine[..., None] ** 3 / np.pi
+    return {
+        "type": "projector",
+        "to_world": to_world,
+        "fov_axis": "x",
+        "fov": float(2.0 * np.degrees(np.arctan(half_tangent))),
+        "irradiance": {
+            "type": "bitmap",
+            "bitmap": mi.Bitmap(slide.astype(np.float32)),
+            "raw": True,
+            "filter_type": "bilinear",
+            "wrap_mode": "clamp",
+        },
+    }
+
+
+def cycles_looking(place: Any, forward: Any, up: Any = (0.0, 1.0, 0.0)) -> list[list[float]]:
+    """To world in Cycles' units, for what looks along -Z with Y upwards."""
+    right, above, ahead = cycles_axes(forward, up)
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([right, above, -ahead, np.asarray(place, np.float64) / UNIT_MM])
+    return [[float(value) for value in row] for row in matrix]
+
+
+def cycles_axes(forward: Any, up: Any) -> tuple[Floats, Floats, Floats]:
+    ahead = np.asarray(forward, np.float64) / np.linalg.norm(forward)
+    right = np.cross(ahead, up)
+    if np.linalg.norm(right) < 1e-6 * np.linalg.norm(up):
+        right = np.cross(ahead, (1.0, 0.0, 0.0))
+    right /= np.linalg.norm(right)
+    return right, np.cross(right, ahead), ahead
+
+
+def cycles_light(
+    kind: str, irradiance: Any, factor: float, place: Any, forward: Any, **given: Any
+) -> Described:
+    strength = float(max(irradiance))
+    colour = [float(part) / strength for part in irradiance] if strength > 0.0 else [0.0, 0.0, 0.0]
+    fields = {"color": colour, "energy": strength * float(factor), **given}
+    fields = {
+        name: float(value) if isinstance(value, np.floating) else value for name, value in fields.items()
+    }
+    return {"type": kind, "set": fields, "to_world": cycles_looking(place, forward)}
+
+
+def surroundings(mi: Any, environment: Environment) -> Described:
+    """Mitsuba's description of light from all around."""
+    if environment.name == UNIFORM:
+        return {"type": "constant", "radiance": rgb(np.full(3, environment.exposure))}
+    panorama = environment.exposure * load_panorama(environment.name)
+    # Mitsuba's pictures begin where ours have their middle.
+    to_world = np.eye(4)
+    to_world[:3, :3] = (np.diag([-1.0, 1.0, -1.0]) @ _turn(environment)).T
+    return {
+        "type": "envmap",
+        "bitmap": mi.Bitmap(_with_poles(panorama).astype(np.float32)),
+        "to_world": mi.ScalarTransform4f(to_world),
+    }
+
+
+def world(environment: Environment | None) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Cycles' description, and the panorama that goes with it."""
+    if environment is None:
+        return {"strength": 0.0}, {}
+    described: dict[str, Any] = {"strength": environment.exposure}
+    if environment.name == UNIFORM:
+        return described, {}
+    # Cycles' panoramas have their middle at +X and their top at +Z; ours at -Z and +Y.
+    described["turn"] = (_TO_CYCLES @ _turn(environment)).tolist()
+    return described, {"panorama": load_panorama(environment.name).astype(np.float32)}
+
+
+def _turn(environment: Environment) -> Floats:
+    angle = np.radians(environment.rotation_degrees)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]])
+
+
+def _with_poles(panorama: Floats) -> Floats:
+    """(h + 1, w, 3) at the edges of the rows: Mitsuba has its first and its last row at the poles."""
+    inside = 0.5 * (panorama[1:] + panorama[:-1])
+    return np.concatenate((panorama[:1], inside, panorama[-1:]))

@@ -1,0 +1,57 @@
+"""Reflection of an index-matched half-space that scatters isotropically, in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dermis.base.errors import refuse
+
+Floats = NDArray[np.float64]
+_NODES = 64
+_ROUNDS = 500
+
+
+def h_function(cosine: ArrayLike, albedo: float) -> Floats:
+    """Chandrasekhar's H at cosines to the normal, of their shape [-].
+
+    albedo : of single scattering, below 1 [-]
+
+    Source: [Chandrasekhar1960] section 38; its form without cancellation, iterated on Gaussian nodes.
+    """
+    if not 0.0 <= albedo < 1.0:
+        refuse("half-space", "an albedo from 0 to below 1", f"{albedo:g} came", "Correct it")
+    mu, weight = _nodes()
+    kernel, rest = 0.5 * albedo * weight * mu, np.sqrt(1.0 - albedo)
+    H = np.ones(_NODES)
+    for _ in range(_ROUNDS):
+        H = 0.5 * (H + 1.0 / (rest + (kernel * H / (mu[:, None] + mu)).sum(axis=1)))
+    at = np.asarray(cosine, np.float64)[..., None]
+    return np.asarray(1.0 / (rest + (kernel * H / (at + mu)).sum(axis=-1)))
+
+
+def directional_albedo(cosine: ArrayLike, albedo: float) -> Floats:
+    """Share of the light from a direction that is reflected, by the cosine of that direction [-]."""
+    return np.asarray(1.0 - np.sqrt(1.0 - albedo) * h_function(cosine, albedo))
+
+
+def diffuse_albedo(albedo: float) -> float:
+    """Share of uniform light from all directions that is reflected [-]."""
+    mu, weight = _nodes()
+    return float((2.0 * weight * mu * directional_albedo(mu, albedo)).sum())
+
+
+def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
+    """Radiance over the irradiance of parallel light, by the cosines of light and view [1/sr].
+
+    Source: [Chandrasekhar1960] section 33: S / (4 pi cos_in cos_out).
+    """
+    mu, view = np.asarray(cosine_in, np.float64), np.asarray(cosine_out, np.float64)
+    H = h_function(mu, albedo) * h_function(view, albedo)
+    return np.asarray(albedo / (4.0 * np.pi) * H / (mu + view))
+
+
+def _nodes() -> tuple[Floats, Floats]:
+    """Nodes and weights on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    return 0.5 * (nodes + 1.0), 0.5 * weights

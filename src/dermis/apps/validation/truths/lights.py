@@ -1,0 +1,220 @@
+"""The scene's lights as Mitsuba and as Cycles have them; places are in mm from the head's centre."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.validation.truths.described import (
+    UNIT_MM,
+    Described,
+    cycles_axes,
+    cycles_light,
+    mitsuba_looking,
+    mitsuba_projector,
+    mitsuba_shape,
+    rgb,
+)
+from dermis.base.errors import refuse
+from dermis.base.registry import Registry
+from dermis.scene.lights import (
+    LIGHTS,
+    DirectionalLight,
+    Light,
+    PointLight,
+    RectangleLight,
+    SphereLight,
+    SpotLight,
+    StripeLight,
+)
+
+Floats = NDArray[np.float64]
+_FAR_MM = 2e5
+"""Distance of what stands for parallel light: irradiance changes by 0.1 % in 100 mm, and single precision
+places a stripe within 0.02 mm."""
+_SPOT_SIDE = 1024
+_STRIPE_REACH = 1.25  # widths to each side: there the Gaussian is 4e-6
+_STRIPE_TEXELS = 40, 64  # least across a width and along the length
+_MOST_STRIPE_TEXELS = 2**23
+
+MITSUBA: Registry[Callable[[Any, Any, str], Described]] = Registry(
+    "light of Mitsuba", {name: f"{__name__}:mitsuba_{name}" for name in LIGHTS}
+)
+"""What describes a kind of light for Mitsuba, given its module with a variant set, the light and its name for
+messages."""
+
+CYCLES: Registry[Callable[[Any], Described]] = Registry(
+    "light of Cycles", {name: f"{__name__}:cycles_{name}" for name in LIGHTS}
+)
+"""What describes a kind of light for Cycles: its type, its fields, and where it stands."""
+
+
+def emitter(mi: Any, light: Light, number: int) -> Described:
+    """Mitsuba's description of a light.
+
+    mi : the module, with a variant set
+    number : the light's place in the scene, for messages
+
+    Raises DermisError for a light without shadows: a path tracer has no such thing.
+    """
+    _check_shadows(light, number, "path tracing")
+    return MITSUBA[light.kind](mi, light, f"light {number}")
+
+
+def lamp(light: Light, number: int) -> Described:
+    """The same for Cycles, in its units."""
+    _check_shadows(light, number, "Cycles")
+    return CYCLES[light.kind](light)
+
+
+def _check_shadows(light: Light, number: int, judge: str) -> None:
+    if not light.shadows:
+        remedy = "Set shadows = true"
+        refuse(f"light {number}", f"a light with shadows, for {judge}", "it has shadows = false", remedy)
+
+
+def mitsuba_point(mi: Any, light: PointLight, called: str) -> Described:
+    """One of Mitsuba's."""
+    intensity = np.multiply(light.irradiance, _distance(light) ** 2)
+    return {"type": "point", "position": list(light.position), "intensity": rgb(intensity)}
+
+
+def mitsuba_spot(mi: Any, light: SpotLight, called: str) -> Described:
+    """A slide projector: Mitsuba's own spot fades evenly in the angle, ours smoothly in its cosine."""
+    steepest = np.tan(np.radians(light.outer_degrees))
+    along = steepest * ((np.arange(_SPOT_SIDE) + 0.5) / _SPOT_SIDE * 2.0 - 1.0)
+    cosine = 1.0 / np.sqrt(1.0 + along[:, None] ** 2 + along[None, :] ** 2)
+    outer, inner = (np.cos(np.radians(a)) for a in (light.outer_degrees, light.inner_degrees))
+    share = _smoothstep((cosine - outer) / (inner - outer))
+    slide = share[..., None] * np.multiply(light.irradiance, _distance(light) ** 2)
+    return mitsuba_projector(mi, slide, cosine, mitsuba_looking(mi, light.position, light.target), steepest)
+
+
+def mitsuba_rectangle(mi: Any, light: RectangleLight, called: str) -> Described:
+    """An even one."""
+    sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
+    to_world = mitsuba_looking(mi, light.position, light.target).scale(sides)
+    given = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
+    return mitsuba_shape("rectangle", np.divide(light.irradiance, given), to_world=to_world)
+
+
+def mitsuba_sphere(mi: Any, light: SphereLight, called: str) -> Described:
+    """An even one."""
+    given = np.pi * (light.radius_mm / _distance(light)) ** 2
+    return mitsuba_shape(
+        "sphere",
+        np.divide(light.irradiance, given),
+        center=[float(c) for c in light.position],
+        radius=float(light.radius_mm),
+    )
+
+
+def mitsuba_directional(mi: Any, light: DirectionalLight, called: str) -> Described:
+    """One of Mitsuba's, or of a sun a far disc."""
+    if light.angle_degrees == 0:
+        return {
+            "type": "directional",
+            "direction": list(light.direction),
+            "irradiance": rgb(light.irradiance),
+        }
+    direction = np.array(light.direction) / np.linalg.norm(light.direction)
+    half = 0.5 * np.radians(light.angle_degrees)
+    to_world = mitsuba_looking(mi, -_FAR_MM * direction, (0.0, 0.0, 0.0)).scale(float(_FAR_MM * np.tan(half)))
+    return mitsuba_shape("disk", np.divide(light.irradiance, np.pi * np.sin(half) ** 2), to_world=to_world)
+
+
+def mitsuba_stripe(mi: Any, light: StripeLight, called: str) -> Described:
+    """A far slide projector with the stripe as its slide."""
+    width, length = light.width_mm, light.length_mm
+    size = np.array([2.0 * _STRIPE_REACH * width, length])
+    texel = min(width / _STRIPE_TEXELS[0], length / _STRIPE_TEXELS[1])
+    texel = max(texel, float(np.sqrt(size.prod() / _MOST_STRIPE_TEXELS)))
+    if width < 10.0 * texel:
+        came = f"it is {length:g} mm long and {width:g} mm wide"
+        refuse(called, "a stripe less slender, for path tracing", came, "Shorten it")
+    columns, rows = np.ceil(size / texel).astype(int)
+    # The slide's texels are square: what the rounding adds is dark.
+    across = ((np.arange(columns) + 0.5) - 0.5 * columns) * texel / (0.5 * width)
+    along = ((np.arange(rows) + 0.5) - 0.5 * rows) * texel / (0.5 * length)
+    with np.errstate(under="ignore"):
+        profile = np.exp(-2.0 * across**2)
+    share = (1.0 - _smoothstep((np.abs(along) - 0.95) / 0.05))[:, None] * profile[None, :]
+    slide = share[..., None] * np.multiply(light.irradiance, _FAR_MM**2)
+    direction = np.array(light.direction) / np.linalg.norm(light.direction)
+    to_world = mitsuba_looking(mi, light.position - _FAR_MM * direction, light.position, light.up)
+    return mitsuba_projector(mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _FAR_MM)
+
+
+def cycles_point(light: PointLight) -> Described:
+    """Its power P gives the irradiance P / 4 pi d^2."""
+    return _lamp("POINT", light)
+
+
+def cycles_spot(light: SpotLight) -> Described:
+    """A point light's cone fades in its cosine, as ours."""
+    inner, outer = (float(np.cos(np.radians(a))) for a in (light.inner_degrees, light.outer_degrees))
+    size, blend = 2.0 * np.radians(light.outer_degrees), (inner - outer) / (1.0 - outer)
+    return _lamp("SPOT", light, spot_size=size, spot_blend=blend)
+
+
+def cycles_sphere(light: SphereLight) -> Described:
+    """A point light with a radius."""
+    return _lamp("POINT", light, radius_mm=light.radius_mm)
+
+
+def cycles_rectangle(light: RectangleLight) -> Described:
+    """Its power P gives a surface A the radiance P / pi A."""
+    width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
+    given = facing_irradiance(light.width_mm, light.height_mm, _distance(light)) / (np.pi * width * height)
+    path = np.subtract(light.target, light.position)
+    shape = {"shape": "RECTANGLE", "size": width, "size_y": height}
+    return cycles_light("AREA", light.irradiance, 1.0 / given, light.position, path, **shape)
+
+
+def cycles_directional(light: DirectionalLight) -> Described:
+    """A sun, as wide as the light's source."""
+    angle = float(np.radians(light.angle_degrees))
+    return cycles_light("SUN", light.irradiance, 1.0, (0, 0, 0), light.direction, angle=angle)
+
+
+def cycles_stripe(light: StripeLight) -> Described:
+    """A far point, on whose light the script paints the stripe."""
+    across, along, forward = cycles_axes(light.direction, light.up)
+    power = 4.0 * np.pi * (_FAR_MM / UNIT_MM) ** 2
+    place = light.position - _FAR_MM * forward
+    described = cycles_light("POINT", light.irradiance, power, place, light.direction, shadow_soft_size=0.0)
+    axes = {
+        "forward": (-forward).tolist(),
+        "across": (across / (0.5 * light.width_mm)).tolist(),
+        "along": (along / (0.5 * light.length_mm)).tolist(),
+    }
+    return described | {"stripe": {**axes, "distance": _FAR_MM}}
+
+
+def _lamp(kind: str, light: PointLight, *, radius_mm: float = 0.0, **given: Any) -> Described:
+    power = 4.0 * np.pi * (_distance(light) / UNIT_MM) ** 2
+    path = np.subtract(light.target, light.position)
+    round_light = {"shadow_soft_size": radius_mm / UNIT_MM, "use_soft_falloff": False}
+    return cycles_light(kind, light.irradiance, power, light.position, path, **round_light, **given)
+
+
+def facing_irradiance(width: float, height: float, distance: float) -> float:
+    """Irradiance from a rectangle of radiance 1 on a surface opposite its middle [-].
+
+    Source: the view factor of a corner, [Baum1989].
+    """
+    a, b = 0.5 * width / distance, 0.5 * height / distance
+    across, along = np.hypot(1.0, a), np.hypot(1.0, b)
+    return float(2.0 * (a / across * np.arctan(b / across) + b / along * np.arctan(a / along)))
+
+
+def _distance(light: PointLight) -> float:
+    return float(np.linalg.norm(np.subtract(light.target, light.position)))
+
+
+def _smoothstep(t: Floats) -> Floats:
+    x = np.clip(t, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)

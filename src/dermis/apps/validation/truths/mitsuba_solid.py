@@ -1,0 +1,140 @@
+"""Closed surfaces around a scattering medium: a head's skin with its openings shut, moved inwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.errors import refuse
+from dermis.mesh.geometry import vertex_normals
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.tangents import triangle_areas
+
+Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
+Index = NDArray[np.int32]
+_LEAST_DEPTH_MM = 0.05  # of a body of volume V and surface A: 3 V / A, a ball's radius
+_MOST_FOLDED = 0.02
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed surface.
+
+    positions : (p, 3) [mm]
+    triangles : (f, 3)
+    caps, cap_area : number of openings that were shut, and the area that this added [mm2]
+    """
+
+    positions: Floats
+    triangles: Index
+    caps: int = 0
+    cap_area: float = 0.0
+
+
+def skin_solid(mesh: Mesh, culprit: str) -> Solid:
+    """The welded skin of a mesh, each opening shut by a fan of triangles around its middle.
+
+    culprit : the head's name, for messages
+
+    Raises DermisError when it encloses no volume: a single sheet, or a surface turned inside out.
+    """
+    skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
+    if not skin.any():
+        refuse(culprit, "skin to trace", "all of its groups are opaque", "Leave a group out of opaque")
+    used, triangles = np.unique(mesh.point[mesh.triangles[skin]], return_inverse=True)
+    positions = np.zeros((int(mesh.point.max()) + 1, 3), np.float32)
+    positions[mesh.point] = mesh.positions
+    solid = _shut(positions[used], triangles.reshape(-1, 3).astype(np.int32))
+    corners = solid.positions[solid.triangles].astype(np.float64)
+    depth = 3.0 * _volume(corners) / float(triangle_areas(corners).sum())
+    if depth < _LEAST_DEPTH_MM:
+        came = "it is a sheet or inside out" if depth < 0.0 else f"it is {depth:.2g} mm deep in the mean"
+        refuse(culprit, "a surface with a volume behind it", came, "Close it, or turn its triangles round")
+    return solid
+
+
+def inwards(solid: Solid, depth_mm: Doubles, culprit: str) -> tuple[Solid, float]:
+    """The surface moved inwards so that the faces around each point move by its depth, and the folded share.
+
+    depth_mm : (p,) negative for outwards
+
+    Raises DermisError when more than 2 % of the surface folds over, or no volume is left. It does not notice
+    thin parts whose two sides pass through one another: none may be thinner than twice the depth.
+    """
+    moved = (solid.positions - depth_mm[:, None] * _mitres(solid)).astype(np.float32)
+    before, after = (_cross(places[solid.triangles]) for places in (solid.positions, moved))
+    area = np.linalg.norm(before, axis=1)
+    folded = float(area[(before * after).sum(axis=1) <= 0.0].sum() / area.sum())
+    empty = _volume(moved[solid.triangles].astype(np.float64)) <= 0.0
+    if empty or folded > _MOST_FOLDED:
+        came = "nothing is left of it" if empty else f"{folded:.1%} of the surface folds over"
+        remedy = "Trace its layers as one medium"
+        where = f"a body deeper than its layers, moved {depth_mm.mean():.2g} mm inwards"
+        refuse(culprit, where, came, remedy)
+    return replace(solid, positions=moved), folded
+
+
+def _mitres(solid: Solid) -> Doubles:
+    """(p, 3) steps outwards that move the faces around a point by 1; at most 2 long."""
+    points = np.arange(len(solid.positions), dtype=np.int32)
+    normals = vertex_normals(solid.positions, points, solid.triangles).astype(np.float64)
+    face = _cross(solid.positions[solid.triangles])
+    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
+    corner = solid.triangles.ravel()
+    along = (normals[corner] * np.repeat(face, 3, axis=0)).sum(axis=1)
+    faces = np.bincount(corner, minlength=len(points))
+    cosine = np.bincount(corner, along, minlength=len(points)) / np.maximum(faces, 1)
+    return normals / np.maximum(cosine, 0.5)[:, None]
+
+
+def _shut(positions: Floats, triangles: Index) -> Solid:
+    open_sides = _open_sides(triangles, len(positions))
+    if not len(open_sides):
+        return Solid(positions, triangles)
+    group = _connected(open_sides)
+    names, opening = np.unique(group, return_inverse=True)
+    middles = np.stack(
+        [positions[open_sides[opening == k]].mean(axis=(0, 1)) for k in range(len(names))]
+    ).astype(np.float32)
+    apex = (len(positions) + opening).astype(np.int32)
+    fan = np.column_stack((open_sides[:, 1], open_sides[:, 0], apex)).astype(np.int32)
+    places = np.vstack((positions, middles))
+    return Solid(places, np.vstack((triangles, fan)), len(names), float(triangle_areas(places[fan]).sum()))
+
+
+def _open_sides(triangles: Index, count: int) -> NDArray[np.int64]:
+    """(n, 2) directed sides that no triangle traverses the other way, as often as they lack one."""
+    sides = np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])).astype(np.int64)
+    low, high = sides.min(axis=1), sides.max(axis=1)
+    edge, of_side = np.unique(low * count + high, return_inverse=True)
+    surplus = np.bincount(of_side, np.where(sides[:, 0] == low, 1.0, -1.0), len(edge)).astype(np.int64)
+    ends = np.column_stack((edge // count, edge % count))
+    directed = np.where((surplus > 0)[:, None], ends, ends[:, ::-1])
+    return np.repeat(directed, np.abs(surplus), axis=0)
+
+
+def _connected(sides: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) the connected component of each side, as a number."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    names, ends = np.unique(sides, return_inverse=True)
+    a, b = ends.reshape(-1, 2).T
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(names), len(names)))
+    _, label = connected_components(graph, directed=False)
+    return np.asarray(label[a], np.int64)
+
+
+def _cross(corners: Floats) -> Doubles:
+    """Twice the area of each triangle along its normal; corners : (f, 3, 3)."""
+    places = corners.astype(np.float64)
+    return np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
+
+
+def _volume(corners: Doubles) -> float:
+    """Enclosed volume [mm3]; negative when inside out."""
+    about = corners - corners.mean(axis=(0, 1))
+    return float((about[:, 0] * np.cross(about[:, 1], about[:, 2])).sum() / 6.0)

@@ -1,0 +1,153 @@
+"""A person by path tracing, with the variance of each pixel."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.validation.truths.described import rgb
+from dermis.apps.validation.truths.mitsuba_passes import Passes, digest_surroundings, kept_passes
+from dermis.apps.validation.truths.mitsuba_scene import (
+    ROULETTE_DEPTH,
+    lit_scene,
+    load_mitsuba,
+    mesh_shape,
+    sensor_of,
+    variant_of,
+)
+from dermis.apps.validation.truths.path_traced import (
+    SAMPLES_PER_PASS,
+    PathTraced,
+    Report,
+    Variant,
+    add_passes,
+    passes_for,
+    traced,
+)
+from dermis.apps.validation.truths.person.eyes import eye_shapes
+from dermis.apps.validation.truths.person.hairs import hair_shapes
+from dermis.apps.validation.truths.person.medium import PASSED, VOXELS, mean_free_paths, medium_of
+from dermis.apps.validation.truths.person.skin import picture, skin_shapes
+from dermis.apps.validation.truths.person.subject import Paint as Paint
+from dermis.apps.validation.truths.person.subject import Person, person_of
+from dermis.scene.model import Scene
+
+_FORM = "person 1"  # raise when the same person is traced in another way
+_MASK_SAMPLES = 64
+_SALIVA, _TONGUE = 0.12, 0.25
+_WET_INDEX = 1.4
+
+
+def trace_person(
+    scene: Scene,
+    paint: Paint,
+    distance_mm: NDArray[np.float64],
+    colour: NDArray[np.float64],
+    size: tuple[int, int],
+    samples: int = 64,
+    *,
+    variant: Variant = "scalar_rgb",
+    keep: bool = True,
+    report: Report | None = None,
+) -> PathTraced:
+    """The person of a scene as painted, its skin's profile and surface lobe aside.
+
+    paint : pictures of skin, eyes and teeth
+    distance_mm : (3,) from where light enters skin of the mean colour (3,) to where it leaves, in the mean
+    samples, variant, keep, report : as of `path_trace`
+
+    The skin is a medium under a rough coat that does not refract; its albedo is a grid of painted colours.
+    The cornea refracts, and the iris is a painted disc behind it, so lights must have a size.
+
+    Raises DermisError when Mitsuba is missing, and for heads without eyes of true shape.
+
+    Sources: [Jakob2022], [Miller2019], [Chiang2016].
+    """
+    wanted, mi = passes_for(samples), load_mitsuba()
+    person, path = person_of(scene, paint), mean_free_paths(colour, distance_mm)
+    form = f"{_FORM} {mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH} {PASSED} {VOXELS} {size}"
+    key = person_key(scene, person, path, form) if keep else None
+    passes = kept_passes(key, size) if key else None
+    if passes is None or passes.count < wanted:
+        with variant_of(mi, variant):
+            built, notes = person_scene(mi, scene, person, path, size)
+            passes = passes or Passes.none(size, _covered(mi, scene, person, size), notes)
+            add_passes(mi, built, passes, wanted, key, report)
+    return traced(passes)
+
+
+def person_scene(
+    mi: Any, scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], size: tuple[int, int]
+) -> tuple[Any, tuple[str, ...]]:
+    """Mitsuba's scene whose image is the radiance, and notes on what was done to the head."""
+    medium = medium_of(mi, person, scene.camera, mean_free_path_mm)
+    shapes, notes = skin_shapes(mi, person, medium)
+    shapes |= eye_shapes(mi, person) | _opaque_shapes(mi, person)
+    for number, hairs in enumerate(person.hairs):
+        shapes |= hair_shapes(mi, hairs, f"hairs_{number}")
+    integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
+    return lit_scene(mi, scene, integrator, shapes, size), notes
+
+
+def _opaque_shapes(mi: Any, person: Person) -> dict[str, Any]:
+    """What is neither skin nor an eye: teeth and tongue under saliva, all else matte."""
+    shapes = {}
+    mesh = person.mesh
+    for k, material in enumerate(mesh.materials):
+        chosen = mesh.triangles[mesh.material == k]
+        if material.kind == "skin" or k in person.eye_materials or not len(chosen):
+            continue
+        used, corners = np.unique(chosen, return_inverse=True)
+        bsdf = mi.load_dict(_wet(mi, person, material))
+        place, normals, uv = mesh.positions[used], mesh.normals[used], mesh.uv[used]
+        shapes[f"part_{k}"] = mesh_shape(mi, place, corners.reshape(-1, 3), normals, uv, bsdf=bsdf)
+    return shapes
+
+
+def _wet(mi: Any, person: Person, material: Any) -> dict[str, Any]:
+    if material.part is None:
+        return {"type": "diffuse", "reflectance": rgb(material.colour)}
+    tongue = material.part == "tongue"
+    upper, lower = person.paint.teeth
+    colour = (
+        rgb(material.colour) if tongue else picture(mi, upper if material.part == "upper teeth" else lower)
+    )
+    return {
+        "type": "roughplastic",
+        "distribution": "beckmann",
+        "alpha": _TONGUE if tongue else _SALIVA,
+        "int_ior": _WET_INDEX,
+        "diffuse_reflectance": colour,
+    }
+
+
+def _covered(mi: Any, scene: Scene, person: Person, size: tuple[int, int]) -> NDArray[np.float32]:
+    """(h, w) share of each pixel that the head fills, hairs aside."""
+    mesh = person.mesh
+    glow = mi.load_dict({"type": "area", "radiance": 1.0})
+    head = mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=glow)
+    described = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 1},
+        "sensor": sensor_of(mi, scene.camera, size, sampler="multijitter"),
+        "head": head,
+    }
+    share = np.array(mi.render(mi.load_dict(described), spp=_MASK_SAMPLES), np.float32)[..., 0]
+    return np.clip(share, 0.0, 1.0)
+
+
+def person_key(scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], form: str) -> str:
+    """A hash of all that the image depends on.
+
+    form : versions, and how it is traced
+    """
+    digest = hashlib.sha256(f"{form} {person.paint.reach_mm} {person.eye_materials}".encode())
+    digest_surroundings(digest, scene)
+    digest.update(repr(person.mesh.materials).encode())
+    for array in (*person.arrays(), mean_free_path_mm):
+        digest.update(f"{array.shape} {array.dtype}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:40]

@@ -1,0 +1,241 @@
+"""Monte Carlo: a pencil beam through a stack of scattering layers, with no diffusion approximation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dermis.apps.validation.truths.slab import ScatteringLayer, SlabResult, check_mean_cosine
+from dermis.base.errors import refuse
+from dermis.base.quantities import whole_number
+from dermis.optics.diffusion.boundary import normal_reflectance
+from dermis.optics.media import Floats, Layer, Medium
+from dermis.optics.radial import RadialProfile, light_beyond, ring_edges
+
+if TYPE_CHECKING:
+    from dermis.apps.validation.truths.photon import Counts, Stack, Tally
+
+__all__ = ["ScatteringLayer", "SlabResult", "counted_profile", "default_edges", "trace_medium", "trace_slab"]
+
+Report = Callable[[int, int], None]
+
+BATCHES = 64
+"""Each has its own random numbers, so the result does not depend on how many run at once."""
+
+MAX_PHOTONS = 10**10
+
+_MOST_SEED = 2**63 - 1
+_AT_ONCE = 20_000  # photons between two checks for Ctrl-C
+_NOTABLE_LOSS = 1e-3
+
+
+def default_edges() -> Floats:
+    """Edges of a disc of 0.001 mm and 92 rings around it, each 12 % wider than the last, to 40 mm [mm]."""
+    return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
+
+
+def trace_slab(
+    layers: Sequence[ScatteringLayer],
+    photons: int = 1_000_000,
+    seed: int = 0,
+    edges_mm: Floats | None = None,
+    report: Report | None = None,
+) -> SlabResult:
+    """What becomes of a thin beam that falls at right angles on a stack of layers in air.
+
+    layers : topmost first; interfaces between unequal indices of refraction reflect and refract
+    photons : how many to trace; standard errors fall with its square root
+    seed : the same seed gives the same result on any number of processors
+    edges_mm : of the rings, from 0; `default_edges` when left out [mm]
+    report : called with the number of batches done, and of all
+
+    Source: [Wang1995].
+    """
+    photons = _check(layers, photons, seed)
+    edges = default_edges() if edges_mm is None else _checked_edges(edges_mm)
+    tally = _trace(_stack(layers), photons, seed, edges, report)
+    return _shares(tally, photons, edges, layers[0].eta)
+
+
+def trace_medium(
+    medium: Medium,
+    photons: int = 1_000_000,
+    seed: int = 0,
+    g: float = 0.0,
+    edges_mm: Floats | None = None,
+    report: Report | None = None,
+) -> list[SlabResult]:
+    """`trace_slab` for each channel of a medium, with independent random numbers.
+
+    g : mean cosine of the deflection in all layers; scattering is the reduced coefficient over 1 - g [-]
+    """
+    check_mean_cosine(g)
+    results: list[SlabResult] = []
+
+    def part(done: int, of: int) -> None:
+        if report is not None:
+            report(len(results) * of + done, medium.channels * of)
+
+    for i in range(medium.channels):
+        layers = [_layer(layer, i, g, medium.eta) for layer in medium.layers]
+        results.append(trace_slab(layers, photons, seed + i, edges_mm, part))
+    return results
+
+
+def counted_profile(
+    medium: Medium,
+    rgb: Floats | None = None,
+    photons: int = 1_000_000,
+    seed: int = 0,
+    g: float = 0.0,
+    report: Callable[[int, int], None] | None = None,
+) -> RadialProfile:
+    """R(r) of a medium by Monte Carlo, averaged over rings, with standard errors.
+
+    rgb : (3, c) weights from wavelengths to linear Rec. 709; the result is then per incident power
+    photons : per channel or wavelength
+    g : mean cosine of the deflection; the reduced scattering coefficient is kept [-]
+
+    Source: [Wang1995].
+    """
+    edges = ring_edges()
+    runs = trace_medium(medium, photons, seed, g, edges, report)
+    entered = 1.0 - normal_reflectance(medium.eta)
+    weights = np.eye(medium.channels) / entered if rgb is None else np.asarray(rgb)
+    R, error, totals, total_error = (
+        np.stack([getattr(run, name) for run in runs])
+        for name in ("reflectance", "reflectance_se", "total_reflectance", "total_reflectance_se")
+    )
+    reflectance = (weights @ R).T
+    ring_energy = reflectance * np.pi * np.diff(edges**2)[:, None]
+    return RadialProfile(
+        name=medium.name,
+        model="montecarlo",
+        radius_mm=np.concatenate([[2.0 / 3.0 * edges[1]], np.sqrt(edges[1:-1] * edges[2:])]),
+        reflectance=reflectance,
+        total=weights @ totals,
+        edges_mm=edges,
+        ring_energy=ring_energy,
+        standard_error=np.sqrt(weights**2 @ error**2).T,
+        total_error=np.sqrt(weights**2 @ total_error**2),
+        incident=rgb is not None,
+        warnings=(*light_beyond(weights @ totals, ring_energy), *_losses(runs)),
+        sources=(*medium.sources, "Wang1995"),
+    )
+
+
+def _losses(runs: Sequence[SlabResult]) -> list[str]:
+    lost = max(run.per_entering.unfinished for run in runs)
+    if lost < _NOTABLE_LOSS:
+        return []
+    return [f"{lost:.1%} of the light was given up after very many scatterings: the total lacks it"]
+
+
+def _layer(layer: Layer, channel: int, g: float, eta: float) -> ScatteringLayer:
+    sigma_s = float(layer.sigma_s_prime[channel]) / (1.0 - g)
+    return ScatteringLayer(float(layer.sigma_a[channel]), sigma_s, layer.thickness_mm, g, eta)
+
+
+def _check(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:
+    if not layers:
+        refuse("slab", "at least one layer", "none came", "Add one")
+    if np.isinf([layer.thickness_mm for layer in layers[:-1]]).any():
+        refuse("slab", "an infinite thickness in the last layer only", "another has it", "Correct it")
+    whole_number("seed", seed, 0, _MOST_SEED)
+    return whole_number("photons", photons, 1, int(MAX_PHOTONS))
+
+
+def _checked_edges(edges_mm: ArrayLike) -> Floats:
+    edges = np.asarray(edges_mm, dtype=np.float64)
+    one_row = edges.ndim == 1 and len(edges) > 1
+    if not (one_row and edges[0] == 0.0 and np.isfinite(edges).all() and (np.diff(edges) > 0.0).all()):
+        expected = "edges of rings that begin with 0 and increase [mm]"
+        refuse("edges_mm", expected, f"{np.array2string(edges, threshold=8)} came", "Correct them")
+    return edges
+
+
+def _stack(layers: Sequence[ScatteringLayer]) -> Stack:
+    from dermis.apps.validation.truths.photon import Stack
+
+    def with_air(air: float, values: list[float]) -> Floats:
+        return np.array([air, *values, air])
+
+    return Stack(
+        eta=with_air(1.0, [layer.eta for layer in layers]),
+        sigma_t=with_air(0.0, [layer.sigma_t for layer in layers]),
+        albedo=with_air(0.0, [layer.albedo for layer in layers]),
+        g=with_air(0.0, [layer.g for layer in layers]),
+        face_mm=np.cumsum([0.0, *(layer.thickness_mm for layer in layers)]),
+    )
+
+
+def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report | None) -> Tally:
+    from numba import config
+
+    from dermis.apps.validation.truths.photon import Tally, walk_batch
+
+    stop = Event()
+
+    def trace(size: int, seeds: np.random.SeedSequence) -> Tally:
+        lengths = (len(edges), len(edges), 2, len(stack.eta) - 2, 1)
+        tally = Tally(*(np.zeros(length, np.int64) for length in lengths))
+        rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
+        for done in range(0, size, _AT_ONCE):
+            if stop.is_set():
+                break
+            walk_batch(min(_AT_ONCE, size - done), stack, edges**2, rng, tally)
+        return tally
+
+    sizes = [photons * (i + 1) // BATCHES - photons * i // BATCHES for i in range(BATCHES)]
+    tallies = []
+    # The compiled walk releases the GIL, so threads share the work.
+    with ThreadPoolExecutor(config.NUMBA_NUM_THREADS) as pool:
+        try:
+            for tally in pool.map(trace, sizes, np.random.SeedSequence(seed).spawn(BATCHES)):
+                tallies.append(tally)
+                if report is not None:
+                    report(len(tallies), BATCHES)
+        finally:
+            stop.set()  # otherwise the pool would wait for batches that are no longer wanted
+    return Tally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
+
+
+def _shares(tally: Tally, photons: int, edges: Floats, eta: float) -> SlabResult:
+    from dermis.apps.validation.truths.photon import refract
+
+    specular = refract(1.0, 1.0 / eta)[0]
+    areas = np.pi * np.diff(edges**2)
+
+    def share(count: Counts) -> Floats:
+        return (1.0 - specular) * count / photons
+
+    def error(count: Counts) -> Floats:
+        p = count / photons
+        return (1.0 - specular) * np.sqrt(p * (1.0 - p) / photons)
+
+    R, T = tally.reflected, tally.transmitted
+    return SlabResult(
+        photons=photons,
+        edges_mm=edges,
+        specular=specular,
+        reflectance=share(R[:-1]) / areas,
+        reflectance_se=error(R[:-1]) / areas,
+        transmittance=share(T[:-1]) / areas,
+        transmittance_se=error(T[:-1]) / areas,
+        total_reflectance=float(share(R.sum())),
+        total_reflectance_se=float(error(R.sum())),
+        total_transmittance=float(share(T.sum())),
+        total_transmittance_se=float(error(T.sum())),
+        overflow_reflectance=float(share(R[-1])),
+        overflow_transmittance=float(share(T[-1])),
+        unscattered_reflectance=float(share(tally.unscattered[0])),
+        unscattered_transmittance=float(share(tally.unscattered[1])),
+        absorbed=share(tally.absorbed),
+        absorbed_se=error(tally.absorbed),
+        unfinished=float(share(tally.unfinished[0])),
+    )

@@ -1,0 +1,134 @@
+"""Checks who may connect; what a page may send is in `messages`."""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+from collections.abc import Awaitable, Callable, MutableMapping
+from typing import Any
+from urllib.parse import parse_qs
+
+from dermis.apps.viewer.browser.messages import checked
+
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+App = Callable[[Message, Receive, Send], Awaitable[None]]
+
+MOST_PAGES = 8
+"""That are open at the same time."""
+
+_SCHEMES = {"ws": "http", "wss": "https"}
+_NO_TOKEN = "This page needs its token: open the whole address that dermis view has printed."
+_NOT_HERE = "This page is not served under this name: open the address that dermis view has printed."
+_OTHER_SITE = "Only the page's own requests are answered."
+_TOO_MANY = "As many pages as may be are open: close one of them."
+
+
+class Guard:
+    """ASGI middleware: lets only requests through that have the token and come from the server's own page.
+
+    app : rendercanvas' application
+    token : in the query of the address, then in a cookie; empty for none
+    cookie : its name, one for each port, which browsers do not tell apart
+    """
+
+    def __init__(self, app: App, token: str, cookie: str = "dermis") -> None:
+        self._app, self._token, self._cookie = app, token, cookie
+        self._pages = 0
+
+    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+        """The ASGI entry point."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+        elif refusal := self._refusal(scope):
+            await _refuse(refusal, scope, receive, send)
+        elif scope["type"] == "websocket":
+            self._pages += 1
+            try:
+                await self._app(scope, _checked(receive), send)
+            finally:
+                self._pages -= 1
+        else:
+            await self._app(scope, receive, self._with_cookie(send) if self._in_query(scope) else send)
+
+    def _refusal(self, scope: Message) -> str:
+        """Why a request is not answered, empty for one that is."""
+        host = next(iter(_headers(scope, b"host")), "")
+        if not self._token and not is_local(_name_of(host)):
+            return _NOT_HERE  # DNS rebinding: another site's name that resolves to this machine
+        scheme = _SCHEMES.get(scope["scheme"], scope["scheme"])
+        if any(origin != f"{scheme}://{host}" for origin in _headers(scope, b"origin")):
+            return _OTHER_SITE
+        if self._token and not self._in_query(scope) and not self._in_cookie(scope):
+            return _NO_TOKEN
+        return _TOO_MANY if scope["type"] == "websocket" and self._pages >= MOST_PAGES else ""
+
+    def _in_query(self, scope: Message) -> bool:
+        given = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [])
+        return bool(self._token) and any(map(self._is_token, given))
+
+    def _in_cookie(self, scope: Message) -> bool:
+        crumbs = (crumb.strip() for line in _headers(scope, b"cookie") for crumb in line.split(";"))
+        pairs = (crumb.partition("=") for crumb in crumbs)
+        return any(self._is_token(value) for name, _, value in pairs if name == self._cookie)
+
+    def _is_token(self, text: str) -> bool:
+        return hmac.compare_digest(text.encode(), self._token.encode())
+
+    def _with_cookie(self, send: Send) -> Send:
+        """Let the browser keep the token, out of the reach of scripts and of other sites."""
+        cookie = f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict".encode()
+
+        async def send_too(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message["headers"], (b"set-cookie", cookie)]
+            await send(message)
+
+        return send_too
+
+
+def is_local(host: str) -> bool:
+    """Whether a host name or address can be reached from this machine only."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _headers(scope: Message, wanted: bytes) -> list[str]:
+    return [value.decode("latin-1") for name, value in scope["headers"] if name == wanted]
+
+
+def _name_of(host: str) -> str:
+    """The host of "name:port", "[address]:port" or the name alone."""
+    if host.startswith("["):
+        return host[1:].partition("]")[0]
+    return host.partition(":")[0]
+
+
+def _checked(receive: Receive) -> Receive:
+    """The page's messages without those it may not send."""
+
+    async def next_message() -> Message:
+        while True:
+            message = await receive()
+            if message["type"] != "websocket.receive":
+                return message
+            if (text := checked(message.get("text"))) is not None:
+                return {"type": "websocket.receive", "text": text}
+
+    return next_message
+
+
+async def _refuse(reason: str, scope: Message, receive: Receive, send: Send) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.close", "code": 1008})
+        return
+    # Closed, or a body that nobody reads could be sent for ever.
+    headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
+    await send({"type": "http.response.start", "status": 403, "headers": headers})
+    await send({"type": "http.response.body", "body": reason.encode()})

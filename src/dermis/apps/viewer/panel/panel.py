@@ -1,0 +1,216 @@
+"""The panel: a column of sections on the left of the window, drawn with Dear ImGui."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import imgui
+
+from dermis.apps.viewer.panel.feeding import POINTER, feed_key, feed_pointer
+from dermis.apps.viewer.panel.fields import attempt, button, record_position
+from dermis.apps.viewer.panel.imgui_frames import ImguiFrames, closed_again
+from dermis.apps.viewer.panel.overlay import HELP_KEYS, PLAY_KEY, draw_divider, draw_help, draw_messages
+from dermis.apps.viewer.panel.sections import SECTIONS
+from dermis.apps.viewer.session import Session
+from dermis.gpu import Device
+
+_WIDTH, _CONTROLS = 330.0, 0.5  # of the panel, and their share of it
+_MOST_OF_WINDOW, _LEAST_SCALE = 0.5, 0.8  # of text in a narrow panel
+_NARROW, _PHONE = 400.0, 480.0  # less wide windows have a drawer; the latter is for phones held upright
+_UPRIGHT = 1.4  # height over width, at least
+_DRAWER = 0.86  # of the window's width
+_FINGER = 8.0  # room around text for a finger
+_MARGIN, _FAINT = 8.0, 0.6  # of the button that brings the panel back
+
+
+class Panel:
+    """Draws the sections, and decides which events are for the panel.
+
+    visible : whether it is there in a window of some width
+    opened : whether it is there in a narrow window, as a drawer over the picture
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.visible, self.opened, self.shows_help = True, False, False
+        self._size = (0.0, 0.0)
+        self._has_popup = self._scrolls = False
+        self._button_end = (0.0, 0.0)
+        self._frames = ImguiFrames(partial(session.tell_fault, "The panel cannot be drawn"))
+        self.label_width = 0.0  # right of the controls, logical
+
+    def open(self, device: Device, target: str) -> None:
+        """Create the resources for drawing into textures of a format."""
+        self._frames.open(device, target)
+
+    def width(self, size: tuple[float, float]) -> float:
+        """Of what the panel takes from the picture in a window of that size, logical."""
+        return 0.0 if is_drawer(size) else self._reach(size)
+
+    def _reach(self, size: tuple[float, float]) -> float:
+        """Of what it covers, logical; 0 when it is hidden."""
+        share, there = (_DRAWER, self.opened) if is_drawer(size) else (_MOST_OF_WINDOW, self.visible)
+        return round(min(_WIDTH, share * size[0])) if there else 0.0
+
+    def toggle(self) -> None:
+        """Hide or show it."""
+        if is_drawer(self._size):
+            self.opened = not self.opened
+        else:
+            self.visible = not self.visible
+
+    def feed(self, event: Mapping[str, Any], size: tuple[float, float]) -> bool:
+        """Process an event; returns whether it was for the panel, not for the picture."""
+        self._frames.enter()
+        self._size = size
+        io, kind = imgui.get_io(), event["event_type"]
+        if kind == "key_down" and not io.want_text_input and self._shortcut(event):
+            return True
+        if kind == "pointer_down" and event["x"] >= self._reach(size):
+            self.shows_help = False
+        if kind in POINTER:
+            covers = self._covers(event["x"], event["y"], size)  # before a press closes a list
+            feed_pointer(event, lambda: self._frame(size))
+            return covers
+        if kind == "pointer_leave":
+            io.add_mouse_pos_event(-1e6, -1e6)
+            return False
+        feed_key(event, lambda: self._frame(size))
+        return bool(imgui.get_io().want_text_input)  # of a context that the frame may have made
+
+    def draw(self, target: Any, size: tuple[float, float], pixel_ratio: float) -> None:
+        """Draw over what the target shows.
+
+        size : of the window, logical
+        """
+        self._frames.enter()
+        imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
+        self._frame(size)
+        self._frames.render(target)
+
+    def _frame(self, size: tuple[float, float]) -> None:
+        self._size = size
+        self._frames.lay_out(size, lambda: self._draw_windows(size))
+
+    def _shortcut(self, event: Mapping[str, Any]) -> bool:
+        """Whether a key was a shortcut of the panel."""
+        key, session = str(event["key"]), self._session
+        if {"Control", "Meta"} & set(event.get("modifiers", ())):
+            if key.lower() != "s":
+                return False
+            attempt(session, lambda: session.save(Path(session.scene_file)))
+        elif key == "Tab":
+            self.toggle()
+        elif key == "Escape":
+            return self._escape()
+        elif key in HELP_KEYS:
+            self.shows_help = not self.shows_help
+        elif key == PLAY_KEY and session.player.clip is not None:
+            session.player.toggle()
+        else:
+            return False
+        return True
+
+    def _escape(self) -> bool:
+        """Close what is open, the topmost first; returns whether there was something."""
+        if self._has_popup:
+            imgui.internal.close_popup_to_level(0, False)
+            self._has_popup = False
+        elif self.shows_help:
+            self.shows_help = False
+        elif self._session.search:
+            self._session.search = ""
+        else:
+            return False
+        return True
+
+    def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
+        """Whether a pointer there is over the panel; Dear ImGui would know it only a frame later."""
+        reach = self._reach(size)
+        on_button = not reach and x < self._button_end[0] and y < self._button_end[1]
+        return x < reach or on_button or self._has_popup or bool(imgui.is_any_item_active())
+
+    def _draw_windows(self, size: tuple[float, float]) -> None:
+        """The panel, or the button that brings it back, and the overlay."""
+        room = _FINGER if is_drawer(size) else imgui.get_style().frame_padding.y
+        padding = imgui.ImVec2(imgui.get_style().frame_padding.x, room)
+        imgui.push_style_var(int(imgui.StyleVar_.frame_padding), padding)
+        if self._reach(size):
+            self._draw_panel(size)
+        else:
+            self._draw_button()
+        imgui.pop_style_var()
+        left, session = self.width(size), self._session
+        if self.shows_help:
+            draw_help(left, size)
+        draw_divider(session.split, left, size)
+        lines = session.message, session.heads.note, "" if self._reach(size) > left else session.status
+        draw_messages([line for line in lines if line], left, size)
+
+    def _draw_button(self) -> None:
+        """A button in the corner of the picture."""
+        self._has_popup = False
+        imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
+        flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
+        imgui.push_style_var(int(imgui.StyleVar_.alpha), _FAINT)
+        imgui.begin("corner", None, int(flags | imgui.WindowFlags_.always_auto_resize))
+        if button(self._session, "panel"):
+            self.toggle()
+        end = imgui.get_item_rect_max()
+        self._button_end = float(end.x) + _MARGIN, float(end.y) + _MARGIN
+        imgui.end()
+        imgui.pop_style_var()
+
+    def _draw_panel(self, size: tuple[float, float]) -> None:
+        session, width = self._session, self._reach(size)
+        imgui.get_style().font_scale_main = max(_LEAST_SCALE, min(1.0, width / _WIDTH))
+        imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
+        imgui.set_next_window_size(imgui.ImVec2(width, size[1]))
+        fixed = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
+        imgui.begin("dermis", None, int(fixed | imgui.WindowFlags_.no_title_bar))
+        self._draw_toolbar()
+        imgui.push_item_width(_CONTROLS * width)
+        gap = imgui.get_style().item_inner_spacing.x
+        self.label_width = imgui.get_content_region_avail().x - _CONTROLS * width - gap
+        for section in (one for one in SECTIONS if one.applies(session)):
+            flags = int(imgui.TreeNodeFlags_.default_open) if section.is_open else 0
+            is_open = imgui.collapsing_header(section.title, flags)
+            record_position(session, section.title)
+            if is_open:
+                imgui.push_id(section.title)  # sections may share labels
+                with closed_again(partial(session.tell_fault, f"{section.title} cannot be drawn")):
+                    section.draw(session)
+                imgui.pop_id()
+        imgui.pop_item_width()
+        self._scroll_by_touch()
+        self._has_popup = bool(imgui.is_popup_open("", int(imgui.PopupFlags_.any_popup)))
+        imgui.end()
+
+    def _draw_toolbar(self) -> None:
+        h = self._session.history
+        for label, possible, step in (("undo", h.can_undo, h.undo), ("redo", h.can_redo, h.redo)):
+            imgui.begin_disabled(not possible)
+            if button(self._session, label):
+                step()
+            imgui.end_disabled()
+            imgui.same_line()
+        self.shows_help ^= button(self._session, "help")
+        imgui.same_line()
+        if button(self._session, "hide"):
+            self.toggle()
+
+    def _scroll_by_touch(self) -> None:
+        """Scroll with a drag that began beside all controls: fingers have no wheel."""
+        if imgui.is_mouse_clicked(0):
+            self._scrolls = imgui.is_window_hovered() and not imgui.is_any_item_hovered()
+        if self._scrolls and imgui.is_mouse_down(0):
+            imgui.set_scroll_y(imgui.get_scroll_y() - imgui.get_io().mouse_delta.y)
+
+
+def is_drawer(size: tuple[float, float]) -> bool:
+    """Whether a window of that size is too narrow for the panel beside the picture, as a phone is."""
+    width, height = size
+    return width < (_PHONE if height > _UPRIGHT * width else _NARROW)

@@ -1,0 +1,202 @@
+"""From states to images on the device."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.viewer.chart import ATLAS
+from dermis.apps.viewer.pace import Pace
+from dermis.apps.viewer.state import PARTS, PICTURE, ViewerState, changed, same
+from dermis.apps.viewer.views import Views
+from dermis.base.errors import refuse
+from dermis.frame.rendered import Rendered
+from dermis.frame.renderer import Renderer
+from dermis.gpu import Device, download, make_texture
+from dermis.images.io import write_image, write_png
+from dermis.scene.camera import Camera
+from dermis.scene.settings import Settings
+
+_SIZES = 2  # of everything: for frames in motion and for still ones
+_SMALL = (96, 64)  # a picture that needs all shaders and little time
+_TIMED_FRAMES = 120
+_BEFORE = "before"  # the frozen state's own light, so that a camera that moves lights neither again
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """The image of a state that does not change, as the camera saw it."""
+
+    state: ViewerState
+    camera: Camera
+    settings: Settings
+    image: Any
+
+
+class Studio:
+    """A renderer that computes only what has changed, and the last image it made.
+
+    adapter : "auto", "cpu" or part of an adapter's name
+
+    is_preparing : whether `prepare` runs, perhaps in another thread, when nothing else may be drawn
+    """
+
+    def __init__(self, adapter: str = "auto") -> None:
+        self.is_preparing = False
+        self.renderer = Renderer(adapter, depth=_SIZES, reopens=False)
+        self.pace = Pace(software=self.renderer.device.adapter.kind == "CPU")
+        self.rendered: Rendered | None = None
+        self.settings: Settings | None = None
+        self._views = Views(self.renderer)
+        self._shown: tuple[ViewerState, Camera, Settings] | None = None
+        self.last_image: Any = None
+        self._size = (0, 0)
+        self.times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAMES)
+        self._frozen: Frozen | None = None
+        self._lit: tuple[ViewerState, str] | None = None
+
+    def prepare(self, state: ViewerState, go_on: Callable[[], None] = lambda: None) -> None:
+        """Make what the first pictures of a state take long for, in motion and still.
+
+        go_on : called when the head's resources are there
+
+        Raises DermisError for states that cannot be rendered and when the device fails.
+        """
+        self.is_preparing = True
+        try:
+            for moving in (True, False):
+                self.renderer.prepare(state.scene, self._settings(state, _SMALL, moving))
+            go_on()
+            for moving in (True, False):
+                self.image(state, state.scene.camera, _SMALL, moving)
+        finally:
+            self.is_preparing = False
+
+    def pictures(
+        self,
+        state: ViewerState,
+        before: ViewerState | None,
+        camera: Camera,
+        size: tuple[int, int],
+        moving: bool,
+    ) -> tuple[Any, Any]:
+        """The image of a state as `image` makes it, and that of a frozen one, None without.
+
+        Raises DermisError for states that cannot be rendered and when the device fails.
+        """
+        if before is None:
+            self._frozen = None
+            return self.image(state, camera, size, moving), None
+        image = self._frozen_image(before, camera, size, moving)
+        return self.image(state, camera, size, moving), image
+
+    def image(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Any:
+        """A texture of sRGB bytes, of the window's size or smaller in motion; the last one where it holds.
+
+        Raises DermisError for states that cannot be rendered and when the device fails.
+        """
+        self._size = size
+        settings = self._settings(state, size, moving)
+        known = self._shown and self._shown[0] is state and self._shown[1:] == (camera, settings)
+        if known:
+            return self.last_image
+        before = self.rendered
+        self.last_image = self._draw(replace(state, settings=settings).with_camera(camera))
+        self._shown = state, camera, settings
+        if self.rendered and self.rendered is not before:
+            self.times.append(self.rendered.gpu_ms or {})
+            if moving and "shade" in (
+                self.rendered.gpu_ms or {"shade"}
+            ):  # others tell nothing of the next one
+                self.pace.note(self.rendered.frame_ms)
+        return self.last_image
+
+    def _frozen_image(self, before: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Any:
+        """A copy, for the renderer has one picture of each size; it is made anew when the camera moves."""
+        settings, frozen = self._settings(before, size, moving), self._frozen
+        finest = self._settings(before, size, moving=False)
+        known = frozen and frozen.state is before and frozen.camera == camera
+        if frozen and known and frozen.settings in (settings, finest):
+            return frozen.image
+        drawn = self._draw(replace(before, settings=settings).with_camera(camera), _BEFORE)
+        self._shown = None  # the picture was the live state's
+        copy = copied(self.renderer.device, drawn, frozen.image if frozen else None)
+        self._frozen = Frozen(before, camera, settings, copy)
+        return copy
+
+    def _settings(self, state: ViewerState, size: tuple[int, int], moving: bool) -> Settings:
+        """Those of a frame; the atlas as a flat picture is always the one that the settings ask for."""
+        return self.pace.settings(state.settings, size, moving and state.view != ATLAS)
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the last image is a still one, with all that its settings ask for."""
+        if not self._shown:
+            return False
+        state, _, settings = self._shown
+        return self._settings(state, self._size, moving=False) == settings
+
+    def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
+        """Write what the state shows at any size: .png with the tone curve, or .exr, linear.
+
+        Raises DermisError when that is not possible.
+        """
+        if self.is_preparing:
+            refuse("picture", "a head that can be drawn", "it is being prepared", "Try it again in a moment")
+        image = self._draw(state.with_settings(size=size))
+        self._shown = None
+        linear, made = path.suffix.lower() == ".exr", self.rendered
+        if not made or state.view not in (PICTURE, *PARTS):
+            write_png(path, self.read(image))
+        elif state.settings.background == "none":
+            write_image(path, made.linear_rgba()) if linear else write_png(path, made.rgba8())
+        else:
+            write_image(path, made.linear()) if linear else write_png(path, self.read(image))
+
+    @property
+    def exposure(self) -> float:
+        """That of the last frame, metered or given."""
+        return self.rendered.exposure if self.rendered else 1.0
+
+    def read(self, image: Any) -> NDArray[np.uint8]:
+        """(h, w, 3) bytes of an image."""
+        return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
+
+    def _draw(self, state: ViewerState, side: str = "") -> Any:
+        parts = PARTS.get(state.view, state.settings.parts)
+        settings = self.settings = changed(state.settings, parts=parts)
+        if state.view == ATLAS and self._shows_light_of(state, side):
+            return self._views.draw_chart(state.scene, settings, state.chart, side)
+        self._lit = None
+        self.rendered = self.renderer.draw(state.scene, settings, view=side)
+        self._lit = state, side
+        if state.view in (PICTURE, *PARTS):
+            return self.rendered.picture.bytes
+        if state.view == ATLAS:
+            return self._views.draw_chart(state.scene, settings, state.chart, side)
+        return self._views.draw(state.scene, settings, state.view, side)
+
+    def _shows_light_of(self, state: ViewerState, side: str) -> bool:
+        """Whether the atlas holds a state's light: then another part of it takes no frame."""
+        if self._lit is None or self._lit[1] != side:
+            return False
+        return same(replace(self._lit[0], chart=state.chart), state)
+
+
+def copied(device: Device, image: Any, space: Any = None) -> Any:
+    """A texture of bytes alike.
+
+    space : an older copy, whose place is taken when its size fits
+    """
+    if space is None or space.size != image.size:
+        space = make_texture(device, image.size[:2], "rgba8uint")
+    encoder = device.handle.create_command_encoder()
+    encoder.copy_texture_to_texture({"texture": image}, {"texture": space}, image.size)
+    device.handle.queue.submit([encoder.finish()])
+    return space
