@@ -1,6 +1,6 @@
 """Renders a described scene with Cycles. Blender's Python runs it by its path: cycles_script.py FOLDER.
 
-FOLDER holds scene.json and arrays.npz as the module `cycles` beside it writes them. The script adds pass_K.exr
+FOLDER holds scene.json and arrays.npz, written by the module `cycles` beside it. The script adds pass_K.exr
 (radiance and coverage) and finally done.json (Blender's version, times of the passes). It imports nothing of
 dermis, which Blender's Python does not have.
 """
