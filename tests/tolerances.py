@@ -146,4 +146,4 @@ FORWARD_CONTINUOUS = 0.005
 """Laws of a mean cosine of next to 0 against those of 0, relative: one by nodes, the other by H-functions."""
 
 PRINTED = 1e-6
-"""Computed figures in a text, relative, and one in their last printed digit: processors add in another order."""
+"""Computed figures in a text, relative, beside one in the last digit: processors add in other orders."""
