@@ -8,8 +8,11 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import child_process
 import pytest
 from small_set import SHARDS, contents
 
@@ -18,19 +21,13 @@ _LONGEST_S = 20.0
 Files = dict[str, bytes]
 
 
-def started(spec: Path, out: Path) -> subprocess.Popen[bytes]:
-    """In a session of its own, by which its workers are found; Ctrl-C is not ignored."""
+def started(
+    spec: Path, out: Path, start: Callable[..., Any] = child_process.start
+) -> subprocess.Popen[bytes]:
+    """Start the command in a session of its own, by which its workers are found."""
     words = f"batch {spec} -o {out} --adapter cpu --workers 2 --encoders 1".split()
-    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        return subprocess.Popen(
-            [sys.executable, "-m", "dermis", *words],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-        )
-    finally:
-        signal.signal(signal.SIGINT, usual)
+    command, pipe = [sys.executable, "-m", "dermis", *words], subprocess.PIPE
+    return start(command, stdout=pipe, stderr=pipe, start_new_session=True)
 
 
 def session(number: int) -> list[int]:
@@ -95,3 +92,15 @@ def test_one_that_is_asked_to_end_keeps_what_is_whole(
     assert (driver.returncode, said, besides_progress(notes)) == (128 + number, b"", [])
     wait_until_all_left(driver.pid)
     assert set(contents(tmp_path)) < set(undisturbed)
+
+
+def test_under_nohup_a_hangup_ends_nothing(small_folder: Path, undisturbed: Files, tmp_path: Path) -> None:
+    """Ctrl-C neither, as a shell's background job ignores it; each reaches the workers too."""
+    with child_process.ignored_signals():
+        driver = started(small_folder / "spec.toml", tmp_path, subprocess.Popen)
+    wait_for_shards(tmp_path, 1)
+    for number in (signal.SIGHUP, signal.SIGINT):
+        os.killpg(driver.pid, number)
+    said, notes = driver.communicate()
+    assert (driver.returncode, besides_progress(notes)) == (0, []) and b"(0 were there)" not in said
+    assert contents(tmp_path) == undisturbed

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import child_process
 import pytest
 from rigged_head import write_rigged_head, write_take
 
@@ -87,29 +88,12 @@ def test_without_a_display_it_names_the_way_out(folder: Path) -> None:
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
 def test_one_signal_ends_the_page(folder: Path, number: int, code: int) -> None:
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
-    command = [
-        sys.executable,
-        "-m",
-        "dermis",
-        "view",
-        "head.obj",
-        "--browser",
-        "--port",
-        "0",
-        "--adapter",
-        "cpu",
-    ]
-    # A shell's background job ignores Ctrl+C, and so would what it starts.
-    default = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        (folder / "temporary").mkdir()
-        environment = os.environ | {"TMPDIR": str(folder / "temporary")}
-        served = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
-        )
-    finally:
-        signal.signal(signal.SIGINT, default)
-    with served:
+    words = ["view", "head.obj", "--browser", "--port", "0", "--adapter", "cpu"]
+    command = [sys.executable, "-m", "dermis", *words]
+    (folder / "temporary").mkdir()
+    environment = os.environ | {"TMPDIR": str(folder / "temporary")}
+    pipe = subprocess.PIPE
+    with child_process.start(command, stdout=pipe, stderr=pipe, text=True, env=environment) as served:
         try:
             assert served.stdout is not None
             urllib.request.urlopen(served.stdout.readline().split()[0], timeout=60).close()

@@ -7,8 +7,11 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import child_process
 import pytest
 from rigged_head import write_rigged_head, write_take
 
@@ -51,18 +54,16 @@ SMALL = "--size 32x32 --atlas 64 --adapter cpu"
 
 
 def _interrupted(folder: Path, moment: str, number: signal.Signals, words: str) -> tuple[int, str]:
-    """Exit status and stderr of a command that is asked to end at a moment; Ctrl-C is not ignored."""
+    """Return exit status and stderr of a command that gets a signal at a moment."""
     code = START.format(moment.format(number.name))
     environment = os.environ | {"DERMIS_CACHE": str(folder / "cache")}
-    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        ran = subprocess.run(
-            [sys.executable, "-c", code, *words.split()], capture_output=True, cwd=folder, env=environment
-        )
-    finally:
-        signal.signal(signal.SIGINT, usual)
-    assert ran.stdout == b""
-    return ran.returncode, ran.stderr.decode()
+    command, pipe = [sys.executable, "-c", code, *words.split()], subprocess.PIPE
+    with child_process.start(
+        command, stdout=pipe, stderr=pipe, cwd=folder, env=environment, text=True
+    ) as ran:
+        said, notes = ran.communicate()
+    assert said == ""
+    return ran.returncode, notes
 
 
 def _left(folder: Path) -> set[str]:
@@ -126,10 +127,12 @@ sys.exit(interruption.code)
 """
 
 
-def _start(body: str, after: str = "pass") -> subprocess.Popen[str]:
+def _start(
+    body: str, after: str = "pass", start: Callable[..., Any] = child_process.start
+) -> subprocess.Popen[str]:
     code = BODY.format(body.replace("\n", "\n        "), after)
     pipe = subprocess.PIPE
-    return subprocess.Popen([sys.executable, "-c", code], stdout=pipe, stderr=pipe, text=True)
+    return start([sys.executable, "-c", code], stdout=pipe, stderr=pipe, text=True)
 
 
 def test_asked_again_it_ends_at_once() -> None:
@@ -194,13 +197,11 @@ def test_where_an_exception_would_be_lost_it_comes_later(place: str) -> None:
         assert (*ran.communicate(timeout=30), ran.returncode) == ("raised\n", "", 143)
 
 
-def test_what_the_caller_ignores_stays_ignored() -> None:
-    """As nohup does with SIGHUP."""
-    usual = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        ran = _start("os.kill(os.getpid(), signal.SIGHUP); time.sleep(0.1)")
-    finally:
-        signal.signal(signal.SIGHUP, usual)
+@pytest.mark.parametrize("number", SIGNALS)
+def test_what_the_caller_ignores_stays_ignored(number: signal.Signals) -> None:
+    """As nohup does with SIGHUP, and a shell with SIGINT in the background."""
+    with child_process.ignored_signals():
+        ran = _start(f"os.kill(os.getpid(), {int(number)}); time.sleep(0.1)", start=subprocess.Popen)
     with ran:
         assert (*ran.communicate(timeout=30), ran.returncode) == ("", "", 0)
 
@@ -208,7 +209,8 @@ def test_what_the_caller_ignores_stays_ignored() -> None:
 def test_afterwards_signals_are_as_before() -> None:
     from dermis.cli.interruption import Interruption
 
-    before = [signal.getsignal(number) for number in SIGNALS], sys.unraisablehook
-    with Interruption():
-        assert signal.getsignal(signal.SIGTERM) != before[0][1]
-    assert ([signal.getsignal(number) for number in SIGNALS], sys.unraisablehook) == before
+    with child_process.default_signals():
+        before = [signal.getsignal(number) for number in SIGNALS], sys.unraisablehook
+        with Interruption():
+            assert not {signal.getsignal(number) for number in SIGNALS} & set(before[0])
+        assert ([signal.getsignal(number) for number in SIGNALS], sys.unraisablehook) == before

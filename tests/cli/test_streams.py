@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import child_process
 import pytest
 
 pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a shell and a full device")
@@ -125,9 +126,8 @@ from dermis.cli.console import print_lines
 dermis.cli._run = lambda: print_lines("x" * 300_000)
 dermis.cli.main()
 """
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as ran:
+    pipe = subprocess.PIPE
+    with child_process.start([sys.executable, "-c", code], stdout=pipe, stderr=pipe) as ran:
         assert ran.stdout is not None and ran.stderr is not None
         assert ran.stdout.read(1) == b"x"
         ran.terminate()

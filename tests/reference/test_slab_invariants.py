@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import fields
 
+import child_process
 import numba
 import numpy as np
 import pytest
@@ -232,8 +233,9 @@ trace_slab([ScatteringLayer(0.01, 0.99)], 1)  # compiles
 threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
 trace_slab([ScatteringLayer(0.01, 0.99)], 10**10)
 """
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
-    assert run.returncode != 0 and "KeyboardInterrupt" in run.stderr
+    with child_process.start([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True) as run:
+        _, said = run.communicate(timeout=60)
+    assert run.returncode != 0 and "KeyboardInterrupt" in said
 
 
 def test_importing_the_module_leaves_the_compiler_alone() -> None:

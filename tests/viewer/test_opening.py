@@ -16,6 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import child_process
 import pytest
 from offscreen_input import ADAPTER
 from page_client import PATIENCE_S, SIZE, Page, visit
@@ -113,12 +114,7 @@ def test_why_nothing_can_be_shown_is_told_in_the_page_and_ends_the_server(start:
 
 def command(*words: str) -> subprocess.Popen[str]:
     line = [sys.executable, "-m", "dermis", "view", *words, "--browser", "--port", "0", "--adapter", "cpu"]
-    # A shell's background job ignores Ctrl+C, and so would what it starts.
-    default = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    finally:
-        signal.signal(signal.SIGINT, default)
+    return child_process.start(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def test_the_command_ends_with_its_one_line(tmp_path: Path) -> None:
