@@ -14,14 +14,13 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from dermis.apps.batch.distributed import Cluster
-from dermis.apps.batch.entries import entries
-from dermis.apps.batch.processes import Processes
+from dermis.apps.batch.dask_cluster import Cluster
+from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.run import Crew, Progress, run
 from dermis.apps.batch.scenes import SceneMaker
-from dermis.apps.batch.seats import Seating, available_cores
 from dermis.apps.batch.spec import Spec, example_text, spec_of
 from dermis.apps.batch.worker import Work
+from dermis.apps.batch.worker_pool import Processes, SlotRequest, available_cores
 from dermis.base.extras import needed
 from dermis.frame.renderer import Renderer
 
@@ -110,7 +109,7 @@ def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int, count: int =
 
 def workers(plan: Plan, count: int, *, moving: bool = False) -> dict[str, Any]:
     """Plain processes, so many of them."""
-    seats, encoders = Seating(plan.adapter, workers=count, encoders=plan.encoders).seats()
+    seats, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).seats()
     spec = spec_for(plan, plan.images * count, 2 * count, moving=moving)
     found = measured_run(plan, Processes(seats), spec, encoders, count)
     return {"workers": count, "encoders": encoders, "adapters": len({one.adapter for one in seats}), **found}
@@ -119,7 +118,7 @@ def workers(plan: Plan, count: int, *, moving: bool = False) -> dict[str, Any]:
 def dask(plan: Plan, count: int) -> dict[str, Any]:
     """The same work by plain processes and by as many workers of dask, each timed by whole shards."""
     distributed = needed("distributed", "the comparison with dask")
-    seats, encoders = Seating(plan.adapter, workers=count, encoders=plan.encoders).seats()
+    seats, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).seats()
     spec = spec_for(plan, plan.images * count, _SHARDS * count)
     threads = {"LP_NUM_THREADS": str(seats[0].threads)} if seats[0].threads else {}
     plain = measured_run(plan, Processes(seats), spec, encoders)
@@ -153,7 +152,7 @@ def steps(plan: Plan) -> dict[str, Any]:
             return next(renderer.observe([scene], settings, outputs=spec.outputs, landmarks=spec.landmarks))
 
         observation = _timed(told, "draw_and_read", seen)
-        _timed(told, "encode", lambda: entries(number, observation, parameters, spec))  # noqa: B023
+        _timed(told, "encode", lambda: encode_record(number, observation, parameters, spec))  # noqa: B023
     return {name: median(times[2:]) for name, times in told.items()}  # the first ones fill caches
 
 
@@ -171,7 +170,7 @@ def disk(plan: Plan) -> dict[str, Any]:
 
 def machine(plan: Plan) -> dict[str, Any]:
     """What all of it is measured on."""
-    adapters = Seating(plan.adapter).adapters()
+    adapters = SlotRequest(plan.adapter).adapters()
     return {
         "adapters": [one.name for one in adapters],
         "is_software": adapters[0].kind == "CPU",

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import dermis
-from dermis.apps.batch.correlation import Correlated
 from dermis.apps.batch.distributions import Distribution
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.tables import (
+from dermis.apps.batch.spec_tables import (
     BackgroundTable,
     CameraTable,
+    Correlated,
     EnvironmentTable,
     ExpressionTable,
     GazeTable,

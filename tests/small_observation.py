@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.apps.batch.entries import entries
+from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.shards import Shard, ShardWriter, shards_of
 from dermis.apps.batch.spec import Spec, spec_of
 from dermis.frame.observation import Landmarks, Observation
@@ -65,7 +65,7 @@ def write_shard(out: Path, shard: Shard, spec: Spec) -> None:
     with ShardWriter(out, shard, spec, "an adapter") as writer:
         for number in range(shard.first, shard.stop):
             seen = observation(number, spec.format == "folder", spec.outputs)
-            writer.add(number, entries(number, seen, spec.parameters(number), spec))
+            writer.add(number, encode_record(number, seen, spec.parameters(number), spec))
 
 
 def write_all(out: Path, spec: Spec) -> None:

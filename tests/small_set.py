@@ -7,15 +7,15 @@ from pathlib import Path
 
 from small_head import obj_text
 
-from dermis.apps.batch.processes import Processes, Seat
 from dermis.apps.batch.run import Report, run
 from dermis.apps.batch.spec import Spec, load_spec
 from dermis.apps.batch.worker import Work
+from dermis.apps.batch.worker_pool import Processes, WorkerSlot
 
 COUNT = 10
 SHARD_SIZE = 2
 SHARDS = COUNT // SHARD_SIZE
-HERE = Seat("cpu", 1)
+HERE = WorkerSlot("cpu", 1)
 _TEXT = f"""
 count = {COUNT}
 seed = 3

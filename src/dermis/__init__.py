@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dermis.apps.batch.dataset import read_dataset
+    from dermis.apps.batch.reader import read_dataset
     from dermis.apps.export.run import export_skin
     from dermis.apps.inverse.fitting.fit import fit
     from dermis.apps.inverse.unmixing.unmix import unmix
@@ -84,7 +84,7 @@ _HOME = {
     "Skin": "scene.skin",
     "export_skin": "apps.export.run",
     "fit": "apps.inverse.fitting.fit",
-    "read_dataset": "apps.batch.dataset",
+    "read_dataset": "apps.batch.reader",
     "unmix": "apps.inverse.unmixing.unmix",
     "view": "apps.viewer.windows",
 }

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dermis.apps.batch.agreement import agreements, compared
-from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.distributions import Distribution, parse_distribution
+from dermis.apps.batch.goodness_of_fit import fit_test, fit_tests
 from dermis.apps.batch.index import INDEX
 from dermis.apps.batch.spec import Spec, example_text, load_spec, spec_of
-from dermis.apps.batch.stated import stated
 from dermis.base.errors import DermisError
 from dermis.base.extras import needed
 
@@ -47,7 +46,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_two_thousand_draws_agree_with_their_spec(folder: Path) -> None:
-    found = {one.parameter: one for one in agreements(folder, load_spec(folder / "spec.toml"))}
+    found = {one.parameter: one for one in fit_tests(folder, load_spec(folder / "spec.toml"))}
     assert len(found) > 30 and all(one.agrees for one in found.values())
     chances = np.array([one.chance for one in found.values()])
     assert chances.min() > 1e-3 and 0.3 < np.median(chances) < 0.8, "chances of what is so are even"
@@ -76,14 +75,17 @@ def test_another_statement_is_found_out(folder: Path, stated_so: str, parameter:
     assert stated_so in lines
     (folder / "other.toml").write_text("\n".join(lines))
     spec = load_spec(folder / "other.toml")
-    assert [one.parameter for one in agreements(folder, spec) if not one.agrees] == [parameter]
+    assert [one.parameter for one in fit_tests(folder, spec) if not one.agrees] == [parameter]
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_distances_are_those_of_kolmogorov_and_smirnov(name: str) -> None:
     told, law = LAWS[name]
     values = np.random.default_rng(1).permutation(law.ppf((np.arange(500) + 0.3) ** 1.02 / 600))
-    found, truth = compared(name, stated(told), list(values)), stats.kstest(values, law.cdf, method="asymp")
+    found, truth = (
+        fit_test(name, parse_distribution(told), list(values)),
+        stats.kstest(values, law.cdf, method="asymp"),
+    )
     assert found.distance == pytest.approx(truth.statistic, abs=1e-4)
     assert found.chance == pytest.approx(truth.pvalue, rel=0.02)
     mean, sd = map(float, found.stated.split(", "))
@@ -93,29 +95,29 @@ def test_distances_are_those_of_kolmogorov_and_smirnov(name: str) -> None:
 
 
 def test_usual_is_the_mean_distance() -> None:
-    law: Distribution = stated({"uniform": [0, 1]})
+    law: Distribution = parse_distribution({"uniform": [0, 1]})
     rng = np.random.default_rng(2)
-    found = [compared("x", law, list(rng.uniform(size=400))) for _ in range(100)]
+    found = [fit_test("x", law, list(rng.uniform(size=400))) for _ in range(100)]
     assert np.mean([one.distance for one in found]) == pytest.approx(found[0].usual, rel=0.1)
 
 
 def test_values_that_nothing_states_are_no_chance() -> None:
-    law = stated({"choice": ["a", "b"], "weights": [1, 0]})
-    assert compared("x", law, ["a"] * 9).chance == 1.0
-    assert not compared("x", law, ["a"] * 9 + ["b"]).agrees
-    steps = stated({"choice": [0, 1 / 3, {"uniform": [5, 6]}]})
+    law = parse_distribution({"choice": ["a", "b"], "weights": [1, 0]})
+    assert fit_test("x", law, ["a"] * 9).chance == 1.0
+    assert not fit_test("x", law, ["a"] * 9 + ["b"]).agrees
+    steps = parse_distribution({"choice": [0, 1 / 3, {"uniform": [5, 6]}]})
     even = list(np.linspace(5, 6, 50))
-    assert compared("x", steps, [0.0, 0.333333] * 50 + even).chance > 0.5, "numbers are rounded"
-    assert not compared("x", steps, [0.0, 0.34, 5.5] * 50).agrees
+    assert fit_test("x", steps, [0.0, 0.333333] * 50 + even).chance > 0.5, "numbers are rounded"
+    assert not fit_test("x", steps, [0.0, 0.34, 5.5] * 50).agrees
 
 
 def test_backgrounds_without_an_environment_count_as_gradients(tmp_path: Path) -> None:
     kinds = {"kind": {"choice": ["environment", "gradient", "none"]}}
     around = {"name": {"choice": ["none", "uniform"]}}
     spec = spec_of({"count": 500, "background": kinds, "environment": around})
-    assert all(one.agrees for one in agreements(index(tmp_path, spec), spec))
+    assert all(one.agrees for one in fit_tests(index(tmp_path, spec), spec))
 
 
 def test_an_index_is_needed(tmp_path: Path) -> None:
     with pytest.raises(DermisError, match=r"expected a data set with index\.parquet"):
-        list(agreements(tmp_path, spec_of({})))
+        list(fit_tests(tmp_path, spec_of({})))

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from dermis.apps.batch.children import start
+from dermis.apps.batch.child_processes import start
 
 FOLDER = Path(__file__).parent
 DRIVER = """
 import os, sys, time
 sys.path.insert(0, sys.argv[1])
-from dermis.apps.batch.children import start
+from dermis.apps.batch.child_processes import start
 from test_children import talk
 child = start(talk)
 child.pipe.recv_bytes()

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from small_set import COUNT, SHARDS, contents, read, write_spec
 
-from dermis.apps.batch import distributed as module
-from dermis.apps.batch.distributed import Cluster
+from dermis.apps.batch import dask_cluster as module
+from dermis.apps.batch.dask_cluster import Cluster
 from dermis.apps.batch.run import Progress, Report, run
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.worker import Work

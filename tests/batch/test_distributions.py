@@ -11,9 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.distributions import Distribution, parse_distribution
 from dermis.apps.batch.sampling import rounded, uniform
-from dermis.apps.batch.stated import stated
 
 COUNT = 5000
 SHARES = [uniform(3, k, "tests") for k in range(COUNT)]
@@ -66,7 +65,7 @@ ANY = SIMPLE | st.builds(
 
 
 def drawn(told: Any) -> list[Any]:
-    found = stated(told)
+    found = parse_distribution(told)
     return [found.at(share) for share in SHARES]
 
 
@@ -74,7 +73,7 @@ def drawn(told: Any) -> list[Any]:
 def test_values_follow_the_law_that_is_stated(told: Any, law: Any) -> None:
     values = drawn(told)
     assert stats.kstest(values, law.cdf).pvalue > 0.01
-    low, high = stated(told).ends
+    low, high = parse_distribution(told).ends
     assert isinstance(low, float) and low <= min(values) and max(values) <= high
 
 
@@ -100,14 +99,14 @@ def test_uniform_numbers_are_even_and_streams_apart() -> None:
 @pytest.mark.parametrize(("told", "said"), REFUSED, ids=lambda one: str(one)[:40])
 def test_what_states_none_is_refused(told: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        stated(told)
+        parse_distribution(told)
 
 
 @given(ANY, st.floats(0, 1, exclude_min=True, exclude_max=True))
 def test_any_value_lies_between_the_ends_and_any_text_says_the_same(told: Any, share: float) -> None:
-    found = stated(told)
+    found = parse_distribution(told)
     assert isinstance(found, Distribution)
-    assert stated(found.told()) == found
+    assert parse_distribution(found.told()) == found
     low, high = min(found.ends), max(found.ends)  # type: ignore[type-var]
     assert low <= found.at(share) <= high  # type: ignore[operator]
 

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from dermis.apps.batch.encoding import Encoders
-from dermis.apps.batch.faults import LostProcessError
+from dermis.apps.batch.child_processes import LostProcessError
+from dermis.apps.batch.encoder_pool import Encoders
 from dermis.base.errors import DermisError
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from small_observation import OUTPUT_NAMES, observation, small_spec
 
-from dermis.apps.batch.encodings import Encoding, decode_output, encode_output, file_kind, stored_as
-from dermis.apps.batch.entries import entries
-from dermis.apps.batch.samples import decoded
+from dermis.apps.batch.output_encoding import Encoding, decode_output, encode_output, file_kind, stored_as
+from dermis.apps.batch.reader import decode_image
+from dermis.apps.batch.records import encode_record
 from dermis.base.errors import DermisError
 from dermis.frame.outputs import OUTPUTS
 
@@ -21,7 +21,7 @@ ALL = tuple(OUTPUTS.names)
 def image(number: int, **spec: Any) -> tuple[Any, dict[str, bytes]]:
     told = small_spec(**spec)
     seen = observation(number, outputs=told.outputs)
-    return seen, entries(number, seen, told.parameters(number), told)
+    return seen, encode_record(number, seen, told.parameters(number), told)
 
 
 @pytest.mark.parametrize("encoding", ["png", "exr", "npy"])
@@ -64,7 +64,7 @@ def test_names_and_order_of_the_files() -> None:
 
 def test_all_that_is_known_comes_back() -> None:
     seen, files = image(1)
-    found = decoded(files)
+    found = decode_image(files)
     assert found["number"] == 1 and found["parameters"] == small_spec().parameters(1)
     np.testing.assert_array_equal(found["picture"], seen.picture)
     for ours, theirs in zip(found["camera"], seen.camera, strict=True):
@@ -81,7 +81,7 @@ def test_all_that_is_known_comes_back() -> None:
 def test_what_is_not_known_is_none_and_places_without_one_are_nan() -> None:
     spec, seen = small_spec(), observation(2)
     seen.landmarks["ibug-68"].pixels[1] = np.nan
-    found = decoded(entries(2, seen, spec.parameters(2), spec))
+    found = decode_image(encode_record(2, seen, spec.parameters(2), spec))
     assert found["gaze"] is None
     assert np.isnan(found["landmarks"]["ibug-68"].pixels[1]).all()
     assert np.isfinite(found["landmarks"]["ibug-68"].pixels[0]).all()
@@ -90,7 +90,7 @@ def test_what_is_not_known_is_none_and_places_without_one_are_nan() -> None:
 def test_records_are_plain_json_without_minus_zero() -> None:
     spec, seen = small_spec(), observation(1)
     seen.camera.t[:] = -0.0, -1e-9, 5.0
-    record = entries(1, seen, spec.parameters(1), spec)["json"]
+    record = encode_record(1, seen, spec.parameters(1), spec)["json"]
     assert b"-0.0," not in record and json.loads(record)["camera"]["t"] == [0.0, 0.0, 5.0]
 
 
@@ -98,4 +98,4 @@ def test_numbers_that_are_none_are_refused() -> None:
     spec, seen = small_spec(outputs=("depth",)), observation(1)
     seen.outputs["depth"][2, 3] = np.nan
     with pytest.raises(DermisError, match="output depth: expected finite numbers"):
-        entries(1, seen, spec.parameters(1), spec)
+        encode_record(1, seen, spec.parameters(1), spec)

@@ -11,8 +11,8 @@ import pytest
 from small_observation import observation, small_spec, write_all, write_shard
 
 from dermis.apps.batch.datasheet import write_datasheet
-from dermis.apps.batch.entries import entries
 from dermis.apps.batch.index import write_index
+from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.shards import ShardWriter, shards_of
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import DermisError
@@ -45,7 +45,7 @@ def described(drawn_spec: Spec, tmp_path_factory: pytest.TempPathFactory) -> Pat
                     writer.leave_out(number, "a | head\nthat is damaged")
                     continue
                 seen = observation(number, outputs=drawn_spec.outputs)
-                found = entries(number, seen, drawn_spec.parameters(number), drawn_spec)
+                found = encode_record(number, seen, drawn_spec.parameters(number), drawn_spec)
                 writer.add(number, {"json": found["json"]})
     write_index(folder, drawn_spec)
     write_datasheet(folder, drawn_spec)

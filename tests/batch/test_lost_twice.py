@@ -29,7 +29,7 @@ def begun(
         if not name.startswith((SHARD, "index", "README")):
             (out / name).parent.mkdir(parents=True, exist_ok=True)
             (out / name).write_bytes(data)
-    monkeypatch.setattr("dermis.apps.batch.processes.serve", losing_worker.serve)
+    monkeypatch.setattr("dermis.apps.batch.worker_pool.serve", losing_worker.serve)
     monkeypatch.setenv(losing_worker.FOLDER, str(lost))
     return out, lost
 
@@ -59,7 +59,7 @@ def test_the_command_ends_with_2_where_all_do(
 ) -> None:
     out, lost = begun
     before = contents(out)
-    monkeypatch.setattr("dermis.apps.batch.processes.MOST_ATTEMPTS", ATTEMPTS)
+    monkeypatch.setattr("dermis.apps.batch.worker_pool.MOST_ATTEMPTS", ATTEMPTS)
     monkeypatch.setenv(losing_worker.WORKERS, "9")
     words = ["batch", str(small_folder / "spec.toml"), "-o", str(out), "--adapter", HERE.adapter]
     monkeypatch.setattr(sys, "argv", ["dermis", *words, "--workers", "1", "--encoders", "0"])

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from small_set import COUNT, HERE, SHARD_SIZE, SHARDS, contents, drawn, read, write_spec
 
-from dermis.apps.batch.processes import Processes
 from dermis.apps.batch.run import Progress, run
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.worker import Work
+from dermis.apps.batch.worker_pool import Processes
 from dermis.base.errors import DermisError
 
 Files = dict[str, bytes]
@@ -92,7 +92,7 @@ def test_killed_workers_lose_nothing(small_spec: Spec, undisturbed: Files, tmp_p
 def test_a_shard_that_no_worker_survives_is_given_up(
     small_spec: Spec, undisturbed: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dermis.apps.batch.processes.MOST_ATTEMPTS", 2)
+    monkeypatch.setattr("dermis.apps.batch.worker_pool.MOST_ATTEMPTS", 2)
     put(undisturbed, tmp_path)
     lost = next(name for name in sorted(undisturbed) if name.startswith("shard-"))
     (tmp_path / lost).unlink()

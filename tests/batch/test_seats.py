@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from dermis.apps.batch import seats
-from dermis.apps.batch.ranks import taken_rank
-from dermis.apps.batch.seats import Seating
+from dermis.apps.batch import worker_pool as seats
+from dermis.apps.batch.dask_worker import taken_rank
+from dermis.apps.batch.worker_pool import SlotRequest
 
 
 def pretend(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbers: int) -> None:
@@ -19,24 +19,24 @@ def pretend(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbers: in
     monkeypatch.setattr(seats, "available_cores", lambda: cores)
 
 
-def places(seating: Seating) -> list[str]:
+def places(seating: SlotRequest) -> list[str]:
     return [seat.adapter for seat in seating.seats()[0]]
 
 
 def test_each_gpu_has_a_worker_or_several(monkeypatch: pytest.MonkeyPatch) -> None:
     pretend(monkeypatch, 16, "DiscreteGPU", 0, 1)
-    assert places(Seating()) == ["#0", "#1"]
-    assert places(Seating(workers_per_gpu=2)) == ["#0", "#1", "#0", "#1"]
-    assert places(Seating(workers=3)) == ["#0", "#1", "#0"]
-    assert places(Seating(numbers=(1,))) == ["#1"]
+    assert places(SlotRequest()) == ["#0", "#1"]
+    assert places(SlotRequest(workers_per_gpu=2)) == ["#0", "#1", "#0", "#1"]
+    assert places(SlotRequest(workers=3)) == ["#0", "#1", "#0"]
+    assert places(SlotRequest(numbers=(1,))) == ["#1"]
 
 
 @pytest.mark.parametrize(("workers", "encoders"), [(1, 7), (2, 3), (8, 1), (16, 1)])
 def test_encoders_share_the_cores(monkeypatch: pytest.MonkeyPatch, workers: int, encoders: int) -> None:
     pretend(monkeypatch, 8, "DiscreteGPU", 0)
-    found, each = Seating(workers=workers).seats()
+    found, each = SlotRequest(workers=workers).seats()
     assert each == encoders and all(seat.threads == 0 for seat in found)
-    assert Seating(workers=workers, encoders=5).seats()[1] == 5
+    assert SlotRequest(workers=workers, encoders=5).seats()[1] == 5
 
 
 @pytest.mark.parametrize(("cores", "workers", "threads"), [(1, 1, 1), (2, 1, 2), (8, 4, 2)])
@@ -44,7 +44,7 @@ def test_a_software_adapter_shares_the_cores(
     monkeypatch: pytest.MonkeyPatch, cores: int, workers: int, threads: int
 ) -> None:
     pretend(monkeypatch, cores, "CPU", 0)
-    found, encoders = Seating().seats()
+    found, encoders = SlotRequest().seats()
     assert (len(found), found[0].threads, encoders) == (workers, threads, 0)
 
 

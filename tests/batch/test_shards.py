@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from small_observation import observation, small_spec, write_all, write_shard
 
-from dermis.apps.batch.entries import entries
-from dermis.apps.batch.settling import settle
+from dermis.apps.batch.atomic_files import atomic_write
+from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.shards import (
     Shard,
     ShardWriter,
@@ -178,7 +178,7 @@ def test_a_full_disk_ends_cleanly_with_what_is_whole_kept(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     for name in ("TarWriter.add", "FolderWriter.add", "take_name"):
-        home = {"TarWriter.add": "tar_files.", "FolderWriter.add": "folder_files."}.get(name, "shards.")
+        home = "shards." if name == "take_name" else "shard_formats."
         with monkeypatch.context() as patch:
             patch.setattr(f"dermis.apps.batch.{home}{name}", full)
             if name.startswith("Tar") != (spec.format == "webdataset") and name != "take_name":
@@ -198,7 +198,7 @@ def test_images_that_were_left_out_are_recorded(tmp_path: Path, spec: Spec) -> N
     shard = shards_of(spec)[1]
     with ShardWriter(tmp_path, shard, spec) as writer:
         for number in (3, 5):
-            writer.add(number, entries(number, observation(number), spec.parameters(number), spec))
+            writer.add(number, encode_record(number, observation(number), spec.parameters(number), spec))
         writer.leave_out(4, "a head\nthat is “damaged”" + "." * 300)
     assert is_whole(tmp_path, shard, spec)
     ((number, reason),) = stamp_of(shard_path(tmp_path, shard, spec)).left_out
@@ -214,7 +214,7 @@ def test_files_that_others_remove_meanwhile_are_written_again(tmp_path: Path) ->
         if len(tries) < 3:
             remove_leftovers(tmp_path)
 
-    settle(tmp_path / "index.parquet", write)
+    atomic_write(tmp_path / "index.parquet", write)
     assert len(tries) == 3 and contents(tmp_path) == {"index.parquet": b"whole"}
     with pytest.raises(DermisError, match=r"no/README\.md: expected a place"):
-        settle(tmp_path / "no" / "README.md", lambda path: path.write_bytes(b""))
+        atomic_write(tmp_path / "no" / "README.md", lambda path: path.write_bytes(b""))

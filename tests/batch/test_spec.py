@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 import dermis
-from dermis.apps.batch.drawing import Parameters
+from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.spec import Spec, example_text, load_spec, spec_of
 from dermis.base.errors import DermisError
 

@@ -145,12 +145,11 @@ def _crew(
     adapter: str, adapters: str | None, workers: int | None, per_gpu: int | None, encoders: int | None
 ) -> tuple[Crew, int]:
     """Processes of this machine, and how many encoders each has."""
-    from dermis.apps.batch.processes import Processes
-    from dermis.apps.batch.seats import Seating
+    from dermis.apps.batch.worker_pool import Processes, SlotRequest
 
     if workers is not None and per_gpu is not None:
         refuse("--workers-per-gpu", "no such option beside --workers", "it came", "Leave one of them out")
-    seating = Seating(
+    seating = SlotRequest(
         adapter,
         _numbers(adapter, adapters),
         _number("--workers", workers, 1),
@@ -172,7 +171,7 @@ def _numbers(adapter: str, adapters: str | None) -> tuple[int, ...]:
 
 
 def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: dict[str, Any]) -> Crew:
-    from dermis.apps.batch.distributed import Cluster
+    from dermis.apps.batch.dask_cluster import Cluster
 
     if address is not None and file is not None:
         refuse("--cluster", "no such option beside --scheduler", "it came", "Leave one of them out")

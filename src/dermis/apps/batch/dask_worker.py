@@ -1,27 +1,28 @@
-"""What runs in a worker of dask.distributed."""
+"""Code that runs inside a worker of dask.distributed."""
 
 from __future__ import annotations
 
+import itertools
 import os
+import socket
 import threading
 import tomllib
 import warnings
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
 from distributed import WorkerPlugin, get_worker
 
-from dermis.apps.batch.children import Child, start
-from dermis.apps.batch.faults import LostProcessError
-from dermis.apps.batch.processes import Seat, serve
-from dermis.apps.batch.ranks import taken_rank
+from dermis.apps.batch.child_processes import Child, LostProcessError, start
 from dermis.apps.batch.shards import Shard
 from dermis.apps.batch.spec import spec_of
-from dermis.apps.batch.told import Told
-from dermis.apps.batch.worker import Work
+from dermis.apps.batch.worker import Work, WorkerEvent
+from dermis.apps.batch.worker_pool import WorkerSlot, serve
 from dermis.base.errors import DermisError, DermisWarning
+from dermis.base.private import cache_folder, make_private
 from dermis.gpu.adapters import alike_adapters
 
 _TRIM = "MALLOC_TRIM_THRESHOLD_"
@@ -29,7 +30,7 @@ _TRIM = "MALLOC_TRIM_THRESHOLD_"
 
 
 @dataclass
-class Drawing(WorkerPlugin):  # type: ignore[misc]
+class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
     """Keeps a process of ours beside a worker of dask's, from its first shard to the end of the run.
 
     It draws as without dask: dask's worker waits for it, and has no part in the drawing.
@@ -66,7 +67,7 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
             self._close()
             self._kept["lock"].release()
 
-    def draw(self, shard: Shard) -> Told:
+    def draw(self, shard: Shard) -> WorkerEvent:
         """Draw a shard: what became of it.
 
         Raises LostProcessError where the process or its device was lost, after which dask tries again.
@@ -78,17 +79,17 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
                 self._close()
                 raise
             except DermisError as fault:
-                return Told(refusal=str(fault))
+                return WorkerEvent(refusal=str(fault))
             finally:
                 if self._kept["over"].is_set():
                     self._close()
 
-    def _drawn(self, shard: Shard) -> Told:
+    def _drawn(self, shard: Shard) -> WorkerEvent:
         child = self._child()
         try:
             child.pipe.send(shard)
             while not self._kept["over"].is_set():
-                told: Told = child.pipe.recv()
+                told: WorkerEvent = child.pipe.recv()
                 if told.again:
                     raise LostProcessError(told.again)
                 if told.note:
@@ -97,10 +98,10 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
                     self._close()
                     return told
                 if told.shard is not None:
-                    return Told(shard.stop - shard.first, shard, told.failed)
+                    return WorkerEvent(shard.stop - shard.first, shard, told.failed)
         except (EOFError, OSError) as fault:
             raise LostProcessError(f"a worker: {child.fate()}") from fault
-        return Told(refusal="the run: expected to go on, but it is over. Give the command again.")
+        return WorkerEvent(refusal="the run: expected to go on, but it is over. Give the command again.")
 
     def _child(self) -> Child:
         """The process, started for the first shard."""
@@ -110,7 +111,7 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
             adapters = alike_adapters(self.adapter)
             spec = spec_of(tomllib.loads(self.text), self.folder)
             work = Work(spec, self.out, self.encoders, self.keep_going)
-            seat = Seat(f"#{adapters[rank % len(adapters)].number}")
+            seat = WorkerSlot(f"#{adapters[rank % len(adapters)].number}")
             self._kept["child"] = start(serve, seat, work)
             ends.callback(self._kept["child"].end)
         found: Child = self._kept["child"]
@@ -121,12 +122,42 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
         self._kept["ends"].close()
 
 
-def draw_shard(name: str, shard: Shard) -> Told:
+def render_shard(name: str, shard: Shard) -> WorkerEvent:
     """The task: draw a shard with the plugin of that name."""
-    told: Told = get_worker().plugins[name].draw(shard)
+    told: WorkerEvent = get_worker().plugins[name].draw(shard)
     return told
 
 
 def sees(mark: str) -> bool:
     """Whether a file is there."""
     return Path(mark).exists()
+
+
+@contextmanager
+def taken_rank() -> Iterator[int]:
+    """The least number from 0 on that no other process of this user has on this host, while the block runs.
+
+    Held by a lock on a file, which the system releases when its process ends, however it does. Where there
+    are no such locks, or no place for them, it is 0.
+    """
+    folder = cache_folder() / "ranks"
+    try:
+        import fcntl
+
+        make_private(folder)
+    except (ImportError, OSError):
+        yield 0
+        return
+    for rank in itertools.count():
+        name = folder / f"{socket.gethostname()}-{rank}.lock"
+        place = os.open(name, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(place, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(place)
+            continue
+        try:
+            yield rank
+        finally:
+            os.close(place)
+        return

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from dermis.apps.batch.agreement import Agreement, agreements
-from dermis.apps.batch.described import classes, landmark_names, outputs_of
-from dermis.apps.batch.licences import licences
-from dermis.apps.batch.settling import settle
+from dermis.apps.batch.atomic_files import atomic_write
+from dermis.apps.batch.goodness_of_fit import FitTest, fit_tests
+from dermis.apps.batch.index import statistics
+from dermis.apps.batch.output_encoding import file_kind, stored_as
+from dermis.apps.batch.shard_formats import Stamp
 from dermis.apps.batch.shards import is_there, shard_path, shards_of, stamp_of
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.stamps import Stamp
-from dermis.apps.batch.statistics import statistics
+from dermis.base.tables import read_rows
+from dermis.frame.outputs import OUTPUTS
+from dermis.human.labels.classes import label_classes
+from dermis.human.landmarks.points import table_points
+from dermis.human.landmarks.sets import SETS
+from dermis.human.model import THANKS
+from dermis.mesh.samples import SAMPLES
 
 README, DESCRIPTION = "README.md", "dataset.json"
 _MOST_LISTED = 50
@@ -57,10 +63,10 @@ def write_datasheet(out: Path, spec: Spec) -> None:
     """
     there = [shard for shard in shards_of(spec) if is_there(out, shard, spec)]
     stamps = [stamp_of(shard_path(out, shard, spec)) for shard in there]
-    text = _readme(spec, stamps, statistics(out), agreements(out, spec)).encode()
+    text = _readme(spec, stamps, statistics(out), fit_tests(out, spec)).encode()
     description = (json.dumps(_description(spec), indent=1, ensure_ascii=False) + "\n").encode()
-    settle(out / DESCRIPTION, lambda path: path.write_bytes(description))
-    settle(out / README, lambda path: path.write_bytes(text))
+    atomic_write(out / DESCRIPTION, lambda path: path.write_bytes(description))
+    atomic_write(out / README, lambda path: path.write_bytes(text))
 
 
 def _description(spec: Spec) -> dict[str, Any]:
@@ -75,7 +81,7 @@ def _description(spec: Spec) -> dict[str, Any]:
     }
 
 
-def _readme(spec: Spec, stamps: Sequence[Stamp], drawn: Rows, agreed: Iterable[Agreement]) -> str:
+def _readme(spec: Spec, stamps: Sequence[Stamp], drawn: Rows, agreed: Iterable[FitTest]) -> str:
     width, height = spec.size
     left_out = [one for stamp in stamps for one in stamp.left_out]
     images = sum(stamp.stop - stamp.first for stamp in stamps) - len(left_out)
@@ -120,7 +126,7 @@ def _files(spec: Spec) -> str:
     return _FILES + _table(("file", "content", "unit", "stored as", "where nothing is seen"), rows)
 
 
-def _stated(agreed: Iterable[Agreement]) -> str:
+def _stated(agreed: Iterable[FitTest]) -> str:
     """The distances of what was drawn from what is stated."""
     rows = [
         (*one[:4], *(f"{size:.2g}" for size in one[4:]), "" if one.agrees else "not as stated")
@@ -164,3 +170,66 @@ def _table(heads: Sequence[str], rows: Rows) -> str:
     lines = [heads, ["---"] * len(heads), *rows]
     cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in line] for line in lines]
     return "".join(f"| {' | '.join(line)} |\n" for line in cells)
+
+
+_LABELS = "label", "label_face_synthetics"
+
+
+def outputs_of(spec: Spec) -> dict[str, dict[str, Any]]:
+    """Of each output: kind of its files, how numbers are stored, unit, content, value of the background."""
+    return {
+        name: {
+            "file": file_kind(name, spec.encoding),
+            "stored": stored_as(name, spec.encoding),
+            "step": _levels(name, spec)[0],
+            "zero": _levels(name, spec)[1],
+            "unit": OUTPUTS[name].unit,
+            "description": OUTPUTS[name].description.partition(", see ")[0],  # pages are elsewhere
+            "background": OUTPUTS[name].background,
+        }
+        for name in spec.outputs
+    }
+
+
+def classes(spec: Spec) -> dict[str, dict[int, str]]:
+    """Names of the classes by level, of each output of the spec that holds labels."""
+    found: dict[str, dict[int, str]] = {}
+    for one in label_classes():
+        for output, level in zip(_LABELS, (one.number, one.face_synthetics), strict=True):
+            if output in spec.outputs:
+                named = found.setdefault(output, {})
+                named[level] = f"{named[level]}, {one.name}" if level in named else one.name
+    return {output: dict(sorted(named.items())) for output, named in found.items()}
+
+
+def landmark_names(name: str, spec: Spec) -> list[str]:
+    """Of the points of a set, or of a table that the spec names, in their order."""
+    if name in SETS:
+        return [row["landmark"] for row in read_rows("dermis.human.landmarks", name)]
+    return [landmark for landmark, _ in table_points(spec.landmark_tables[name])]
+
+
+def _levels(name: str, spec: Spec) -> tuple[float, int]:
+    """Step and zero of its levels: value = (level - zero) * step; (1, 0) for numbers as they are."""
+    levels = OUTPUTS[name].levels
+    return (1.0, 0) if levels is None or file_kind(name, spec.encoding) != "png" else levels
+
+
+_OURS = {"none", "uniform", "human"}
+
+
+def licences(spec: Spec) -> Iterator[tuple[str, str, str]]:
+    """Part, author and licence of all that the spec can draw.
+
+    Files that it names are their owner's.
+    """
+    author, _, licence = THANKS.rpartition(", ")
+    yield "people: the parametric human", author, licence
+    for parameter in ("person.head", "environment.name"):
+        found = spec.distributions.get(parameter)
+        for name in () if found is None else map(str, found.ends):
+            if name in SAMPLES:
+                yield f"{parameter} {name}", SAMPLES[name].attribution, SAMPLES[name].licence
+            elif name not in _OURS and not name.startswith("human:"):
+                yield f"{parameter} {name}", "a file of the spec", "its owner's: state it here"
+    yield "light, skin and pictures", "computed by dermis (Apache-2.0)", "none is claimed"

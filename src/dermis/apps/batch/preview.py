@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.distributions import Constant
-from dermis.apps.batch.drawing import Parameters
+from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneMaker
 from dermis.apps.batch.spec import Spec
 from dermis.frame.renderer import Renderer

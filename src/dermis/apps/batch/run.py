@@ -1,4 +1,4 @@
-"""A run: which shards are missing, who draws them, and what is written when all are there."""
+"""Run of a data set: render the missing shards, then write its index and datasheet."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.datasheet import write_datasheet
 from dermis.apps.batch.index import write_index
-from dermis.apps.batch.settling import settle
 from dermis.apps.batch.shards import Shard, is_there, is_whole, remove_leftovers, shards_of
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.told import Told
-from dermis.apps.batch.worker import Failure, Work
+from dermis.apps.batch.worker import Failure, Work, WorkerEvent
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import notify, refuse
 from dermis.base.reading import read_text
@@ -26,7 +25,7 @@ SPEC_FILE = "spec.toml"
 class Crew(Protocol):
     """Who draws: `Processes` of this machine, or those of a `Cluster`."""
 
-    def draw(self, work: Work, shards: Sequence[Shard]) -> Iterator[Told]:
+    def draw(self, work: Work, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Draw the shards, each whole or not at all; what happens is told as it does."""
         ...
 
@@ -110,7 +109,7 @@ def claim(out: Path, spec: Spec) -> None:
             remedy = "Choose another folder, or give the spec that it was begun with"
             refuse(out, "a folder for this data set", f"{SPEC_FILE} in it is another's", remedy)
         return
-    settle(place, lambda path: path.write_text(spec.text(), encoding="utf-8"))
+    atomic_write(place, lambda path: path.write_text(spec.text(), encoding="utf-8"))
 
 
 def _drawn(

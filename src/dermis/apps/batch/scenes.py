@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from dermis.apps.batch.cameras import camera_of, face_points
 from dermis.apps.batch.lighting import lights_of, towards
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.tables import ANGLES, NONE
+from dermis.apps.batch.spec_tables import ANGLES, NONE
 from dermis.base.reading import is_file
 from dermis.human.person import Human
 from dermis.mesh.head import Head

@@ -10,11 +10,20 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from dermis.apps.batch.folder_files import FolderWriter, folder_sha256
-from dermis.apps.batch.settling import leftovers, remove, take_name, unfinished_name
+from dermis.apps.batch.atomic_files import leftovers, remove, take_name, unfinished_name
+from dermis.apps.batch.shard_formats import (
+    MOST_STAMP_BYTES,
+    STAMP_NAME,
+    FolderWriter,
+    Stamp,
+    TarWriter,
+    folder_sha256,
+    made_with,
+    read_stamp,
+    tar_sha256,
+    tar_stamp,
+)
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.stamps import MOST_BYTES, NAME, Stamp, made_with, read_stamp
-from dermis.apps.batch.tar_files import TarWriter, tar_sha256, tar_stamp
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import DermisError, refuse, shortened
 from dermis.base.reading import opened, read_file, understood
@@ -113,7 +122,7 @@ class ShardWriter:
         left_out = tuple(sorted(self._left_out.items()))
         digest, made = self._files.sha256(), made_with(self._adapter)
         stamp = Stamp(spec.digest(), shard.index, shard.first, shard.stop, left_out, digest, made).data()
-        if len(stamp) > MOST_BYTES:
+        if len(stamp) > MOST_STAMP_BYTES:
             came = f"{len(left_out)} could not be made, such as: {left_out[0][1]}"
             refuse(self._target, "a shard of images most of which can be made", came, "Correct the spec")
         return stamp
@@ -125,7 +134,7 @@ def stamp_of(path: Path) -> Stamp:
     Raises DermisError where it is not whole, as far as its end tells.
     """
     if path.is_dir():
-        return read_stamp(read_file(path / NAME, EXPECTED, MOST_BYTES), path)
+        return read_stamp(read_file(path / STAMP_NAME, EXPECTED, MOST_STAMP_BYTES), path)
     with opened(path, EXPECTED) as file, understood(path, EXPECTED):
         return read_stamp(tar_stamp(file)[1], path)
 
@@ -179,6 +188,6 @@ def remove_leftovers(out: Path, shards: Collection[Shard] | None = None) -> None
 def _sha256(path: Path) -> str:
     """Of what lies in a shard before its stamp."""
     if path.is_dir():
-        return folder_sha256(path, sorted(one.name for one in path.iterdir() if one.name != NAME))
+        return folder_sha256(path, sorted(one.name for one in path.iterdir() if one.name != STAMP_NAME))
     with opened(path, EXPECTED) as file, understood(path, EXPECTED):
         return tar_sha256(file, tar_stamp(file)[0])

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, Field, PrivateAttr
 
-from dermis.apps.batch.checks import check_spec
-from dermis.apps.batch.correlation import Correlated
-from dermis.apps.batch.distributions import Distribution
-from dermis.apps.batch.drawing import Drawing, Parameters
-from dermis.apps.batch.drawn import Anything
-from dermis.apps.batch.encodings import Encoding
+from dermis.apps.batch.distributions import Distribution, Files
 from dermis.apps.batch.expressions import package_expressions, targets_of
-from dermis.apps.batch.matching import check_hashes, hashes, matched
-from dermis.apps.batch.spec_text import plain_values, tables_text
-from dermis.apps.batch.tables import (
+from dermis.apps.batch.output_encoding import Encoding
+from dermis.apps.batch.sampling import Parameters, Sampler
+from dermis.apps.batch.spec_checks import check_spec
+from dermis.apps.batch.spec_tables import (
     BackgroundTable,
     CameraTable,
+    Correlated,
+    DistributionField,
     EnvironmentTable,
     ExpressionTable,
     GazeTable,
@@ -31,11 +30,12 @@ from dermis.apps.batch.tables import (
 )
 from dermis.base.errors import about, refuse, shown_value
 from dermis.base.quantities import whole_number
-from dermis.base.reading import named_path, read_toml
+from dermis.base.reading import is_file, named_path, read_file, read_toml
 from dermis.human.landmarks.sets import SETS
 from dermis.scene.findings import Because, ImpossibleError
 from dermis.scene.plain import Plain
 from dermis.scene.settings import Settings
+from dermis.scene.toml_text import key_text, table_text
 
 MOST_IMAGES = 10**9
 RENDER: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
@@ -85,7 +85,7 @@ class Spec(Plain):
     """What the face does."""
     expressions: dict[str, dict[str, _Weight]] = Field(default_factory=dict)
     """Expressions of the spec's own: weights of targets, or of pairs without Left and Right."""
-    pose: dict[str, Annotated[Distribution, Anything()]] = Field(default_factory=dict)
+    pose: dict[str, Annotated[Distribution, DistributionField()]] = Field(default_factory=dict)
     """Weights of morph targets, or of pairs, in place of those that the expression gives."""
     head: TurnTable = TurnTable()
     """How the head is turned."""
@@ -93,7 +93,7 @@ class Spec(Plain):
     """Where the eyes look."""
     camera: CameraTable = CameraTable()
     """From where the face is seen."""
-    skin: dict[str, Annotated[Distribution, Anything()]] = Field(default_factory=dict)
+    skin: dict[str, Annotated[Distribution, DistributionField()]] = Field(default_factory=dict)
     """Dials of the skin, as of scenes: roughness, oiliness, ..."""
     light: LightTable = LightTable()
     """Lamps."""
@@ -108,14 +108,14 @@ class Spec(Plain):
     folder: Path = Field(default=Path(), exclude=True)
     """Where those files lie; no part of a spec's text."""
 
-    _drawing: Drawing = PrivateAttr()
+    _drawing: Sampler = PrivateAttr()
 
     def model_post_init(self, context: Any) -> None:
         drawn = _drawn("", self)
         expressions = {**package_expressions(), **self.expressions}
         check_spec(self, drawn, expressions)
         rows = {name: row for group in self.correlated for name, row in group.rows().items()}
-        drawing = Drawing(self.seed, self.images_per_person, drawn, rows, expressions)
+        drawing = Sampler(self.seed, self.images_per_person, drawn, rows, expressions)
         BaseModel.__setattr__(self, "_drawing", drawing)
 
     @property
@@ -240,3 +240,87 @@ def _made(kind: type[P], where: str, table: Any) -> P:
         return kind(**values)
     except ImpossibleError as error:
         raise ImpossibleError(where or "spec", error.findings) from None
+
+
+HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
+
+
+def tables_text(values: Mapping[str, Any]) -> str:
+    """The TOML of values, distributions, tables and lists of tables, by name."""
+    return "\n".join([HEADER, *_tables("", values)])
+
+
+def plain_values(table: Plain) -> dict[str, Any]:
+    """Fields by name, those left out that have no value."""
+    return {
+        name: getattr(table, name) for name in type(table).model_fields if getattr(table, name) is not None
+    }
+
+
+def _tables(title: str, values: Mapping[str, Any]) -> list[str]:
+    own, below = dict[str, Any](), list[str]()
+    for name, value in values.items():
+        whole = f"{title}.{key_text(name)}" if title else key_text(name)
+        if isinstance(value, Plain):
+            below += _tables(whole, plain_values(value))
+        elif isinstance(value, Mapping):
+            below += _tables(whole, value)
+        elif isinstance(value, tuple) and value and isinstance(value[0], Plain):
+            below += [table_text(f"[[{whole}]]", plain_values(one)) for one in value]
+        else:
+            own[name] = value.told() if isinstance(value, Distribution) else value
+    return [table_text(f"[{title}]" if title else "", own), *below] if own or not below else below
+
+
+_MOST_FILES = 100_000
+_MOST_BYTES = 4 << 30
+
+
+def matched(value: Any, folder: Path, key: str) -> Any:
+    """A value of a spec with the files of each {files = PATTERN} in it found, in the order of their names.
+
+    key : of the value
+
+    Raises DermisError for patterns that no file matches.
+    """
+    if isinstance(value, Mapping):
+        if value.keys() == {"files"} and isinstance(value["files"], str):
+            return _files(value["files"], folder, key)
+        return {name: matched(one, folder, f"{key}.{name}") for name, one in value.items()}
+    return value
+
+
+def _files(pattern: str, folder: Path, key: str) -> Files:
+    names = []
+    try:
+        for path in folder.glob(pattern):
+            if is_file(path):
+                names.append(Path(os.path.relpath(path, folder)).as_posix())
+            if len(names) > _MOST_FILES:
+                break
+    except (ValueError, NotImplementedError, OSError, RecursionError) as fault:
+        came = f"{pattern!r} is none ({fault or type(fault).__name__})"
+        refuse(key, "a pattern of files below the spec's folder, such as heads/*.json", came, "Correct it")
+    if not 0 < len(names) <= _MOST_FILES:
+        came = f"more than {_MOST_FILES:,} match" if names else "none matches"
+        refuse(key, f"files that match {pattern!r} in the spec's folder", came, "Correct the pattern")
+    return Files(pattern, tuple(sorted(names)))
+
+
+def hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
+    """SHA-256 of those names that are files, sorted."""
+    found = {}
+    for name in sorted(set(names)):
+        if is_file(folder / name):
+            data = read_file(folder / name, "a file that the spec names", _MOST_BYTES)
+            found[name] = hashlib.sha256(data).hexdigest()
+    return found
+
+
+def check_hashes(stated: Mapping[str, str], found: Mapping[str, str]) -> None:
+    """Refuse files that are not those that a spec was made with."""
+    for name in sorted(stated.keys() | found.keys()):
+        if stated.get(name) != found.get(name):
+            expected = f"the file of hash {stated[name][:16]}..." if name in stated else "no such file"
+            came = f"it has {found[name][:16]}..." if name in found else "there is none"
+            refuse(f"files: {name}", expected, came, "Put it back, or take [files] out for another data set")

@@ -1,4 +1,4 @@
-"""What draws shards: a renderer, the maker of its scenes, and processes that encode."""
+"""Worker that renders shards: a renderer, the maker of its scenes and encoder processes."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from dermis.apps.batch.drawing import Parameters
-from dermis.apps.batch.encoding import Encoded, Encoders
-from dermis.apps.batch.entries import entries
+from dermis.apps.batch.encoder_pool import Encoded, Encoders
+from dermis.apps.batch.records import encode_record
+from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneMaker
 from dermis.apps.batch.shards import Shard, ShardWriter, is_whole
 from dermis.apps.batch.spec import Spec
@@ -164,4 +164,24 @@ class Worker:
 
 
 def _encode(spec: Spec, number: int, observation: Observation, parameters: Parameters) -> Encoded:
-    return number, entries(number, observation, parameters, spec)
+    return number, encode_record(number, observation, parameters, spec)
+
+
+@dataclass(frozen=True)
+class WorkerEvent:
+    """One of these at a time.
+
+    images : that were drawn since the last time
+    shard : that is whole now
+    failed : images that were left out of it
+    note : for who waits
+    again : why the worker ends, and its shard is drawn by another
+    refusal : why the run ends
+    """
+
+    images: int = 0
+    shard: Shard | None = None
+    failed: tuple[Failure, ...] = ()
+    note: str = ""
+    again: str = ""
+    refusal: str = ""

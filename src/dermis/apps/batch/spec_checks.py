@@ -1,26 +1,32 @@
-"""What of a spec does not go together."""
+"""Checks of a spec across its tables, and of names and values that other models define."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from dermis.apps.batch.dials import check_looks, check_skin, check_weights
 from dermis.apps.batch.distributions import Distribution
-from dermis.apps.batch.tables import MIXTURE, NONE
-from dermis.base.errors import about, refuse, shortened
+from dermis.apps.batch.spec_tables import MIXTURE, NONE
+from dermis.base.errors import DermisError, about, refuse, shortened
 from dermis.base.reading import is_file
 from dermis.environment.panorama import UNIFORM
 from dermis.frame.outputs import asked_outputs
+from dermis.human.hair.look import HairLook
 from dermis.human.landmarks.points import table_points
 from dermis.human.landmarks.sets import SETS
+from dermis.human.person import Human
+from dermis.human.skin.look import SkinLook
+from dermis.mesh.eyes import EyeLook
 from dermis.mesh.samples import SAMPLES
 from dermis.scene.heads import HUMAN
 from dermis.scene.lights import NO_LIGHTS
+from dermis.scene.pose import MOST_WEIGHT
+from dermis.scene.skin import Skin
 
 _ANCESTRY = "person.african", "person.asian", "person.caucasian"
-_HEAD = "person.head"
+HEAD_NAME = "person.head"
 _LONGEST = 100  # letters of a name
 
 
@@ -51,10 +57,10 @@ def _check_landmarks(names: Sequence[str], folder: Path) -> None:
 
 
 def _check_person(drawn: Mapping[str, Distribution]) -> None:
-    given = [name for name in drawn if name.startswith("person.") and name != _HEAD]
-    if _HEAD in drawn and given:
+    given = [name for name in drawn if name.startswith("person.") and name != HEAD_NAME]
+    if HEAD_NAME in drawn and given:
         remedy = "Leave one out"
-        refuse(given[0], "people that are drawn", f"{_HEAD} names heads", remedy)
+        refuse(given[0], "people that are drawn", f"{HEAD_NAME} names heads", remedy)
     shares = [drawn[name] for name in _ANCESTRY if name in drawn]
     if shares and not any(min(share.ends) > 0 for share in shares):  # type: ignore[operator]
         came = "all of them can be 0 at once"
@@ -97,9 +103,56 @@ def _check_named(drawn: Mapping[str, Distribution], folder: Path) -> None:
     """Refuse heads and environments that are neither the package's nor files."""
     heads = [HUMAN, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]
     around = [NONE, UNIFORM, *(name for name, sample in SAMPLES.items() if sample.kind == "environment")]
-    for parameter, known in ((_HEAD, heads), ("environment.name", around)):
+    for parameter, known in ((HEAD_NAME, heads), ("environment.name", around)):
         for name in map(str, drawn[parameter].ends if parameter in drawn else ()):
-            person = parameter == _HEAD and name.startswith(f"{HUMAN}:")
+            person = parameter == HEAD_NAME and name.startswith(f"{HUMAN}:")
             if name not in known and not person and not is_file(folder / name):
                 expected = f"a file in the spec's folder, or one of {', '.join(known)}"
                 refuse(parameter.replace(".", ": "), expected, f"{name!r} is neither", "Check the name")
+
+
+_NO_DIALS = "pigments", "layers", "profile_map", "other_profiles"
+_SEED = "seed"  # a whole number, which follows from the person
+_LOOKS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
+
+
+def check_looks(person: Any) -> None:
+    """Refuse names and values that a person's skin, eyes, hair and targets do not have."""
+    for part, kind in _LOOKS.items():
+        known = [one.name for one in fields(kind) if one.name != _SEED]
+        _check(f"person.{part}", getattr(person, part), known, lambda values, kind=kind: kind(**values))
+    known = list(_published())
+    _check("person.targets", person.targets, known, lambda values: Human(targets=values))
+
+
+def check_skin(dials: Mapping[str, Distribution]) -> None:
+    """Refuse names and values that `Skin` does not have."""
+    known = [name for name in Skin.model_fields if name not in _NO_DIALS]
+    _check("skin", dials, known, lambda values: Skin(**values))
+
+
+def check_weights(weights: Mapping[str, Distribution]) -> None:
+    """Refuse weights of targets that no pose takes."""
+    for name, drawn in weights.items():
+        if any(isinstance(end, str) or abs(end) > MOST_WEIGHT for end in drawn.ends):
+            expected = f"numbers from {-MOST_WEIGHT:g} to {MOST_WEIGHT:g}"
+            refuse(f"pose: {name}", expected, f"{drawn.told()} came", "Correct it")
+
+
+def _published() -> tuple[str, ...]:
+    from dermis.human.published import human_targets
+
+    return human_targets()
+
+
+def _check(table: str, drawn: Mapping[str, Distribution], known: list[str], make: Any) -> None:
+    """Try the ends of each."""
+    for name, one in drawn.items():
+        if name not in known:
+            listed = ", ".join(known) if len(known) < 40 else "those of dermis head --list-targets"
+            refuse(f"{table}: {name}", f"one of {listed}", "this name is unknown", "Correct it")
+        for end in one.ends:
+            try:
+                make({name: end})
+            except DermisError as error:
+                raise DermisError(f"{table}: {error}") from None

@@ -1,4 +1,4 @@
-"""Processes that begin anew, and end with the one that started them."""
+"""Child processes that are spawned without the parent's state and end with their parent."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from multiprocessing import connection, resource_tracker
 from multiprocessing.context import SpawnProcess
 from typing import Any
+
+from dermis.base.errors import DermisError
 
 _CONTEXT = multiprocessing.get_context("spawn")
 _BLOCKS = hasattr(signal, "pthread_sigmask")
@@ -121,3 +123,7 @@ def _without_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class LostProcessError(DermisError):
+    """A process that ended before its work did."""

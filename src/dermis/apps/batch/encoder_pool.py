@@ -1,4 +1,4 @@
-"""Processes that encode what a worker has drawn: a few images ahead, in their order."""
+"""Processes that encode the images of a worker, a few images ahead, in order."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Self
 
-from dermis.apps.batch.children import Child, shared_bytes, start
-from dermis.apps.batch.faults import LostProcessError
+from dermis.apps.batch.child_processes import Child, LostProcessError, shared_bytes, start
 from dermis.base.errors import DermisError
 
 Encoded = tuple[int, dict[str, bytes]]

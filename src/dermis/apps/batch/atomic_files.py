@@ -1,4 +1,4 @@
-"""Files that take their name when they are whole, while others may write the same."""
+"""Files that are renamed into place when complete, safe against other processes writing the same."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def unfinished_name(target: Path) -> Path:
     return target.with_name(f".{target.name}-{secrets.token_hex(6)}.unfinished")
 
 
-def settle(target: Path, write: Callable[[Path], object]) -> None:
+def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
     """Write a file whole or not at all; another process may remove what is unfinished, then it is done again.
 
     write : does so, to the name that it is given

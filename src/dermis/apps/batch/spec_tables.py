@@ -1,13 +1,14 @@
-"""The tables of a spec: what each of them draws."""
+"""Tables of a spec: their fields, the bounds of these and correlations between them."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 
-from dermis.apps.batch.distributions import Choice, Constant, Distribution, Uniform
-from dermis.apps.batch.drawn import Anything, OneOf, Within
+from dermis.apps.batch.distributions import Constant, Distribution, Uniform, parse_distribution
 from dermis.human.published import OLD, YOUNG
 from dermis.scene.lights import light_presets
 from dermis.scene.plain import Plain
@@ -17,6 +18,114 @@ MIXTURE = "mixture"
 NONE = "none"
 CAMERA, ANGLES = "camera", "angles"
 BACKGROUNDS = "none", "gradient", "environment", "colour"
+_REACH = "; normal reaches to 6 sd either way, truncated to its ends"
+
+
+class DistributionField:
+    """For pydantic: `Annotated[Distribution, Anything()]` is read from what a spec states."""
+
+    def check(self, told: Any) -> Distribution | None:
+        """The distribution; None for a field that is left out.
+
+        Raises ValueError for what is none, and for one that reaches too far, worded as expected.
+        """
+        if told is None:
+            return None
+        found = parse_distribution(told)
+        self.check_ends(found)
+        return found
+
+    def check_ends(self, found: Distribution) -> None:
+        """Raises ValueError for values that the field cannot have."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
+        def told(value: Distribution | None) -> Any:
+            return None if value is None else value.told()
+
+        serialised = core_schema.plain_serializer_function_ser_schema(told)
+        return core_schema.no_info_plain_validator_function(self.check, serialization=serialised)
+
+
+class Within(DistributionField):
+    """Numbers between two bounds.
+
+    why : the reason of the bounds
+    """
+
+    def __init__(self, low: float, high: float, why: str = "") -> None:
+        self.ge, self.le, self.why = low, high, why
+
+    def check_ends(self, found: Distribution) -> None:
+        if any(isinstance(end, str) or not self.ge <= end <= self.le for end in found.ends):
+            why = f" ({self.why})" if self.why else ""
+            reach = "" if isinstance(found, Constant) else _REACH
+            raise ValueError(f"numbers from {self.ge:.10g} to {self.le:.10g}{why}{reach}")
+
+
+class OneOf(DistributionField):
+    """Names: of some where they are known, else any, those of files too."""
+
+    def __init__(self, known: Callable[[], Iterable[str]] | None = None) -> None:
+        self.known = known
+
+    def check_ends(self, found: Distribution) -> None:
+        names = list(self.known()) if self.known else []
+        for end in found.ends:
+            if not isinstance(end, str) or (names and end not in names):
+                raise ValueError(f"one of {', '.join(names)}" if names else "a name, or a choice of names")
+        if names and not found.ends:
+            raise ValueError(f"one of {', '.join(names)}, no files")
+
+
+_MOST_NAMES = 50
+_Coefficient = Annotated[float, Field(ge=-1, le=1)]
+
+
+class Correlated(Plain):
+    """Parameters by name, and the correlation of the normal numbers that they are drawn by.
+
+    A greater number gives a greater value, and of a choice a later one.
+    """
+
+    of: tuple[str, ...]
+    """Names of parameters, such as ["camera.yaw_deg", "head.yaw_deg"]; those of a person first."""
+    correlation: _Coefficient | tuple[tuple[_Coefficient, ...], ...]
+    """Of all pairs alike, or the matrix: rows of as many numbers as there are names."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> Correlated:
+        if not 2 <= len(set(self.of)) == len(self.of) <= _MOST_NAMES:
+            raise ValueError(f"2 to {_MOST_NAMES} names, each once")
+        if isinstance(self.correlation, tuple) and {len(self.of), *map(len, self.correlation)} != {
+            len(self.correlation)
+        }:
+            raise ValueError(f"a correlation of {len(self.of)} rows of {len(self.of)} numbers")
+        matrix = self.matrix
+        if not (np.array_equal(matrix, matrix.T) and (np.diag(matrix) == 1).all()):
+            raise ValueError("a correlation that is symmetric, with 1 on its diagonal")
+        if np.linalg.eigvalsh(matrix)[0] < 1e-6:
+            raise ValueError("a correlation that is positive definite: these cannot all be at once")
+        return self
+
+    @property
+    def matrix(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+        """(n, n) the correlations of all."""
+        if isinstance(self.correlation, tuple):
+            return np.array(self.correlation, np.float64)
+        count = len(self.of)
+        return np.full((count, count), self.correlation) + (1.0 - self.correlation) * np.eye(count)
+
+    def rows(self) -> dict[str, dict[str, float]]:
+        """By name the factors of the independent normal numbers of each that make its own."""
+        lower = np.linalg.cholesky(self.matrix)
+        return {
+            name: {other: float(lower[k, j]) for j, other in enumerate(self.of[: k + 1])}
+            for k, name in enumerate(self.of)
+        }
+
+
 _TURN = Within(-180, 180, "degrees")
 _LEAN = Within(-85, 85, "degrees: straight above there is no side")
 _SHARE = Within(0, 1)
@@ -25,11 +134,7 @@ _TREND = Within(-1, 1, "0 is the average")
 _MELANIN = Within(0, 10, "0.3 is blond, 8 black")
 _AWAY = Within(150, 20_000, "mm: before the nose, and not across a street")
 _STOPS = Within(0, 100, "light is not negative")
-_Dials = dict[str, Annotated[Distribution, Anything()]]
-
-
-def _choice(*names: str) -> Choice:
-    return Choice(tuple(map(Constant, names)), (1.0,) * len(names))
+_Dials = dict[str, Annotated[Distribution, DistributionField()]]
 
 
 class PersonTable(Plain):

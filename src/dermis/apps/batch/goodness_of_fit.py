@@ -1,4 +1,4 @@
-"""Whether what was drawn for a data set is what its spec states: distances that chance explains, or not."""
+"""Goodness of fit of the sampled parameters of a data set to the distributions of its spec."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.apps.batch.expressions import targets_of
 from dermis.apps.batch.index import index_file
 from dermis.apps.batch.sampling import rounded
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.tables import NONE
+from dermis.apps.batch.spec_tables import NONE
 
 LEAST_CHANCE = 1e-6
 """Below it, what was drawn is not what is stated."""
@@ -30,7 +30,7 @@ _FEWEST = 5.0  # of a kind, expected, that count by themselves in chi-square
 Array = NDArray[np.float64]
 
 
-class Agreement(NamedTuple):
+class FitTest(NamedTuple):
     """A parameter as it is stated and as it was found.
 
     draws : images that have it, or people
@@ -53,7 +53,7 @@ class Agreement(NamedTuple):
         return self.chance >= LEAST_CHANCE
 
 
-def agreements(out: Path, spec: Spec) -> Iterator[Agreement]:
+def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
     """Each parameter that varies in the index of a data set, against its own distribution in the spec.
 
     People count once, however many images show them. Raises DermisError where there is no index.
@@ -72,7 +72,7 @@ def agreements(out: Path, spec: Spec) -> Iterator[Agreement]:
                 yield _compared(name, law, there, spec)
 
 
-def compared(name: str, law: Distribution, values: Sequence[Any]) -> Agreement:
+def fit_test(name: str, law: Distribution, values: Sequence[Any]) -> FitTest:
     """Values of a parameter against the distribution that they were drawn from, one by one."""
     if any(isinstance(end, str) for end in law.ends):
         return _texts(name, shares(law), [str(value) for value in values])
@@ -114,9 +114,9 @@ def shares(law: Distribution) -> dict[str, float]:
     return {text: share / total for text, share in found.items() if share}
 
 
-def _compared(name: str, law: Distribution, values: Sequence[Any], spec: Spec) -> Agreement:
+def _compared(name: str, law: Distribution, values: Sequence[Any], spec: Spec) -> FitTest:
     if name != "background.kind" or NONE not in spec.distributions["environment.name"].ends:
-        return compared(name, law, values)
+        return fit_test(name, law, values)
     plain = {"environment": "gradient"}  # where there is no environment, see `Drawing.parameters`
     stated = Counter[str]()
     for text, share in shares(law).items():
@@ -124,7 +124,7 @@ def _compared(name: str, law: Distribution, values: Sequence[Any], spec: Spec) -
     return _texts(name, dict(stated), [plain.get(value, value) for value in values])
 
 
-def _numbers(name: str, law: Distribution, values: Array) -> Agreement:
+def _numbers(name: str, law: Distribution, values: Array) -> FitTest:
     """values : sorted"""
     count, near = len(values), _HALF_DIGIT * np.abs(values)
     up_to = np.searchsorted(values, values, "right") / count
@@ -135,16 +135,16 @@ def _numbers(name: str, law: Distribution, values: Array) -> Agreement:
     grid: Array = np.array([law.at((k + 0.5) / _GRID) for k in range(_GRID)], np.float64)
     chance = float(kolmogorov(sqrt(count) * distance))
     stated, found = _moments(grid), _moments(values)
-    return Agreement(name, count, stated, found, distance, float(_USUAL / sqrt(count)), chance)
+    return FitTest(name, count, stated, found, distance, float(_USUAL / sqrt(count)), chance)
 
 
-def _texts(name: str, stated: dict[str, float], values: Sequence[str]) -> Agreement:
+def _texts(name: str, stated: dict[str, float], values: Sequence[str]) -> FitTest:
     count, found = len(values), Counter(values)
     distance = max(abs(found[text] / count - stated.get(text, 0.0)) for text in {*stated, *found})
     usual = max(sqrt(2 / np.pi * share * (1 - share) / count) for share in stated.values())
     chance = 0.0 if found.keys() - stated.keys() else _chi_square(stated, found, count)
     came = {text: found[text] / count for text in stated}
-    return Agreement(name, count, _told(stated), _told(came), distance, usual, chance)
+    return FitTest(name, count, _told(stated), _told(came), distance, usual, chance)
 
 
 def _told(of: dict[str, float]) -> str:

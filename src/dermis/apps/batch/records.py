@@ -1,4 +1,4 @@
-"""The files of one image, as bytes."""
+"""Files of one image, as bytes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.apps.batch.encodings import encode_output, file_kind
+from dermis.apps.batch.output_encoding import encode_output, file_kind
 from dermis.apps.batch.spec import Spec
 from dermis.frame.observation import Landmarks, Observation
 from dermis.images.codecs import encode_png
@@ -21,7 +21,7 @@ _MM_DIGITS = 4
 _UNIT_DIGITS = 8  # of rotations and directions
 
 
-def entries(
+def encode_record(
     number: int, observation: Observation, parameters: Mapping[str, Any], spec: Spec
 ) -> dict[str, bytes]:
     """The files of image `number` by suffix: equal bytes for equal arguments.

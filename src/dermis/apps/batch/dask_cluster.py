@@ -1,4 +1,4 @@
-"""Workers of dask.distributed, on this machine or many: each of them draws on an adapter of its own."""
+"""Crew of dask.distributed workers, on this machine or many, each with an adapter of its own."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dermis.apps.batch.shards import Shard
-from dermis.apps.batch.told import Told
-from dermis.apps.batch.worker import Work
+from dermis.apps.batch.worker import Work, WorkerEvent
 from dermis.base.errors import DermisError, refuse
 from dermis.base.extras import needed
 
@@ -32,18 +31,18 @@ class Cluster:
     file: Path | None
     adapter: str = "auto"
 
-    def draw(self, work: Work, shards: Sequence[Shard]) -> Iterator[Told]:
+    def draw(self, work: Work, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Draw the shards, each as a task.
 
         Raises DermisError where no worker is reached, where one sees another disk, and for what no worker
         can mend.
         """
         needed("distributed", "--scheduler and --cluster")
-        from dermis.apps.batch.dask_worker import Drawing
+        from dermis.apps.batch.dask_worker import ShardPlugin
 
         name = f"dermis-{secrets.token_hex(6)}"
         with self._client() as client:
-            client.register_plugin(Drawing.of(work, self.adapter), name=name)
+            client.register_plugin(ShardPlugin.of(work, self.adapter), name=name)
             try:
                 with _mark(work.out) as mark:
                     _check_disks(client, mark)
@@ -93,14 +92,14 @@ def _check_disks(client: Any, mark: Path) -> None:
         refuse(mark.parent, "a folder on a disk that all workers share", came, "Choose another one")
 
 
-def _told(client: Any, name: str, shards: Sequence[Shard]) -> Iterator[Told]:
+def _told(client: Any, name: str, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
     """What becomes of the shards."""
     from distributed import as_completed
 
-    from dermis.apps.batch.dask_worker import draw_shard
+    from dermis.apps.batch.dask_worker import render_shard
 
     tasks = {
-        client.submit(draw_shard, name, shard, key=f"{name}-{shard.index}", retries=_RETRIES): shard
+        client.submit(render_shard, name, shard, key=f"{name}-{shard.index}", retries=_RETRIES): shard
         for shard in shards
     }
     try:
@@ -111,7 +110,7 @@ def _told(client: Any, name: str, shards: Sequence[Shard]) -> Iterator[Told]:
                     f"shard {shard.index}: expected a worker of dask's to draw it, but they failed: "
                     f"{done.exception()}. What is whole is kept; give the command again to go on."
                 )
-            told: Told = done.result()
+            told: WorkerEvent = done.result()
             if told.refusal:
                 raise DermisError(told.refusal)
             yield told
