@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.lobe import fit_d, lobe
+from dermis.apps.export.fitting import fit_d, lobe
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.babylon_spiral import TOO_WIDE, spiral
+from dermis.apps.export.targets.babylon.target import TOO_WIDE, spiral
 
 HERE = Path(__file__).parent
 RESULT = HERE / "results" / "engines_babylon.json"

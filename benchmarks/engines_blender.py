@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 from engines_blender_head import heads, picture
 
-from dermis.apps.export.deviation import deviation
-from dermis.apps.export.lobe import fit_d
+from dermis.apps.export.fitting import deviation, fit_d
 from dermis.apps.export.subject import subject_of
-from dermis.apps.export.targets.blender import TARGET
+from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.validation.truths.blender_process import Errand, run_blender
 
 RESULTS = Path(__file__).with_name("results") / "engines_blender.json"

@@ -14,8 +14,7 @@ from PIL import Image
 from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.subject import Subject, subject_of
-from dermis.apps.export.textures import painted
+from dermis.apps.export.subject import Subject, painted, subject_of
 from dermis.apps.validation.truths.metrics import relative_rmse
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb

@@ -11,10 +11,10 @@ from typing import Any
 from cyclopts import run
 from figures_file import write_figures
 
-from dermis.apps.export.deviation import deviation
+from dermis.apps.export.fitting import deviation
 from dermis.apps.export.subject import subject_of
-from dermis.apps.export.targets.gltf import DIFFUSE, DRAFT, SCATTER, TARGET
-from dermis.apps.export.targets.gltf_medium import fitted, walked
+from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARGET
+from dermis.apps.export.targets.gltf.volume import fitted, walked
 
 RESULTS = Path(__file__).parent / "results" / "engines_gltf.json"
 SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"

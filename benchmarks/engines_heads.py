@@ -25,8 +25,7 @@ from figures_file import write_figures
 from PIL import Image
 
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.subject import Subject, subject_of
-from dermis.apps.export.textures import painted
+from dermis.apps.export.subject import Subject, painted, subject_of
 from dermis.images.colour import decode_srgb, encode_srgb
 from dermis.scene.lights import DirectionalLight
 

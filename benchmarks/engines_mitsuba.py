@@ -16,11 +16,11 @@ from cyclopts import run
 from figures_file import write_figures
 from numpy.typing import NDArray
 
-from dermis.apps.export.lobe import fit_d
+from dermis.apps.export.fitting import fit_d
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.mitsuba import TARGET
-from dermis.apps.export.targets.mitsuba_files import BOUNDARIES, Boundary, Walked, medium_words, surface_words
+from dermis.apps.export.targets.mitsuba.scene import BOUNDARIES, Boundary, Walked, medium_words, surface_words
+from dermis.apps.export.targets.mitsuba.target import TARGET
 from dermis.apps.validation.truths.described import rgb
 from dermis.apps.validation.truths.mitsuba_scene import load_mitsuba, variant_of
 from dermis.optics.curve import Curve

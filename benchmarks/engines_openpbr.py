@@ -17,13 +17,14 @@ import numpy as np
 from cyclopts import run
 from figures_file import write_figures
 
-from dermis.apps.export.deviation import deviation
+from dermis.apps.export.fitting import deviation
 from dermis.apps.export.run import export_skin, judged
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets import openpbr, pbrt
-from dermis.apps.export.targets.openpbr_document import OPEN_PBR
-from dermis.apps.export.targets.openpbr_fit import fitted_mm, profile_of_specification
+from dermis.apps.export.targets.openpbr.document import OPEN_PBR
+from dermis.apps.export.targets.openpbr.target import fitted_mm, profile_of_specification
+from dermis.apps.export.targets.openpbr.target import target as openpbr
+from dermis.apps.export.targets.pbrt.target import target as pbrt
 
 RESULTS = Path(__file__).parent / "results" / "engines_openpbr.json"
 SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from web_page import FLAGS, SOFTWARE, STATE
 
 import dermis
-from dermis.apps.export.web.build import Asked, built
-from dermis.apps.export.web.maps import smaller
-from dermis.apps.export.web.page import web_page
+from dermis.apps.export.targets.web.build import Asked, built
+from dermis.apps.export.targets.web.maps import smaller
+from dermis.apps.export.targets.web.page import web_page
 from dermis.cli.console import print_lines
 from dermis.frame.taping import renderer_for
 

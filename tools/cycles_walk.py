@@ -1,4 +1,4 @@
-"""Walks as Cycles takes them through a half-space: writes `apps/export/data/cycles_walk.csv`.
+"""Walks as Cycles takes them through a half-space: writes `apps/export/targets/blender/cycles_walk.csv`.
 
     python tools/cycles_walk.py [PHOTONS]   # a minute for 4 million
 
@@ -27,7 +27,7 @@ MOST = 256
 """Steps after which Cycles gives a walk up."""
 ETA = 1.4
 ENTRIES = ("straight", "skin")
-PLACE = Path(__file__).resolve().parents[1] / "src" / "dermis" / "export" / "data" / "cycles_walk.csv"
+PLACE = Path(__file__).resolve().parents[1] / "src/dermis/apps/export/targets/blender/cycles_walk.csv"
 HEADER = """\
 # quantity: share of the light seen along the normal of a half-space that fell on it within a radius of the
 #   place seen: walks of Cycles, isotropic, of at most {most} steps, that leave an index-matched surface.

@@ -12,15 +12,13 @@ import numpy as np
 import pytest
 from small_head import write_head
 
-from dermis.apps.export.deviation import deviation
-from dermis.apps.export.lobe import fit_d
+from dermis.apps.export.fitting import deviation, fit_d
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.blender import TARGET
-from dermis.apps.export.targets.blender_scene import surroundings
-from dermis.apps.export.targets.blender_text import script_text
-from dermis.apps.export.targets.blender_walks import (
+from dermis.apps.export.targets.blender.files import script_text, surroundings
+from dermis.apps.export.targets.blender.target import TARGET
+from dermis.apps.export.targets.blender.walks import (
     albedo,
     burley_stretch,
     burley_within,

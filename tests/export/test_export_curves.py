@@ -7,9 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from dermis.apps.export.deviation import deviation
-from dermis.apps.export.equivalent import homogeneous
-from dermis.apps.export.lobe import fit_d, lobe
+from dermis.apps.export.fitting import deviation, fit_d, homogeneous, lobe
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.base.errors import DermisError
 from dermis.optics.curve import Curve

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from dermis.apps.export.lobe import fit_d
+from dermis.apps.export.fitting import fit_d
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import export_skin, judged
 from dermis.apps.export.subject import Subject, subject_of

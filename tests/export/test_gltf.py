@@ -12,11 +12,11 @@ import pytest
 from gltf_rules import check_rules, khronos_issues
 
 from dermis import Human, load_head
-from dermis.apps.export.deviation import deviation
+from dermis.apps.export.fitting import deviation
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, subject_of
-from dermis.apps.export.targets.gltf import DIFFUSE, DRAFT, SCATTER, TARGET
-from dermis.apps.export.targets.gltf_medium import (
+from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARGET
+from dermis.apps.export.targets.gltf.volume import (
     Volume,
     colour_for,
     fitted,

@@ -9,14 +9,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from dermis.apps.export.deviation import deviation
+from dermis.apps.export.fitting import deviation
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.mitsuba import TARGET, medium_for
-from dermis.apps.export.targets.mitsuba_colours import Colours
-from dermis.apps.export.targets.mitsuba_painted import divided
-from dermis.apps.export.targets.mitsuba_words import Bitmap, Transform, Words, element
+from dermis.apps.export.targets.mitsuba.meshes import divided
+from dermis.apps.export.targets.mitsuba.target import TARGET, Colours, medium_for
+from dermis.apps.export.targets.mitsuba.xml import Bitmap, Transform, Words, element
 from dermis.apps.validation.truths.mitsuba_scene import variant_of
 from dermis.optics.curve import Curve
 from dermis.optics.media import media

@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.apps.export.deviation import deviation
+from dermis.apps.export.fitting import deviation
 from dermis.apps.export.run import export_skin, judged
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.openpbr import TARGET, radii_mm
-from dermis.apps.export.targets.openpbr_document import OPEN_PBR
-from dermis.apps.export.targets.openpbr_fit import fitted_mm
+from dermis.apps.export.targets.openpbr.document import OPEN_PBR
+from dermis.apps.export.targets.openpbr.target import TARGET, fitted_mm, radii_mm
 from dermis.apps.validation.truths.half_space import diffuse_albedo
 from dermis.optics.van_de_hulst import albedo_of_colour
 

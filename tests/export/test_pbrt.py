@@ -11,7 +11,7 @@ from rigged_head import write_rigged_head
 
 from dermis.apps.export.run import export_skin, judged
 from dermis.apps.export.subject import Subject, subject_of
-from dermis.apps.export.targets.pbrt import TARGET
+from dermis.apps.export.targets.pbrt.target import TARGET
 from dermis.base.errors import DermisWarning
 from dermis.mesh.load import load_mesh
 from dermis.optics.tissue import load_tissue

@@ -14,10 +14,10 @@ pytest.importorskip("pxr")
 pytest.importorskip("MaterialX")
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 
-from dermis.apps.export.targets.openpbr_document import library
-from dermis.apps.export.targets.openpbr_look import Look, skin_look
-from dermis.apps.export.targets.usd_motion import valid_names
-from dermis.apps.export.targets.usd_stage import stage_of
+from dermis.apps.export.targets.openpbr.document import library
+from dermis.apps.export.targets.openpbr.materials import Look, skin_look
+from dermis.apps.export.targets.usd.motion import valid_names
+from dermis.apps.export.targets.usd.stage import stage_of
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.scene.heads import load_head

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.apps.export.web.packing import Packer, planes, seven_bits, stepped
-from dermis.apps.export.web.pictures import picture_of
+from dermis.apps.export.targets.web.maps import picture_of
+from dermis.apps.export.targets.web.packing import Packer, planes, seven_bits, stepped
 
 
 def test_differences_and_planes_can_be_undone() -> None:

@@ -15,14 +15,14 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from dermis.apps.export.inlining import hash_of, inline
-from dermis.apps.export.lobe import fit_d, lobe
+from dermis.apps.export.fitting import fit_d, lobe
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import export_skin, judged
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.babylon_spiral import spiral_curve
-from dermis.apps.export.targets.web_target import camera_of
+from dermis.apps.export.targets.babylon.target import spiral_curve
+from dermis.apps.export.targets.pages.html import hash_of, inline
+from dermis.apps.export.targets.pages.library_page import camera_of
 from dermis.base.errors import DermisError
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

@@ -20,15 +20,15 @@ from rigged_head import write_rigged_head
 from small_head import write_head
 
 import dermis
-from dermis.apps.export.inlining import hash_of
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.web.build import Asked, Built, built
-from dermis.apps.export.web.dials import Dial, dials_of
-from dermis.apps.export.web.page import MODULES, player, web_page
+from dermis.apps.export.targets.pages.html import hash_of
+from dermis.apps.export.targets.web.build import Asked, Built, built
+from dermis.apps.export.targets.web.dials import Dial, dials_of
+from dermis.apps.export.targets.web.page import MODULES, player, web_page
 from dermis.frame.renderer import Renderer
 
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]
-MODULES_FOLDER = Path(str(dermis.__file__)).parent / "export" / "web"
+MODULES_FOLDER = Path(str(dermis.__file__)).parent / "apps/export/targets/web"
 SETTINGS = dermis.Settings(atlas=128, shadow_size=128, strands=False)
 SIDE = 96
 LIMIT = 0.005  # relative RMSE

@@ -1,21 +1,31 @@
-"""Targets by name: each module of `dermis.apps.export.targets` without an underscore in its name."""
+"""Programs that skin is exported to, by name; each has a module with a `TARGET`."""
 
 from __future__ import annotations
 
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING
 
-import dermis.apps.export.targets as home
 from dermis.base.registry import Registry
 
 if TYPE_CHECKING:
     from dermis.apps.export.target import Target
 
+_HOME = "dermis.apps.export.targets"
 TARGETS: Registry[Target] = Registry(
     "target",
     {
-        one.name: f"{home.__name__}.{one.name}:TARGET"
-        for one in iter_modules(home.__path__)
-        if "_" not in one.name
+        "arnold": f"{_HOME}.arnold:TARGET",
+        "babylon": f"{_HOME}.babylon.target:TARGET",
+        "blender": f"{_HOME}.blender.target:TARGET",
+        "gltf": f"{_HOME}.gltf.target:TARGET",
+        "maps": f"{_HOME}.maps.target:TARGET",
+        "mitsuba": f"{_HOME}.mitsuba.target:TARGET",
+        "openpbr": f"{_HOME}.openpbr.target:TARGET",
+        "pbrt": f"{_HOME}.pbrt.target:TARGET",
+        "renderman": f"{_HOME}.renderman:TARGET",
+        "three": f"{_HOME}.three.target:TARGET",
+        "unity": f"{_HOME}.unity:TARGET",
+        "unreal": f"{_HOME}.unreal.target:TARGET",
+        "usd": f"{_HOME}.usd.target:TARGET",
+        "web": f"{_HOME}.web.target:TARGET",
     },
 )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dermis.apps.export.deviation import Deviation
+from dermis.apps.export.fitting import Deviation
 from dermis.apps.export.target import Rows, Value
 from dermis.optics.media import Floats
 

@@ -9,14 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dermis.apps.export.deviation import deviation
-from dermis.apps.export.lobe import fit_d
+from dermis.apps.export.fitting import deviation, fit_d
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.report import Report
-from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.subject import ModelName, Subject, painted, subject_of
 from dermis.apps.export.target import Target
-from dermis.apps.export.textures import painted
-from dermis.apps.export.truth import ModelName
 from dermis.base.atomic_write import check_output, folder_beside, replacing, replacing_folder
 from dermis.base.errors import refuse
 

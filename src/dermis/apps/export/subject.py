@@ -6,21 +6,28 @@ import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from dermis.apps.export.truth import ModelName, true_curve
+from dermis.base.errors import refuse, shown_value
 from dermis.base.reading import named_path
+from dermis.human.head_file import relief_slopes
+from dermis.mesh.gltf.textures import skin_pictures
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.mesh.samples import SAMPLES
+from dermis.optics.counted import counted_curve
 from dermis.optics.curve import Curve
+from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.media import Floats
+from dermis.optics.profiles import find_table
+from dermis.optics.radial import RadialProfile, profile_of_table
 from dermis.optics.tissue import Tissue
 from dermis.scene.heads import is_person, load_head, person_of
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.skin import Skin
+from dermis.scene.tissue import tissue_of
 
 if TYPE_CHECKING:
     from dermis.human.person import Human
@@ -113,3 +120,79 @@ def _skin_of(name: str, profile: str | Path | None) -> Skin:
         return Skin(profile=str(profile))
     person: Human | None = person_of(name) if is_person(name) else None
     return Skin() if person is None else skin_of(person)
+
+
+ModelName = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
+MODELS: tuple[ModelName, ...] = get_args(ModelName)
+_PHOTONS = 1_000_000
+
+
+def true_curve(skin: Skin, model: ModelName | None = None) -> tuple[Curve, str, Tissue | None]:
+    """The curve of a skin's profile, the model that it is by, and its tissue.
+
+    model : by default Monte Carlo for homogeneous media by name, which the package has tables of, layered
+        diffusion for other tissue, and for a table of Gaussians the table
+
+    DermisError : an unknown model, or one for a table of Gaussians
+    """
+    if model is not None and model not in MODELS:
+        refuse("model", f"one of {', '.join(MODELS)}", f"{shown_value(model)} came", "Choose one of them")
+    table = None if skin.has_own_tissue else find_table(skin.profile)
+    if table is not None:
+        if model is not None:
+            refuse("model", "a tissue", f"{skin.profile} is a table of Gaussians", "Leave it out")
+        return Curve.of_profile(profile_of_table(table)), "table", None
+    tissue = tissue_of(skin)
+    if model in (None, "montecarlo") and (counted := _counted(tissue)) is not None:
+        return counted, "montecarlo", tissue
+    used: ModelName = model or "layered"
+    entering = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)
+    return Curve.of_profile(_profile(tissue, used), entering), used, tissue
+
+
+def _counted(tissue: Tissue) -> Curve | None:
+    return counted_curve(tissue.medium) if tissue.rgb is None else None
+
+
+def _profile(tissue: Tissue, model: ModelName) -> RadialProfile:
+    if model != "montecarlo":
+        return tissue.profile(model)
+    from dermis.apps.validation.truths.slab_mc import counted_profile
+
+    return counted_profile(tissue.medium, tissue.rgb, _PHOTONS)
+
+
+ROLES = "colour", "normal", "roughness", "specular", "height"
+
+
+def painted(subject: Subject, side: int, adapter: str) -> Subject:
+    """The subject with all maps of its head as arrays; it is itself where nothing has to be painted.
+
+    side : of maps that are painted, a power of two from 256 to 4096 [texels]
+    adapter : that paints
+    """
+    if subject.head is None or not subject.head.maps.painted:
+        return subject
+    from dermis.frame.painted import with_painted_maps
+    from dermis.gpu.failures import on_device
+
+    head = subject.head
+    return subject.with_head(on_device(adapter, lambda device: with_painted_maps(device, head, side)))
+
+
+def write_maps(subject: Subject, folder: Path, stem: str = "") -> dict[str, Path]:
+    """The maps that a head has, as PNG, by role: colour (sRGB), normal (green up), and grey ones.
+
+    Roughness is Beckmann's m, specular the strength of the reflection, both plain; height is from its lowest
+    to its highest in 16 bits.
+
+    stem : what their names begin with, such as "skin_"
+    """
+    head = subject.head
+    if head is None:
+        return {}
+    pictures, _ = skin_pictures(head.maps, relief_slopes(head))
+    written = {role: folder / f"{stem}{role}.png" for role in ROLES if role in pictures}
+    for role, path in written.items():
+        path.write_bytes(pictures[role])
+    return written

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -124,3 +125,20 @@ class Target(ABC):
         place : a folder that is empty, where the output's name has no suffix; else a file of that name in
             such a folder, beside which others may be put. It is moved to where it belongs afterwards
         """
+
+
+def write_values(target: Target, subject: Subject, rows: Rows, place: Path, version: str) -> Path:
+    """A JSON file of parameters with unit and meaning, marked as not run."""
+    file = place if place.suffix else place / f"{subject.identifier}.json"
+    told = {
+        "for": f"{target.title} {version}",
+        "status": "not run: by the published meanings",
+        "skin": subject.name,
+        "profile": subject.model,
+        "parameters": {
+            row.name: {"value": row.value, "unit": row.unit, "meaning": row.meaning} for row in rows
+        },
+        "remains_wrong": target.wrong,
+    }
+    file.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    return file

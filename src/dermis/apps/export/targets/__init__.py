@@ -1,1 +1,1 @@
-"""The programs that skin is exported to: each module without an underscore in its name has a `TARGET`."""
+"""One module or folder for each program that skin is exported to."""

@@ -11,11 +11,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.apps.export.equivalent import homogeneous
-from dermis.apps.export.lobe import fit_d
+from dermis.apps.export.fitting import fit_d, homogeneous
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, numbers_of
-from dermis.apps.export.values import write_values
+from dermis.apps.export.target import Row, Rows, Target, numbers_of, write_values
 from dermis.optics.curve import Curve
 from dermis.optics.half_space import albedo_of, half_space
 from dermis.optics.media import Floats

@@ -6,16 +6,15 @@ where the world scale is the metres of a unit.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from dermis.apps.export.lobe import fit_d, lobe
-from dermis.apps.export.naming import yaml_text
-from dermis.apps.export.subject import Subject
+from dermis.apps.export.fitting import fit_d, lobe
+from dermis.apps.export.subject import Subject, write_maps
 from dermis.apps.export.target import Row, Rows, Target, Value, numbers_of
-from dermis.apps.export.textures import write_maps
 from dermis.optics.curve import Curve
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
@@ -105,7 +104,7 @@ MonoBehaviour:
   m_Enabled: 1
   m_EditorHideFlags: 0
   m_Script: {{fileID: 11500000, guid: b2686e09ec7aef44bad2843e4416f057, type: 3}}
-  m_Name: {yaml_text(name)}
+  m_Name: {json.dumps(name)}
   m_EditorClassIdentifier:
   profile:
     scatteringDistance: {colour}

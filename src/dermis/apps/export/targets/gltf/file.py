@@ -1,0 +1,69 @@
+"""The bytes of an exported .glb file."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from dermis.apps.export.subject import Subject
+from dermis.apps.export.targets.gltf.volume import colour_for
+from dermis.frame.passes.painting.eye_pictures import eye_pictures
+from dermis.gpu.failures import on_device
+from dermis.human.head_file import relief_slopes
+from dermis.human.person_file import numbers_of
+from dermis.mesh.eye_layout import EyePictures
+from dermis.mesh.gltf.textures import Added, colours_png
+from dermis.mesh.gltf.write import encode_head
+from dermis.mesh.head import Head
+from dermis.scene.heads import is_person, person_of
+from dermis.scene.skin import Skin
+
+_MULTISCATTER = "multiscatter"
+_STEPS = 1024
+
+
+def encoded(subject: Subject, extensions: dict[str, dict[str, Any]], draft: str) -> bytes:
+    """The head, or the ball, with its eyes, hairs, targets and bones.
+
+    extensions : of the skin's material, by name
+    draft : what is no settled extension, "" for a file without
+    """
+    head, skin = subject.shape, Skin() if subject.scene is None else subject.scene.skin
+    notes: dict[str, Any] = {"draft": draft} if draft else {}
+    if is_person(subject.name):
+        notes["person"] = numbers_of(person_of(subject.name))
+    elif head.eyes is not None:
+        notes["person"] = {"eyes": asdict(head.eyes.look)}
+    return encode_head(
+        head,
+        roughness=skin.roughness,
+        slopes=relief_slopes(head),
+        notes=notes,
+        eyes=_eyes(head),
+        added=_added(subject, head, extensions, draft),
+    )
+
+
+def _added(subject: Subject, head: Head, extensions: dict[str, dict[str, Any]], draft: str) -> Added:
+    """Of a colour map the scattered colours become a map too; what is white lets all light in."""
+    if not draft:
+        plain = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
+        return Added({} if head.maps.colour is not None else plain, extensions)
+    white, extras = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, {"draft": draft}
+    if head.maps.colour is None:
+        return Added(white, extensions, extras)
+    steps = np.linspace(0.0, 1.0, _STEPS)
+    scattered = np.interp(head.maps.colour, steps, colour_for(steps)).astype(np.float32)
+    scatter = {**extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
+    scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER}
+    made = {**extensions, "KHR_materials_scatter": scatter}
+    return Added(white, made, extras, {_MULTISCATTER: colours_png(scattered)})
+
+
+def _eyes(head: Head) -> EyePictures | None:
+    if head.eyes is None:
+        return None
+    look = head.eyes.look
+    return on_device("auto", lambda device: eye_pictures(device, look))

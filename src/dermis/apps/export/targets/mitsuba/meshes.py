@@ -1,0 +1,150 @@
+"""Triangles as binary PLY files, as Mitsuba reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.validation.truths.mitsuba_scene import gap_of
+from dermis.apps.validation.truths.mitsuba_solid import Solid, inwards, skin_solid
+from dermis.frame.baking import baked_colours
+from dermis.frame.renderer import Renderer
+from dermis.mesh.head import Head
+from dermis.scene.model import Scene
+
+_FACE = np.dtype([("count", "u1"), ("corner", "<i4", (3,))])
+
+
+def ply(
+    triangles: NDArray[Any], positions: Any, normals: Any = None, uv: Any = None, colour: Any = None
+) -> bytes:
+    """A file of triangles.
+
+    positions, normals, uv, colour : (v, 3), (v, 3), (v, 2) with v = 0 at the pictures' top, (v, 3) linear
+    """
+    given = {"x y z": positions, "nx ny nz": normals, "u v": uv, "r g b": colour}
+    columns = {names: values for names, values in given.items() if values is not None}
+    vertices = np.concatenate([np.asarray(one, "<f4") for one in columns.values()], axis=1)
+    lines = [f"property float {name}" for names in columns for name in names.split()]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(vertices)}",
+        *lines,
+        f"element face {len(triangles)}",
+        "property list uchar int vertex_indices",
+        "end_header",
+    ]
+    faces = np.empty(len(triangles), _FACE)
+    faces["count"], faces["corner"] = 3, triangles
+    return "\n".join(header).encode() + b"\n" + vertices.tobytes() + faces.tobytes()
+
+
+class Surfaces(NamedTuple):
+    """Files of triangles by the names of their shapes.
+
+    skin, caps : with normals and uv, and what shuts its openings
+    upper, upper_caps : the same a little outside, for a matched surface, which is there twice
+    """
+
+    skin: bytes
+    caps: bytes | None
+    upper: bytes
+    upper_caps: bytes | None
+
+
+def surfaces(words: Any, head: Head) -> Surfaces:
+    """The head about its centre [mm].
+
+    words : the module `mitsuba`, or what stands in for it
+
+    Raises DermisError when the skin encloses no volume.
+    """
+    mesh, centre = head.mesh, np.array(head.centre_mm, np.float32)
+    solid = skin_solid(mesh, head.name)
+    solid = replace(solid, positions=(solid.positions - centre).astype(np.float32))
+    skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
+    outer, _ = inwards(solid, -gap_of(words, solid), head.name)
+    used, corners = np.unique(mesh.triangles[skin], return_inverse=True)
+    of_solid = np.unique(mesh.point[used], return_inverse=True)[1]  # as the solid's points are numbered
+    given = mesh.normals[used], mesh.uv[used]
+    count = int(skin.sum())
+    sheets = [ply(corners.reshape(-1, 3), one.positions[of_solid], *given) for one in (solid, outer)]
+    caps = [_caps(one, count) for one in (solid, outer)]
+    return Surfaces(sheets[0], caps[0], sheets[1], caps[1])
+
+
+def files_of(made: Surfaces) -> Iterator[tuple[str, bytes]]:
+    """Names and contents."""
+    for name, content in made._asdict().items():
+        if content is not None:
+            yield f"meshes/{name}.ply", content
+
+
+def _caps(solid: Solid, first: int) -> bytes | None:
+    """The triangles from one on, None for none."""
+    if len(solid.triangles) == first:
+        return None
+    used, corners = np.unique(solid.triangles[first:], return_inverse=True)
+    return ply(corners.reshape(-1, 3), solid.positions[used])
+
+
+_FINER = 4  # times, along a side
+
+
+class Divided(NamedTuple):
+    """Triangles that are divided evenly.
+
+    triangle : (n,) in which each corner lies
+    weights : (n, 3) of that triangle's corners
+    corners : (m, 3) of the smaller triangles
+    """
+
+    triangle: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    corners: NDArray[np.int64]
+
+
+def divided(triangles: NDArray[np.integer], finer: int = _FINER) -> Divided:
+    """Each of some triangles as finer^2 smaller ones, which share no corners with those of others.
+
+    triangles : (t,) numbers
+    """
+    places = [(i, j) for i in range(finer + 1) for j in range(finer + 1 - i)]
+    at = {place: index for index, place in enumerate(places)}
+    upright = [(at[i, j], at[i + 1, j], at[i, j + 1]) for i in range(finer) for j in range(finer - i)]
+    turned = [
+        (at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]) for i in range(finer) for j in range(finer - i - 1)
+    ]
+    second, third = np.array(places, np.float64).T / finer
+    weights = np.stack([1.0 - second - third, second, third], axis=1)
+    first = len(places) * np.arange(len(triangles))[:, None, None]
+    corners = (first + np.array(upright + turned)).reshape(-1, 3)
+    return Divided(np.repeat(triangles, len(places)), np.tile(weights, (len(triangles), 1)), corners)
+
+
+def painted_meshes(renderer: Renderer, scene: Scene) -> dict[int, bytes]:
+    """Files of all materials but the skin, by their indices; the head about its centre [mm]."""
+    mesh = scene.head.mesh
+    opaque = [k for k, material in enumerate(mesh.materials) if material.kind != "skin"]
+    parts = {k: divided(np.flatnonzero(mesh.material == k)) for k in opaque if (mesh.material == k).any()}
+    if not parts:
+        return {}
+    triangle, weights = (np.concatenate([one[i] for one in parts.values()]) for i in (0, 1))
+    colours = baked_colours(renderer, scene, triangle, weights[:, 1:])
+    ends = np.cumsum([len(one.triangle) for one in parts.values()])[:-1]
+    each = zip(parts.items(), np.split(colours, ends), strict=True)
+    return {k: _file(scene.head, part, colour) for (k, part), colour in each}
+
+
+def _file(head: Head, part: Divided, colours: NDArray[np.float32]) -> bytes:
+    mesh, corners = head.mesh, head.mesh.triangles[part.triangle]
+    between = part.weights[:, :, None]
+    places = (between * mesh.positions[corners]).sum(axis=1) - np.array(head.centre_mm)
+    normals = (between * mesh.normals[corners]).sum(axis=1)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return ply(part.corners, places, normals, None, np.clip(colours, 0.0, 1.0))

@@ -1,0 +1,213 @@
+"""Materials as OpenPBR has them, before any file: values, and which map drives which input."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.export.subject import Subject
+from dermis.human.head_file import relief_slopes
+from dermis.images.codecs import encode_png
+from dermis.images.colour import encode_srgb8
+from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Material
+from dermis.scene.skin import USUAL_ROUGHNESS, Skin
+from dermis.specular.fresnel import SKIN_ETA
+
+Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
+Value = float | tuple[float, ...]
+
+_EYE_IOR = 1.376
+_ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a word in the name
+_ROUGH_ELSE = 0.8
+
+
+class MapKind(NamedTuple):
+    """How a map is read: its type and colour space in MaterialX, and in what USD's preview takes."""
+
+    type: str
+    space: str
+    preview_space: str
+
+
+MAPS: Mapping[str, MapKind] = {
+    "colour": MapKind("color3", "srgb_texture", "sRGB"),
+    "roughness": MapKind("float", "", "raw"),
+    "specular": MapKind("float", "", "raw"),
+    "normal": MapKind("vector3", "", "raw"),
+    "eye": MapKind("color3", "srgb_texture", "sRGB"),
+}
+INPUTS: Mapping[str, str] = {
+    "colour": "subsurface_color",
+    "roughness": "specular_roughness",
+    "specular": "specular_weight",
+    "normal": "geometry_normal",
+}
+"""What each map drives."""
+DISTANCES = ("subsurface_radius",)
+"""Inputs with a length [m]."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """A material.
+
+    name : as told
+    values : of inputs, lengths in metres
+    maps : names of maps by the inputs that they drive
+    """
+
+    name: str
+    values: Mapping[str, Value]
+    maps: Mapping[str, str]
+
+
+def skin_look(
+    name: str,
+    skin: Skin,
+    radius_m: tuple[float, float, float],
+    colour: tuple[float, ...],
+    roles: Iterable[str],
+) -> Look:
+    """Of skin.
+
+    radius_m : mean free paths
+    colour : of skin without a map of it, linear Rec. 709 [-]
+    roles : of the maps that there are
+    """
+    longest = max(radius_m)
+    values: dict[str, Value] = {
+        "base_color": colour,
+        "subsurface_weight": 1.0,
+        "subsurface_color": colour,
+        "subsurface_radius": longest,
+        "subsurface_radius_scale": tuple(one / longest for one in radius_m),
+        "subsurface_scatter_anisotropy": 0.0,
+        "specular_weight": skin.strength,
+        "specular_ior": SKIN_ETA,
+        "specular_roughness": float(np.sqrt(skin.roughness * skin.smoothing)),
+    }
+    driven = {INPUTS[role]: role for role in roles}
+    return Look(name, {key: value for key, value in values.items() if key not in driven}, driven)
+
+
+def plain_look(one: Material) -> Look:
+    """Of what is not skin."""
+    rough = next((value for word, value in _ROUGH.items() if word in one.name.casefold()), _ROUGH_ELSE)
+    ior = _EYE_IOR if "eye" in one.name.casefold() else SKIN_ETA
+    red, green, blue = (float(part) for part in one.colour)
+    return Look(
+        one.name, {"base_color": (red, green, blue), "specular_roughness": rough, "specular_ior": ior}, {}
+    )
+
+
+def eye_look(name: str) -> Look:
+    """Of an eyeball with a map of its colour."""
+    wet: dict[str, Value] = {"specular_roughness": _ROUGH["eye"], "specular_ior": _EYE_IOR}
+    return Look(name, wet, {"base_color": "eye"})
+
+
+def hair_look(absorption: Floats, radius_mm: float) -> Look:
+    """Of hairs, a plain surface of their mean colour.
+
+    absorption : (n, 3) of their inside [1/mm]
+
+    Source: [Chiang2016] eq. 9 for the colour, at a roughness of 0.3.
+    """
+    depth = np.sqrt(np.maximum(absorption.mean(axis=0), 0.0) * radius_mm)
+    red, green, blue = (float(part) for part in np.exp(-5.888 * depth))
+    return Look(
+        "hair", {"base_color": (red, green, blue), "specular_roughness": 0.4, "specular_ior": 1.55}, {}
+    )
+
+
+def drawn_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
+    """The maps that there are, by role, as numbers that go into files.
+
+    slopes : (n, n, 2) of the relief, where `maps` has no normals
+    """
+    found: dict[str, Floats] = {}
+    if maps.colour is not None and skin.albedo == "map":
+        found["colour"] = maps.colour
+    if maps.roughness is not None:
+        rough = maps.roughness * np.float32(skin.roughness / USUAL_ROUGHNESS * skin.smoothing)
+        found["roughness"] = np.sqrt(np.clip(rough, 0.0, 1.0))
+    if maps.specular is not None and (mean := float(maps.specular.mean())) > 0:
+        found["specular"] = np.clip(maps.specular * np.float32(skin.strength / mean), 0.0, 1.0)
+    shown = slopes if maps.normal is None else maps.normal
+    if shown is not None:
+        normal = np.concatenate([-shown, np.ones_like(shown[..., :1])], axis=-1)
+        found["normal"] = 0.5 + 0.5 * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    return found
+
+
+def encoded_maps(found: Mapping[str, Floats]) -> dict[str, bytes]:
+    """PNG files of 8 bits by role."""
+    with ThreadPoolExecutor() as pool:  # zlib does not hold other threads up
+        return dict(zip(found, pool.map(_png, found, found.values()), strict=True))
+
+
+def _png(role: str, values: Floats) -> bytes:
+    if role in ("colour", "eye"):
+        return encode_png(encode_srgb8(values))
+    levels = np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)
+    return encode_png(levels if levels.ndim == 3 else levels[..., None])
+
+
+_M = 1e-3
+_LONGEST = 40
+
+
+def place_of(place: Path, subject: Subject, suffix: str) -> tuple[Path, str]:
+    """The file that a target writes, and what the names of those beside it begin with.
+
+    place : as `Target.write` gets it
+    suffix : of the file in a folder
+    """
+    file = place if place.suffix else place / f"{subject.identifier}{suffix}"
+    plain = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_LONGEST]
+    return file, f"{plain or subject.identifier}_"
+
+
+def skin_of(subject: Subject) -> Skin:
+    """The subject's own skin, or the default one."""
+    return Skin() if subject.scene is None else subject.scene.skin
+
+
+def write_pictures(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
+    """The maps of the skin by role; none for a skin by itself."""
+    if subject.head is None:
+        return {}
+    found = drawn_maps(subject.head.maps, skin_of(subject), relief_slopes(subject.head))
+    written = {}
+    for role, data in encoded_maps(found).items():
+        written[role] = folder / f"{prefix}{role}.png"
+        written[role].write_bytes(data)
+    return written
+
+
+def looks_of(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, Look]:
+    """Materials by their number in the subject's mesh.
+
+    mfp_mm : (3,) mean free paths of the skin
+    roles : of the maps that there are
+    """
+    red, green, blue = (_M * float(one) for one in mfp_mm)
+    colour = tuple(float(min(max(one, 0.0), 1.0)) for one in subject.albedo)
+    mesh, known = subject.shape.mesh, list(roles)
+    looks = {}
+    for kind in sorted(set(mesh.material.tolist())):
+        one = mesh.materials[kind]
+        if one.kind == "skin":
+            looks[kind] = skin_look(one.name, skin_of(subject), (red, green, blue), colour, known)
+        else:
+            looks[kind] = plain_look(one)
+    return looks

@@ -1,0 +1,98 @@
+"""three.js: a page with the head, lit and turned, whose skin spreads no light."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from dermis.apps.export.subject import Subject
+from dermis.apps.export.target import Row, Rows
+from dermis.apps.export.targets.pages.html import hash_of
+from dermis.apps.export.targets.pages.library_page import Script, WebPage, module_url, surface_rows
+from dermis.optics.curve import Curve
+
+_HASHES = {
+    "three": ("build/three.module.js", "T/E3B9AvPtLn5PKD7aTSFqizQcA4kHDfU0lub7u0fvM4w9BMGcSb3yI7r5LqMAMn"),
+    "three/core": ("build/three.core.js", "drH6BueSlcvoXCwAqWkNJvXwu2Ax3mnGOmZnIXaomedIw+uXSP9Bf/XIUINgLUW+"),
+    "three/orbit": (
+        "examples/jsm/controls/OrbitControls.js",
+        "ZVBN/wmVxgX0mUGjFJXakzzdZrAF4g4aHfKyusbjoF0WsVXSoGpeM/qRaVnXtaFo",
+    ),
+    "three/gltf": (
+        "examples/jsm/loaders/GLTFLoader.js",
+        "WH6tljjFikpYMGa2JMqlbJlM1lEMkd/Y6Sqnuog1rX87eShphltUQI5NKByEo4CP",
+    ),
+    "three/buffers": (
+        "examples/jsm/utils/BufferGeometryUtils.js",
+        "NArny884Zj3HwjLRjeY1kbfLZnAHIElzho3N71FW0eMGxxBT+QuLEiSnSgpSaBXh",
+    ),
+    "three/skeletons": (
+        "examples/jsm/utils/SkeletonUtils.js",
+        "Pozn8j5+YFr3ak8Pm90ayqDrGYn/DV7vVs/YIIqzJhzeJT0LQksoS1fZQ5lfsYlw",
+    ),
+}
+_IMPORTS = {
+    "./three.core.js": "three/core",
+    "../utils/BufferGeometryUtils.js": "three/buffers",
+    "../utils/SkeletonUtils.js": "three/skeletons",
+}
+_DEFAULT_IOR = 1.5
+
+
+class Three(WebPage):
+    """A page that runs."""
+
+    name: ClassVar[str] = "three"
+    title: ClassVar[str] = "three.js"
+    versions: ClassVar[tuple[str, ...]] = ("0.187.0",)
+    licence: ClassVar[str] = "MIT"
+    draw: ClassVar[Path] = Path(__file__).with_name("three.js")
+    wrong: ClassVar[str] = (
+        "Nothing spreads: its materials send all light back from where it falls, so shadows' edges are sharp "
+        "and have no red fringe, and nothing shines through an ear. Transmission would make glass of the "
+        "skin and is left at 0. Lights are parallel here."
+    )
+    scripts: ClassVar[dict[str, tuple[Script, ...]]] = {
+        "0.187.0": tuple(Script("three", "0.187.0", *told, name) for name, told in _HASHES.items())
+    }
+
+    def parameters(self, subject: Subject, version: str) -> Rows:
+        """The surface; there is nothing for what is below."""
+        return (
+            *surface_rows(subject),
+            Row("specularIntensity", 1.0, "-", "all that the index of refraction gives"),
+            Row("transmission", 0.0, "-", "of clear glass, which skin is not"),
+        )
+
+    def naive(self, subject: Subject, version: str) -> Rows:
+        """The index of refraction that the material begins with."""
+        usual = {"ior": _DEFAULT_IOR}
+        rows = self.parameters(subject, version)
+        return tuple(Row(r.name, usual.get(r.name, r.value), r.unit, r.meaning) for r in rows)
+
+    def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
+        """All light leaves where it falls."""
+        return Curve.of(lambda r: np.ones((len(r), 3)), subject.curve.energy)
+
+    def loaded(self, version: str) -> tuple[str, list[str]]:
+        """Six modules and the map of their names."""
+        scripts = self.scripts[version]
+        if self.installed is None:
+            places = {script.name: script.url for script in scripts}
+            checks = {script.url: script.integrity for script in scripts}
+            return _import_map({"imports": places, "integrity": checks}, [script.url for script in scripts])
+        texts = {script.name: script.read(self.installed) for script in scripts}
+        return _import_map(
+            {"imports": {name: module_url(text, _IMPORTS) for name, text in texts.items()}}, ["data:"]
+        )
+
+
+def _import_map(told: dict[str, dict[str, str]], sources: list[str]) -> tuple[str, list[str]]:
+    text = json.dumps(told)
+    return f'<script type="importmap">{text}</script>', [hash_of(text), *sources]
+
+
+TARGET = Three()

@@ -1,0 +1,208 @@
+"""Which resources have to hold something before a frame, as none of its passes has written it by then."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dermis.apps.export.targets.web.packing import Packer
+from dermis.frame.passes.post import Picture
+from dermis.gpu.tape import Take, Taken, Tape
+
+
+def needed(tape: Tape, takes: list[Take]) -> list[int]:
+    """Numbers of textures and buffers that some pass reads before any writes it, in order."""
+    found: set[int] = set()
+    for take in takes:
+        written: set[int] = set()
+        for one in take.passes:
+            found |= {whole(tape, k) for k in read_by(tape, one) if not _there(tape, k, written)}
+            written |= set(written_by(tape, one))
+    return sorted(found)
+
+
+def bound(tape: Tape, takes: list[Take], names: tuple[str, ...]) -> dict[int, str]:
+    """What is bound by some names."""
+    found: dict[int, str] = {}
+    for take in takes:
+        for one in (each for each in take.passes if each.program is not None):
+            known = [name for _, name, _ in tape.programs[one.program or 0]["bindings"]]
+            found |= {k: name for k, name in zip(one.bound, known, strict=True) if name in names and k >= 0}
+    return found
+
+
+def whole(tape: Tape, number: int) -> int:
+    """The texture of a view; others themselves."""
+    return int(tape.resources[number].get("of", number))
+
+
+def read_by(tape: Tape, one: Taken) -> Iterator[int]:
+    """What a pass may read."""
+    yield from (k for k, entry in _entries(tape, one) if _reads(entry))
+    if one.raster and one.raster["indices"] >= 0:
+        yield int(one.raster["indices"])
+
+
+def written_by(tape: Tape, one: Taken) -> Iterator[int]:
+    """What a pass writes; of a buffer that the host fills from the start, the buffer."""
+    if one.written:
+        yield one.written[0]
+    yield from (k for k, entry in _entries(tape, one) if _writes(entry))
+    if one.raster:
+        yield from (int(one.raster[name]) for name in ("depth", "target") if one.raster[name] >= 0)
+
+
+def _entries(tape: Tape, one: Taken) -> Iterator[tuple[int, dict[str, Any]]]:
+    if one.program is not None:
+        bindings = tape.programs[one.program]["bindings"]
+        yield from ((k, entry) for k, (_, _, entry) in zip(one.bound, bindings, strict=True) if k >= 0)
+
+
+def _reads(entry: dict[str, Any]) -> bool:
+    return "sampler" not in entry and entry.get("storage_texture", {}).get("access") != "write-only"
+
+
+def _writes(entry: dict[str, Any]) -> bool:
+    return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}
+
+
+def _there(tape: Tape, number: int, written: set[int]) -> bool:
+    """Whether a pass has written what is there, or any part of it."""
+    return any(whole(tape, k) == whole(tape, number) for k in written)
+
+
+Json = dict[str, Any]
+_TABLES = "triangle_table", "triangle_buffer"
+
+
+@dataclass(frozen=True)
+class Named:
+    """A take with its name and picture.
+
+    picture : what it fills
+    fewer : of a frame that is drawn while hands move, how many coarse hairs became one; else 0
+    """
+
+    name: str
+    take: Take
+    picture: Picture
+    size: tuple[int, int]
+    fewer: int = 0
+
+
+Mapped = dict[int, tuple[str, int, Take | None]]
+"""Maps that come as pictures: role, how many mips, and passes that fill the others, see `Pictured.put`."""
+
+
+Stepped = dict[int, tuple[float, ...]]
+"""Buffers of floats that are multiples of steps."""
+
+
+def described(tape: Tape, frames: list[Named], mapped: Mapped, steps: Stepped, packer: Packer) -> Json:
+    """The file's description; what it names by number lies in the packer.
+
+    Of resources that hold nothing but zeros, as new ones do, no content is kept.
+    """
+    pictures = [[tape.resource(one.picture.bytes), tape.resource(one.picture.exposed)] for one in frames]
+    contents, tables = {}, set(bound(tape, [one.take for one in frames], _TABLES))
+    for number in needed(tape, [one.take for one in frames]):
+        if number in steps:
+            floats = tape.content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
+            contents[number] = [packer.add_floats(floats, steps[number])]
+            continue
+        _, pictured, halving = mapped.get(number, ("", 0, None))
+        mips = [] if halving else _mips(tape, number)[pictured:]
+        if any(one.any() for one in mips):
+            add = packer.add if number not in tables else _in_parts(packer)
+            contents[number] = [-1] * pictured + [add(one) for one in mips]
+    fills = [(number, take) for number, (*_, take) in mapped.items() if take]
+    return {
+        "shaders": tape.shaders,
+        "programs": [_program(one) for one in tape.programs],
+        "resources": [_camel(one) for one in tape.resources],
+        "structs": {name: _struct(dtype) for name, dtype in tape.structs.items()},
+        "contents": contents,
+        "frames": [_frame(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
+        "halved": {number: [_pass(one, packer) for one in take.passes] for number, take in fills},
+    }
+
+
+def _in_parts(packer: Packer) -> Callable[[Any], int]:
+    """Of a table of three columns, one below the other, each is packed its own way."""
+    return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
+
+
+def _mips(tape: Tape, number: int) -> list[Any]:
+    """A buffer's bytes, or a texture's mip by mip, each with all its layers."""
+    parts, layers = tape.content(number), tape.resources[number].get("size")
+    count = layers[2] if isinstance(layers, list) else 1
+    return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
+
+
+def _frame(one: Named, picture: list[int], packer: Packer) -> Json:
+    records = [
+        (struct, packer.add(np.frombuffer(record.tobytes(), np.uint8))) for struct, record in one.take.records
+    ]
+    return {
+        "name": one.name,
+        "size": one.size,
+        "moving": one.fewer > 0,
+        "picture": picture[0],
+        "linear": picture[1],
+        "views": {stage: _views(one.take, stage) for stage in ("visibility", "shadows")},
+        "passes": [_pass(each, packer) for each in one.take.passes],
+        "records": records,
+    }
+
+
+def _views(take: Take, stage: str) -> int:
+    """The record by which a stage's passes see the head, -1 for none."""
+    views = [k for k, (struct, _) in enumerate(take.records) if struct == "Views"]
+    records = (-1 - k for one in take.passes if one.stage == stage for k in one.bound if k < 0)
+    return next((k for k in records if k in views), -1)
+
+
+def _pass(one: Taken, packer: Packer) -> Json:
+    written = None if one.written is None else (one.written[0], packer.add(one.written[1]))
+    return {
+        "stage": one.stage,
+        "program": one.program,
+        "bound": one.bound,
+        "groups": one.groups,
+        "completes": one.completes,
+        "raster": one.raster,
+        "written": written,
+        "unit": one.unit,
+    }
+
+
+def _program(one: Json) -> Json:
+    return {**one, "bindings": [(index, name, _camel(entry)) for index, name, entry in one["bindings"]]}
+
+
+def _struct(dtype: np.dtype[Any]) -> Json:
+    """Its size, and of each member the offset and the number of floats [4 bytes]."""
+    members = {name: _member(kind, offset) for name, (kind, offset, *_) in (dtype.fields or {}).items()}
+    return {"size": dtype.itemsize, "members": members}
+
+
+def _member(kind: np.dtype[Any], offset: int) -> Any:
+    base = kind.base
+    if base.fields is None:
+        return [offset // 4, kind.itemsize // 4]
+    return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct(base)["members"]}
+
+
+def _camel(value: Any) -> Any:
+    """The same with names of members as WebGPU spells them."""
+    if isinstance(value, dict):
+        return {_spelt(name): _camel(one) for name, one in value.items()}
+    return value
+
+
+def _spelt(name: str) -> str:
+    first, *others = name.split("_")
+    return first + "".join(word.title() for word in others)

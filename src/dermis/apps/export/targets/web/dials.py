@@ -1,0 +1,156 @@
+"""Dials of the page: what each turns, by the differences that it makes in a frame's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.export.targets.web.packing import Packer
+from dermis.base.errors import refuse
+from dermis.frame.inputs import Inputs
+from dermis.gpu.tape import Take, Taken
+from dermis.human.skin.painted import PaintedMaps
+from dermis.scene.model import Scene
+from dermis.scene.pose import Pose
+
+Json = dict[str, Any]
+Floats = NDArray[np.float32]
+EXPRESSIONS = {
+    "smile": {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0, "cheekSquintLeft": 0.6, "cheekSquintRight": 0.6},
+    "open mouth": {"jawOpen": 0.7},
+    "frown": {"browDownLeft": 1.0, "browDownRight": 1.0, "mouthFrownLeft": 0.8, "mouthFrownRight": 0.8},
+}
+"""Weights of morph targets at a dial's end."""
+_ROUGHER = (0.5, 1.0, 1.7)
+FACTORS = (0.4, 1.0, 3.0)
+"""Of a person's own melanin and blood."""
+
+
+@dataclass(frozen=True)
+class Dial:
+    """Something to turn.
+
+    values : of its nodes, increasing; `rest` is the one that the frame was taken with
+    scenes : for each node the scene, None at rest
+    moves : whether only the head's motion differs
+    """
+
+    name: str
+    values: tuple[float, ...]
+    rest: float
+    scenes: tuple[Scene | None, ...]
+    moves: bool = False
+
+
+def node_inputs(dial: Dial, prepare: Callable[[Scene], Inputs], base: Inputs) -> Iterator[Inputs | None]:
+    """What a frame reads at each node, None at rest."""
+    for scene in dial.scenes:
+        if scene is None:
+            yield None
+        elif dial.moves:
+            posed = prepare(scene)
+            yield replace(base, motion=posed.motion, view=posed.view)
+        else:
+            yield prepare(scene)
+
+
+def changes(base: Take, node: Take, packer: Packer) -> Json:
+    """What a node changes: of records and of what the host writes, first word and differences as floats.
+
+    Whole numbers stay those of the base, as do the pairs of places that light passes between.
+
+    DermisError : its passes are others
+    """
+    stages = [[one.stage for one in take.passes] for take in (base, node)]
+    if stages[0] != stages[1]:
+        refuse("dial", "the same passes at each of its nodes", "they differ", "Leave it out")
+    pairs = enumerate(zip(base.records, node.records, strict=True))
+    records = [(k, (_floats(one), _floats(other))) for k, ((_, one), (_, other)) in pairs]
+    hosts = enumerate(zip(base.passes, node.passes, strict=True))
+    written = [(k, (_written(one), _written(other))) for k, (one, other) in hosts if one.written]
+    return {"records": _parts(records, packer), "written": _parts(written, packer)}
+
+
+def _floats(record: Any) -> Floats:
+    """A record as floats, 0 where it has whole numbers."""
+    found = np.frombuffer(record.tobytes(), "<f4").copy()
+    found[~_is_float(record.dtype)] = 0.0
+    return found
+
+
+def _is_float(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
+    """Which words of a record are floats."""
+    found = np.zeros(dtype.itemsize // 4, np.bool_)
+    for kind, offset, *_ in (dtype.fields or {}).values():
+        words = slice(offset // 4, (offset + kind.itemsize) // 4)
+        base, count = kind.base, int(np.prod(kind.shape, dtype=int))
+        found[words] = np.tile(_is_float(base), count) if base.fields else base.kind == "f"
+    return found
+
+
+def _written(one: Taken) -> Floats:
+    return np.frombuffer(one.written[1] if one.written else b"", "<f4")
+
+
+def _parts(pairs: list[tuple[int, tuple[Floats, Floats]]], packer: Packer) -> list[tuple[int, int, int]]:
+    found = []
+    for number, (before, after) in pairs:
+        if before.tobytes() == after.tobytes():
+            continue
+        if len(before) != len(after):
+            refuse("dial", "the same numbers at each of its nodes", "their count differs", "Leave it out")
+        with np.errstate(all="ignore"):
+            difference = np.where(before == after, np.float32(0.0), after - before).astype("<f4")
+        apart = np.flatnonzero(difference)
+        if len(apart):
+            part = difference[apart[0] : apart[-1] + 1]
+            found.append((number, int(apart[0]), packer.add(part.view(np.uint8))))
+    return found
+
+
+def dials_of(scene: Scene) -> tuple[Dial, ...]:
+    """The dials of a scene: expressions where the head has them, pigments where skin is painted."""
+    return (*_pigments(scene), _roughness(scene), *_expressions(scene))
+
+
+def _roughness(scene: Scene) -> Dial:
+    rest = scene.skin.roughness
+    values = tuple(rest * factor for factor in _ROUGHER)
+    scenes = [replace(scene, skin=scene.skin.model_copy(update={"roughness": value})) for value in values]
+    return Dial("roughness", values, rest, (scenes[0], None, scenes[2]))
+
+
+def _expressions(scene: Scene) -> list[Dial]:
+    known = set(scene.head.targets)
+    return [
+        Dial(name, (0.0, 1.0), 0.0, (None, replace(scene, pose=Pose(weights))), moves=True)
+        for name, weights in EXPRESSIONS.items()
+        if known >= set(weights)
+    ]
+
+
+def _pigments(scene: Scene) -> list[Dial]:
+    """Melanin and blood: how far light spreads, and the colour that is painted with them."""
+    pigments, maps = scene.skin.pigments, scene.head.maps
+    if pigments is None or not isinstance(maps, PaintedMaps) or scene.skin.albedo != "map":
+        return []
+    made = []
+    for name in ("melanin", "blood"):
+        rest = getattr(maps.look, name)
+        values = tuple(min(1.0, rest * factor) for factor in FACTORS)
+        changed = (None if value == rest else _pigmented(scene, maps, name, value) for value in values)
+        made.append(Dial(name, values, rest, tuple(changed)))
+    return made
+
+
+def _pigmented(scene: Scene, maps: PaintedMaps, name: str, value: float) -> Scene:
+    assert scene.skin.pigments is not None
+    pigments = scene.skin.pigments.model_copy(update={name: value})
+    changed: Any = {name: value}
+    painted = replace(maps, look=replace(maps.look, **changed))
+    skin = scene.skin.model_copy(update={"pigments": pigments})
+    return replace(scene, head=replace(scene.head, maps=painted), skin=skin)

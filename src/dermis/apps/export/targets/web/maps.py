@@ -1,0 +1,195 @@
+"""Maps as pictures: eight bits a channel, along a curve of each channel's own."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.export.targets.web.described import bound
+from dermis.apps.export.targets.web.packing import stepped
+from dermis.frame.renderer import Renderer
+from dermis.frame.taping import halving, refill
+from dermis.gpu.tape import Take, Tape
+from dermis.images.filters import mip_chain
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+
+Halves = NDArray[np.float16]
+LEAST = 64
+"""Side of the smallest map that becomes a picture [texels]."""
+_QUALITY = 88  # of WebP
+_STEPS = 256
+_COLOURS = 3
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A map's layer.
+
+    data : WebP; of maps that are no colours grey, one channel below the other
+    curves : (c, 256) what each of a channel's steps stands for
+    texels : (h, w, c) what it is decoded to
+    """
+
+    data: bytes
+    curves: Halves
+    texels: Halves
+
+
+def picture_of(texels: Halves, colours: bool) -> Picture:
+    """A map as a picture.
+
+    texels : (h, w, c)
+    colours : whether the first three channels are seen as a colour; those after it are one number each
+    """
+    curves = np.stack([_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
+    steps = np.stack([_steps(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
+    image = steps[..., :_COLOURS] if colours else steps.transpose(2, 0, 1).reshape(-1, steps.shape[1])
+    data = _encoded(image)
+    found = _decoded(data)
+    if colours:
+        found = np.concatenate([found, steps[..., _COLOURS:]], axis=-1)
+        found[..., _COLOURS:] = steps[:1, :1, _COLOURS:]  # one number each
+    else:
+        found = found[..., 0].reshape(len(curves), *texels.shape[:2]).transpose(1, 2, 0)
+    decoded = np.stack([curves[k][found[..., k]] for k in range(len(curves))], axis=-1)
+    return Picture(data, curves.astype(np.float16), decoded.astype(np.float16))
+
+
+def _curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(256,) values from the least to the largest, closer together near 0 as eyes and slopes are."""
+    low, high = _bent(float(values.min())), _bent(float(values.max()))
+    return _straight(np.linspace(low, high, _STEPS))
+
+
+def _bent(value: float) -> float:
+    return float(np.sign(value) * np.sqrt(abs(value)))
+
+
+def _straight(bent: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.sign(bent) * bent * bent)
+
+
+def _steps(values: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """The nearest step of the curve to each value."""
+    middles = 0.5 * (curve[1:] + curve[:-1])
+    return np.searchsorted(middles, values.astype(np.float64)).astype(np.uint8)
+
+
+def _encoded(image: NDArray[np.uint8]) -> bytes:
+    from PIL import Image
+
+    into = io.BytesIO()
+    Image.fromarray(image).save(into, "WEBP", quality=_QUALITY, method=4)
+    return into.getvalue()
+
+
+def _decoded(data: bytes) -> NDArray[np.uint8]:
+    """(h, w, 3)"""
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+
+
+_STORABLE = 8  # WebGPU's number of STORAGE_BINDING
+_KNOT_MM = 2.0**-8, 2.0**-8, 2.0**-8, 2.0**-14  # steps of hairs' places and of their radius
+_COLOUR = "colour_map"
+_ROLES = (_COLOUR, "relief_map", "slope_map", "specular_map", "roughness_map", "detail_map")
+
+
+@dataclass
+class Pictured:
+    """Pictures by role, mip and layer; and of each tape, which resource has them.
+
+    A texture whose mips the device can halve comes with the first alone.
+    """
+
+    pictures: dict[tuple[str, int, int], Picture] = field(default_factory=dict)
+    placed: dict[tuple[str, int, int], list[Any]] = field(default_factory=dict)
+    _given: dict[str, NDArray[np.float16]] = field(default_factory=dict)
+
+    def same(self, role: str, texels: NDArray[np.float16]) -> bool:
+        """Whether a map is that which its picture was made of."""
+        return bool(np.array_equal(self._given[role], texels))
+
+    def put(
+        self, renderer: Renderer, tape: Tape, takes: list[Take]
+    ) -> dict[int, tuple[str, int, Take | None]]:
+        """Encode what is not yet encoded, and decode it into a tape's textures.
+
+        Of each of these its role, how many mips come as pictures, and the passes that fill the others.
+        """
+        found = {}
+        for number, role in _mapped(tape, takes).items():
+            texture, described = tape.object(number), tape.resources[number]
+            mips = 1 if described["usage"] & _STORABLE else _large(described)
+            small = [self._layers(tape, number, role, mip) for mip in range(mips)]
+            refill(renderer, texture, small if mips == 1 else small + _rest(tape, number, mips))
+            found[number] = role, mips, halving(tape, texture) if described["usage"] & _STORABLE else None
+        return found
+
+    def _layers(self, tape: Tape, number: int, role: str, mip: int) -> NDArray[np.float16]:
+        """(l, h, w, c) a mip as it is decoded."""
+        layers = texels_of(tape, number, mip)
+        for layer, texels in enumerate(layers):
+            if (role, mip, layer) not in self.pictures:
+                self.pictures[role, mip, layer] = picture_of(texels, role == _COLOUR)
+                self._given.setdefault(role, texels)
+        return np.stack([self.pictures[role, mip, layer].texels for layer in range(len(layers))])
+
+
+def smaller(head: Head, most: int) -> Head:
+    """The head with its maps of files halved until none has a longer side [texels]."""
+    maps = head.maps
+    if not isinstance(maps, Maps):
+        return head
+    given = {name: getattr(maps, name) for name in ("colour", "normal", "height", "specular", "roughness")}
+    halved: Any = {name: _halved(one, most) for name, one in given.items() if one is not None}
+    return replace(head, maps=replace(maps, **halved))
+
+
+def _halved(values: NDArray[np.float32], most: int) -> NDArray[np.float32]:
+    times = max(0, (max(values.shape[:2]) - 1).bit_length() - (most - 1).bit_length())
+    return np.asarray(mip_chain(values)[times], np.float32)
+
+
+def shorten(renderer: Renderer, tape: Tape, takes: list[Take]) -> dict[int, tuple[float, ...]]:
+    """Round the places of hairs on a device; of each buffer of them the steps of its columns."""
+    found: dict[int, tuple[float, ...]] = {}
+    for number in bound(tape, takes, ("knots",)):
+        data = stepped(tape.content(number)[0].view(np.float32).reshape(-1, len(_KNOT_MM)), _KNOT_MM)
+        renderer.device.write(tape.object(number), data.tobytes(), data.nbytes)
+        found[number] = _KNOT_MM
+    return found
+
+
+def texels_of(tape: Tape, number: int, mip: int) -> NDArray[np.float16]:
+    """(l, h, w, c) what a texture of halves holds."""
+    width, height, layers = tape.resources[number]["size"]
+    sides = max(1, height >> mip), max(1, width >> mip)
+    parts = tape.content(number)[mip * layers : (mip + 1) * layers]
+    return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
+
+
+def _rest(tape: Tape, number: int, mips: int) -> list[NDArray[np.float16]]:
+    return [texels_of(tape, number, mip) for mip in range(mips, tape.resources[number]["mips"])]
+
+
+def _large(described: dict[str, Any]) -> int:
+    """How many mips are large enough for pictures."""
+    side = min(described["size"][:2])
+    return sum(side >> mip >= LEAST for mip in range(described["mips"]))
+
+
+def _mapped(tape: Tape, takes: list[Take]) -> dict[int, str]:
+    """Textures of halves bound as maps, large enough for pictures, with their roles."""
+    return {
+        number: role
+        for number, role in bound(tape, takes, _ROLES).items()
+        if tape.resources[number].get("format", "").endswith("16float")
+        and min(tape.resources[number]["size"][:2]) >= LEAST
+    }
