@@ -77,6 +77,11 @@ def test_no_curve_leaves_its_panel(m: float) -> None:
         assert all(curve.get_ydata().max() <= axes.get_rmax() for curve in axes.lines)
 
 
+def test_lobes_of_other_packages_have_panels_of_their_own() -> None:
+    with MODELS.including("other", MODELS["phong"]), MODELS.including("another", MODELS["phong"]):
+        assert [axes.get_title() for axes in _lobes(0.3).axes][-2:] == ["other", "another"]
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [

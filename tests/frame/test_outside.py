@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from outside.chalk import ALBEDO, CHALK
 from outside.dim import LEFT, TECHNIQUE
-from outside.glow import GLOW, GlowLight
+from outside.glow import GLOW
+from outside.glow_light import GlowLight
 from setups import frontal, head_of, place, scene_of, settings_of
 from tolerances import FURNACE, TWIN
 

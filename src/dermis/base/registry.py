@@ -20,9 +20,14 @@ class Registry(Mapping[str, T], Generic[T]):
     changes : how often entries have been added or taken away
     """
 
-    def __init__(self, kind: str, entries: Mapping[str, T | str] | None = None) -> None:
-        """kind : what an entry is, for messages: "technique", say"""
-        self.kind = kind
+    def __init__(
+        self, kind: str, entries: Mapping[str, T | str] | None = None, advice: str = "Correct it"
+    ) -> None:
+        """kind : what an entry is, for messages: "technique", say
+
+        advice : what to do about a name that is not registered
+        """
+        self.kind, self.advice = kind, advice
         self.changes = 0
         self._entries: dict[str, T | str] = dict(entries or {})
         self._summaries: dict[str, str] = {}
@@ -71,7 +76,7 @@ class Registry(Mapping[str, T], Generic[T]):
         """Raises DermisError for a name that is not registered."""
         entry = self._entries.get(name)
         if entry is None:
-            refuse(self.kind, f"one of {', '.join(self._entries)}", f"{name!r} came", "Correct it")
+            refuse(self.kind, f"one of {', '.join(self._entries)}", f"{name!r} came", self.advice)
         if isinstance(entry, str):
             module, _, attribute = entry.partition(":")
             entry = self._entries[name] = cast(T, getattr(import_module(module), attribute))

@@ -16,7 +16,8 @@ from dermis.specular.models import MODELS
 
 _DEGREES = (0, 30, 60, 75, 85)
 _INCIDENT = {15: "#2a62b0", 45: "#2e8b57", 75: "#c0392b"}
-_DRAWN = [name for name in MODELS if name != "kelemen-direct"]  # the same curve as kelemen
+_SAME_CURVE = "kelemen-direct"  # as kelemen
+_COLUMNS = 4
 _FARTHEST = 1.8  # root of the intensity over kelemen's peak; on rough skin some models pass it
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -94,15 +95,24 @@ def _draw(folder: Path, m: float) -> None:
     _save(_albedos(m), folder / "albedo.png")
 
 
+def _drawn() -> list[str]:
+    """Names of the models that have a curve of their own."""
+    return [name for name in MODELS if name != _SAME_CURVE]
+
+
 def _lobes(m: float) -> Any:
     """Intensity under three lights in the plane of incidence: a polar panel for each model."""
-    figure = needed("matplotlib.figure", "plots").Figure(figsize=(12.0, 4.8), dpi=130, layout="constrained")
-    figure.suptitle(f"Intensity over kelemen's peak under the same light, on a root scale; m = {m:g}")
-    panels = figure.subplots(2, 4, subplot_kw={"projection": "polar"}).ravel()
     whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
-    roots = [np.sqrt(_intensity(name, m) / whole) for name in _DRAWN]
-    farthest = max(_FARTHEST, 1.05 * float(np.max(roots)))
-    for axes, name, curves in zip(panels, _DRAWN, roots, strict=True):
+    roots = {name: np.sqrt(_intensity(name, m) / whole) for name in _drawn()}
+    farthest = max(_FARTHEST, 1.05 * float(np.max(list(roots.values()))))
+    rows = -(-len(roots) // _COLUMNS)
+    make = needed("matplotlib.figure", "plots").Figure
+    figure = make(figsize=(3.0 * _COLUMNS, 2.4 * rows), dpi=130, layout="constrained")
+    figure.suptitle(f"Intensity over kelemen's peak under the same light, on a root scale; m = {m:g}")
+    panels = figure.subplots(rows, _COLUMNS, subplot_kw={"projection": "polar"}).ravel()
+    for axes in panels[len(roots) :]:
+        axes.remove()
+    for axes, (name, curves) in zip(panels, roots.items(), strict=False):
         for (degrees, ink), curve in zip(_INCIDENT.items(), curves, strict=True):
             axes.plot(_view_angles(), curve, color=ink, label=f"light from {degrees}°")
         axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=farthest)
@@ -138,7 +148,7 @@ def _albedos(m: float) -> Any:
     figure = needed("matplotlib.figure", "plots").Figure(figsize=(7.2, 4.6), dpi=130, layout="constrained")
     axes = figure.subplots()
     degrees = np.linspace(0.0, 89.0, 180)
-    for name in _DRAWN:
+    for name in _drawn():
         rho = directional_albedo(np.cos(np.radians(degrees)), m, MODELS[name].lobe)
         axes.plot(degrees, rho, linewidth=1.4, label=name)
     axes.set(xlabel="angle from the normal [°]", ylabel="share reflected, ρ_s = 1", xlim=(0, 90))

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, get_args
 
-from cyclopts import Parameter, Token
+from cyclopts import CoercionError, Parameter, Token
 
 from dermis.base.errors import DermisError, refuse
 from dermis.base.quantities import number
@@ -20,6 +20,16 @@ if TYPE_CHECKING:
 
 def _whole(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
+
+
+def _word(model: type[Plain], field: str, kind: Any, tokens: Sequence[Token]) -> str:
+    """Return a word that the field may be now, which may be more than when the command was imported."""
+    from dermis.scene.plain import choices_of
+
+    if (word := tokens[0].value) in (choices := choices_of(model, field)):
+        return word
+    wanted: Any = Literal[choices]
+    raise CoercionError(token=tokens[0], target_type=wanted)
 
 
 def _whole_or_word(words: Collection[str], _: type, tokens: Sequence[Token]) -> int | str:
@@ -99,7 +109,7 @@ def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
     from dermis.scene.plain import choices_of
 
     if choices := choices_of(model, field):
-        return Literal[choices], {}
+        return Literal[choices] | str, {"converter": partial(_word, model, field), "metavar": "CHOICE"}
     if words := words_of(model, field):
         number = model.model_fields[field].annotation in (float, int)
         shown = {"metavar": "|".join((*words, "NUMBER" if number else "COLOUR")), "show_choices": False}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 
 from dermis.frame.outputs import OUTPUTS, Output
 from dermis.gpu.wgsl_source import Member
@@ -18,7 +17,7 @@ def output_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
 
 
 def _made_by(stage: str) -> list[Member]:
-    return [Member(one.name, Path(), _words(one)) for one in OUTPUTS.values() if one.stage == stage]
+    return [Member(one.name, one.shader, _words(one)) for one in OUTPUTS.values() if one.stage == stage]
 
 
 def _words(output: Output) -> tuple[tuple[str, str], ...]:

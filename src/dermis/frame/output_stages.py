@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
+from dermis.base.registry import Registry
 from dermis.frame import light_stages
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import shape
@@ -97,15 +98,18 @@ def _look(inputs: Inputs) -> tuple[Any, Any]:
     return inputs.view, inputs.centre_mm
 
 
-STAGES: Mapping[str, Stage] = {
-    "geometry": _geometry,
-    "surface": _surface,
-    "motion": _motion,
-    "alpha": _alpha,
-    "light": light_stages.draw_light,
-    "visibility": light_stages.draw_visibility,
-    "pigments": light_stages.draw_pigments,
-    "thickness": light_stages.draw_thickness,
-    "label": _label,
-}
+STAGES: Registry[Stage] = Registry(
+    "stage of outputs",
+    {
+        "geometry": _geometry,
+        "surface": _surface,
+        "motion": _motion,
+        "alpha": _alpha,
+        "light": light_stages.draw_light,
+        "visibility": light_stages.draw_visibility,
+        "pigments": light_stages.draw_pigments,
+        "thickness": light_stages.draw_thickness,
+        "label": _label,
+    },
+)
 """By the names of their shaders, passes/outputs/STAGE.wgsl."""

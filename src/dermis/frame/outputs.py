@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 from dermis.base.errors import refuse, shown_value
@@ -37,6 +38,7 @@ class Output:
     description : of it, in a few words for the help texts
     background : its value where nothing is seen
     levels : how a PNG holds it, None where none can; whole numbers of a byte are their own levels
+    shader : the file of its function where that is not in its stage's shader
     """
 
     name: str
@@ -47,6 +49,7 @@ class Output:
     description: str
     background: float = 0.0
     levels: Levels | None = None
+    shader: Path | None = None
 
     @property
     def channels(self) -> int:

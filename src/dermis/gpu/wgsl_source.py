@@ -34,11 +34,12 @@ class Member(NamedTuple):
     """One of a list of shaders to which others may be added.
 
     name : as in scene files; in shaders {name} has underscores for hyphens, and {NAME} is in capitals
+    file : of its shader; None where it has none of its own
     words : replacements for other {words} in repeated lines
     """
 
     name: str
-    file: Path
+    file: Path | None
     words: Words = ()
 
 
@@ -127,7 +128,8 @@ class _Composed:
                 self.insert(self._find(name, path))
             elif name := directive["files"]:
                 for member in self._members(name, path):
-                    self.insert(member.file)
+                    if member.file is not None:
+                        self.insert(member.file)
             else:
                 self.lines += [(text, (path.name, number)) for text in self._filled(directive, path)]
 

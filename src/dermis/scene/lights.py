@@ -184,8 +184,8 @@ LIGHTS: Registry[type[Light]] = Registry(
         "stripe": StripeLight,
     },
 )
-"""The kinds by their word in scene files. How each is drawn stands in `dermis.frame.lights`, what Mitsuba and
-Cycles take in its place in `dermis.apps.validation.truths.lights`."""
+"""Kinds by their names in scene files. `dermis.frame.lights.kind.KINDS` draws them, MITSUBA and CYCLES of
+`dermis.apps.validation.truths.lights` judge them; exports take others for the kind they derive from."""
 
 
 NO_LIGHTS = "none"

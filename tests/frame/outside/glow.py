@@ -1,26 +1,13 @@
-"""A kind of light from outside the package: a point that shines the more, the straighter ahead."""
+"""How the frame draws a light from outside the package."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import Field
+from outside.glow_light import GlowLight
 
 from dermis.frame.lights.kind import Kind
 from dermis.frame.projection import Triple
-from dermis.scene.lights import PointLight
-
-
-class GlowLight(PointLight):
-    """Falls off with a power of the cosine from the line to its target."""
-
-    kind: Literal["after-glow"] = "after-glow"  # type: ignore[assignment]
-    power: Annotated[float, Field(ge=1, le=64)] = 4.0
-    """Power of the cosine."""
-
-    @property
-    def sources(self) -> tuple[str, ...]:
-        return ("Phong1975",)
 
 
 class _Glow(Kind[GlowLight]):

@@ -10,7 +10,7 @@ from dermis.base.registry import Registry
 from dermis.frame.projection import Triple, axes_of, between
 from dermis.gpu.wgsl_source import Member
 from dermis.mesh.head import Head
-from dermis.scene.lights import LIGHTS, Light, PointLight
+from dermis.scene.lights import Light, PointLight
 
 L = TypeVar("L", bound=Light)
 
@@ -58,8 +58,15 @@ class Kind(Generic[L]):
         return {}
 
 
-KINDS: Registry[Kind[Any]] = Registry("light", {name: f"{__package__}.{name}:KIND" for name in LIGHTS})
-"""Keyed by the names of scene files."""
+KINDS: Registry[Kind[Any]] = Registry(
+    "light of the frame",
+    {
+        shader.stem.replace("_", "-"): f"{__package__}.{shader.stem}:KIND"
+        for shader in sorted(Path(__file__).parent.glob("*.wgsl"))
+    },
+    f"Register how it is drawn in {__name__}.KINDS",
+)
+"""By the names of scene files: each shader of this folder, with the module beside it."""
 
 
 def facing(light: PointLight, radiance: float, half_width: float, half_height: float) -> dict[str, Any]:

@@ -14,16 +14,16 @@ from dermis.frame.fine_light import fine_numbers
 from dermis.frame.interreflection import link_numbers
 from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
-from dermis.frame.lights.kind import light_shaders
+from dermis.frame.lights.kind import KINDS, light_shaders
 from dermis.frame.metering import meter_numbers
 from dermis.frame.output_lists import label_numbers, output_lists
+from dermis.frame.outputs import OUTPUTS
 from dermis.frame.painting import painting_numbers, texture_names
 from dermis.frame.strands import strand_numbers
 from dermis.frame.surface import eye_numbers, lobe_shaders, surface_numbers
 from dermis.gpu import ComputeProgram, Constants, Device, compiled
 from dermis.gpu.program import declared
 from dermis.gpu.wgsl_source import Folder, ShaderFolder
-from dermis.scene.lights import LIGHTS
 from dermis.specular.models import MODELS
 
 PASSES = Path(__file__).parent
@@ -112,8 +112,8 @@ def each(count: int, workgroup: int = EACH) -> tuple[int, int, int]:
 
 
 def registered() -> int:
-    """A number that changes whenever a light or a lobe is added to the shaders or removed."""
-    return LIGHTS.changes + MODELS.changes
+    """A number that changes whenever a light, a lobe or an output is added to the shaders or removed."""
+    return KINDS.changes + MODELS.changes + OUTPUTS.changes
 
 
 def device_constants(device: Device) -> Constants:

@@ -21,7 +21,6 @@ from dermis.apps.validation.truths.described import (
 from dermis.base.errors import refuse
 from dermis.base.registry import Registry
 from dermis.scene.lights import (
-    LIGHTS,
     DirectionalLight,
     Light,
     PointLight,
@@ -40,17 +39,6 @@ _STRIPE_REACH = 1.25  # widths to each side: there the Gaussian is 4e-6
 _STRIPE_TEXELS = 40, 64  # least across a width and along the length
 _MOST_STRIPE_TEXELS = 2**23
 
-MITSUBA: Registry[Callable[[Any, Any, str], Described]] = Registry(
-    "light of Mitsuba", {name: f"{__name__}:mitsuba_{name}" for name in LIGHTS}
-)
-"""What describes a kind of light for Mitsuba, given its module with a variant set, the light and its name for
-messages."""
-
-CYCLES: Registry[Callable[[Any], Described]] = Registry(
-    "light of Cycles", {name: f"{__name__}:cycles_{name}" for name in LIGHTS}
-)
-"""What describes a kind of light for Cycles: its type, its fields, and where it stands."""
-
 
 def emitter(mi: Any, light: Light, number: int) -> Described:
     """Mitsuba's description of a light.
@@ -58,7 +46,8 @@ def emitter(mi: Any, light: Light, number: int) -> Described:
     mi : the module, with a variant set
     number : the light's place in the scene, for messages
 
-    Raises DermisError for a light without shadows: a path tracer has no such thing.
+    Raises DermisError for a light without shadows, which a path tracer has not, and for an unknown kind: a
+    truth approximates nothing.
     """
     _check_shadows(light, number, "path tracing")
     return MITSUBA[light.kind](mi, light, f"light {number}")
@@ -218,3 +207,33 @@ def _distance(light: PointLight) -> float:
 def _smoothstep(t: Floats) -> Floats:
     x = np.clip(t, 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
+
+
+MITSUBA: Registry[Callable[[Any, Any, str], Described]] = Registry(
+    "light of Mitsuba",
+    {
+        "point": mitsuba_point,
+        "spot": mitsuba_spot,
+        "rectangle": mitsuba_rectangle,
+        "sphere": mitsuba_sphere,
+        "directional": mitsuba_directional,
+        "stripe": mitsuba_stripe,
+    },
+    f"Leave the light out, or register in {__name__}.MITSUBA what stands for it",
+)
+"""What describes a kind of light for Mitsuba, given its module with a variant set, the light and its name for
+messages."""
+
+CYCLES: Registry[Callable[[Any], Described]] = Registry(
+    "light of Cycles",
+    {
+        "point": cycles_point,
+        "spot": cycles_spot,
+        "rectangle": cycles_rectangle,
+        "sphere": cycles_sphere,
+        "directional": cycles_directional,
+        "stripe": cycles_stripe,
+    },
+    f"Leave the light out, or register in {__name__}.CYCLES what stands for it",
+)
+"""What describes a kind of light for Cycles: its type, its fields, and where it stands."""

@@ -1,6 +1,7 @@
 // What head and hair cover of each pixel, by all of its samples.
 //#include "planes.wgsl"
 
+//#include <alpha_outputs>
 //#each alpha_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
 @group(0) @binding(50) var exposed: texture_2d<f32>;

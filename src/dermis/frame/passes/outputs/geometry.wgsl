@@ -1,6 +1,7 @@
 // Outputs of the mesh: where the centre of each pixel meets it.
 //#include "each_seen.wgsl"
 
+//#include <geometry_outputs>
 //#each geometry_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
 fn depth_output(seen: Seen) -> f32 {

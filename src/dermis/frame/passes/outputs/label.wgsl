@@ -5,6 +5,7 @@ override FIELDS: u32 = 0u; // distances that each vertex has
 override HAIRS: bool = false; // whether hairs are drawn
 
 //#fill const CLASSES: u32 = {class_count};
+//#include <label_outputs>
 //#each label_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
 @group(0) @binding(56) var<storage, read> label_base: array<u32>; // class of each triangle

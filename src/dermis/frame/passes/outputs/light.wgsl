@@ -3,6 +3,7 @@
 //#include "seen.wgsl"
 //#include "planes.wgsl"
 
+//#include <light_outputs>
 //#each light_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
 @group(0) @binding(34) var apart: texture_storage_2d_array<rgba32float, write>; // light below, depth; share of it that leaves

@@ -3,6 +3,7 @@
 //#include "skin.wgsl"
 //#include "each_seen.wgsl"
 
+//#include <pigments_outputs>
 //#each pigments_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
 struct Pigments {

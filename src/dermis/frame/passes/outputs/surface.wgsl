@@ -3,6 +3,7 @@
 //#include "skin.wgsl"
 //#include "each_seen.wgsl"
 
+//#include <surface_outputs>
 //#each surface_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
 // That of eyes and teeth is the mesh's.

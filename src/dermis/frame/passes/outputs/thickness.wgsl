@@ -2,6 +2,7 @@
 //#include "bilinear.wgsl"
 //#include "each_seen.wgsl"
 
+//#include <thickness_outputs>
 //#each thickness_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
 @group(0) @binding(53) var thickness_map: texture_2d<f32>; // of the coarse atlas [mm]; 1 where there is surface

@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.export.lights import known_lights
 from dermis.apps.export.subject import BALL_MM, Subject
 from dermis.apps.export.target import Rows
 from dermis.apps.validation import truths as reference
 from dermis.apps.validation.truths.blender_process import Errand, blender_python, run_blender
 from dermis.apps.validation.truths.cycles_scene import camera_of
 from dermis.apps.validation.truths.described import UNIT_MM, world
-from dermis.apps.validation.truths.lights import lamp
+from dermis.apps.validation.truths.lights import CYCLES, lamp
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
@@ -95,7 +96,8 @@ def surroundings(scene: Scene, centre_mm: Any) -> tuple[dict[str, Any], NDArray[
     Raises DermisError for lights and cameras that Blender has not.
     """
     centre = np.array(centre_mm) * M
-    lights = [_light(lamp(light, number), centre) for number, light in enumerate(scene.lights, start=1)]
+    known = known_lights(scene.lights, CYCLES, "Blender")
+    lights = [_light(lamp(light, number), centre) for number, light in enumerate(known, start=1)]
     camera = camera_of(scene)
     around, panorama = world(scene.environment)
     if "turn" in around:

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.export.lights import known_lights
 from dermis.apps.export.targets.maps.files import exr
 from dermis.apps.export.targets.mitsuba.meshes import Surfaces, files_of, surfaces
 from dermis.apps.export.targets.mitsuba.xml import (
@@ -23,7 +24,7 @@ from dermis.apps.export.targets.mitsuba.xml import (
     picture_file,
 )
 from dermis.apps.validation.truths.described import rgb, surroundings
-from dermis.apps.validation.truths.lights import emitter
+from dermis.apps.validation.truths.lights import MITSUBA, emitter
 from dermis.apps.validation.truths.mitsuba_scene import ROULETTE_DEPTH, sensor_of
 from dermis.scene.model import Scene
 from dermis.specular.fresnel import SKIN_ETA
@@ -148,7 +149,8 @@ def _frame(
     # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
     parts: list[dict[str, Any]] = [integrator, sensor]
-    parts += [emitter(words, light, k) for k, light in enumerate(scene.lights, start=1)]
+    lights = known_lights(scene.lights, MITSUBA, "Mitsuba")
+    parts += [emitter(words, light, k) for k, light in enumerate(lights, start=1)]
     if scene.environment is not None:
         parts.append(surroundings(words, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dermis.apps.export.lights import known_lights
 from dermis.apps.validation.truths.lights import facing_irradiance
 from dermis.base.errors import notify
 from dermis.base.registry import Registry
@@ -15,7 +16,6 @@ from dermis.mesh.mesh import Mesh
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import (
-    LIGHTS,
     DirectionalLight,
     Light,
     PointLight,
@@ -68,7 +68,7 @@ def view_of(camera: Camera, file: str) -> Lines:
 def lights_of(lights: Iterable[Light], environment: Environment | None) -> Lines:
     """What shines; what pbrt has not is told in a note and left out."""
     lines: Lines = []
-    for number, light in enumerate(lights, start=1):
+    for number, light in enumerate(known_lights(lights, PBRT, "pbrt"), start=1):
         if PBRT[light.kind] is _no_light:
             notify(f"pbrt has no {light.kind} light: light {number} is left out")
             continue
@@ -151,6 +151,15 @@ def _no_light(light: StripeLight) -> Lines:
     return []
 
 
-_OWN = (_point, _spot, _rectangle, _sphere, _directional, _no_light)
-PBRT: Registry[Callable[[Any], Lines]] = Registry("light of pbrt", dict(zip(LIGHTS, _OWN, strict=True)))
+PBRT: Registry[Callable[[Any], Lines]] = Registry(
+    "light of pbrt",
+    {
+        "point": _point,
+        "spot": _spot,
+        "rectangle": _rectangle,
+        "sphere": _sphere,
+        "directional": _directional,
+        "stripe": _no_light,
+    },
+)
 """What writes a kind of light for pbrt."""

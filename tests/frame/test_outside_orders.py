@@ -1,0 +1,38 @@
+"""What another package registers is known whatever was imported before it: nothing copies a registry."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+FRAME = ("dermis.frame.renderer", "dermis.frame.outputs", "dermis.frame.passes")
+EXPORT = ("dermis.apps.export.run", "dermis.apps.export.targets.pbrt.target")
+REFERENCE = ("dermis.apps.validation.truths.lights", "dermis.apps.validation.truths.cycles_scene")
+CLI = (
+    "dermis.cli",
+    "dermis.cli.cite",
+    "dermis.cli.render",
+    "dermis.cli.export",
+    "dermis.cli.compare_specular",
+)
+
+
+@pytest.mark.parametrize(
+    "before",
+    [(), FRAME, EXPORT, REFERENCE, CLI, (*CLI, *REFERENCE, *EXPORT, *FRAME)],
+    ids=["nothing", "frame", "export", "reference", "cli", "all"],
+)
+def test_a_light_a_lobe_a_technique_and_an_output(before: tuple[str, ...]) -> None:
+    """Drawn, exported to pbrt with a note, refused by a truth and cited by a command."""
+    path = os.pathsep.join([str(HERE), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
+    command = [sys.executable, str(HERE / "outside" / "registered.py"), *before]
+    run = subprocess.run(
+        command, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=300
+    )
+    assert run.returncode == 0, run.stderr
+    assert "@" in run.stdout and "Borshukov2003" in run.stdout and "Phong1975" in run.stdout
