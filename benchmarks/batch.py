@@ -21,8 +21,8 @@ from cyclopts import Parameter, run
 from figures_file import write_figures
 
 from dermis.base.atomic_write import check_output
+from dermis.base.console import note, print_lines
 from dermis.base.errors import DermisError
-from dermis.cli.console import note, print_lines
 from dermis.cli.options import parse_size
 
 PARTS = ("steps", "new", "moving", "dask", "disk")

@@ -28,8 +28,8 @@ from figures_file import write_figures
 from peers import cpu_model
 
 from dermis.apps.validation.truths.blender_process import blender_python
+from dermis.base.console import print_lines
 from dermis.base.errors import DermisError, refuse
-from dermis.cli.console import print_lines
 
 ROOT = Path(__file__).resolve().parent
 RESULTS = ROOT / "results" / "batch_peers.json"

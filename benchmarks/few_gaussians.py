@@ -15,7 +15,7 @@ from cyclopts import Parameter, run
 from dermis.apps.validation.benchmarks.cases import Case, scenes_of, settings_of
 from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, stage_ms
 from dermis.base.atomic_write import check_output, replacing
-from dermis.cli.console import print_json
+from dermis.base.console import print_json
 from dermis.frame.renderer import Renderer
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.frame.techniques.texture_space import TextureSpace

@@ -19,7 +19,7 @@ from typing import Annotated
 from cyclopts import Parameter, run
 
 from dermis.base.atomic_write import check_output, replacing
-from dermis.cli.console import print_json
+from dermis.base.console import print_json
 
 _WARM = 2  # runs after each cold one
 

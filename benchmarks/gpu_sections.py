@@ -21,8 +21,8 @@ from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
 from dermis.apps.validation.benchmarks.measure import Effort, row_ms, stage_ms
 from dermis.apps.validation.benchmarks.report import as_json
 from dermis.apps.validation.benchmarks.run import run
+from dermis.base.console import note
 from dermis.base.errors import DermisError
-from dermis.cli.console import note
 from dermis.frame.renderer import Renderer
 from dermis.images.writer import ImageWriter
 from dermis.mesh.head import Head

@@ -22,8 +22,8 @@ from gpu_sections import Plan, plan_of, quick_plan
 
 import dermis
 from dermis.base.atomic_write import check_output
+from dermis.base.console import note
 from dermis.base.errors import DermisError
-from dermis.cli.console import note
 from dermis.mesh.samples import cached
 
 PARTS = ("bench", "lobes", "sequences", "lights", "options", "start", "viewer", "film")

@@ -22,7 +22,7 @@ from dermis.apps.validation.benchmarks.cases import Case, scenes_of, settings_of
 from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, row_ms, stage_ms
 from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
 from dermis.base.atomic_write import check_output, replacing
-from dermis.cli.console import print_json
+from dermis.base.console import print_json
 from dermis.frame.renderer import Renderer
 from dermis.gpu.memory import held_bytes
 from dermis.mesh.head import Head

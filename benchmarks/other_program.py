@@ -12,8 +12,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
+from dermis.base.console import note
 from dermis.base.errors import DermisError
-from dermis.cli.console import note
 
 LONGEST_S = 150.0
 

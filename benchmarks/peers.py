@@ -28,8 +28,8 @@ from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
 from dermis.apps.validation.truths.blender_process import blender_python
 from dermis.apps.validation.truths.mitsuba_scene import load_mitsuba
 from dermis.base.atomic_write import check_output, replacing
+from dermis.base.console import note, print_lines, progress
 from dermis.base.errors import DermisError, refuse
-from dermis.cli.console import note, print_lines, progress
 
 ROOT = Path(__file__).resolve().parent
 RESULTS = ROOT / "results" / "peers.json"

@@ -29,7 +29,7 @@ from viewer_page import through_the_page
 from viewer_tables import tables
 
 from dermis.base.atomic_write import check_output, replacing
-from dermis.cli.console import note, print_lines
+from dermis.base.console import note, print_lines
 from dermis.cli.options import parse_size
 from dermis.gpu import Device, open_device
 

@@ -22,7 +22,7 @@ import dermis
 from dermis.apps.export.targets.web.build import Asked, built
 from dermis.apps.export.targets.web.maps import smaller
 from dermis.apps.export.targets.web.page import web_page
-from dermis.cli.console import print_lines
+from dermis.base.console import print_lines
 from dermis.frame.taping import renderer_for
 
 ATLAS, MAP = 512, 1024  # as exported

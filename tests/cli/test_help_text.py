@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from dermis.base.command_line import reflowed
 from dermis.cli import COMMANDS
-from dermis.cli.help_text import reflowed
 
 Run = Callable[..., Any]
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from cyclopts import App
 
+from dermis.base.console import print_json
 from dermis.cli import COMMANDS
-from dermis.cli.console import print_json
 
 Run = Callable[..., Any]
 SUBJECTS = {"render": ["head.obj"], "animate": ["head.obj"], "view": ["head.obj"]}

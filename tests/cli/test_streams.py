@@ -83,7 +83,7 @@ def test_a_bar_outlives_its_terminal() -> None:
     master, slave = os.openpty()
     code = """
 import sys
-from dermis.cli.console import progress, working_on
+from dermis.base.console import progress, working_on
 from dermis.cli.streams import Streams
 with Streams():
     with working_on("loading"), progress("drawing") as report:
@@ -122,7 +122,7 @@ with Streams() as streams:
 def test_a_reader_that_does_not_read_holds_up_no_end() -> None:
     code = """
 import dermis.cli, sys
-from dermis.cli.console import print_lines
+from dermis.base.console import print_lines
 dermis.cli._run = lambda: print_lines("x" * 300_000)
 dermis.cli.main()
 """

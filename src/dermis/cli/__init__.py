@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from importlib import import_module
-from typing import Any
 
 COMMANDS = {
     "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
@@ -24,7 +22,6 @@ COMMANDS = {
     "doctor": "Show what this machine can do and render a test frame.",
     "cite": "Print BibTeX entries of the works behind a picture.",
 }
-_NO_MEMORY = "failed to map segment", "allocate memory"  # of a library that is loaded
 _INTERRUPTED = 130
 
 
@@ -41,8 +38,12 @@ def main() -> None:
         try:
             code = _run()
             if (fault := streams.fault()) and not code:
+                from dermis.base.command_line import failed
+
                 came = f"it fails ({fault.strerror})"
-                code = _fail(f"stdout: expected a place to write to, but {came}. Write it elsewhere.")
+                code = failed(
+                    "dermis", f"stdout: expected a place to write to, but {came}. Write it elsewhere."
+                )
         except KeyboardInterrupt:
             code = _INTERRUPTED
             streams.drop()
@@ -53,20 +54,11 @@ def main() -> None:
 
 
 def _run() -> int:
-    """The exit status of the command that was typed."""
-    from cyclopts import App, CycloptsError
+    """Return the exit status of the command that was typed."""
+    from dermis.base.command_line import make_app, reflowed, run_app
 
-    from dermis.base.errors import DermisError
-    from dermis.cli.help_text import reflowed
-    from dermis.cli.misuse import explain
-
-    app = App(
-        name="dermis",
-        help="Human skin: physically based, in real time, checked against the truth.",
-        help_format="plaintext",
-        result_action="return_value",
-        suppress_keyboard_interrupt=False,
-    )
+    app = make_app("dermis", "Human skin: physically based, in real time, checked against the truth.")
+    app.version_flags = ("--version",)
     if (chosen := next(iter(sys.argv[1:]), "")) in COMMANDS:
         command = getattr(import_module(f"dermis.cli.{chosen}"), chosen)
         command.__doc__ = reflowed(command.__doc__)
@@ -74,36 +66,4 @@ def _run() -> int:
         # The list of commands must not import them; a command's own help is its docstring.
         shown = None if sys.argv[1:2] == [name] else summary
         app.command(f"dermis.cli.{name}:{name}", name=name, help=shown, version_flags=())
-    try:
-        with warnings.catch_warnings():
-            _show_notes()
-            return int(app(sys.argv[1:], exit_on_error=False, print_error=False) or 0)
-    except DermisError as error:
-        return _fail(str(error))
-    except CycloptsError as error:
-        return _fail(explain(error))
-    except (MemoryError, ImportError) as error:
-        if isinstance(error, ImportError) and not any(words in str(error) for words in _NO_MEMORY):
-            raise
-        return _fail(f"memory: expected enough for this, but there is no more ({error}). Ask for less.")
-
-
-def _show_notes() -> None:
-    """Print the package's own warnings as notes, each once."""
-    from dermis.base.errors import DermisWarning
-
-    usual = warnings.showwarning
-
-    def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
-        if issubclass(category, DermisWarning):
-            sys.stderr.write(f"note: {message}\n")
-        else:
-            usual(message, category, *more, **named)
-
-    warnings.simplefilter("default", DermisWarning)
-    warnings.showwarning = show
-
-
-def _fail(message: str) -> int:
-    sys.stderr.write(f"dermis: {message}\n")
-    return 2
+    return run_app(app)

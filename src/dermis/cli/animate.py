@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from dermis.cli.console import note, print_json, print_lines, progress, working_on
+from dermis.base.console import note, print_json, print_lines, progress, working_on
 from dermis.cli.motion import clip_of, motion_file, names_of, parse_span
 from dermis.cli.moving_output import MovingOutput
 from dermis.cli.options import Adapter, Json, Whole

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.base.console import print_json, print_lines, working_on
 from dermis.base.errors import refuse
-from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.options import Adapter, Json, Whole, given, parse_size
 from dermis.cli.rate import rate_of_images
 

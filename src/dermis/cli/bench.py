@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
-from dermis.cli.console import print_json, print_lines, progress
+from dermis.base.console import print_json, print_lines, progress
 from dermis.cli.head_options import HEAD, FileOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, Output, refuse_options
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from dermis.cli.console import print_lines
+from dermis.base.console import print_lines
 from dermis.cli.options import NOTHING, options_of, refuse_options
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dermis.apps.validation.comparisons.profile_models import ModelName
+from dermis.base.console import print_json, print_lines, working_on
 from dermis.base.errors import refuse
-from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.eye_options import note_eyes
 from dermis.cli.head_options import ShapeOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, given, option_name, options_of

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from dermis.base.atomic_write import refuse_output, replacing
+from dermis.base.console import print_json, print_lines, working_on
 from dermis.base.extras import needed
-from dermis.cli.console import print_json, print_lines, working_on
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS

@@ -6,8 +6,8 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from dermis.base.console import print_json, print_lines
 from dermis.base.errors import DermisError
-from dermis.cli.console import print_json, print_lines
 from dermis.cli.options import Adapter, Json
 
 _LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "OpenEXR", "pillow")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from dermis.apps.export.registry import TARGETS
+from dermis.base.console import print_json, print_lines, working_on
 from dermis.base.errors import refuse
-from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.head_options import HeadOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, given
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.cli.console import note
+from dermis.base.console import note
 from dermis.mesh.eye_limits import LIMITS
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.base.console import note
 from dermis.base.errors import refuse
-from dermis.cli.console import note
 from dermis.frame.outputs import OUTPUTS, asked_outputs
 
 if TYPE_CHECKING:

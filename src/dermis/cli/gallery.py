@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.cli.console import note, print_json, print_lines, progress
+from dermis.base.console import note, print_json, print_lines, progress
 from dermis.cli.options import Adapter, Json, Whole
 
 if TYPE_CHECKING:

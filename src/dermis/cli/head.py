@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from cyclopts import Parameter
 
+from dermis.base.console import print_json, print_lines, working_on
 from dermis.base.errors import refuse
-from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.options import Adapter, Json, Whole, given
 from dermis.cli.pose_options import parse_weights
 

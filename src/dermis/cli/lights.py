@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dermis.cli.console import print_json, print_lines
+from dermis.base.console import print_json, print_lines
 from dermis.cli.options import Json
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.base.console import note, print_json, print_lines, progress
 from dermis.base.errors import refuse
 from dermis.base.quantities import number, whole_number
-from dermis.cli.console import note, print_json, print_lines, progress
 from dermis.cli.options import NOTHING, Json, Output, Whole, option_name, options_of, parse_lengths
 from dermis.scene.skin import Pigments
 

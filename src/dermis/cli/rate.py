@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from dermis.cli.console import note
+from dermis.base.console import note
 
 _EVERY_S = 30.0  # between lines of a log
 _WINDOW_S = 60.0  # that the rate is taken over

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from dermis.cli.console import note, print_json, print_lines, working_on
+from dermis.base.console import note, print_json, print_lines, working_on
 from dermis.cli.frame_landmarks import FrameLandmarks, Landmarks
 from dermis.cli.frame_outputs import Format, FrameOutputs, Outputs
 from dermis.cli.options import Adapter, Json

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.base.console import note
 from dermis.base.errors import refuse
-from dermis.cli.console import note
 from dermis.cli.eye_options import EYE, EyeLooks, note_eyes
 from dermis.cli.head_options import HEAD, HeadOptions, check_head
 from dermis.cli.options import check, option_name, options_of, refuse_options

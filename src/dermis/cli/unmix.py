@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from dermis.cli.console import print_json, print_lines, progress
+from dermis.base.console import print_json, print_lines, progress
 from dermis.cli.options import Adapter, Json
 
 if TYPE_CHECKING:

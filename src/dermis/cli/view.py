@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from dermis.base.console import note, print_lines, working_on
 from dermis.base.errors import refuse
-from dermis.cli.console import note, print_lines, working_on
 from dermis.cli.options import Adapter, Whole
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
 
