@@ -27,7 +27,7 @@ from cyclopts import Parameter, run
 from figures_file import write_figures
 from peers import cpu_model
 
-from dermis.apps.validation.truths.blender_process import blender_python
+from dermis.apps.truths.blender_process import blender_python
 from dermis.base.console import print_lines
 from dermis.base.errors import DermisError, refuse
 

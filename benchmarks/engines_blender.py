@@ -21,7 +21,7 @@ from engines_blender_head import heads, picture
 from dermis.apps.export.fitting import deviation, fit_d
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.targets.blender.target import TARGET
-from dermis.apps.validation.truths.blender_process import Errand, run_blender
+from dermis.apps.truths.blender_process import Errand, run_blender
 
 RESULTS = Path(__file__).with_name("results") / "engines_blender.json"
 SCRIPT = Path(__file__).with_name("engines_blender_script.py")

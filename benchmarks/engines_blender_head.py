@@ -15,7 +15,7 @@ from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, painted, subject_of
-from dermis.apps.validation.truths.metrics import relative_rmse
+from dermis.apps.truths.metrics import relative_rmse
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb
 from dermis.images.io import read_image

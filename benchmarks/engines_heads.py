@@ -96,7 +96,7 @@ def in_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
 
 def in_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
     """The exported scene by several seeds; where the head is, as ours says."""
-    from dermis.apps.validation.truths.mitsuba_scene import load_mitsuba, variant_of
+    from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
 
     mi = load_mitsuba()
     with TemporaryDirectory() as place, variant_of(mi, "scalar_rgb"):

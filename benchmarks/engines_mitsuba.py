@@ -21,8 +21,8 @@ from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.mitsuba.scene import BOUNDARIES, Boundary, Walked, medium_words, surface_words
 from dermis.apps.export.targets.mitsuba.target import TARGET
-from dermis.apps.validation.truths.described import rgb
-from dermis.apps.validation.truths.mitsuba_scene import load_mitsuba, variant_of
+from dermis.apps.truths.described import rgb
+from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
 from dermis.optics.curve import Curve
 
 Floats = NDArray[np.float64]

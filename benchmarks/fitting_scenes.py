@@ -16,10 +16,10 @@ from tempfile import gettempdir
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.truths.half_space import diffuse_albedo, reflected_radiance
+from dermis.apps.truths.path_traced import PathTraced, Variant
 from dermis.apps.validation.comparisons.person import traced
 from dermis.apps.validation.comparisons.person_paint import paint_of
-from dermis.apps.validation.truths.half_space import diffuse_albedo, reflected_radiance
-from dermis.apps.validation.truths.path_traced import PathTraced, Variant
 from dermis.environment.panorama import directions
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human

@@ -13,7 +13,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, run
 
-from dermis.apps.validation.truths.slab_mc import ScatteringLayer, trace_slab
+from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 
 MEDIA = {
     "half-space, albedo 0.5": [ScatteringLayer(0.5, 0.5)],

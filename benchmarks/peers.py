@@ -24,9 +24,9 @@ from peers_measured import METHODS, Measured, Plan, measure
 from peers_page import place_text, scene_text
 
 import dermis
+from dermis.apps.truths.blender_process import blender_python
+from dermis.apps.truths.mitsuba_scene import load_mitsuba
 from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
-from dermis.apps.validation.truths.blender_process import blender_python
-from dermis.apps.validation.truths.mitsuba_scene import load_mitsuba
 from dermis.base.atomic_write import check_output, replacing
 from dermis.base.console import note, print_lines, progress
 from dermis.base.errors import DermisError, refuse

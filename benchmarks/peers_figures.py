@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from peers_measured import OF_2007, OURS, Frames, Measured
 
-from dermis.apps.validation.truths.cycles import CyclesPass
-from dermis.apps.validation.truths.metrics import energy_ratio, relative_rmse
-from dermis.apps.validation.truths.path_traced import PathTraced
+from dermis.apps.truths.cycles import CyclesPass
+from dermis.apps.truths.metrics import energy_ratio, relative_rmse
+from dermis.apps.truths.path_traced import PathTraced
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

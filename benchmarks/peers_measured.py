@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.truths.cycles import CyclesPass, Method, cycles_passes
+from dermis.apps.truths.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
 from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
 from dermis.apps.validation.comparisons.scenes import medium_scene, usual_region
-from dermis.apps.validation.truths.cycles import CyclesPass, Method, cycles_passes
-from dermis.apps.validation.truths.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head

@@ -24,7 +24,7 @@ from dermis.apps.inverse.unmixing.model import FACE, SkinModel, Third, skin_mode
 from dermis.apps.inverse.unmixing.on_device import Unmixer
 from dermis.apps.inverse.unmixing.solve import solve, weights_of
 from dermis.apps.inverse.unmixing.unmix import unmix
-from dermis.apps.validation.truths.slab_mc import counted_profile
+from dermis.apps.truths.slab_mc import counted_profile
 from dermis.gpu import Device, Frame, open_device
 from dermis.gpu.textures import texture_from
 from dermis.images.difference import delta_e_2000

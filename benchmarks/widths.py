@@ -23,7 +23,7 @@ import dermis
 from dermis.apps.inverse.unmixing.model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.inverse.unmixing.widths import widths_of
-from dermis.apps.validation.truths.two_media import exchange
+from dermis.apps.truths.two_media import exchange
 from dermis.frame.renderer import Renderer
 from dermis.images.io import write_png
 

@@ -12,7 +12,7 @@ import numpy as np
 
 import dermis
 from dermis.apps.gallery.picture import main
-from dermis.apps.validation.truths.slab_mc import counted_profile
+from dermis.apps.truths.slab_mc import counted_profile
 
 HALF_MM, EXPOSED_MM, PHOTONS = 4.0, 1.0, 400_000
 

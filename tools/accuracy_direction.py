@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.validation.comparisons.compare import compare
 from dermis.apps.validation.comparisons.report import cells
 from dermis.apps.validation.comparisons.scenes import usual_region
 from dermis.apps.validation.comparisons.truths import Truth
-from dermis.apps.validation.truths.metrics import energy_ratio, relative_rmse
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

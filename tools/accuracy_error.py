@@ -6,6 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from dermis.apps.truths.metrics import energy_ratio, relative_rmse
+from dermis.apps.truths.surface_integral import GaussianSum as Profile
+from dermis.apps.truths.surface_integral import integrate
 from dermis.apps.validation.comparisons.compare import subject_of
 from dermis.apps.validation.comparisons.scenes import usual_region
 from dermis.apps.validation.comparisons.truths import (
@@ -16,9 +19,6 @@ from dermis.apps.validation.comparisons.truths import (
     positions,
     surface_integral,
 )
-from dermis.apps.validation.truths.metrics import energy_ratio, relative_rmse
-from dermis.apps.validation.truths.surface_integral import GaussianSum as Profile
-from dermis.apps.validation.truths.surface_integral import integrate
 from dermis.frame.surface_points import surface_points
 from dermis.human.regions.labels import known_landmarks
 from dermis.mesh.head import Head

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.half_space import reflected_radiance
+from dermis.apps.truths.half_space import reflected_radiance
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.optics.directions import directional_albedo, directions, mean_of_once, refracted

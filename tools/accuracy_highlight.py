@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 import dermis
-from dermis.apps.validation.truths.cycles import cycles_passes
-from dermis.apps.validation.truths.cycles_scene import Facets
+from dermis.apps.truths.cycles import cycles_passes
+from dermis.apps.truths.cycles_scene import Facets
 from dermis.atlas.build import build_atlas
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

@@ -17,8 +17,8 @@ from accuracy_person import sheet_bytes
 from numpy.typing import NDArray
 
 import dermis
-from dermis.apps.validation.truths.cycles import cycles_passes
-from dermis.apps.validation.truths.cycles_scene import Coated
+from dermis.apps.truths.cycles import cycles_passes
+from dermis.apps.truths.cycles_scene import Coated
 from dermis.atlas.build import build_atlas
 from dermis.frame.painted import with_painted_maps
 from dermis.mesh.head import Head

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dermis.apps.validation.truths.slab_mc import counted_profile, trace_medium
+from dermis.apps.truths.slab_mc import counted_profile, trace_medium
 from dermis.optics.diffusion.models import Model, cut, through_gaussians, through_slab
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.fits.burley import fit_burley

@@ -17,11 +17,11 @@ import numpy as np
 from dermis.apps.gallery.picture import sheet
 from dermis.apps.gallery.run import encode_webp
 from dermis.apps.gallery.script import Panels
+from dermis.apps.truths.metrics import Estimate
 from dermis.apps.validation.comparisons.person import Pair, compare_person
 from dermis.apps.validation.comparisons.person_iris import iris_of
 from dermis.apps.validation.comparisons.person_paint import paint_of
 from dermis.apps.validation.comparisons.person_views import EYE_MM, VIEWS, scene_of
-from dermis.apps.validation.truths.metrics import Estimate
 from dermis.frame.renderer import Renderer
 from dermis.scene.heads import load_head
 

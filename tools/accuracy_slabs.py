@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import dermis
-from dermis.apps.validation.truths.slab import ScatteringLayer
-from dermis.apps.validation.truths.slab_mc import trace_slab
+from dermis.apps.truths.slab import ScatteringLayer
+from dermis.apps.truths.slab_mc import trace_slab
 from dermis.gpu import download
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

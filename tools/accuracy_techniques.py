@@ -16,11 +16,11 @@ import accuracy_surface as surface
 import numpy as np
 
 import dermis
+from dermis.apps.truths.half_space import directional_albedo
 from dermis.apps.validation.comparisons.compare import Comparison, Row, compare
 from dermis.apps.validation.comparisons.profile_models import ModelName
 from dermis.apps.validation.comparisons.report import cells
 from dermis.apps.validation.comparisons.scenes import comparison_scene, usual_region
-from dermis.apps.validation.truths.half_space import directional_albedo
 from dermis.frame.surface_points import irradiance_at, surface_points
 from dermis.mesh.head import Head
 from dermis.optics.media import media

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import dermis
-from dermis.apps.validation.truths import surface_integral
-from dermis.apps.validation.truths.irradiance_samples import Places
+from dermis.apps.truths import surface_integral
+from dermis.apps.truths.irradiance_samples import Places
 from dermis.gpu import download
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

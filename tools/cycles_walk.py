@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.photon import Words, deflect, uniform
+from dermis.apps.truths.photon import Words, deflect, uniform
 from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.photon import deflect, refract, uniform
+from dermis.apps.truths.photon import deflect, refract, uniform
 from dermis.base.atomic_write import replacing
 from dermis.base.compiled import compiled
 

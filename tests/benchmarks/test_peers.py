@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import dermis
+from dermis.apps.truths.cycles import CyclesPass
+from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
-from dermis.apps.validation.truths.cycles import CyclesPass
-from dermis.apps.validation.truths.path_traced import PathTraced
 from dermis.base.errors import DermisError, refuse
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

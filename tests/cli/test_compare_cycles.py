@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from conftest import FORM
 
-from dermis.apps.validation.truths import cycles
-from dermis.apps.validation.truths.cycles import PYTHON_VARIABLE
+from dermis.apps.truths import cycles
+from dermis.apps.truths.cycles import PYTHON_VARIABLE
 
 Run = Callable[..., Any]
 PROGRAM = """

@@ -8,13 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from dermis.apps.truths.path_traced import PathTraced
+from dermis.apps.truths.person import medium
+from dermis.apps.truths.person.traced import Paint
 from dermis.apps.validation.comparisons.person import Pair, compare_person, drawn, pair_of
 from dermis.apps.validation.comparisons.person_iris import iris_of
 from dermis.apps.validation.comparisons.person_paint import paint_of
 from dermis.apps.validation.comparisons.person_views import EYE_MM, VIEWS, scene_of, softbox
-from dermis.apps.validation.truths.path_traced import PathTraced
-from dermis.apps.validation.truths.person import medium
-from dermis.apps.validation.truths.person.traced import Paint
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human

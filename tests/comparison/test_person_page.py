@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from dermis.apps.truths.metrics import Estimate
 from dermis.apps.validation.comparisons.person import Pair
 from dermis.apps.validation.comparisons.person_views import VIEWS
-from dermis.apps.validation.truths.metrics import Estimate
 
 ROOT = Path(__file__).parents[2]
 ONE = Estimate(1.0, 0.01)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.validation.comparisons.compare import subject_of
 from dermis.apps.validation.comparisons.truths import (
     Subject,
@@ -16,7 +17,6 @@ from dermis.apps.validation.comparisons.truths import (
     irradiance_samples,
     surface_integral,
 )
-from dermis.apps.validation.truths.metrics import energy_ratio, relative_rmse
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

@@ -26,7 +26,7 @@ from dermis.apps.export.targets.blender.walks import (
     skin_stretch,
     walk_within,
 )
-from dermis.apps.validation.truths.half_space import diffuse_albedo, directional_albedo
+from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
 from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

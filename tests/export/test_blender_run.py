@@ -15,7 +15,7 @@ from small_head import write_head
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.targets.blender.target import TARGET
-from dermis.apps.validation.truths.blender_process import PYTHON_VARIABLE
+from dermis.apps.truths.blender_process import PYTHON_VARIABLE
 from dermis.base.errors import DermisError
 
 PYTHON = os.environ.get(PYTHON_VARIABLE, "")

@@ -16,7 +16,7 @@ from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.mitsuba.meshes import divided
 from dermis.apps.export.targets.mitsuba.target import TARGET, Colours, medium_for
 from dermis.apps.export.targets.mitsuba.xml import Bitmap, Transform, Words, element
-from dermis.apps.validation.truths.mitsuba_scene import variant_of
+from dermis.apps.truths.mitsuba_scene import variant_of
 from dermis.optics.curve import Curve
 from dermis.optics.media import media
 

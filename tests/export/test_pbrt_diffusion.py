@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dermis.apps.export.targets.pbrt.diffusion import diffusion_table
-from dermis.apps.validation.truths.slab_mc import trace_medium
+from dermis.apps.truths.slab_mc import trace_medium
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.media import Layer, Medium
 

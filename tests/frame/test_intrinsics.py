@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from setups import head_of
 
 import dermis
-from dermis.apps.validation.truths.described import check_lens
+from dermis.apps.truths.described import check_lens
 from dermis.apps.viewer.navigation import pick
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer

@@ -15,7 +15,7 @@ from outside.glow_light import GlowLight
 from setups import frontal, head_of, place, scene_of, settings_of
 from tolerances import FURNACE, TWIN
 
-from dermis.apps.validation.truths.lights import lamp
+from dermis.apps.truths.lights import lamp
 from dermis.base.errors import DermisError
 from dermis.frame.lights.kind import KINDS
 from dermis.frame.renderer import Renderer

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths import surface_integral
+from dermis.apps.truths import surface_integral
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import SKIN

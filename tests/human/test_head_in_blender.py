@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dermis import Human, Pose, load_head
-from dermis.apps.validation.truths.cycles import PYTHON_VARIABLE
+from dermis.apps.truths.cycles import PYTHON_VARIABLE
 from dermis.frame.painted import painted_head
 from dermis.gpu import open_device
 from dermis.human.head_file import write_person

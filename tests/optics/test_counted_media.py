@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from tolerances import COUNTED_FLESH, COUNTED_RINGS, COUNTED_TOTAL
 
-from dermis.apps.validation.truths.half_space import directional_albedo
-from dermis.apps.validation.truths.slab_mc import counted_profile
+from dermis.apps.truths.half_space import directional_albedo
+from dermis.apps.truths.slab_mc import counted_profile
 from dermis.base.errors import DermisError
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.flesh import medium_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from walk import fresnel, returned
 
-from dermis.apps.validation.truths import half_space
+from dermis.apps.truths import half_space
 from dermis.optics.directions import ROWS, directional_albedo, directions, h_function, mean_of_once
 
 COSINES = np.array([0.0, 0.03, 0.2, 0.5, 0.8, 1.0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.validation.truths.half_space import diffuse_albedo
+from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.optics.van_de_hulst import albedo_of_colour, colour_of_albedo
 
 PRINTED = 1e-4  # its constants have six digits

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.path_traced import PathTraced, path_trace
+from dermis.apps.truths.path_traced import PathTraced, path_trace
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

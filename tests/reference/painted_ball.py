@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.apps.validation.truths.person.subject import Paint, Person
+from dermis.apps.truths.person.subject import Paint, Person
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.validation.truths.slab_mc import counted_profile
+from dermis.apps.truths.slab_mc import counted_profile
 from dermis.optics.media import Layer, Medium, media
 from dermis.optics.tissue import load_tissue
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from lit_balls import BALL, LIGHTS, ball_scene
 
-from dermis.apps.validation.truths.cycles import PYTHON_VARIABLE, Method, cycles_passes, cycles_render
-from dermis.apps.validation.truths.cycles_scene import Coated, describe
-from dermis.apps.validation.truths.half_space import diffuse_albedo
-from dermis.apps.validation.truths.path_traced import Lambertian, path_trace
+from dermis.apps.truths.cycles import PYTHON_VARIABLE, Method, cycles_passes, cycles_render
+from dermis.apps.truths.cycles_scene import Coated, describe
+from dermis.apps.truths.half_space import diffuse_albedo
+from dermis.apps.truths.path_traced import Lambertian, path_trace
 from dermis.base.errors import DermisError
 from dermis.optics.media import media
 from dermis.scene.environment import Environment

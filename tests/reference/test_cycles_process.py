@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from lit_balls import LIGHTS, ball_scene
 
-from dermis.apps.validation.truths import cycles
-from dermis.apps.validation.truths.cycles import CyclesRendered, cycles_render, read_passes
+from dermis.apps.truths import cycles
+from dermis.apps.truths.cycles import CyclesRendered, cycles_render, read_passes
 from dermis.base.errors import DermisError
 from dermis.images.io import write_image
 from dermis.optics.media import media

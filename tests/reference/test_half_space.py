@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.validation.truths.half_space import (
-    diffuse_albedo,
-    directional_albedo,
-    h_function,
-    reflected_radiance,
-)
+from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo, h_function, reflected_radiance
 from dermis.base.errors import DermisError
 
 # Normal incidence by adding-doubling, to four digits.

@@ -9,13 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.metrics import (
-    Estimate,
-    energy_ratio,
-    flip,
-    relative_rmse,
-    signed_difference,
-)
+from dermis.apps.truths.metrics import Estimate, energy_ratio, flip, relative_rmse, signed_difference
 from dermis.base.errors import DermisError
 from dermis.images.colour import encode_srgb
 

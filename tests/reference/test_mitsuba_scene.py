@@ -10,7 +10,7 @@ import pytest
 from lit_balls import COLOUR, DRY, LIGHTS, ball_scene
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.path_traced import Lambertian, PathTraced, path_trace
+from dermis.apps.truths.path_traced import Lambertian, PathTraced, path_trace
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from half_spaces import pan
 
-from dermis.apps.validation.truths.mitsuba_solid import Solid, inwards, skin_solid
+from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import build_mesh, edges
 from dermis.mesh.mesh import Material, Mesh

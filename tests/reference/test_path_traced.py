@@ -10,9 +10,9 @@ import pytest
 from half_spaces import mean_and_error, pan, traced
 from tolerances import STANDARD_ERRORS
 
-from dermis.apps.validation.truths.half_space import directional_albedo, reflected_radiance
-from dermis.apps.validation.truths.path_traced import Lambertian, path_trace
-from dermis.apps.validation.truths.slab_mc import ScatteringLayer, trace_slab
+from dermis.apps.truths.half_space import directional_albedo, reflected_radiance
+from dermis.apps.truths.path_traced import Lambertian, path_trace
+from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

@@ -10,13 +10,13 @@ import pytest
 from numpy.typing import NDArray
 from painted_ball import ball, scene
 
-from dermis.apps.validation.truths.half_space import diffuse_albedo, directional_albedo
-from dermis.apps.validation.truths.mitsuba_scene import lit_scene, load_mitsuba, mesh_shape, variant_of
-from dermis.apps.validation.truths.person import medium, skin
-from dermis.apps.validation.truths.person.medium import PASSED, colours_in, mean_free_paths, single_albedo
-from dermis.apps.validation.truths.person.traced import person_scene
-from dermis.apps.validation.truths.slab import ScatteringLayer
-from dermis.apps.validation.truths.slab_mc import trace_slab
+from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
+from dermis.apps.truths.mitsuba_scene import lit_scene, load_mitsuba, mesh_shape, variant_of
+from dermis.apps.truths.person import medium, skin
+from dermis.apps.truths.person.medium import PASSED, colours_in, mean_free_paths, single_albedo
+from dermis.apps.truths.person.traced import person_scene
+from dermis.apps.truths.slab import ScatteringLayer
+from dermis.apps.truths.slab_mc import trace_slab
 from dermis.scene.lights import RectangleLight
 
 pytest.importorskip("mitsuba")

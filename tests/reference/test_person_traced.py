@@ -11,10 +11,10 @@ import pytest
 from painted_ball import ball, paint
 from painted_ball import scene as ball_scene
 
-from dermis.apps.validation.truths.path_traced import PathTraced
-from dermis.apps.validation.truths.person import medium
-from dermis.apps.validation.truths.person.subject import person_of
-from dermis.apps.validation.truths.person.traced import person_key, trace_person
+from dermis.apps.truths.path_traced import PathTraced
+from dermis.apps.truths.person import medium
+from dermis.apps.truths.person.subject import person_of
+from dermis.apps.truths.person.traced import person_key, trace_person
 from dermis.base.errors import DermisError
 from dermis.human.person import Human
 from dermis.mesh.head import Head

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.validation.truths import photon
+from dermis.apps.truths import photon
 from dermis.optics.diffusion.boundary import fresnel
 
 DIRECTIONS = [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, -0.8), (-0.48, 0.64, 0.6), (1.0, 0.0, 0.0)]

@@ -14,13 +14,7 @@ import pytest
 from scipy.stats import chi2
 from tolerances import CHANCE, STANDARD_ERRORS
 
-from dermis.apps.validation.truths.slab_mc import (
-    ScatteringLayer,
-    SlabResult,
-    default_edges,
-    trace_medium,
-    trace_slab,
-)
+from dermis.apps.truths.slab_mc import ScatteringLayer, SlabResult, default_edges, trace_medium, trace_slab
 from dermis.base.errors import DermisError
 from dermis.optics.diffusion.boundary import fresnel, normal_reflectance
 from dermis.optics.media import Layer, Medium
@@ -228,7 +222,7 @@ def test_bad_input_is_refused(wrong: Callable[[], object], said: str) -> None:
 def test_keys_stop_photons_of_many_hours() -> None:
     code = """
 import os, signal, threading
-from dermis.apps.validation.truths.slab_mc import ScatteringLayer, trace_slab
+from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 trace_slab([ScatteringLayer(0.01, 0.99)], 1)  # compiles
 threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
 trace_slab([ScatteringLayer(0.01, 0.99)], 10**10)
@@ -239,6 +233,6 @@ trace_slab([ScatteringLayer(0.01, 0.99)], 10**10)
 
 
 def test_importing_the_module_leaves_the_compiler_alone() -> None:
-    code = "import sys, dermis.apps.validation.truths.slab_mc; print('numba' in sys.modules)"
+    code = "import sys, dermis.apps.truths.slab_mc; print('numba' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"

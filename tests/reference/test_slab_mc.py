@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2, norm
 from tolerances import CHANCE, STANDARD_ERRORS
 
-from dermis.apps.validation.truths.slab_mc import ScatteringLayer, trace_slab
+from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.optics.media import Floats
 
 MCML_SLAB = (

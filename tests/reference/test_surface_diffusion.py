@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import eval_legendre
 
-from dermis.apps.validation.truths.surface_diffusion import (
+from dermis.apps.truths.surface_diffusion import (
     STEPS,
     diffuse_on_surface,
     edge_for,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.refine import Patch, refine_patch
-from dermis.apps.validation.truths.surface_diffusion import (
+from dermis.apps.truths.refine import Patch, refine_patch
+from dermis.apps.truths.surface_diffusion import (
     diffuse_on_surface,
     edge_for,
     longest_edge_mm,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.surface_diffusion import diffuse_on_surface, welded
+from dermis.apps.truths.surface_diffusion import diffuse_on_surface, welded
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import SKIN

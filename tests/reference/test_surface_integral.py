@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from dermis.apps.validation.truths.surface_integral import (
+from dermis.apps.truths.surface_integral import (
     GaussianSum,
     IrradianceSamples,
     Places,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.irradiance_samples import IrradianceSamples, Places, sample_irradiance
-from dermis.apps.validation.truths.octree import Tree, build_tree
+from dermis.apps.truths.irradiance_samples import IrradianceSamples, Places, sample_irradiance
+from dermis.apps.truths.octree import Tree, build_tree
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Material

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.validation.truths.slab_mc import trace_medium
-from dermis.apps.validation.truths.two_media import exchange
+from dermis.apps.truths.slab_mc import trace_medium
+from dermis.apps.truths.two_media import exchange
 from dermis.optics.media import Layer, Medium
 
 EDGES = np.linspace(-6.0, 6.0, 25)

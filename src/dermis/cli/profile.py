@@ -194,7 +194,7 @@ def _spectrum(tissue: Tissue, model: Model | None, clamp: Any) -> Floats | None:
 def _profile(tissue: Tissue, model: Model | None, clamp: Any, light: dict[str, Any]) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
-    from dermis.apps.validation.truths.slab_mc import counted_profile
+    from dermis.apps.truths.slab_mc import counted_profile
 
     with progress("tracing photons") as report:
         return counted_profile(tissue.medium, tissue.rgb, report=report, **light)

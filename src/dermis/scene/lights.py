@@ -185,7 +185,7 @@ LIGHTS: Registry[type[Light]] = Registry(
     },
 )
 """Kinds by their names in scene files. `dermis.frame.lights.kind.KINDS` draws them, MITSUBA and CYCLES of
-`dermis.apps.validation.truths.lights` judge them; exports take others for the kind they derive from."""
+`dermis.apps.truths.lights` judge them; exports take others for the kind they derive from."""
 
 
 NO_LIGHTS = "none"

@@ -39,7 +39,7 @@ import numpy as np
 from setups import frontal, head_of, place, scene_of, settings_of
 
 from dermis.apps.export.targets.pbrt.scene import lights_of
-from dermis.apps.validation.truths.lights import lamp
+from dermis.apps.truths.lights import lamp
 from dermis.base.errors import DermisError
 from dermis.cli import main
 from dermis.frame.renderer import Renderer
@@ -71,9 +71,8 @@ assert any(line.startswith('LightSource "point"') for line in lines)
 try:
     lamp(glow, 1)
 except DermisError as error:
-    assert (
-        "'after-glow' came. Leave the light out, or register in dermis.apps.validation.truths.lights.CYCLES"
-        in str(error)
+    assert "'after-glow' came. Leave the light out, or register in dermis.apps.truths.lights.CYCLES" in str(
+        error
     )
 else:
     raise AssertionError("a truth takes a light that it does not know")

@@ -157,7 +157,7 @@ def _counted(tissue: Tissue) -> Curve | None:
 def _profile(tissue: Tissue, model: ModelName) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model)
-    from dermis.apps.validation.truths.slab_mc import counted_profile
+    from dermis.apps.truths.slab_mc import counted_profile
 
     return counted_profile(tissue.medium, tissue.rgb, _PHOTONS)
 

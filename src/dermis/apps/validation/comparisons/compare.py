@@ -158,7 +158,7 @@ def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, flo
 
 
 def _row(made: Comparison, technique: str, ms: float) -> Row:
-    from dermis.apps.validation.truths.metrics import energy_ratio, relative_rmse
+    from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 
     truth, image = made.truth, made.images[technique]
     error = relative_rmse(image, truth.image, truth.mask, truth.variance)
@@ -170,6 +170,6 @@ def _row(made: Comparison, technique: str, ms: float) -> Row:
 def _flip(image: Floats, truth: Floats, mask: NDArray[np.bool_]) -> float | None:
     from importlib.util import find_spec
 
-    from dermis.apps.validation.truths.metrics import flip
+    from dermis.apps.truths.metrics import flip
 
     return flip(image, truth, mask).mean if find_spec("flip_evaluator") else None

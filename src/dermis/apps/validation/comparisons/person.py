@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse
+from dermis.apps.truths.path_traced import PathTraced, Variant
+from dermis.apps.truths.person.traced import Paint, trace_person
 from dermis.apps.validation.comparisons.person_views import VIEWS, scene_of
 from dermis.apps.validation.comparisons.truths import check_seen
-from dermis.apps.validation.truths.metrics import Estimate, energy_ratio, relative_rmse
-from dermis.apps.validation.truths.path_traced import PathTraced, Variant
-from dermis.apps.validation.truths.person.traced import Paint, trace_person
 from dermis.base.errors import refuse
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.truths.metrics import Estimate
 from dermis.apps.validation.comparisons.person import Pair
-from dermis.apps.validation.truths.metrics import Estimate
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.person.traced import Paint
+from dermis.apps.truths.person.traced import Paint
 from dermis.base.errors import refuse
 from dermis.frame.passes import program
 from dermis.frame.passes.painting import paint

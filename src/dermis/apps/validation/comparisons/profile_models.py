@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from dermis.apps.validation.truths.slab_mc import counted_profile
+from dermis.apps.truths.slab_mc import counted_profile
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Medium
 from dermis.optics.profiles import fit_radial

@@ -11,9 +11,9 @@ from string import Template
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.truths.metrics import MID_GREY, signed_difference
 from dermis.apps.validation.comparisons.compare import Comparison, Row
 from dermis.apps.validation.comparisons.sources import comparison_sources
-from dermis.apps.validation.truths.metrics import MID_GREY, signed_difference
 from dermis.base.atomic_write import replacing
 from dermis.images.codecs import encode_png
 

@@ -20,9 +20,9 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import DirectionName
 
 if TYPE_CHECKING:
-    from dermis.apps.validation.truths.cycles import CyclesRendered
-    from dermis.apps.validation.truths.irradiance_samples import IrradianceSamples
-    from dermis.apps.validation.truths.path_traced import PathTraced
+    from dermis.apps.truths.cycles import CyclesRendered
+    from dermis.apps.truths.irradiance_samples import IrradianceSamples
+    from dermis.apps.truths.path_traced import PathTraced
 
 Floats = NDArray[np.float64]
 
@@ -102,8 +102,8 @@ def heat_around(
     lit : of the whole head, see `irradiance_samples`
     least_mm2 : variance below which Gaussians are integrated by straight-line distance
     """
-    from dermis.apps.validation.truths.refine import patch_of
-    from dermis.apps.validation.truths.surface_diffusion import diffuse_on_surface
+    from dermis.apps.truths.refine import patch_of
+    from dermis.apps.truths.surface_diffusion import diffuse_on_surface
 
     started = time.perf_counter()
     narrow = subject.profile.variance_mm2 < least_mm2
@@ -130,7 +130,7 @@ def heat_around(
 
 def irradiance_samples(subject: Subject) -> IrradianceSamples:
     """The light that enters all of the skin, sampled as finely as the truths need it."""
-    from dermis.apps.validation.truths.irradiance_samples import Places, sample_irradiance
+    from dermis.apps.truths.irradiance_samples import Places, sample_irradiance
 
     def light(places: Places) -> Floats:
         return _entered(subject, places.face, places.barycentric)
@@ -143,7 +143,7 @@ def path_traced(subject: Subject, samples: int) -> Truth:
 
     samples : paths through each pixel
     """
-    from dermis.apps.validation.truths.path_traced import path_trace
+    from dermis.apps.truths.path_traced import path_trace
 
     made = path_trace(subject.scene, subject.medium, samples, subject.settings)
     truth = _rendered(made, made.mask, f"{made.samples} paths a pixel", *made.notes)
@@ -155,7 +155,7 @@ def cycles(subject: Subject, samples: int) -> Truth:
 
     samples : paths through each pixel
     """
-    from dermis.apps.validation.truths.cycles import cycles_render
+    from dermis.apps.truths.cycles import cycles_render
 
     made = cycles_render(subject.scene, subject.medium, samples, subject.settings)
     return _rendered(made, made.coverage, f"{made.samples} paths a pixel, random walk")
@@ -180,8 +180,8 @@ def _entered(subject: Subject, triangle: NDArray[np.int64], barycentric: Floats)
 
 def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
     """(n, 3) radiant exitance at points by Gaussians of the straight-line distance."""
-    from dermis.apps.validation.truths.surface_integral import GaussianSum as Profile
-    from dermis.apps.validation.truths.surface_integral import integrate
+    from dermis.apps.truths.surface_integral import GaussianSum as Profile
+    from dermis.apps.truths.surface_integral import integrate
 
     if not len(variance_mm2):
         return np.zeros_like(points)

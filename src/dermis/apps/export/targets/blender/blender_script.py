@@ -16,7 +16,7 @@ from typing import Any
 import bpy  # type: ignore[import-not-found,unused-ignore]
 import numpy as np
 
-from dermis.apps.validation.truths.cycles_script import add_light, add_object, set_camera, set_world
+from dermis.apps.truths.cycles_script import add_light, add_object, set_camera, set_world
 
 DESCRIBED: dict[str, Any] = {}
 

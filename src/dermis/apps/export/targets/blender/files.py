@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps import truths as reference
 from dermis.apps.export.lights import known_lights
 from dermis.apps.export.subject import BALL_MM, Subject
 from dermis.apps.export.target import Rows
-from dermis.apps.validation import truths as reference
-from dermis.apps.validation.truths.blender_process import Errand, blender_python, run_blender
-from dermis.apps.validation.truths.cycles_scene import camera_of
-from dermis.apps.validation.truths.described import UNIT_MM, world
-from dermis.apps.validation.truths.lights import CYCLES, lamp
+from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
+from dermis.apps.truths.cycles_scene import camera_of
+from dermis.apps.truths.described import UNIT_MM, world
+from dermis.apps.truths.lights import CYCLES, lamp
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
@@ -28,9 +28,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 _EMPTY = "DESCRIBED: dict[str, Any] = {}\n"
-_IMPORT = (
-    "from dermis.apps.validation.truths.cycles_script import add_light, add_object, set_camera, set_world\n"
-)
+_IMPORT = "from dermis.apps.truths.cycles_script import add_light, add_object, set_camera, set_world\n"
 _INSTEAD = "from mathutils import Matrix\n"
 _END = 'if __name__ == "__main__":'
 _BORROWED = (

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.mitsuba_scene import gap_of
-from dermis.apps.validation.truths.mitsuba_solid import Solid, inwards, skin_solid
+from dermis.apps.truths.mitsuba_scene import gap_of
+from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.frame.baking import baked_colours
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head

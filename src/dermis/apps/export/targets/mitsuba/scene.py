@@ -23,9 +23,9 @@ from dermis.apps.export.targets.mitsuba.xml import (
     include,
     picture_file,
 )
-from dermis.apps.validation.truths.described import rgb, surroundings
-from dermis.apps.validation.truths.lights import MITSUBA, emitter
-from dermis.apps.validation.truths.mitsuba_scene import ROULETTE_DEPTH, sensor_of
+from dermis.apps.truths.described import rgb, surroundings
+from dermis.apps.truths.lights import MITSUBA, emitter
+from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, sensor_of
 from dermis.scene.model import Scene
 from dermis.specular.fresnel import SKIN_ETA
 

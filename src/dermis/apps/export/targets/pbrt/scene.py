@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dermis.apps.export.lights import known_lights
-from dermis.apps.validation.truths.lights import facing_irradiance
+from dermis.apps.truths.lights import facing_irradiance
 from dermis.base.errors import notify
 from dermis.base.registry import Registry
 from dermis.environment.panorama import UNIFORM

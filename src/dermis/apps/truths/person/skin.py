@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from dermis.apps.validation.truths.mitsuba_scene import gap_of, mesh_shape, shell
-from dermis.apps.validation.truths.mitsuba_solid import Solid, inwards, skin_solid
-from dermis.apps.validation.truths.person.medium import INDEX, PASSED
-from dermis.apps.validation.truths.person.subject import Paint, Person
+from dermis.apps.truths.mitsuba_scene import gap_of, mesh_shape, shell
+from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
+from dermis.apps.truths.person.medium import INDEX, PASSED
+from dermis.apps.truths.person.subject import Paint, Person
 
 
 def picture(mi: Any, values: Any) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.triangles import Floats, Index, divide, sides
+from dermis.apps.truths.triangles import Floats, Index, divide, sides
 from dermis.base.errors import refuse
 from dermis.mesh.mesh import Mesh
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.photon import MAX_EVENTS, Words, deflect, refract, uniform
+from dermis.apps.truths.photon import MAX_EVENTS, Words, deflect, refract, uniform
 from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from dermis.apps.validation.truths.described import check_lens, rgb, surroundings
-from dermis.apps.validation.truths.lights import emitter
-from dermis.apps.validation.truths.mitsuba_solid import Solid, inwards, skin_solid
+from dermis.apps.truths.described import check_lens, rgb, surroundings
+from dermis.apps.truths.lights import emitter
+from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.base.errors import refuse
 from dermis.base.extras import needed
 from dermis.mesh.head import Head

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.validation.truths.surface_diffusion_operators import delaunay, intrinsic, mass_and_stiffness
-from dermis.apps.validation.truths.triangles import Floats, Index, sides
+from dermis.apps.truths.surface_diffusion_operators import delaunay, intrinsic, mass_and_stiffness
+from dermis.apps.truths.triangles import Floats, Index, sides
 from dermis.base.errors import refuse
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.tangents import sum_at

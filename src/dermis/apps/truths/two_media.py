@@ -20,7 +20,7 @@ def exchange(
 
     Source: [Wang1995], with a second medium.
     """
-    from dermis.apps.validation.truths.half_planes import count_crossings
+    from dermis.apps.truths.half_planes import count_crossings
 
     sigma_t = np.asarray(sigma_a, np.float64) + sigma_s_prime
     tally = np.zeros((len(edges_mm) - 1,) * 2, np.int64)

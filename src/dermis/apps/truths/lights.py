@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.described import (
+from dermis.apps.truths.described import (
     UNIT_MM,
     Described,
     cycles_axes,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.triangles import Floats, Index, sides
+from dermis.apps.truths.triangles import Floats, Index, sides
 from dermis.mesh.tangents import sum_at
 
 if TYPE_CHECKING:

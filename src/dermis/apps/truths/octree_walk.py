@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.octree import Tree
-from dermis.apps.validation.truths.radial_table import Table
+from dermis.apps.truths.octree import Tree
+from dermis.apps.truths.radial_table import Table
 from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.apps.validation.truths.slab import ScatteringLayer, SlabResult, check_mean_cosine
+from dermis.apps.truths.slab import ScatteringLayer, SlabResult, check_mean_cosine
 from dermis.base.errors import refuse
 from dermis.base.quantities import whole_number
 from dermis.optics.diffusion.boundary import normal_reflectance
@@ -18,7 +18,7 @@ from dermis.optics.media import Floats, Layer, Medium
 from dermis.optics.radial import RadialProfile, light_beyond, ring_edges
 
 if TYPE_CHECKING:
-    from dermis.apps.validation.truths.photon import Counts, Stack, Tally
+    from dermis.apps.truths.photon import Counts, Stack, Tally
 
 __all__ = ["ScatteringLayer", "SlabResult", "counted_profile", "default_edges", "trace_medium", "trace_slab"]
 
@@ -160,7 +160,7 @@ def _checked_edges(edges_mm: ArrayLike) -> Floats:
 
 
 def _stack(layers: Sequence[ScatteringLayer]) -> Stack:
-    from dermis.apps.validation.truths.photon import Stack
+    from dermis.apps.truths.photon import Stack
 
     def with_air(air: float, values: list[float]) -> Floats:
         return np.array([air, *values, air])
@@ -177,7 +177,7 @@ def _stack(layers: Sequence[ScatteringLayer]) -> Stack:
 def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report | None) -> Tally:
     from numba import config
 
-    from dermis.apps.validation.truths.photon import Tally, walk_batch
+    from dermis.apps.truths.photon import Tally, walk_batch
 
     stop = Event()
 
@@ -206,7 +206,7 @@ def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report 
 
 
 def _shares(tally: Tally, photons: int, edges: Floats, eta: float) -> SlabResult:
-    from dermis.apps.validation.truths.photon import refract
+    from dermis.apps.truths.photon import refract
 
     specular = refract(1.0, 1.0 / eta)[0]
     areas = np.pi * np.diff(edges**2)

@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.mitsuba_passes import Passes, kept_passes, scene_key, store_passes
-from dermis.apps.validation.truths.mitsuba_scene import (
+from dermis.apps.truths.mitsuba_passes import Passes, kept_passes, scene_key, store_passes
+from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     Lambertian,
     check_traceable,

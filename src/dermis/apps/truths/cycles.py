@@ -15,9 +15,9 @@ from typing import Any, Literal, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.blender_process import PYTHON_VARIABLE as PYTHON_VARIABLE
-from dermis.apps.validation.truths.blender_process import Errand, blender_python, run_blender
-from dermis.apps.validation.truths.cycles_scene import FALLOFFS, Below, describe
+from dermis.apps.truths.blender_process import PYTHON_VARIABLE as PYTHON_VARIABLE
+from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
+from dermis.apps.truths.cycles_scene import FALLOFFS, Below, describe
 from dermis.base.errors import DermisError, refuse
 from dermis.images.io import read_image
 from dermis.scene.model import Scene

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.described import rgb
-from dermis.apps.validation.truths.person.subject import Hairs
+from dermis.apps.truths.described import rgb
+from dermis.apps.truths.person.subject import Hairs
 
 Doubles = NDArray[np.float64]
 

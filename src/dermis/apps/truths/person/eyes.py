@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.mitsuba_scene import mesh_shape
-from dermis.apps.validation.truths.person.skin import picture
-from dermis.apps.validation.truths.person.subject import Paint, Person
+from dermis.apps.truths.mitsuba_scene import mesh_shape
+from dermis.apps.truths.person.skin import picture
+from dermis.apps.truths.person.subject import Paint, Person
 from dermis.mesh.eyeball import (
     LIMBUS_MM,
     SCLERA_MM,

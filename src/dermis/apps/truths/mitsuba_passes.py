@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.mitsuba_scene import Lambertian
+from dermis.apps.truths.mitsuba_scene import Lambertian
 from dermis.base.disk import find, keep
 from dermis.environment.panorama import load_panorama
 from dermis.optics.media import Medium

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.validation.truths.surface_diffusion import edge_for, margin_for, welded
-from dermis.apps.validation.truths.triangles import Floats, Index, divide, sides
+from dermis.apps.truths.surface_diffusion import edge_for, margin_for, welded
+from dermis.apps.truths.triangles import Floats, Index, divide, sides
 from dermis.base.errors import refuse
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.tangents import triangle_areas

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.described import UNIT_MM, check_lens, cycles_looking, world
-from dermis.apps.validation.truths.half_space import diffuse_albedo
-from dermis.apps.validation.truths.lights import lamp
-from dermis.apps.validation.truths.mitsuba_scene import Lambertian
+from dermis.apps.truths.described import UNIT_MM, check_lens, cycles_looking, world
+from dermis.apps.truths.half_space import diffuse_albedo
+from dermis.apps.truths.lights import lamp
+from dermis.apps.truths.mitsuba_scene import Lambertian
 from dermis.base.errors import refuse
 from dermis.mesh.head import Head
 from dermis.optics.media import Medium

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.irradiance_samples import IrradianceSamples
+from dermis.apps.truths.irradiance_samples import IrradianceSamples
 from dermis.mesh.tangents import triangle_areas
 
 Floats = NDArray[np.float64]

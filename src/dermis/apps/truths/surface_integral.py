@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.validation.truths.irradiance_samples import IrradianceSamples, Places, sample_irradiance
-from dermis.apps.validation.truths.octree import Tree, build_tree
-from dermis.apps.validation.truths.radial_table import GaussianSum, Profile, RadialTable, tabulate
+from dermis.apps.truths.irradiance_samples import IrradianceSamples, Places, sample_irradiance
+from dermis.apps.truths.octree import Tree, build_tree
+from dermis.apps.truths.radial_table import GaussianSum, Profile, RadialTable, tabulate
 from dermis.base.errors import refuse
 
 __all__ = ["GaussianSum", "IrradianceSamples", "Places", "RadialTable", "integrate", "sample_irradiance"]
@@ -50,7 +50,7 @@ def integrate(points: ArrayLike, samples: IrradianceSamples, profile: Profile, e
 def _gathered(places: Floats, samples: IrradianceSamples, profile: Profile, error: float) -> Floats:
     from numba import config
 
-    from dermis.apps.validation.truths.octree_walk import gather
+    from dermis.apps.truths.octree_walk import gather
 
     bound = (error / _ERROR_OF_BOUND) ** (2 / 3)
     tree, table = _weighed(build_tree(samples), bound / (_STRICT_BOUND * error)), tabulate(profile)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.truths.described import rgb
-from dermis.apps.validation.truths.mitsuba_passes import Passes, digest_surroundings, kept_passes
-from dermis.apps.validation.truths.mitsuba_scene import (
+from dermis.apps.truths.described import rgb
+from dermis.apps.truths.mitsuba_passes import Passes, digest_surroundings, kept_passes
+from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     lit_scene,
     load_mitsuba,
@@ -18,7 +18,7 @@ from dermis.apps.validation.truths.mitsuba_scene import (
     sensor_of,
     variant_of,
 )
-from dermis.apps.validation.truths.path_traced import (
+from dermis.apps.truths.path_traced import (
     SAMPLES_PER_PASS,
     PathTraced,
     Report,
@@ -27,12 +27,12 @@ from dermis.apps.validation.truths.path_traced import (
     passes_for,
     traced,
 )
-from dermis.apps.validation.truths.person.eyes import eye_shapes
-from dermis.apps.validation.truths.person.hairs import hair_shapes
-from dermis.apps.validation.truths.person.medium import PASSED, VOXELS, mean_free_paths, medium_of
-from dermis.apps.validation.truths.person.skin import picture, skin_shapes
-from dermis.apps.validation.truths.person.subject import Paint as Paint
-from dermis.apps.validation.truths.person.subject import Person, person_of
+from dermis.apps.truths.person.eyes import eye_shapes
+from dermis.apps.truths.person.hairs import hair_shapes
+from dermis.apps.truths.person.medium import PASSED, VOXELS, mean_free_paths, medium_of
+from dermis.apps.truths.person.skin import picture, skin_shapes
+from dermis.apps.truths.person.subject import Paint as Paint
+from dermis.apps.truths.person.subject import Person, person_of
 from dermis.scene.model import Scene
 
 _FORM = "person 1"  # raise when the same person is traced in another way
