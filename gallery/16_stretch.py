@@ -21,7 +21,7 @@ def draw(studio):
     lines = [{"position": (0.0, y, 0.0), "up": (0, 0, 1)} for y in (-40.0, -20.0, 0.0, 20.0)]
     lines += [{"position": (0.0, 0.0, z), "up": (0, 1, 0)} for z in (-20.0, 0.0, 20.0, 40.0, 60.0)]
     stripes = [dermis.StripeLight(direction=(-1, 0, 0), irradiance=(30, 30, 30), **line) for line in lines]
-    camera = dermis.profile(head).model_copy(update={"frame_mm": 130})
+    camera = dermis.side(head).model_copy(update={"frame_mm": 130})
     skin = dermis.Skin(profile="skin1", specular="none")
     scene = dermis.Scene(head, lights=stripes, camera=camera, skin=skin)
     panels = {label: studio.render(scene, stretch=way, transmission="none") for label, way in WAYS.items()}

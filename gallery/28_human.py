@@ -13,7 +13,7 @@ from dermis.apps.gallery.picture import main
 
 def draw(studio):
     head = studio.head("human")
-    views = {"front": dermis.portrait, "three-quarter": dermis.three_quarter, "side": dermis.profile}
+    views = {"front": dermis.portrait, "three-quarter": dermis.three_quarter, "side": dermis.side}
     panels = {}
     for technique, note in {"texture-space": "", "none": ", dry"}.items():
         for name, camera in views.items():

@@ -33,7 +33,7 @@ REGIONS = {
 
 VIEWS = {
     "portrait": dermis.portrait,  # shows the seam between neck and chest of the MakeHuman heads
-    "profile": dermis.profile,
+    "profile": dermis.side,
     "back": lambda head: dermis.Camera(position=(0, -25, -1100), target=(0, -25, 0)),  # and that of the crown
 }
 

@@ -6,14 +6,18 @@ import inspect
 import pydoc
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 from small_head import write_head
 
 import dermis
+import dermis.scene
 from dermis.gpu.device import Device
 from dermis.images.io import read_image
 
@@ -45,6 +49,54 @@ def test_all_names_are_listed_before_they_are_used() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_the_version_is_that_of_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))["project"]
+    monkeypatch.delitem(vars(dermis), "__version__", raising=False)
+    assert dermis.__version__ == version("dermis") and "__version__" in dir(dermis)
+
+    def unknown(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.delitem(vars(dermis), "__version__")
+    monkeypatch.setattr("importlib.metadata.version", unknown)
+    assert dermis.__version__ == project["version"]
+
+
+@pytest.mark.parametrize("module", [dermis, dermis.scene])
+def test_a_name_of_the_last_release_warns_and_works(module: ModuleType) -> None:
+    with pytest.warns(DeprecationWarning, match=r"profile is now dermis\.(scene\.)?side; .*") as told:
+        assert module.profile is dermis.side
+    assert [one.filename for one in told] == [__file__]
+    assert "profile" not in dir(module) and "profile" not in module.__all__
+
+
+OLD_MODULES = """
+import sys, warnings
+from importlib import import_module
+from dermis.base.renamed import MODULES
+for old, new in MODULES.items():
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        module = import_module(f"dermis.{old}")
+    assert module is import_module(f"dermis.{new}") is sys.modules[f"dermis.{old}"], old
+    assert module.__name__ == module.__spec__.name == f"dermis.{new}", old
+    (one,) = told
+    assert str(one.message).startswith(f"dermis.{old} is now dermis.{new}; the old name goes"), one
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    from dermis.batch.samples import decoded
+assert [one.filename for one in told] == [__file__], told
+from dermis.apps.batch import samples
+assert decoded is samples.decoded
+"""
+
+
+def test_modules_of_the_last_release_warn_and_are_the_new_ones(tmp_path: Path) -> None:
+    script = tmp_path / "old.py"
+    script.write_text(OLD_MODULES)
+    subprocess.run([sys.executable, str(script)], check=True)
+
+
 def test_import_by_star_gives_what_is_promised() -> None:
     names: dict[str, object] = {}
     exec("from dermis import *", names)
@@ -71,7 +123,7 @@ def test_a_renderer_is_kept_for_many_frames(
     head = dermis.load_head(write_head(tmp_path / "head.obj"))
     renderer = dermis.Renderer()
     front = dermis.Scene(head)
-    side = dermis.Scene(head, camera=dermis.profile(head), skin=dermis.Skin(mix=0.2))
+    side = dermis.Scene(head, camera=dermis.side(head), skin=dermis.Skin(mix=0.2))
     first = renderer.render(front, size=(32, 32), atlas=64)
     other = renderer.render(side, size=(32, 32), atlas=64)
     again = renderer.render(front, size=(32, 32), atlas=64)

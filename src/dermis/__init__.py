@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from dermis.base.renamed import find_renamed_modules, successor
+
 if TYPE_CHECKING:
     from dermis.apps.batch.reader import read_dataset
     from dermis.apps.export.run import export_skin
@@ -19,15 +21,18 @@ if TYPE_CHECKING:
     from dermis.base.errors import DermisError
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer, render
+    from dermis.human.hair.look import HairLook
     from dermis.human.person import Human
     from dermis.human.published import human_targets
     from dermis.human.regions.apply import with_regions
+    from dermis.human.skin.look import SkinLook
     from dermis.images.io import write_image
     from dermis.images.movie import MovieWriter
+    from dermis.mesh.eyes import EyeLook
     from dermis.mesh.head import Head
     from dermis.optics.profiles import load_profile
     from dermis.optics.tissue import Tissue, load_tissue
-    from dermis.scene.camera import Camera, portrait, profile, three_quarter
+    from dermis.scene.camera import Camera, portrait, side, three_quarter
     from dermis.scene.clips.clip import Clip
     from dermis.scene.clips.load import load_motion
     from dermis.scene.environment import Environment
@@ -51,6 +56,9 @@ _HOME = {
     "Head": "mesh.head",
     "load_head": "scene.heads",
     "Human": "human.person",
+    "SkinLook": "human.skin.look",
+    "EyeLook": "mesh.eyes",
+    "HairLook": "human.hair.look",
     "human_targets": "human.published",
     "with_regions": "human.regions.apply",
     "DermisError": "base.errors",
@@ -64,7 +72,7 @@ _HOME = {
     "render": "frame.renderer",
     "Camera": "scene.camera",
     "portrait": "scene.camera",
-    "profile": "scene.camera",
+    "side": "scene.camera",
     "three_quarter": "scene.camera",
     "Clip": "scene.clips.clip",
     "load_motion": "scene.clips.load",
@@ -95,6 +103,8 @@ __all__ = [
     "DermisError",
     "DirectionalLight",
     "Environment",
+    "EyeLook",
+    "HairLook",
     "Head",
     "Human",
     "MovieWriter",
@@ -106,6 +116,7 @@ __all__ = [
     "Scene",
     "Settings",
     "Skin",
+    "SkinLook",
     "SphereLight",
     "SpotLight",
     "StripeLight",
@@ -120,9 +131,9 @@ __all__ = [
     "load_scene",
     "load_tissue",
     "portrait",
-    "profile",
     "read_dataset",
     "render",
+    "side",
     "studio",
     "three_quarter",
     "unmix",
@@ -133,16 +144,24 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Public names on first use, so that `import dermis` stays quick."""
+    """Return a public name on first use, so that `import dermis` stays quick."""
     from importlib import import_module
 
-    if name not in _HOME:
+    if name == "__version__":
+        value = import_module(f"{__name__}.base.version").version()
+    elif name in _HOME:
+        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    elif new := successor(__name__, name):
+        return __getattr__(new)
+    else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    """The public names, whether they were used before or not."""
-    return [*__all__, *(name for name in globals() if name.startswith("__"))]
+    """List the public names, whether they were used before or not."""
+    return list({*__all__, "__version__", *(name for name in globals() if name.startswith("__"))})
+
+
+find_renamed_modules()

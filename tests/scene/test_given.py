@@ -32,7 +32,7 @@ def test_cameras_skins_and_environments_may_be_named(head: Head) -> None:
     scene = dermis.Scene(head, camera="cheek", skin={"mix": 0.2}, environment="uniform")  # type: ignore[arg-type]
     assert scene.camera == cheek(head) and scene.skin == dermis.Skin(mix=0.2)
     assert scene.environment == dermis.Environment(name="uniform") and scene.lights == ()
-    assert dermis.Scene(head, camera=dermis.profile).camera == dermis.profile(head)  # type: ignore[arg-type]
+    assert dermis.Scene(head, camera=dermis.side).camera == dermis.side(head)  # type: ignore[arg-type]
 
 
 def test_heads_may_be_named(head: Head, tmp_path: Path) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
+import dermis
+
 COMMANDS = {
     "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
     "animate": "Draw a head that moves, as a movie or as numbered pictures.",
@@ -58,6 +60,7 @@ def _run() -> int:
     from dermis.base.command_line import make_app, reflowed, run_app
 
     app = make_app("dermis", "Human skin: physically based, in real time, checked against the truth.")
+    app.version = lambda: dermis.__version__
     app.version_flags = ("--version",)
     if (chosen := next(iter(sys.argv[1:]), "")) in COMMANDS:
         command = getattr(import_module(f"dermis.cli.{chosen}"), chosen)

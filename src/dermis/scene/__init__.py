@@ -5,8 +5,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from dermis.base.renamed import successor
+
 if TYPE_CHECKING:
-    from dermis.scene.camera import Camera, portrait, profile, three_quarter
+    from dermis.scene.camera import Camera, portrait, side, three_quarter
     from dermis.scene.environment import Environment
     from dermis.scene.files import load_camera, load_lights, load_scene
     from dermis.scene.lights import *  # noqa: F403 each kind
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
     from dermis.scene.skin import Skin
 
 _HOMES = {
-    "camera": ("Camera", "portrait", "profile", "three_quarter"),
+    "camera": ("Camera", "portrait", "side", "three_quarter"),
     "environment": ("Environment",),
     "files": ("load_camera", "load_lights", "load_scene"),
     "model": ("Scene",),
@@ -36,13 +38,15 @@ __all__ = [  # besides those of dermis.scene.lights
     "load_lights",
     "load_scene",
     "portrait",
-    "profile",
+    "side",
     "three_quarter",
 ]
 
 
 def __getattr__(name: str) -> Any:
     """Names on first use: a command's help needs some of the models, not the heads."""
+    if new := successor(__name__, name):
+        return __getattr__(new)
     home = next((home for home, names in _HOMES.items() if name in names), "lights")
     module = import_module(f"{__name__}.{home}")
     if name.startswith("_") or not hasattr(module, name):

@@ -106,7 +106,7 @@ def three_quarter(head: Head) -> Camera:
     return _around(head, 40.0)
 
 
-def profile(head: Head) -> Camera:
+def side(head: Head) -> Camera:
     """From the head's left side."""
     return _around(head, 90.0)
 
@@ -130,7 +130,7 @@ def ear(head: Head) -> Camera:
 PRESETS = {
     "portrait": portrait,
     "three-quarter": three_quarter,
-    "profile": profile,
+    "profile": side,
     "ear": ear,
     "cheek": cheek,
 }

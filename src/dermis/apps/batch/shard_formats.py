@@ -10,12 +10,13 @@ import tarfile
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from functools import cache
-from importlib.metadata import version
+from importlib import metadata
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 from dermis.apps.batch.atomic_files import sync
 from dermis.base.reading import parse_json, read_file, understood
+from dermis.base.version import version
 from dermis.images.sizes import MOST_BYTES
 
 STAMP_NAME = "__whole__"
@@ -74,7 +75,7 @@ def read_stamp(data: bytes, culprit: object) -> Stamp:
 @cache
 def versions() -> dict[str, str]:
     """Of what draws."""
-    return {"dermis": version("dermis"), "wgpu": version("wgpu"), "python": platform.python_version()}
+    return {"dermis": version(), "wgpu": metadata.version("wgpu"), "python": platform.python_version()}
 
 
 def made_with(adapter: str) -> dict[str, str]:

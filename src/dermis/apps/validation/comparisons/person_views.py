@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.environment.panorama import UNIFORM
 from dermis.mesh.head import Head
-from dermis.scene.camera import PRESETS, Camera, profile, three_quarter
+from dermis.scene.camera import PRESETS, Camera, side, three_quarter
 from dermis.scene.camera import cheek as at_cheek
 from dermis.scene.camera import portrait as from_front
 from dermis.scene.environment import Environment
@@ -90,7 +90,7 @@ def _mouth_mm(head: Head) -> float:
 VIEWS: dict[str, View] = {
     "portrait": View(from_front, "studio"),
     "three-quarter": View(three_quarter, "studio"),
-    "profile": View(profile, "studio"),
+    "profile": View(side, "studio"),
     "eye": View(at_eye, "window", times=2.0),
     "eye from its side": View(at_eye_beside, "window", times=2.0),
     "lips and teeth": View(at_lips, "studio", SMILE),

@@ -6,7 +6,6 @@ import json
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
+from dermis.base.version import version
 from dermis.frame.baking import Baked, bake
 from dermis.frame.painted import with_painted_maps
 from dermis.frame.passes.painting.paint import LEAST, MOST
@@ -168,7 +168,7 @@ def _told(baked: Baked, scene: Scene, normal_y: NormalY, described: dict[str, An
     around = scene.environment
     return {
         "format": "dermis maps 1",
-        "made_by": f"dermis {version('dermis')}",
+        "made_by": f"dermis {version()}",
         "size": len(baked.covered),
         "layout": "the head's own uv, each texel at its centre; row 0 of the pictures is the top, v = 1 in "
         "glTF's and OBJ's upward count",
