@@ -84,10 +84,10 @@ for old, new in MODULES.items():
     assert str(one.message).startswith(f"dermis.{old} is now dermis.{new}; the old name goes"), one
 with warnings.catch_warnings(record=True) as told:
     warnings.simplefilter("always")
-    from dermis.batch.samples import decoded
+    from dermis.unmixing.change import Change
 assert [one.filename for one in told] == [__file__], told
-from dermis.apps.batch import samples
-assert decoded is samples.decoded
+from dermis.apps.inverse.unmixing import change
+assert Change is change.Change
 """
 
 
