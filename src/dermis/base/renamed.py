@@ -26,7 +26,7 @@ MODULES: Mapping[str, str] = {
     "export": "apps.export",
     "fitting": "apps.inverse.fitting",
     "gallery": "apps.gallery",
-    "reference": "apps.validation.truths",
+    "reference": "apps.truths",
     "registry": "base.registry",
     "unmixing": "apps.inverse.unmixing",
     "viewer": "apps.viewer",
