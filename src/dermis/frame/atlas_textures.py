@@ -121,8 +121,8 @@ def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: A
         return AtlasTextures(resources, **more)
     beyond = np.concatenate([sheet.source.view(np.uint32), sheet.gutter.astype(np.uint32)], axis=1)
     gathered = scratch(device, device.space(_LIGHT * len(beyond)))
-    lists = {"gutter": device.buffer(beyond, "STORAGE"), "gathered": gathered}
-    return AtlasTextures(resources, gutter_texels=sheet.gutter, **lists, **more)
+    gutter = device.buffer(beyond, "STORAGE")
+    return AtlasTextures(resources, gutter_texels=sheet.gutter, gutter=gutter, gathered=gathered, **more)
 
 
 def _rooted(atlas: Atlas) -> NDArray[np.uint32]:

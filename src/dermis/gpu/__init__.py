@@ -9,10 +9,25 @@ from dermis.gpu.memo import Memo
 from dermis.gpu.program import ComputeProgram, Constants, compiled
 from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.recorder import Recorder
-from dermis.gpu.textures import download, make_texture, upload
+from dermis.gpu.textures import download, make_texture, texture_from, upload, view_of
+from dermis.gpu.types import (
+    Bindable,
+    Bindings,
+    Buffer,
+    MutableBindings,
+    Record,
+    Resource,
+    Sampler,
+    Texture,
+    TextureOrView,
+    TextureView,
+)
 
 __all__ = [
     "Adapter",
+    "Bindable",
+    "Bindings",
+    "Buffer",
     "ComputeProgram",
     "Constants",
     "Device",
@@ -20,13 +35,22 @@ __all__ = [
     "Frame",
     "Graph",
     "Memo",
+    "MutableBindings",
     "RasterProgram",
+    "Record",
     "Recorder",
+    "Resource",
+    "Sampler",
+    "Texture",
+    "TextureOrView",
+    "TextureView",
     "compiled",
     "download",
     "list_adapters",
     "make_texture",
     "open_device",
     "scratch",
+    "texture_from",
     "upload",
+    "view_of",
 ]

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Container
 from dataclasses import dataclass, field
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from dermis.gpu.types import Bindable, Resource
 
 if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
 _number = count(1)
+R = TypeVar("R", bound=Resource)
 
 
 @dataclass(eq=False, slots=True)
@@ -68,15 +71,15 @@ def new_number() -> int:
     return next(_number)
 
 
-def scratch(device: Device, resource: Any) -> Any:
+def scratch(device: Device, resource: R) -> R:
     """The texture or buffer, which passes share: none runs only for what it leaves there."""
     slot_of(device, resource).scratch = True
     return resource
 
 
-def slot_of(device: Device, resource: Any) -> Slot:
+def slot_of(device: Device, resource: Bindable) -> Slot:
     """The slot of a texture, a buffer or a view."""
-    found: Slot | None = device.slots.get(resource)
+    found = device.slots.get(resource)
     if found is None:
         texture = getattr(resource, "texture", None)
         found = device.slots[resource] = Slot(slot_of(device, texture) if texture is not None else None)

@@ -6,10 +6,10 @@ import contextlib
 import logging
 import os
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,13 @@ from dermis.gpu.adapters import Adapter, fitting_adapters
 from dermis.gpu.address_space import check_software
 from dermis.gpu.default_limits import check_limits, limits_within
 from dermis.gpu.no_room import room_for
+from dermis.gpu.types import Bindable, Buffer, Sampler
+
+if TYPE_CHECKING:
+    from dermis.gpu.access import Slot
+    from dermis.gpu.readback import Fetched
+
+T = TypeVar("T")
 
 _TIMED_PASSES = 2048
 _STAGING_STEP = 4096
@@ -85,23 +92,23 @@ class Device:
         self.has_timestamps = "timestamp-query" in features
         self.executor = ThreadPoolExecutor(os.cpu_count())
         weakref.finalize(self, self.executor.shutdown, wait=False, cancel_futures=True)
-        self._timestamps: tuple[Any, Any] | None = None
-        self._uniform_chunks: list[Any] = []
+        self._timestamps: tuple[Any, Buffer] | None = None
+        self._uniform_chunks: list[Buffer] = []
         self.spare_records: list[bytearray] = []
-        self.slots: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
-        self.programs: dict[Any, Any] = {}
-        self._shared: dict[str, Any] = {}
-        self._staging: dict[int, list[Any]] = {}
-        self.fetching: set[Any] = set()
-        self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
+        self.slots: weakref.WeakKeyDictionary[Bindable, Slot] = weakref.WeakKeyDictionary()
+        self.programs: dict[Hashable, object] = {}
+        self._shared: dict[str, object] = {}
+        self._staging: dict[int, list[Buffer]] = {}
+        self.fetching: set[Fetched] = set()
+        self._samplers: dict[tuple[tuple[str, str], ...], Sampler] = {}
 
-    def shared(self, name: str, make: Callable[[], Any]) -> Any:
+    def shared(self, name: str, make: Callable[[], T]) -> T:
         """A small object by its name, made on first use and kept as long as the device."""
         if name not in self._shared:
             self._shared[name] = make()
-        return self._shared[name]
+        return cast(T, self._shared[name])
 
-    def write(self, buffer: Any, data: bytearray | bytes, size: int) -> None:
+    def write(self, buffer: Buffer, data: bytearray | bytes, size: int) -> None:
         """Put the first `size` bytes of the data into a buffer before the next submit."""
         start = self.ffi.from_buffer(data)
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
@@ -148,17 +155,17 @@ class Device:
         """Length of a timestamp's tick [ns]; wgpu returns the native API's ticks."""
         return float(self.lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
-    def uniform_chunk(self, index: int, size: int) -> Any:
+    def uniform_chunk(self, index: int, size: int) -> Buffer:
         """One of the frames' uniform buffers, of `size` bytes; made on first use."""
         while len(self._uniform_chunks) <= index:
             self._uniform_chunks.append(self.uniform_buffer(size))
         return self._uniform_chunks[index]
 
-    def uniform_buffer(self, size: int) -> Any:
+    def uniform_buffer(self, size: int) -> Buffer:
         """A new uniform buffer of `size` bytes."""
         return self.buffer(np.zeros(size, np.uint8), "UNIFORM")
 
-    def staging(self, size: int) -> Any:
+    def staging(self, size: int) -> Buffer:
         """A staging buffer of at least `size` bytes, one given back if there is any."""
         size = -(-size // _STAGING_STEP) * _STAGING_STEP
         spare = self._staging.get(size)
@@ -168,13 +175,13 @@ class Device:
             "copy for reading", size, "MAP_READ", partial(self.handle.create_buffer, size=size)
         )
 
-    def give_back(self, buffer: Any) -> None:
+    def give_back(self, buffer: Buffer) -> None:
         """Keep a buffer from `staging` for reuse at its size; the first of another size drops the others."""
         if buffer.size not in self._staging:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)
 
-    def buffer(self, data: NDArray[Any], usage: str, name: str = "buffer") -> Any:
+    def buffer(self, data: NDArray[np.generic], usage: str, name: str = "buffer") -> Buffer:
         """A new buffer with the array's bytes.
 
         usage : wgpu's name ("STORAGE", "UNIFORM")
@@ -184,11 +191,11 @@ class Device:
         create = partial(self.handle.create_buffer_with_data, data=data)
         return self._buffer(name, data.nbytes, usage, create)
 
-    def space(self, size: int, name: str = "buffer") -> Any:
+    def space(self, size: int, name: str = "buffer") -> Buffer:
         """A new buffer of zeros that shaders write [byte]."""
         return self._buffer(name, size, "STORAGE", partial(self.handle.create_buffer, size=size))
 
-    def _buffer(self, name: str, size: int, usage: str, create: Callable[..., Any]) -> Any:
+    def _buffer(self, name: str, size: int, usage: str, create: Callable[..., Buffer]) -> Buffer:
         import wgpu
 
         flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST
@@ -197,18 +204,18 @@ class Device:
         with room_for(self.adapter.name, name, size, most):
             return create(usage=flags)
 
-    def sampler(self, **options: str) -> Any:
+    def sampler(self, **options: str) -> Sampler:
         """A sampler with wgpu's options; made once for each set of them."""
         key = tuple(sorted(options.items()))
         if key not in self._samplers:
             self._samplers[key] = self.handle.create_sampler(**options)
         return self._samplers[key]
 
-    def sampler_options(self, sampler: Any) -> dict[str, str]:
+    def sampler_options(self, sampler: Sampler) -> dict[str, str]:
         """The options that a sampler was made with."""
         return next(dict(key) for key, made in self._samplers.items() if made is sampler)
 
-    def timestamp_pool(self) -> tuple[Any, Any]:
+    def timestamp_pool(self) -> tuple[Any, Buffer]:
         """The query set for a frame's timestamps and the buffer that they are resolved into."""
         import wgpu
 

@@ -14,6 +14,7 @@ from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.timing import Timestamps, WallClock
+from dermis.gpu.types import Buffer, Texture, TextureOrView, TextureView
 from dermis.gpu.uniforms import Uniforms
 
 Timed = bool | Literal["whole"]
@@ -79,16 +80,16 @@ class Frame(Recorder):
         elif steps:
             self._compute_pass(steps[0].stage).run(steps)
 
-    def write(self, stage: str, buffer: Any, data: bytes) -> None:
+    def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
         """Put bytes into the start of a buffer, before what is submitted next."""
         self.device.write(buffer, data, len(data))
 
-    def clear(self, buffer: Any) -> None:
+    def clear(self, buffer: Buffer) -> None:
         """Fill a buffer with zeros."""
         self._end_pass()
         self._encoder.clear_buffer(buffer, 0, buffer.size)
 
-    def copy(self, buffer: Any, texture: Any, *, pitch: int, layers: int) -> None:
+    def copy(self, buffer: Buffer, texture: Texture, *, pitch: int, layers: int) -> None:
         """Copy rows of `pitch` 4-byte pixels, layer after layer, from a buffer into a texture."""
         width, height = texture.size[:2]
         self._end_pass()
@@ -98,7 +99,7 @@ class Frame(Recorder):
             (width, height, layers),
         )
 
-    def fetch(self, buffers: Sequence[Any], fetched: Fetched) -> None:
+    def fetch(self, buffers: Sequence[Buffer], fetched: Fetched) -> None:
         """Send the bytes of buffers on their way, one after the other, as the passes so far leave them."""
         self._end_pass()
         start = 0
@@ -114,11 +115,11 @@ class Frame(Recorder):
         resources: Resources,
         vertices: int,
         *,
-        indices: Any = None,
+        indices: Buffer | None = None,
         layer: int = 0,
-        depth: Any,
+        depth: TextureView,
         far: float,
-        target: Any = None,
+        target: TextureOrView | None = None,
     ) -> None:
         """Rasterise `vertices` / 3 triangles into cleared targets.
 
@@ -142,7 +143,7 @@ class Frame(Recorder):
         one.end()
 
     def fill(
-        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[Any]
+        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[TextureOrView]
     ) -> None:
         """Run `program` for each texel of its targets, textures or views of them, in a render pass."""
         views = [one.create_view() if hasattr(one, "create_view") else one for one in targets]
@@ -176,7 +177,7 @@ class Frame(Recorder):
         stage: str,
         program: RasterProgram | FragmentProgram,
         resources: Resources,
-        targets: Sequence[Any],
+        targets: Sequence[TextureOrView],
         depth: dict[str, Any] | None = None,
     ) -> Any:
         """A pass over cleared targets in which `program` is about to draw."""

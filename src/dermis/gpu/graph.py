@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, TypeVar, TypeVarTuple
 
 from dermis.gpu.access import Access, Slot, slot_of
 from dermis.gpu.dependencies import Declared, Dependencies
@@ -16,9 +16,11 @@ from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.recording import Recordings
+from dermis.gpu.types import Buffer, TextureOrView, TextureView
 from dermis.gpu.uniforms import Uniforms
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 Groups = tuple[int, int, int]
 _MOST_KNOWN = 8  # kinds of frames in turn: pictures, their readback, and those of several views
 
@@ -57,7 +59,7 @@ class Graph(Recorder):
         self._passes: list[Pass] = []
         self._uniforms = Uniforms(device)
         self._known: list[Dependencies] = []
-        self._fetches: list[tuple[tuple[Any, ...], Fetched]] = []
+        self._fetches: list[tuple[tuple[Buffer, ...], Fetched]] = []
 
     def forget(self) -> None:
         """Take all content for unknown: the next frame runs every pass."""
@@ -84,7 +86,7 @@ class Graph(Recorder):
 
         self._add(stage, program, resources, groups, access, writes, run)
 
-    def write(self, stage: str, buffer: Any, data: bytes) -> None:
+    def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
         """Declare that the host puts bytes into the start of a buffer, before all passes.
 
         data : the same object in each frame costs nothing, as Python keeps the hash of bytes
@@ -105,25 +107,34 @@ class Graph(Recorder):
         resources: Resources,
         vertices: int,
         *,
-        indices: Any = None,
+        indices: Buffer | None = None,
         layer: int = 0,
-        depth: Any,
+        depth: TextureView,
         far: float,
-        target: Any = None,
+        target: TextureOrView | None = None,
     ) -> None:
         """Declare a pass that rasterises triangles into cleared targets, as `Frame.draw` does."""
         writes = tuple(slot_of(self.device, one) for one in (depth, target) if one is not None)
 
         def run(frame: Frame) -> None:
-            attached = {"depth": depth, "far": far, "target": target}
-            frame.draw(stage, program, resources, vertices, indices=indices, layer=layer, **attached)
+            frame.draw(
+                stage,
+                program,
+                resources,
+                vertices,
+                indices=indices,
+                layer=layer,
+                depth=depth,
+                far=far,
+                target=target,
+            )
 
         access = program.access(resources)
         taken = None if indices is None else slot_of(self.device, indices)
         self._add(stage, program, resources, (vertices,), access, writes, run, (layer, far, taken))
 
     def fill(
-        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[Any]
+        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[TextureOrView]
     ) -> None:
         """Declare a pass for each texel of its targets, as `Frame.fill` does."""
         writes = tuple(slot_of(self.device, one) for one in targets)
@@ -133,7 +144,7 @@ class Graph(Recorder):
 
         self._add(stage, program, resources, (3,), program.access(resources), writes, run)
 
-    def repeat(self, record: Callable[..., T], *args: Any) -> T:
+    def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Declare the passes that `record(graph, *args)` declares, recorded once for the same arguments.
 
         Compute passes only. The recording runs as a whole or not at all, and takes Python next to no time.
@@ -146,7 +157,7 @@ class Graph(Recorder):
         self._passes.append(Pass(recording.stages, lambda frame: frame.run(steps), access.number, declared))
         return result
 
-    def fetch(self, *buffers: Any) -> Fetched:
+    def fetch(self, *buffers: Buffer) -> Fetched:
         """The bytes of buffers, one after the other, as all the frame's passes leave them."""
         fetched = Fetched(self.device, sum(buffer.size for buffer in buffers))
         self._fetches.append((buffers, fetched))

@@ -7,11 +7,12 @@ from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, TypeVarTuple, overload
 
 import numpy as np
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 Role = tuple[Callable[..., Any], str]
 
 
@@ -43,7 +44,13 @@ class Memo:
         self._making: list[Made] = []
         self._found: list[tuple[Role, Made]] = []  # in this round, parts not among them
 
-    def keep(self, make: Callable[..., T], *args: Any, using: tuple[Any, ...] = (), of: str = "") -> T:
+    @overload
+    def keep(self, make: Callable[[*Ts], T], *args: *Ts, of: str = "") -> T: ...
+
+    @overload
+    def keep(self, make: Callable[..., T], *args: object, using: tuple[object, ...], of: str = "") -> T: ...
+
+    def keep(self, make: Callable[..., T], *args: object, using: tuple[object, ...] = (), of: str = "") -> T:
         """What `make(*args, *using)` returned, made unless these are among the arguments used last.
 
         using : what it also takes, and what makes no other result where the arguments are the same
@@ -73,7 +80,7 @@ class Memo:
         value: T = found.value
         return value
 
-    def soon(self, executor: Executor, make: Callable[..., T], *args: Any, of: str = "") -> Future[T]:
+    def soon(self, executor: Executor, make: Callable[[*Ts], T], *args: *Ts, of: str = "") -> Future[T]:
         """What `make(*args)` returns, begun on another thread unless it is kept; for `wait`."""
         return self.keep(_begin, executor, make, args, of=of)
 
@@ -126,7 +133,7 @@ class Memo:
             self._touch(*part)
 
 
-def _begin(executor: Executor, make: Callable[..., T], args: tuple[Any, ...]) -> Future[T]:
+def _begin(executor: Executor, make: Callable[[*Ts], T], args: tuple[*Ts]) -> Future[T]:
     return executor.submit(make, *args)
 
 

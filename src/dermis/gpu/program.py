@@ -7,9 +7,10 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
 from dermis.gpu.access import Access, new_number, slot_of
@@ -17,10 +18,13 @@ from dermis.gpu.bind_groups import UNIFORM, make_group
 from dermis.gpu.by_resources import ByResources, key_of
 from dermis.gpu.device import Device
 from dermis.gpu.shader_types import Binding, bindings, members_read, record_of
+from dermis.gpu.types import Bindable, Bindings, Record
 from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Folder, Source, compose
 
-Resources = Mapping[str, Any]
+Resources = Bindings
+Records = Mapping[str, NDArray[np.generic]]
+"""The uniforms of bindings, where a shader is known to declare them so."""
 P = TypeVar("P")
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 _LARGE_RECORD = 2048  # bytes; a skin is smaller, of which few shaders read all
@@ -29,7 +33,7 @@ Constants = tuple[tuple[str, float], ...]
 """Names and values of pipeline constants, a shader's `override`s; those left out keep their default."""
 
 
-def _reader(names: Sequence[str]) -> Callable[[Resources], Sequence[Any]]:
+def _reader(names: Sequence[str]) -> Callable[[Resources], Sequence[Bindable]]:
     """Takes what is named out of what is given."""
     if len(names) > 1:
         return itemgetter(*names)
@@ -64,14 +68,15 @@ class Program:
         self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
-    def record(self, struct: str, **values: Any) -> np.ndarray[Any, Any]:
+    def record(self, struct: str, **values: object) -> Record:
         """A zeroed record of one of the shader's structs with the given members filled in."""
         return record_of(self.source.text, struct, **values)
 
     def places(self, resources: Resources, uniforms: Uniforms) -> tuple[int, ...]:
         """Where the records are among the uniforms."""
+        records = cast("Records", resources)
         try:
-            return tuple([uniforms.place(resources[name]) for name, _ in self._numbers_of])
+            return tuple([uniforms.place(records[name]) for name, _ in self._numbers_of])
         except KeyError as missing:
             raise self._unbound(missing) from None
 
@@ -106,15 +111,16 @@ class Program:
     def numbers(self, resources: Resources, uniforms: Uniforms) -> tuple[Hashable, ...]:
         """What the shader reads of the records; all of large ones, whose hash several passes share."""
         found: list[Hashable] = []
+        records = cast("Records", resources)
         try:
             for name, read in self._numbers_of:
-                raw = uniforms.bytes_of(resources[name])
+                raw = uniforms.bytes_of(records[name])
                 found.append(raw if len(raw) > _LARGE_RECORD else read(raw))
         except KeyError as missing:
             raise self._unbound(missing) from None
         return tuple(found)
 
-    def _bound(self, resources: Resources) -> Sequence[Any]:
+    def _bound(self, resources: Resources) -> Sequence[Bindable]:
         """What is bound besides records, in the shader's order."""
         try:
             return self._read(resources)
@@ -126,7 +132,8 @@ class Program:
 
     def _make_group(self, bound: Sequence[Any], resources: Resources) -> Any:
         """The group of what the others are, and then the uniforms' buffers."""
-        sizes = [resources[one.name].nbytes for one in self._uniforms]
+        records = cast("Records", resources)
+        sizes = [records[one.name].nbytes for one in self._uniforms]
         return make_group(self.device, self._group_layout, (*self._others, *self._uniforms), bound, sizes)
 
     def _compile(self, path: Path) -> Any:
@@ -188,7 +195,7 @@ def compiled(device: Device, shader: Hashable, constants: Constants, make: Calla
 
     shader : what tells it from others
     """
-    variants: dict[Constants, P] = device.programs.setdefault(shader, {})
+    variants = cast(dict[Constants, P], device.programs.setdefault(shader, {}))
     found = variants.pop(constants, None)
     if found is None:
         found = make()

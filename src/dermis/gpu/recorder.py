@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar, TypeVarTuple
 
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, Resources
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 
 
 class Recorder(ABC):
@@ -44,6 +45,6 @@ class Recorder(ABC):
         """Take a pass of size[0] x size[1] invocations, in workgroups of tile x tile."""
         self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), completes)
 
-    def repeat(self, record: Callable[..., T], *args: Any) -> T:
+    def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Take the passes of `record(recorder, *args)`."""
         return record(self, *args)

@@ -6,7 +6,7 @@ import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property, partial
-from typing import Any, TypeVar
+from typing import Any, TypeVar, TypeVarTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from dermis.gpu.recorder import Recorder
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 _MOST = 4  # recordings of a function: two states, each in motion and still
 
 
@@ -106,7 +107,9 @@ class Recordings:
     def __init__(self) -> None:
         self._known: dict[Callable[..., Any], list[tuple[Any, Recording, Any]]] = {}
 
-    def find(self, device: Device, record: Callable[..., T], args: tuple[Any, ...]) -> tuple[Recording, T]:
+    def find(
+        self, device: Device, record: Callable[[Recorder, *Ts], T], args: tuple[*Ts]
+    ) -> tuple[Recording, T]:
         """What `record` did for these arguments and what it returned; it is called when that is not known."""
         known = self._known.setdefault(record, [])
         found = next((one for one in known if not one[1].is_void and _alike(one[0], args)), None)

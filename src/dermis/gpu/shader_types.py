@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from dermis.base.errors import DermisError
+from dermis.gpu.types import Record
 
 _COMMENT = re.compile(r"//[^\n]*")
 _STRUCT = re.compile(r"struct\s+(\w+)\s*\{([^}]*)\}")
@@ -74,7 +75,7 @@ def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
     return dtype
 
 
-def record_of(text: str, struct: str, **values: Any) -> np.ndarray[Any, Any]:
+def record_of(text: str, struct: str, **values: object) -> Record:
     """A zeroed record of one of a text's structs with the given members filled in."""
     record = np.zeros((), dtype=struct_dtype(text, struct))
     for member, value in values.items():

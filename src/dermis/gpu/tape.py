@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar, TypeVarTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,13 @@ from dermis.gpu.device import Device
 from dermis.gpu.graph import Graph
 from dermis.gpu.program import ComputeProgram, Program, Resources
 from dermis.gpu.raster_program import FragmentProgram, RasterProgram
+from dermis.gpu.recorder import Recorder
 from dermis.gpu.shader_types import Binding, record_type
 from dermis.gpu.tape_content import content_of, described
+from dermis.gpu.types import Buffer, Record, TextureOrView, TextureView
 
-Record = NDArray[Any]
+T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 Bound = list[int]
 """In the order of the program's bindings: numbers of resources, and -1 - k for the take's record k."""
 
@@ -129,7 +132,7 @@ class Tape(Graph):
         taken = self._pass(stage, program, resources, groups)
         taken.completes = self.resource(resources[completes]) if completes else -1
 
-    def write(self, stage: str, buffer: Any, data: bytes) -> None:
+    def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
         """Take down what the host writes."""
         written = self.resource(buffer), data
         self._take.add(Taken(stage, None, [], (len(data),), written=written), self._unit)
@@ -141,11 +144,11 @@ class Tape(Graph):
         resources: Resources,
         vertices: int,
         *,
-        indices: Any = None,
+        indices: Buffer | None = None,
         layer: int = 0,
-        depth: Any,
+        depth: TextureView,
         far: float,
-        target: Any = None,
+        target: TextureOrView | None = None,
     ) -> None:
         """Take down a pass that rasterises."""
         attached = {"indices": indices, "depth": depth, "target": target}
@@ -154,12 +157,12 @@ class Tape(Graph):
         taken.raster = {"layer": layer, "far": far, **numbers}
 
     def fill(
-        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[Any]
+        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[TextureOrView]
     ) -> None:
         """Nothing that is taken down fills targets."""
         raise NotImplementedError(f"{stage}: passes that fill targets are not taken down")
 
-    def repeat(self, record: Callable[..., Any], *args: Any) -> Any:
+    def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Take down the passes of `record(tape, *args)`, which run as a whole."""
         if self._unit is not None:
             return record(self, *args)

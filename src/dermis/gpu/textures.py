@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import DermisError
 from dermis.gpu.device import Device
 from dermis.gpu.no_room import room_for
+from dermis.gpu.types import Texture, TextureView
 
 _FORMATS: dict[str, tuple[type[np.generic], int]] = {
     "r8unorm": (np.uint8, 1),
@@ -45,7 +46,7 @@ def make_texture(
     mips: int = 1,
     use: str = "compute",
     name: str = "texture",
-) -> Any:
+) -> Texture:
     """An empty 2-D texture (an array when `layers` > 1).
 
     size : (width, height) [texel]
@@ -71,20 +72,24 @@ def make_texture(
     described = f"{name} of {size[0]}x{size[1]}x{layers} {texel}"
     texels = layers * sum(max(1, size[0] >> mip) * max(1, size[1] >> mip) for mip in range(mips))
     with room_for(device.adapter.name, described, FORMAT_BYTES[texel] * texels, math.inf):
-        return device.handle.create_texture(
+        made: Texture = device.handle.create_texture(
             size=(*size, layers), format=texel, usage=usage, mip_level_count=mips, dimension="2d"
         )
+    return made
 
 
-def view_of(texture: Any, *, layer: int = 0, mip: int = 0) -> Any:
+def view_of(texture: Texture, *, layer: int = 0, mip: int = 0) -> TextureView:
     """A 2-D view of one mip level of one layer, which tells them as its `part`."""
-    one = {"dimension": "2d", "array_layer_count": 1, "mip_level_count": 1}
-    view = texture.create_view(base_array_layer=layer, base_mip_level=mip, **one)
+    view = texture.create_view(
+        dimension="2d", base_array_layer=layer, array_layer_count=1, base_mip_level=mip, mip_level_count=1
+    )
     view.part = layer, mip
     return view
 
 
-def upload(device: Device, texture: Any, array: NDArray[Any], *, mip: int = 0, layer: int = 0) -> None:
+def upload(
+    device: Device, texture: Texture, array: NDArray[np.generic], *, mip: int = 0, layer: int = 0
+) -> None:
     """Fill one mip level of one layer with an (h, w) or (h, w, c) array of the texture's own type."""
     kind, channels = _FORMATS[texture.format]
     data = np.ascontiguousarray(array, dtype=kind)
@@ -99,19 +104,19 @@ def upload(device: Device, texture: Any, array: NDArray[Any], *, mip: int = 0, l
         device.handle.queue.submit([])  # starts the copy while Python goes on
 
 
-def texel_bytes(texture: Any) -> int:
+def texel_bytes(texture: Texture) -> int:
     """Bytes of one texel of a texture."""
     return FORMAT_BYTES[texture.format]
 
 
-def texture_from(device: Device, array: NDArray[Any], texel: str, name: str = "texture") -> Any:
+def texture_from(device: Device, array: NDArray[np.generic], texel: str, name: str = "texture") -> Texture:
     """A texture for reading that holds the (h, w) or (h, w, c) array."""
     texture = make_texture(device, (array.shape[1], array.shape[0]), texel, use="map", name=name)
     upload(device, texture, array)
     return texture
 
 
-def download(device: Device, texture: Any, *, mip: int = 0, layer: int = 0) -> NDArray[Any]:
+def download(device: Device, texture: Texture, *, mip: int = 0, layer: int = 0) -> NDArray[Any]:
     """One mip level of one layer as an (h, w, c) array, or (h, w) for one channel."""
     kind, channels = _FORMATS[texture.format]
     width, height = max(1, texture.size[0] >> mip), max(1, texture.size[1] >> mip)

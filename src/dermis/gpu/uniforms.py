@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from dermis.gpu.device import Device
+from dermis.gpu.types import Buffer
 
 CHUNK_BYTES = 1 << 18
 _STEP = 256  # WebGPU's default alignment of uniforms in a buffer
@@ -22,29 +23,29 @@ class Uniforms:
     chunk : gives the buffers by number, CHUNK_BYTES each; those of the device when left out
     """
 
-    def __init__(self, device: Device, chunk: Callable[[int], Any] | None = None) -> None:
+    def __init__(self, device: Device, chunk: Callable[[int], Buffer] | None = None) -> None:
         self._device = device
         self._chunk = chunk or partial(device.uniform_chunk, size=CHUNK_BYTES)
         self._staged: list[bytearray] = []
         self._end = CHUNK_BYTES
-        self._taken: dict[int, tuple[bytes, NDArray[Any]]] = {}  # which keeps the records' names
+        self._taken: dict[int, tuple[bytes, NDArray[np.generic]]] = {}  # which keeps the records' names
         self._placed: dict[int, int] = {}
 
-    def bytes_of(self, record: NDArray[Any]) -> bytes:
+    def bytes_of(self, record: NDArray[np.generic]) -> bytes:
         """A record as it is when it comes first; it must not be changed until the frame is submitted."""
         found = self._taken.get(id(record))
         if found is None:
             found = self._taken[id(record)] = record.tobytes(), record
         return found[0]
 
-    def place(self, record: NDArray[Any]) -> int:
+    def place(self, record: NDArray[np.generic]) -> int:
         """Where the record will be, counted through all buffers [byte]."""
         found = self._placed.get(id(record))
         if found is None:
             found = self._placed[id(record)] = self._add(self.bytes_of(record))
         return found
 
-    def at(self, place: int) -> tuple[Any, int]:
+    def at(self, place: int) -> tuple[Buffer, int]:
         """The buffer of a place, and the offset in it."""
         number, offset = divmod(place, CHUNK_BYTES)
         return self._chunk(number), offset
