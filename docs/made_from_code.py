@@ -210,6 +210,8 @@ def bibliography() -> str:
 
 def _as_fields(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
     """Lines "name : meaning" of the house's docstrings as Sphinx's fields, and keys as links."""
+    if isinstance(thing, type) and issubclass(thing, Plain) and "Parameters" in lines:
+        del lines[lines.index("Parameters") :]  # the table that follows has them
     made: list[str] = []
     entry: list[str] = []  # of the fields of a line, with what goes on below it
     for line in [*lines, ""]:
@@ -238,12 +240,5 @@ def _fields_of(entry: list[str]) -> list[str]:
 def _signature(
     app: Any, what: str, name: str, thing: Any, options: Any, signature: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
-    """The fields of plain data, where Sphinx would show what pydantic makes of them."""
-    if what != "class" or not issubclass(thing, Plain):
-        return signature and signature.replace("<factory>", "..."), returned
-    fields = sorted(thing.model_fields.items(), key=lambda field: not field[1].is_required())
-    told = (
-        name if info.is_required() else f"{name}={info.get_default(call_default_factory=True)!r}"
-        for name, info in fields
-    )
-    return f"({', '.join(told)})", ""
+    """The signature with dots for a default that is made for each object."""
+    return signature and signature.replace("<factory>", "..."), returned

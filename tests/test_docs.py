@@ -21,7 +21,10 @@ def test_pages_build(tmp_path: Path) -> None:
     text = re.sub(r"<[^>]+>", "", reference)
     for dump in ("_Buffer", "FieldInfo", "pydantic", "factory", "**data"):
         assert dump not in text
-    assert "dermis.Camera(position, target=(0.0, 0.0, 0.0), up=" in " ".join(text.split())
+    assert (
+        "dermis.Camera(position: tuple[float, float, float], *, target: tuple[float, float, float] = (0.0"
+        in " ".join(text.split())
+    )
     assert "from_opencv" in text and "irradiance" in text.partition("dermis.SpotLight")[2][:3000]  # inherited
     named = re.findall(r"<strong>(\w+)</strong>", reference)
     assert {"african", "asian", "caucasian", "weights", "bones"} <= set(named)  # each of a shared line

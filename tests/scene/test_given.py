@@ -22,23 +22,23 @@ def head(tmp_path: Path) -> Head:
 
 
 def test_lights_may_be_one_or_a_name_or_made_as_they_are_asked_for(head: Head) -> None:
-    assert dermis.Scene(head, lights=LAMP).lights == (LAMP,)  # type: ignore[arg-type]
-    assert dermis.Scene(head, lights=(one for one in [LAMP, LAMP])).lights == (LAMP, LAMP)  # type: ignore[arg-type]
-    assert dermis.Scene(head, lights="window").lights == dermis.load_lights("window")  # type: ignore[arg-type]
-    assert dermis.Scene(head, lights="none").lights == ()  # type: ignore[arg-type]
+    assert dermis.Scene(head, lights=LAMP).lights == (LAMP,)
+    assert dermis.Scene(head, lights=(one for one in [LAMP, LAMP])).lights == (LAMP, LAMP)
+    assert dermis.Scene(head, lights="window").lights == dermis.load_lights("window")
+    assert dermis.Scene(head, lights="none").lights == ()
 
 
 def test_cameras_skins_and_environments_may_be_named(head: Head) -> None:
-    scene = dermis.Scene(head, camera="cheek", skin={"mix": 0.2}, environment="uniform")  # type: ignore[arg-type]
+    scene = dermis.Scene(head, camera="cheek", skin={"mix": 0.2}, environment="uniform")
     assert scene.camera == cheek(head) and scene.skin == dermis.Skin(mix=0.2)
     assert scene.environment == dermis.Environment(name="uniform") and scene.lights == ()
-    assert dermis.Scene(head, camera=dermis.side).camera == dermis.side(head)  # type: ignore[arg-type]
+    assert dermis.Scene(head, camera=dermis.side).camera == dermis.side(head)
 
 
 def test_heads_may_be_named(head: Head, tmp_path: Path) -> None:
-    assert dermis.Scene(tmp_path / "head.obj").head.name == head.name  # type: ignore[arg-type]
+    assert dermis.Scene(tmp_path / "head.obj").head.name == head.name
     person = dermis.Human(age=60)
-    assert dermis.Scene(person).head.maps == person.head().maps  # type: ignore[arg-type]
+    assert dermis.Scene(person).head.maps == person.head().maps
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.machinery import ModuleSpec
 from types import ModuleType
+from typing import Any, cast
 
 NAMES: Mapping[str, str] = {
     "profile": "side",
@@ -56,7 +57,7 @@ class _Finder:
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        return ModuleSpec(fullname, self) if _moved(fullname) else None
+        return ModuleSpec(fullname, cast(Any, self)) if _moved(fullname) else None
 
     def create_module(self, spec: ModuleSpec) -> None:
         """Leave it to the import system, whose module `exec_module` replaces."""

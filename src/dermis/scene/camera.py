@@ -43,7 +43,7 @@ class Camera(Plain):
         "fov": "frame_mm (height of what is shown at the target)",
     }
 
-    position: Vector
+    position: Vector = Field(kw_only=False)
     """Place of the eye [mm]."""
     target: Vector = (0.0, 0.0, 0.0)
     """The point on the optical axis that is looked at: as a rule the middle of the picture [mm]."""

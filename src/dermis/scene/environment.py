@@ -13,7 +13,7 @@ from dermis.scene.plain import Plain, slider
 class Environment(Plain):
     """A panorama around the head; its middle lies behind the head, where a camera before the face looks."""
 
-    name: str
+    name: str = Field(kw_only=False)
     """Light from all around: a sample (royal_esplanade, lebombo), a latitude-longitude picture (.hdr, .exr),
     or "uniform" for radiance 1 from everywhere."""
     rotation_degrees: Annotated[

@@ -72,7 +72,8 @@ class PointLight(_Source):
     """Light from a point in all directions; falls off with the square of the distance."""
 
     kind: Literal["point"] = "point"
-    position: Vector
+    """Word for this kind of light in scene files."""
+    position: Vector = Field(kw_only=False)
     """Where it stands [mm]."""
     target: Vector = (0.0, 0.0, 0.0)
     """Where it is directed, and where its irradiance is given [mm]."""
@@ -88,6 +89,7 @@ class SpotLight(PointLight):
     """A point light within a cone around the line to the target."""
 
     kind: Literal["spot"] = "spot"  # type: ignore[assignment]
+    """Word for this kind of light in scene files."""
     inner_degrees: _Degrees = 25.0
     """Half angle at which the cone begins to fade."""
     outer_degrees: _Degrees = 35.0
@@ -104,6 +106,7 @@ class RectangleLight(PointLight):
     """A window or softbox: an even rectangle that faces the target, one pair of sides level."""
 
     kind: Literal["rectangle"] = "rectangle"  # type: ignore[assignment]
+    """Word for this kind of light in scene files."""
     width_mm: _Length = 600.0
     """Length of the level sides [mm]."""
     height_mm: _Length = 600.0
@@ -118,6 +121,7 @@ class SphereLight(PointLight):
     """An evenly bright sphere, as a lamp with a globe."""
 
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
+    """Word for this kind of light in scene files."""
     radius_mm: Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True)), _LAMPS] = (
         100.0
     )
@@ -138,7 +142,8 @@ class DirectionalLight(_Source):
     """Parallel light, as from the sun."""
 
     kind: Literal["directional"] = "directional"
-    direction: Direction
+    """Word for this kind of light in scene files."""
+    direction: Direction = Field(kw_only=False)
     """The way in which the light travels."""
     angle_degrees: Annotated[float, Field(ge=0, le=20), Because("degrees; wider light is no beam")] = 0.0
     """Angle that its source spans, 0.53 for the sun: shadows harden towards what casts them."""
@@ -152,6 +157,7 @@ class StripeLight(DirectionalLight):
     """A sheet of parallel light, as from a laser through a cylindrical lens."""
 
     kind: Literal["stripe"] = "stripe"  # type: ignore[assignment]
+    """Word for this kind of light in scene files."""
     position: Vector = (0.0, 0.0, 0.0)
     """A point in the middle of the sheet [mm]."""
     up: Direction = (0.0, 1.0, 0.0)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Motion
@@ -16,8 +17,11 @@ from dermis.scene.lights import Light, studio
 from dermis.scene.pose import Pose
 from dermis.scene.skin import Skin
 
+if TYPE_CHECKING:
+    from dermis.human.person import Human
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, init=False)
 class Scene:
     """A head, its skin, the light on it and the camera before it.
 
@@ -25,7 +29,7 @@ class Scene:
     lights : several, one or the name of a preset; the studio preset when left out, or none with an
         environment
     camera : or the name of a preset; the portrait of the head when left out
-    skin : or its values by name
+    skin : or its values by name; the default skin when left out
     environment : or its name
     pose : how the head is moved, or weights of its morph targets by name; at rest when left out
 
@@ -35,24 +39,31 @@ class Scene:
     """
 
     head: Head
-    lights: Sequence[Light] = None  # type: ignore[assignment]
-    camera: Camera = None  # type: ignore[assignment]
-    skin: Skin = field(default_factory=Skin)
-    environment: Environment | None = None
-    pose: Pose | Mapping[str, float] | None = None
+    lights: Sequence[Light]
+    camera: Camera
+    skin: Skin
+    environment: Environment | None
+    pose: Pose | None
 
-    def __post_init__(self) -> None:
-        self._set("head", given_head(self.head))
-        self._set("environment", given_environment(self.environment))
-        self._set("skin", given_plain(Skin, self.skin, "skin", 'profile="medium"'))
-        if self.lights is None:
+    def __init__(
+        self,
+        head: Head | Human | str | os.PathLike[str],
+        lights: Iterable[Light] | Light | str | None = None,
+        camera: Camera | str | Callable[[Head], Camera] | None = None,
+        skin: Skin | Mapping[str, Any] | None = None,
+        environment: Environment | str | os.PathLike[str] | None = None,
+        pose: Pose | Mapping[str, float] | None = None,
+    ) -> None:
+        self._set("head", given_head(head))
+        self._set("environment", given_environment(environment))
+        self._set("skin", Skin() if skin is None else given_plain(Skin, skin, "skin", 'profile="medium"'))
+        if lights is None:
             self._set("lights", () if self.environment else studio())
         else:
-            self._set("lights", given_lights(self.lights))
-        camera = portrait(self.head) if self.camera is None else given_camera(self.camera, self.head)
-        self._set("camera", camera)
+            self._set("lights", given_lights(lights))
+        self._set("camera", portrait(self.head) if camera is None else given_camera(camera, self.head))
+        self._set("pose", Pose.of(pose))
         if self.pose is not None:
-            self._set("pose", Pose.of(self.pose))
             self.motion  # noqa: B018 checks the pose
 
     @classmethod
@@ -73,5 +84,4 @@ class Scene:
     @cached_property
     def motion(self) -> Motion | None:
         """The pose as numbers, None at rest."""
-        pose = Pose.of(self.pose)
-        return None if pose is None else pose.motion(self.head.control)
+        return None if self.pose is None else self.pose.motion(self.head.control)

@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from types import UnionType
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, Union, get_args, get_origin
+import textwrap
+from collections.abc import Iterator, Mapping
+from functools import reduce
+from inspect import Parameter, Signature, cleandoc, formatannotation
+from operator import or_
+from types import FunctionType, UnionType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    Self,
+    Union,
+    dataclass_transform,
+    get_args,
+    get_origin,
+)
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
@@ -23,8 +39,15 @@ from dermis.scene.findings import (
     words_of,
 )
 
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
 FARTHEST_MM = 1e6
 _VAST = 1e5  # bounds beyond it only keep numbers finite
+_MEMBERS = FunctionType, classmethod, property
+_WIDTH = 92  # of a line of a docstring
 
 
 def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -47,10 +70,34 @@ Intensity = Annotated[
 Colour = tuple[Intensity, Intensity, Intensity]
 
 
-class Plain(BaseModel):
+@dataclass_transform(kw_only_default=True, field_specifiers=(Field, PrivateAttr))
+class _Documented(ModelMetaclass):
+    # The class of all models: their signature and their docstring list the fields, and `dir` leaves out what
+    # pydantic adds. Type checkers read the fields themselves.
+    if not TYPE_CHECKING:
+
+        @property
+        def __signature__(self) -> Signature:
+            return signature_of(self)
+
+        @__signature__.setter
+        def __signature__(self, signature: Any) -> None:
+            """Drop pydantic's own, which shows `__init__`'s parameters."""
+
+        @property
+        def __doc__(self) -> str:
+            return documentation_of(self)
+
+        def __dir__(self) -> list[str]:
+            bases = self.__mro__[: self.__mro__.index(BaseModel)]
+            members = {name: thing for base in reversed(bases) for name, thing in vars(base).items()}
+            return [name for name, thing in members.items() if name[0] != "_" and isinstance(thing, _MEMBERS)]
+
+
+class Plain(BaseModel, metaclass=_Documented):
     """Immutable settings: unknown names and impossible values are refused.
 
-    The docstring under a field is its help, in the command line, the viewer and the documentation.
+    The docstring under a field is its help, in Python, the command line, the viewer and the documentation.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, defer_build=True)
@@ -118,6 +165,60 @@ def range_of(model: type[BaseModel], field: str) -> Range | None:
     return _range(model.model_fields[field])
 
 
+class Heading(str):
+    """For a field: the heading under which help texts and panels list it, after the fields without one."""
+
+    __slots__ = ()
+
+
+def heading_of(model: type[BaseModel], field: str) -> str:
+    """Return the heading under which a field is listed; an empty text for one of the main fields."""
+    return next((one for one in model.model_fields[field].metadata if isinstance(one, Heading)), "")
+
+
+def signature_of(model: type[BaseModel]) -> Signature:
+    """Return the parameters of a model's constructor; the one required field may come without its name."""
+    alone = _required(model)
+    return Signature(sorted(_parameters(model, alone), key=lambda one: one.kind))
+
+
+def _parameters(model: type[BaseModel], required: list[str]) -> Iterator[Parameter]:
+    for name, info in model.model_fields.items():
+        kind = Parameter.POSITIONAL_OR_KEYWORD if required == [name] else Parameter.KEYWORD_ONLY
+        default = Parameter.empty if info.is_required() else info.get_default(call_default_factory=True)
+        annotation = _without_checks(info.annotation)
+        if words := words_of(model, name):
+            annotation = annotation | Literal[words]
+        yield Parameter(name, kind, default=default, annotation=annotation)
+
+
+def _without_checks(kind: Any) -> Any:
+    """Return a type without the metadata that checks its values."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _without_checks(parts[0])
+    if origin in (None, Literal):
+        return kind
+    bare = tuple(map(_without_checks, parts))
+    return reduce(or_, bare) if origin in (Union, UnionType) else origin[bare]
+
+
+def documentation_of(model: type[BaseModel]) -> str:
+    """Return a model's own docstring with its fields, those under a heading last, in numpydoc's form."""
+    sections: dict[str, list[str]] = {"Parameters": []}
+    for parameter in signature_of(model).parameters.values():
+        lines = sections.setdefault(heading_of(model, parameter.name) or "Parameters", [])
+        default = "" if parameter.default is Parameter.empty else f", default {parameter.default!r}"
+        lines.append(f"{parameter.name} : {formatannotation(parameter.annotation)}{default}")
+        bounds = "" if "Literal" in lines[-1] else values_of(model, parameter.name)
+        text = help_of(model, parameter.name) + (f" [{bounds}]" if bounds else "")
+        lines += textwrap.wrap(
+            text, _WIDTH, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False
+        )
+    listed = ["\n".join(["", title, "-" * len(title), *lines]) for title, lines in sections.items() if lines]
+    return "\n".join([cleandoc(vars(model)["__doc__"] or ""), *listed])
+
+
 def values_of(model: type[BaseModel], field: str) -> str:
     """The words that a field may be, and the bounds of a number where they say something."""
     low, high = bounds_of(model.model_fields[field])
@@ -157,9 +258,14 @@ def _range(info: FieldInfo) -> Range | None:
     return None if low is None or high is None else Range(low, high)
 
 
+def _required(model: type[BaseModel]) -> list[str]:
+    """Return the fields without a default."""
+    return [name for name, info in model.model_fields.items() if info.is_required()]
+
+
 def _only_required(model: type[BaseModel], value: tuple[Any, ...]) -> str:
     """The field that a value without a name is for."""
-    required = [name for name, info in model.model_fields.items() if info.is_required()]
+    required = _required(model)
     if len(required) != 1 or len(value) != 1:
         some, came = (
             ", ".join(f"{name}=..." for name in list(model.model_fields)[:3]),

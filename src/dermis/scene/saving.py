@@ -41,7 +41,7 @@ def scene_toml(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
     """
     said = _SAID_BY_REGIONS if names_regions(head) else set()
     parts = [] if scene.lights else ['lights = "none"\n']
-    parts += [table_text("[head]", head), *_pose(Pose.of(scene.pose))]
+    parts += [table_text("[head]", head), *_pose(scene.pose)]
     parts.append(_plain("[skin]", scene.skin, said | {"pigments", "layers"}))
     if scene.skin.pigments:
         parts.append(_plain("[skin.pigments]", scene.skin.pigments))

@@ -13,7 +13,6 @@ from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.samples import SAMPLES, cached
 from dermis.scene.heads import HUMAN, load_head
-from dermis.scene.pose import Pose
 
 HEAD_FILES = (".glb", ".obj", ".ply", ".json", ".toml")
 """What a file that a page sends may end in: meshes, people, scenes."""
@@ -88,7 +87,7 @@ def _with_head(state: ViewerState, head: Head, name: str) -> ViewerState:
     """The state with another head in the same light, posed as before where it has the same names."""
     old = state.scene.head
     alike = old.targets == head.targets and old.bones == head.bones
-    pose = Pose.of(state.scene.pose) if alike else None
+    pose = state.scene.pose if alike else None
     kept = pose if pose is None or pose.positions_mm is None else None
     return replace(state, scene=replace(state.scene, head=head, pose=kept), head={"name": name})
 

@@ -98,7 +98,7 @@ def matching(names: Sequence[str], wanted: str) -> list[str]:
 
 
 def _pose(scene: Scene) -> Pose:
-    return Pose.of(scene.pose) or AT_REST
+    return scene.pose or AT_REST
 
 
 def _shortest(pose: Pose) -> Pose | None:

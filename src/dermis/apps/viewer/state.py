@@ -114,7 +114,7 @@ class ViewerState:
 
         Raises DermisError for a frame that cannot be read.
         """
-        pose = with_moves(Pose.of(self.scene.pose), clip.pose_at(seconds))
+        pose = with_moves(self.scene.pose, clip.pose_at(seconds))
         return replace(self.with_pose(pose), seconds=seconds)
 
     def with_head(self, head: Head, table: Mapping[str, Any], rho_s: float) -> ViewerState:

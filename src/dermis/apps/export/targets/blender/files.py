@@ -23,7 +23,6 @@ from dermis.apps.truths.lights import CYCLES, lamp
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
@@ -214,7 +213,7 @@ def _glb(head: Head, scene: Scene | None) -> bytes:
     from dermis.mesh.gltf.write import encode_head
 
     assert scene is not None
-    pose, eyes = Pose.of(scene.pose), head.eyes
+    pose, eyes = scene.pose, head.eyes
     pictures = None if eyes is None else on_device("auto", lambda device: eye_pictures(device, eyes.look))
     weights = {} if pose is None else dict(pose.weights)
     rough = scene.skin.roughness
