@@ -29,7 +29,7 @@ from dermis.scene.techniques import TECHNIQUES
 
 PACKAGE = Path(dermis.__file__).parent
 SHADERS = sorted(PACKAGE.rglob("*.wgsl"))
-FOLDERS = (*shader_folders(), *sorted({path.parent for path in SHADERS}))
+FOLDERS = (*shader_folders("FILTERED_SOURCE", "HAIR_LABELS"), *sorted({path.parent for path in SHADERS}))
 MOST = {
     kind: DEFAULT_LIMITS[f"max-{name}-per-shader-stage"]
     for kind, name in {

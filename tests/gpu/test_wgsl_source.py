@@ -45,6 +45,26 @@ def test_missing_include_is_named(tmp_path: Path) -> None:
         compose(tmp_path / "main.wgsl", ())
 
 
+@pytest.mark.parametrize(
+    ("options", "lines"), [((), "cd"), (("A",), "a"), (("A", "B"), "ab"), (("B",), "cd")]
+)
+def test_lines_of_options(tmp_path: Path, options: tuple[str, ...], lines: str) -> None:
+    text = '//#if A\na\n//#if B\nb\n//#end\n//#else\nc\n//#include "part.wgsl"\n//#end'
+    write(tmp_path, main=text, part="d")
+    folder = ShaderFolder(tmp_path, options=frozenset(options))
+    source = compose(tmp_path / "main.wgsl", (folder,))
+    assert source.text.splitlines() == list(lines)
+    numbers = {"a": 2, "b": 4, "c": 7, "d": 1}
+    assert [number for _, number in source.origin] == [numbers[line] for line in lines]
+
+
+@pytest.mark.parametrize("text", ["//#if A\na", "a\n//#else\nb", "//#end"])
+def test_options_without_begin_or_end_are_named(tmp_path: Path, text: str) -> None:
+    write(tmp_path, main=text)
+    with pytest.raises(DermisError, match=r"main\.wgsl: expected //#(end|if)"):
+        compose(tmp_path / "main.wgsl", ())
+
+
 def test_only_whole_lines_include(tmp_path: Path) -> None:
     text = '// as in: //#include "gone.wgsl"'
     write(tmp_path, main=text)

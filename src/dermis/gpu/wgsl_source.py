@@ -5,7 +5,8 @@ A directive takes a whole line:
 - `//#include "name.wgsl"`: another file, inserted once;
 - `//#include <list>`: the file of each member of a list;
 - `//#each list: text`: the text once for each member, with its {name}, {NAME}, {number} and words filled in;
-- `//#fill text`: the text with a number from Python for each {word}.
+- `//#fill text`: the text with a number from Python for each {word};
+- `//#if NAME`, `//#else`, `//#end`: lines for programs with that option, and for those without it.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from dermis.base.errors import DermisError
 
 _DIRECTIVE = re.compile(
     r'^(?P<indent>\s*)//#(?:include "(?P<file>[\w./]+)"|include <(?P<files>\w+)>'
-    r"|each (?P<list>\w+): (?P<text>.*)|fill (?P<filled>.*))\s*$"
+    r"|each (?P<list>\w+): (?P<text>.*)|fill (?P<filled>.*)|if (?P<option>\w+)|(?P<turn>else|end))\s*$"
 )
 _WORD = re.compile(r"\{(\w+)\}")
 _ERROR_LINE = re.compile(r"(?:wgsl|shader[^:\n]*|source):(\d+):(\d+)")
@@ -45,15 +46,17 @@ class Member(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ShaderFolder(os.PathLike[str]):
-    """A folder of shaders with the lists and numbers that their directives use.
+    """A folder of shaders with the lists, numbers and options that directives use.
 
     lists : members of each list, called for whenever a shader is composed
     numbers : constants that Python uses too, called for likewise
+    options : names for which `//#if` holds, in shaders of all folders
     """
 
     path: Path
     lists: Mapping[str, Callable[[], Sequence[Member]]] = field(default_factory=dict)
     numbers: Callable[[], Mapping[str, float]] = dict
+    options: frozenset[str] = frozenset()
 
     def __fspath__(self) -> str:
         return str(self.path)
@@ -87,20 +90,25 @@ def compose(path: Path, folders: Sequence[Folder]) -> Source:
 
     folders : where includes are looked up that are not beside the including file
 
-    Raises DermisError for a missing file, list or {word}.
+    Raises DermisError for a missing file, list, {word} or `//#end`.
     """
     shared = [folder for folder in folders if isinstance(folder, ShaderFolder)]
     lists = {name: tuple(members()) for folder in shared for name, members in folder.lists.items()}
     numbers = {name: repr(value) for folder in shared for name, value in folder.numbers().items()}
+    options = frozenset[str]().union(*(folder.options for folder in shared))
     found = tuple(Path(folder) for folder in folders), tuple(lists.items()), tuple(numbers.items())
-    return _compose(path, *found)
+    return _compose(path, *found, options)
 
 
 @cache
 def _compose(
-    path: Path, folders: tuple[Path, ...], lists: tuple[tuple[str, tuple[Member, ...]], ...], numbers: Words
+    path: Path,
+    folders: tuple[Path, ...],
+    lists: tuple[tuple[str, tuple[Member, ...]], ...],
+    numbers: Words,
+    options: frozenset[str],
 ) -> Source:
-    composed = _Composed(folders, dict(lists), dict(numbers))
+    composed = _Composed(folders, dict(lists), dict(numbers), options)
     composed.insert(path)
     text, origin = zip(*composed.lines, strict=True) if composed.lines else ((), ())
     return Source("\n".join(text), origin)
@@ -110,9 +118,13 @@ class _Composed:
     """lines : each with the file and line that it came from"""
 
     def __init__(
-        self, folders: Sequence[Path], lists: Mapping[str, Sequence[Member]], numbers: Mapping[str, str]
+        self,
+        folders: Sequence[Path],
+        lists: Mapping[str, Sequence[Member]],
+        numbers: Mapping[str, str],
+        options: frozenset[str],
     ) -> None:
-        self._folders, self._lists, self._numbers = folders, lists, numbers
+        self._folders, self._lists, self._numbers, self._options = folders, lists, numbers, options
         self._seen: set[Path] = set()
         self.lines: list[tuple[str, tuple[str, int]]] = []
 
@@ -120,9 +132,14 @@ class _Composed:
         if path in self._seen:
             return
         self._seen.add(path)
+        holds: list[bool] = []  # of each `//#if` that is open
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
             directive = _DIRECTIVE.match(line)
-            if directive is None:
+            if directive and (directive["option"] or directive["turn"]):
+                self._choose(holds, directive, path)
+            elif not all(holds):
+                continue
+            elif directive is None:
                 self.lines.append((line, (path.name, number)))
             elif name := directive["file"]:
                 self.insert(self._find(name, path))
@@ -132,6 +149,20 @@ class _Composed:
                         self.insert(member.file)
             else:
                 self.lines += [(text, (path.name, number)) for text in self._filled(directive, path)]
+
+        if holds:
+            raise DermisError(f"{path.name}: expected //#end after //#if, but the file ends.")
+
+    def _choose(self, holds: list[bool], directive: re.Match[str], asker: Path) -> None:
+        """Begin, turn or end the lines of an option."""
+        if option := directive["option"]:
+            holds.append(option in self._options)
+        elif not holds:
+            raise DermisError(f"{asker.name}: expected //#if before //#{directive['turn']}, but none came.")
+        elif directive["turn"] == "else":
+            holds[-1] = not holds[-1]
+        else:
+            holds.pop()
 
     def _filled(self, directive: re.Match[str], asker: Path) -> list[str]:
         """The lines that a directive expands to."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from dermis import specular
@@ -50,17 +51,6 @@ SHARED_SHADERS = ShaderFolder(
 )
 TILE = 16
 """Side of workgroups that do little: smaller ones finish before the H200 has started the next."""
-_LEVELS = PASSES / "levels"
-_SOURCES = {FLOATS: _LEVELS / "loaded", HALVES: _LEVELS / "filtered"}
-LABELS, NO_LABELS = "labels", "no labels"
-"""What a pass of hairs stores besides the picture."""
-_STRANDS = PASSES / "strand_labels"
-_STORES = {
-    FLOATS: _LEVELS / "floats",
-    HALVES: _LEVELS / "halves",
-    LABELS: _STRANDS / "counted",
-    NO_LABELS: _STRANDS / "none",
-}
 EACH = 64
 """Invocations of a workgroup, as in each.wgsl."""
 _ROW = 32768  # workgroups in a row, at most 65535
@@ -69,30 +59,39 @@ _SPLAT_STEP = 2.0  # of hairs' shadows on software adapters [texel], see docs/pe
 _SAMPLES = 64  # that an invocation may meet: drivers end what goes round loops 65,535 times
 
 
-def shader_folders(source: str = "", store: str = "") -> tuple[Folder, ...]:
-    """Where includes are looked up.
-
-    source, store : formats in which the shader reads and stores blurred light, if it does; of passes of hairs
-        whether they store labels
-    """
-    levels = [_SOURCES[source]] if source else []
-    levels += [_STORES[store]] if store else []
-    return (*levels, SHARED_SHADERS, TECHNIQUES, SPECULAR)
+def shader_folders(*options: str) -> tuple[Folder, ...]:
+    """Return the folders where includes are looked up, with the names for which `//#if` holds."""
+    return (replace(SHARED_SHADERS, options=frozenset(options)), TECHNIQUES, SPECULAR)
 
 
 def program(
-    device: Device, path: str | Path, constants: Constants = (), source: str = "", store: str = ""
+    device: Device,
+    path: str | Path,
+    constants: Constants = (),
+    source: str = FLOATS,
+    store: str = FLOATS,
+    labels: bool = False,
 ) -> ComputeProgram:
-    """The shader of that name among the passes, or at that path, with pipeline constants.
+    """Return the shader of that name among the passes, or at that path, with pipeline constants.
 
-    The device's own constants are added to them; see `shader_folders` for the formats.
+    The device's own constants are added to them.
+
+    source, store : formats in which the shader reads and stores blurred light, if it does
+    labels : whether a pass of hairs stores labels besides the picture
     """
+    chosen = options(source, store, labels)
 
     def make() -> ComputeProgram:
-        file, folders = PASSES / path, shader_folders(source, store)
+        file, folders = PASSES / path, shader_folders(*chosen)
         return ComputeProgram(device, file, folders, suited(device, file, folders, constants))
 
-    return compiled(device, (path, source, store, registered()), constants, make)
+    return compiled(device, (path, chosen, registered()), constants, make)
+
+
+def options(source: str, store: str, labels: bool) -> tuple[str, ...]:
+    """Return the names for which `//#if` holds in a shader, see `program`."""
+    chosen = {"FILTERED_SOURCE": source == HALVES, "STORED_HALVES": store == HALVES, "HAIR_LABELS": labels}
+    return tuple(name for name, holds in chosen.items() if holds)
 
 
 def suited(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dermis.frame.geometry import HeadResources
-from dermis.frame.passes import LABELS, NO_LABELS, each, program
+from dermis.frame.passes import each, program
 from dermis.frame.shape import Shape
 from dermis.frame.strand_space import TILE
 from dermis.frame.strands import WINDOW_KNOTS, StrandResources, StrandTables, drawn_of
@@ -77,13 +77,13 @@ def draw(
     _each(graph, "strands_bin.wgsl", seen | listed, pieces, ways)
     bound = head.resources | seen | listed
     bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result, **(labels or {})}
-    (width, height), store = picture.result.size[:2], LABELS if labels else NO_LABELS
+    width, height = picture.result.size[:2]
     if picture.ways > 1:
-        shader = program(graph.device, "strands_draw_tiles.wgsl", ways, store=store)
+        shader = program(graph.device, "strands_draw_tiles.wgsl", ways, labels=labels is not None)
         graph.compute("strands", shader, bound, (width, height))
         return picture.result
     rows = _rows_for(graph.device, strands, view)
-    shader = program(graph.device, "strands_draw.wgsl", (("ROWS", rows),), store=store)
+    shader = program(graph.device, "strands_draw.wgsl", (("ROWS", rows),), labels=labels is not None)
     graph.compute("strands", shader, bound, (width, -(-height // rows)))
     return picture.result
 

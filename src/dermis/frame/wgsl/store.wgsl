@@ -1,3 +1,4 @@
+//#if STORED_HALVES
 // Light stored as halves.
 //#include "halves.wgsl"
 
@@ -6,3 +7,12 @@
 fn store(at: vec2u, light: vec4f) {
     textureStore(stored, at, rounded_to_halves(light));
 }
+//#else
+// Light stored as 32-bit floats.
+
+@group(0) @binding(32) var stored: texture_storage_2d<rgba32float, write>;
+
+fn store(at: vec2u, light: vec4f) {
+    textureStore(stored, at, light);
+}
+//#end

@@ -1,3 +1,4 @@
+//#if HAIR_LABELS
 // The class of hairs that covers most of each pixel, where they cover at least half of it, in front of what its centre sees.
 //#include "strand_fragments.wgsl"
 
@@ -97,3 +98,16 @@ fn put_label(pixel: vec2u) {
     hair_labels[pixel.y * u32(strand_view.size.x) + pixel.x] = labels_of(counted);
     counted = NO_HAIRS; // for the next pixel
 }
+//#else
+// No labels of hairs.
+
+fn begin_labels(pixel: vec2u) {}
+
+fn label_piece(one: Fragment) {}
+
+fn put_label(pixel: vec2u) {}
+
+fn hand_labels_over(lane: u32) {}
+
+fn take_labels_over(lane: u32) {}
+//#end

@@ -1,7 +1,0 @@
-// Light stored as 32-bit floats.
-
-@group(0) @binding(32) var stored: texture_storage_2d<rgba32float, write>;
-
-fn store(at: vec2u, light: vec4f) {
-    textureStore(stored, at, light);
-}
