@@ -10,7 +10,7 @@ from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.geometry import HeadResources
 from dermis.frame.gutters import Walks
 from dermis.frame.interreflection import Interreflection
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +55,15 @@ class Translucency:
     """
 
     pairs: PairBuffers
-    surface: Resources
+    surface: Bindings
     receiver_points: Any
     source_points: Any
     weights: Any
     gathered: Any
     evenly: Any
     slants: Any
-    weighing: Resources = field(default_factory=dict)
-    losing: Resources = field(default_factory=dict)
+    weighing: Bindings = field(default_factory=dict)
+    losing: Bindings = field(default_factory=dict)
     gaussians: int = 0
     slabs: bool = False
     layer: int = 0

@@ -13,14 +13,13 @@ from dermis.frame.passes.outputs import alpha, geometry, labels, landmarks, moti
 from dermis.frame.passes.outputs.planes import Drawn, Planes
 from dermis.frame.passes.visibility_buffer import Layers, draw_layers
 from dermis.frame.projection import MIDDLE, Views
-from dermis.gpu import Graph
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Graph
 
 Stage = Callable[[Graph, Planes, Inputs, Drawn], None]
 _OF_THE_SURFACE = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
-def labels_of_hairs(graph: Graph, inputs: Inputs) -> Resources | None:
+def labels_of_hairs(graph: Graph, inputs: Inputs) -> Bindings | None:
     """What the pass that draws hairs is given to label them too; None where nobody asks."""
     made = inputs.resources.outputs
     if made is None or not _labels_hairs(inputs):

@@ -18,8 +18,7 @@ from dermis.environment.prefilter import prefilter
 from dermis.frame.lights import sun_lights
 from dermis.frame.passes.occlusion import FORM, bake_occlusion, whole_map
 from dermis.frame.surface import model_of
-from dermis.gpu import ComputeProgram, Device, Memo, make_texture, upload
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, ComputeProgram, Device, Memo, make_texture, upload
 from dermis.gpu.textures import texture_from
 from dermis.mesh.head import Head
 from dermis.scene.environment import Environment
@@ -118,7 +117,7 @@ def environment_record(
     )
 
 
-def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Resources, texels: Any) -> Any:
+def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Bindings, texels: Any) -> Any:
     """The open share of the sky of the atlas' texels and of the vertices, baked or read from disk.
 
     lit : what the lighting passes read, lights aside

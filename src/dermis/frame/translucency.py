@@ -19,8 +19,7 @@ from dermis.frame.passes.pair_search.places import upload_receivers, upload_sour
 from dermis.frame.passes.pair_search.search import Found, search
 from dermis.frame.passes.translucency_points import RECEIVER_BYTES, SOURCE_BYTES, space
 from dermis.frame.passes.translucency_weights import source_level, weighing
-from dermis.gpu import Device, Memo, make_texture, scratch, upload
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Device, Memo, make_texture, scratch, upload
 from dermis.optics.thin_parts import ThinParts
 
 Floats = NDArray[np.float64]
@@ -33,8 +32,8 @@ _COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 def translucency_of(
     memo: Memo,
     device: Device,
-    surface: Resources,
-    at_rest: Resources,
+    surface: Bindings,
+    at_rest: Bindings,
     atlas: Atlas,
     variance_mm2: Floats,
     weight: Floats,
@@ -63,7 +62,7 @@ class PairsByWidth:
     surface : resources of geometry.wgsl and of the atlas, for the search
     """
 
-    def __init__(self, device: Device, surface: Resources, atlas: Atlas) -> None:
+    def __init__(self, device: Device, surface: Bindings, atlas: Atlas) -> None:
         self._device, self._surface, self._atlas = device, surface, atlas
         self._kept: dict[float, PairBuffers] = {}
 
@@ -88,7 +87,7 @@ def shared_width(widest_mm: float) -> float:
 
 @preparing("finding the thin parts")
 def find_pairs(
-    device: Device, surface: Resources, atlas: Atlas, cells: Cells, tables: CellTables
+    device: Device, surface: Bindings, atlas: Atlas, cells: Cells, tables: CellTables
 ) -> PairBuffers:
     """The translucent pairs of a surface; of coarser cells where memory does not hold those of these."""
     found, times = search(device, surface, cells, tables), count(1)
@@ -134,7 +133,7 @@ def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
 
 def translucency_from(
     device: Device,
-    surface: Resources,
+    surface: Bindings,
     pairs: PairBuffers,
     variance_mm2: Floats,
     weight: Floats,
@@ -160,7 +159,7 @@ def _weighed(
     )
 
 
-def _unweighed(device: Device, surface: Resources, pairs: PairBuffers) -> Translucency:
+def _unweighed(device: Device, surface: Bindings, pairs: PairBuffers) -> Translucency:
     receivers, sources = pairs.receivers[1], pairs.sources[1]
     return Translucency(
         pairs=pairs,

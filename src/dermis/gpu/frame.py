@@ -9,12 +9,12 @@ from typing import Any, Literal
 from dermis.gpu.access import Access
 from dermis.gpu.compute_pass import ComputePass, Step
 from dermis.gpu.device import Device
-from dermis.gpu.program import ComputeProgram, Resources
+from dermis.gpu.program import ComputeProgram
 from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.timing import Timestamps, WallClock
-from dermis.gpu.types import Buffer, Texture, TextureOrView, TextureView
+from dermis.gpu.types import Bindings, Buffer, Texture, TextureOrView, TextureView
 from dermis.gpu.uniforms import Uniforms
 
 Timed = bool | Literal["whole"]
@@ -52,7 +52,7 @@ class Frame(Recorder):
         self,
         stage: str,
         program: ComputeProgram,
-        resources: Resources,
+        resources: Bindings,
         groups: tuple[int, int, int],
         completes: str = "",
         access: Access | None = None,
@@ -112,7 +112,7 @@ class Frame(Recorder):
         self,
         stage: str,
         program: RasterProgram,
-        resources: Resources,
+        resources: Bindings,
         vertices: int,
         *,
         indices: Buffer | None = None,
@@ -143,7 +143,7 @@ class Frame(Recorder):
         one.end()
 
     def fill(
-        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[TextureOrView]
+        self, stage: str, program: FragmentProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
         """Run `program` for each texel of its targets, textures or views of them, in a render pass."""
         views = [one.create_view() if hasattr(one, "create_view") else one for one in targets]
@@ -176,7 +176,7 @@ class Frame(Recorder):
         self,
         stage: str,
         program: RasterProgram | FragmentProgram,
-        resources: Resources,
+        resources: Bindings,
         targets: Sequence[TextureOrView],
         depth: dict[str, Any] | None = None,
     ) -> Any:

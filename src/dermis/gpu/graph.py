@@ -11,12 +11,12 @@ from dermis.gpu.dependencies import Declared, Dependencies
 from dermis.gpu.device import Device
 from dermis.gpu.frame import Frame, Timed
 from dermis.gpu.listing import Lister, Listing
-from dermis.gpu.program import ComputeProgram, Program, Resources
+from dermis.gpu.program import ComputeProgram, Program
 from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.recording import Recordings
-from dermis.gpu.types import Buffer, TextureOrView, TextureView
+from dermis.gpu.types import Bindings, Buffer, TextureOrView, TextureView
 from dermis.gpu.uniforms import Uniforms
 
 T = TypeVar("T")
@@ -72,7 +72,7 @@ class Graph(Recorder):
         self._fetches.clear()
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Resources, groups: Groups, completes: str = ""
+        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
     ) -> None:
         """Declare a pass of a number of workgroups along each axis; see `Recorder.dispatch`."""
         access = program.access(resources)
@@ -104,7 +104,7 @@ class Graph(Recorder):
         self,
         stage: str,
         program: RasterProgram,
-        resources: Resources,
+        resources: Bindings,
         vertices: int,
         *,
         indices: Buffer | None = None,
@@ -134,7 +134,7 @@ class Graph(Recorder):
         self._add(stage, program, resources, (vertices,), access, writes, run, (layer, far, taken))
 
     def fill(
-        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[TextureOrView]
+        self, stage: str, program: FragmentProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
         """Declare a pass for each texel of its targets, as `Frame.fill` does."""
         writes = tuple(slot_of(self.device, one) for one in targets)
@@ -201,7 +201,7 @@ class Graph(Recorder):
         self,
         stage: str,
         program: Program,
-        resources: Resources,
+        resources: Bindings,
         size: tuple[int, ...],
         access: Access,
         writes: tuple[Slot, ...],

@@ -7,8 +7,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from dermis.gpu.device import Device
-from dermis.gpu.program import ComputeProgram, Program, Resources
+from dermis.gpu.program import ComputeProgram, Program
 from dermis.gpu.recorder import Recorder
+from dermis.gpu.types import Bindings
 
 
 @dataclass
@@ -48,7 +49,7 @@ class Listing:
         self,
         stage: str,
         program: Program,
-        resources: Resources,
+        resources: Bindings,
         groups: Sequence[int],
         index: int,
         recorded: bool = False,
@@ -108,7 +109,7 @@ class Lister(Recorder):
         self,
         stage: str,
         program: ComputeProgram,
-        resources: Resources,
+        resources: Bindings,
         groups: tuple[int, int, int],
         completes: str = "",
     ) -> None:

@@ -22,7 +22,6 @@ from dermis.gpu.types import Bindable, Bindings, Record
 from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Folder, Source, compose
 
-Resources = Bindings
 Records = Mapping[str, NDArray[np.generic]]
 """The uniforms of bindings, where a shader is known to declare them so."""
 P = TypeVar("P")
@@ -33,7 +32,7 @@ Constants = tuple[tuple[str, float], ...]
 """Names and values of pipeline constants, a shader's `override`s; those left out keep their default."""
 
 
-def _reader(names: Sequence[str]) -> Callable[[Resources], Sequence[Bindable]]:
+def _reader(names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
     """Takes what is named out of what is given."""
     if len(names) > 1:
         return itemgetter(*names)
@@ -72,7 +71,7 @@ class Program:
         """A zeroed record of one of the shader's structs with the given members filled in."""
         return record_of(self.source.text, struct, **values)
 
-    def places(self, resources: Resources, uniforms: Uniforms) -> tuple[int, ...]:
+    def places(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
         """Where the records are among the uniforms."""
         records = cast("Records", resources)
         try:
@@ -80,7 +79,7 @@ class Program:
         except KeyError as missing:
             raise self._unbound(missing) from None
 
-    def bind_group(self, resources: Resources, uniforms: Uniforms) -> tuple[Any, list[int]]:
+    def bind_group(self, resources: Bindings, uniforms: Uniforms) -> tuple[Any, list[int]]:
         """A bind group of resources by their name in the shader, and the offsets of its uniforms.
 
         A resource is a buffer, a texture, a texture view, a sampler, or a numpy record, which finds a place
@@ -95,7 +94,7 @@ class Program:
             self.kept_groups.keep(key, bound, group)
         return group, [offset for _, offset in found]
 
-    def access(self, resources: Resources) -> Access:
+    def access(self, resources: Bindings) -> Access:
         """What a pass of this program with these resources reads and writes, records aside."""
         bound = self._bound(resources)
         key = key_of(bound)
@@ -108,7 +107,7 @@ class Program:
             self._accesses.keep(key, bound, found)
         return found
 
-    def numbers(self, resources: Resources, uniforms: Uniforms) -> tuple[Hashable, ...]:
+    def numbers(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
         """What the shader reads of the records; all of large ones, whose hash several passes share."""
         found: list[Hashable] = []
         records = cast("Records", resources)
@@ -120,7 +119,7 @@ class Program:
             raise self._unbound(missing) from None
         return tuple(found)
 
-    def _bound(self, resources: Resources) -> Sequence[Bindable]:
+    def _bound(self, resources: Bindings) -> Sequence[Bindable]:
         """What is bound besides records, in the shader's order."""
         try:
             return self._read(resources)
@@ -130,7 +129,7 @@ class Program:
     def _unbound(self, missing: KeyError) -> KeyError:
         return KeyError(f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it")
 
-    def _make_group(self, bound: Sequence[Any], resources: Resources) -> Any:
+    def _make_group(self, bound: Sequence[Any], resources: Bindings) -> Any:
         """The group of what the others are, and then the uniforms' buffers."""
         records = cast("Records", resources)
         sizes = [records[one.name].nbytes for one in self._uniforms]

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from typing import TypeVar, TypeVarTuple
 
 from dermis.gpu.device import Device
-from dermis.gpu.program import ComputeProgram, Resources
+from dermis.gpu.program import ComputeProgram
+from dermis.gpu.types import Bindings
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
@@ -23,7 +24,7 @@ class Recorder(ABC):
         self,
         stage: str,
         program: ComputeProgram,
-        resources: Resources,
+        resources: Bindings,
         groups: tuple[int, int, int],
         completes: str = "",
     ) -> None:
@@ -37,7 +38,7 @@ class Recorder(ABC):
         self,
         stage: str,
         program: ComputeProgram,
-        resources: Resources,
+        resources: Bindings,
         size: tuple[int, int],
         tile: int = 8,
         completes: str = "",

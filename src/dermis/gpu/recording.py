@@ -15,8 +15,9 @@ from dermis.gpu.compute_pass import Step
 from dermis.gpu.device import Device
 from dermis.gpu.frame import step_of
 from dermis.gpu.memo import is_value, same
-from dermis.gpu.program import ComputeProgram, Resources
+from dermis.gpu.program import ComputeProgram
 from dermis.gpu.recorder import Recorder
+from dermis.gpu.types import Bindings
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
@@ -61,7 +62,7 @@ class Recording(Recorder):
         self,
         stage: str,
         program: ComputeProgram,
-        resources: Resources,
+        resources: Bindings,
         groups: tuple[int, int, int],
         completes: str = "",
     ) -> None:
@@ -79,7 +80,7 @@ class Recording(Recorder):
         steps.append(step_of(stage, program, group, offsets, groups))
         self._note(program, resources, completes)
 
-    def _note(self, program: ComputeProgram, resources: Resources, completes: str) -> None:
+    def _note(self, program: ComputeProgram, resources: Bindings, completes: str) -> None:
         access = program.access(resources)
         for slot in access.reads:
             if slot not in self._writes and slot not in access.writes:

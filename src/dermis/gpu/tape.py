@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from dermis.gpu.device import Device
 from dermis.gpu.graph import Graph
-from dermis.gpu.program import ComputeProgram, Program, Resources
+from dermis.gpu.program import ComputeProgram, Program
 from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.shader_types import Binding, record_type
 from dermis.gpu.tape_content import content_of, described
-from dermis.gpu.types import Buffer, Record, TextureOrView, TextureView
+from dermis.gpu.types import Bindings, Buffer, Record, TextureOrView, TextureView
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
@@ -124,7 +124,7 @@ class Tape(Graph):
         self,
         stage: str,
         program: ComputeProgram,
-        resources: Resources,
+        resources: Bindings,
         groups: tuple[int, int, int],
         completes: str = "",
     ) -> None:
@@ -141,7 +141,7 @@ class Tape(Graph):
         self,
         stage: str,
         program: RasterProgram,
-        resources: Resources,
+        resources: Bindings,
         vertices: int,
         *,
         indices: Buffer | None = None,
@@ -157,7 +157,7 @@ class Tape(Graph):
         taken.raster = {"layer": layer, "far": far, **numbers}
 
     def fill(
-        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[TextureOrView]
+        self, stage: str, program: FragmentProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
         """Nothing that is taken down fills targets."""
         raise NotImplementedError(f"{stage}: passes that fill targets are not taken down")
@@ -173,7 +173,7 @@ class Tape(Graph):
         finally:
             self._unit = None
 
-    def _pass(self, stage: str, program: Program, resources: Resources, groups: tuple[int, ...]) -> Taken:
+    def _pass(self, stage: str, program: Program, resources: Bindings, groups: tuple[int, ...]) -> Taken:
         bound = [self._bound(program, one, resources[one.name]) for one in program.bindings]
         taken = Taken(stage, self._program(program), bound, groups)
         self._take.add(taken, self._unit)

@@ -7,8 +7,7 @@ from typing import Any
 
 from dermis.frame.passes import program
 from dermis.frame.passes.meter import Meter, exposed_by, rays_of
-from dermis.gpu import Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Recorder
 from dermis.scene.settings import Settings
 
 _KINDS = ("gradient", "environment")  # numbered from 1 as in background.wgsl; 0 is a colour
@@ -28,7 +27,7 @@ class Backdrop:
 def draw(
     graph: Recorder,
     backdrop: Backdrop,
-    look: tuple[Resources, Any],
+    look: tuple[Bindings, Any],
     image: Any,
     meter: Meter | None,
     settings: Settings,

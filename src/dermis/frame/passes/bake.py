@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.baked_numbers import COUNT
 from dermis.frame.passes import each, program
-from dermis.gpu import Constants, Device, Frame, make_texture
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Constants, Device, Frame, make_texture
 
 
 def places_of(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
@@ -27,7 +26,7 @@ def places_of(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> N
 def bake(
     device: Device,
     constants: Constants,
-    bound: Resources,
+    bound: Bindings,
     places: NDArray[np.uint32],
     footprint: float,
     pigments: tuple[float, float] | None,

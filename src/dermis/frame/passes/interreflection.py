@@ -8,14 +8,13 @@ from typing import Any
 from dermis.atlas.interreflection import SAMPLES, SIDE
 from dermis.frame.interreflection import Interreflection, LinkSpace
 from dermis.frame.passes import EACH, each, program
-from dermis.gpu import Constants, Device, Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Constants, Device, Recorder
 
 _BOUNCES = 4  # between patches; gathering adds another
 _TEAM = 16  # invocations of a patch or a cell
 
 
-def draw(graph: Recorder, lit: Resources, made: Interreflection, constants: Constants) -> None:
+def draw(graph: Recorder, lit: Bindings, made: Interreflection, constants: Constants) -> None:
     """Find the light that skin sends to skin.
 
     lit : what patches are lit with

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.metering import SIDE
 from dermis.frame.passes import program
-from dermis.gpu import Constants, Device, Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Constants, Device, Recorder
 from dermis.scene.settings import Settings
 
 
@@ -29,7 +28,7 @@ def make_meter(device: Device) -> Meter:
 
 
 def draw(
-    graph: Recorder, meter: Meter, look: tuple[Resources, Any, Constants], visibility: Any, image: Any
+    graph: Recorder, meter: Meter, look: tuple[Bindings, Any, Constants], visibility: Any, image: Any
 ) -> None:
     """Meter the skin that a picture shows.
 

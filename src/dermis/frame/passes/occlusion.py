@@ -14,8 +14,7 @@ from dermis.frame.passes.shape import rest_shape
 from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
 from dermis.frame.shape import shape_tables
-from dermis.gpu import ComputeProgram, Device, Frame
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, ComputeProgram, Device, Frame
 from dermis.mesh.directions import fibonacci_sphere
 from dermis.mesh.head import Head
 
@@ -30,7 +29,7 @@ def bake_occlusion(
     device: Device,
     head: Head,
     atlas: Atlas,
-    lit: Resources,
+    lit: Bindings,
     texels: Any,
     side: int,
     directions: int = DIRECTIONS,

@@ -7,8 +7,7 @@ from typing import Any
 from dermis.frame.passes import program, strip_for
 from dermis.frame.passes.post import Picture
 from dermis.frame.passes.visibility_buffer import Layers
-from dermis.gpu import ComputeProgram, Constants, Device, Recorder, make_texture
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, ComputeProgram, Constants, Device, Recorder, make_texture
 
 
 def shade_program(device: Device, constants: Constants = ()) -> ComputeProgram:
@@ -21,7 +20,7 @@ def shade_program(device: Device, constants: Constants = ()) -> ComputeProgram:
 
 def draw(
     graph: Recorder,
-    lit: Resources,
+    lit: Bindings,
     view: Any,
     constants: Constants,
     visibility: Layers,

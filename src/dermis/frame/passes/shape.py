@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.passes import each, program
 from dermis.frame.shape import LEAST_ACROSS, Shape, ShapeTables, displacements, make_shape
-from dermis.gpu import Device, Frame, Graph, Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Device, Frame, Graph, Recorder
 from dermis.mesh.rig import Rig
 from dermis.mesh.tangents import MIN_UV_CROSS
 
@@ -83,6 +82,6 @@ def _evaluate(graph: Recorder, shape: Shape) -> None:
     _each(graph, "shape_vertices.wgsl", shape.surface, tables.vertices, least)
 
 
-def _each(graph: Recorder, name: str, bound: Resources, count: int, constants: Any = ()) -> None:
+def _each(graph: Recorder, name: str, bound: Bindings, count: int, constants: Any = ()) -> None:
     """A pass of one invocation for each of `count`."""
     graph.dispatch("shape", program(graph.device, name, constants), bound, each(count))

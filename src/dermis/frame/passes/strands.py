@@ -11,10 +11,9 @@ from dermis.frame.passes import each, program
 from dermis.frame.shape import Shape
 from dermis.frame.strand_space import TILE
 from dermis.frame.strands import WINDOW_KNOTS, StrandResources, StrandTables, drawn_of
-from dermis.gpu import ComputeProgram, Constants, Device, Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, ComputeProgram, Constants, Device, Recorder
 
-Look = tuple[Resources, Any, Constants]
+Look = tuple[Bindings, Any, Constants]
 
 _ROWS, _ROUNDS = 8, 60_000
 _HEAD_MM = 100.0  # side of a square that has no more hair than a head seen from anywhere
@@ -35,7 +34,7 @@ def pose(graph: Recorder, made: StrandTables, shape: Shape) -> None:
     _each(graph, "strands_pose.wgsl", bound | {"posed": made.posed}, count)
 
 
-def shadow(graph: Recorder, strands: StrandResources, lit: Resources) -> None:
+def shadow(graph: Recorder, strands: StrandResources, lit: Bindings) -> None:
     """Find what the hairs hold back of each light that casts shadows."""
     made = strands.tables
     pieces = made.fine.pieces() + made.coarse.pieces(made.shading)
@@ -56,7 +55,7 @@ def draw(
     head: HeadResources,
     visibility: Any,
     radiance: Any,
-    labels: Resources | None = None,
+    labels: Bindings | None = None,
 ) -> Any:
     """The picture with hairs over it, a texture of theirs.
 

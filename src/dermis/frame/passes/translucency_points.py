@@ -8,8 +8,7 @@ import numpy as np
 
 from dermis.atlas.translucency.cells import Cells
 from dermis.frame.passes import each, program
-from dermis.gpu import ComputeProgram, Constants, Device, Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, ComputeProgram, Constants, Device, Recorder
 
 RECEIVER_BYTES, SOURCE_BYTES = 48, 32
 """Of a place that takes light, and of one that gives it; see translucent_pair.wgsl."""
@@ -24,7 +23,7 @@ def space(device: Device, count: int, size: int = 4) -> Any:
 
 def draw_receivers(
     graph: Recorder,
-    surface: Resources,
+    surface: Bindings,
     cells: Cells,
     asked: tuple[Any, int],
     points: Any,
@@ -44,7 +43,7 @@ def draw_receivers(
 
 
 def draw_sources(
-    graph: Recorder, surface: Resources, cells: Cells, asked: tuple[Any, int], points: Any
+    graph: Recorder, surface: Bindings, cells: Cells, asked: tuple[Any, int], points: Any
 ) -> None:
     """Centres, normals and areas of cells that give light.
 

@@ -9,8 +9,7 @@ from dermis.frame.atlas_layout import PairBuffers, Translucency
 from dermis.frame.passes import program
 from dermis.frame.passes.translucency import add_up
 from dermis.frame.passes.translucency_points import draw_receivers, draw_sources
-from dermis.gpu import ComputeProgram, Device, Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, ComputeProgram, Device, Recorder
 from dermis.optics.gaussians import MOST_GAUSSIANS
 from dermis.optics.thin_parts import ROWS, ThinParts
 
@@ -53,7 +52,7 @@ def weighing(
     weight: Floats,
     thin: ThinParts | None = None,
     passing: Floats | None = None,
-) -> Resources:
+) -> Bindings:
     """The record of a profile's pass, and its table.
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels

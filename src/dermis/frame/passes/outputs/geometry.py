@@ -8,8 +8,7 @@ from dermis.frame.passes.meter import rays_of
 from dermis.frame.passes.outputs import planes as outputs
 from dermis.frame.passes.outputs.planes import Planes
 from dermis.frame.projection import Triple
-from dermis.gpu import ComputeProgram, Constants, Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, ComputeProgram, Constants, Recorder
 
 
 def look_of(shader: ComputeProgram, view: Any, centre_mm: Triple) -> Any:
@@ -24,7 +23,7 @@ def look_of(shader: ComputeProgram, view: Any, centre_mm: Triple) -> Any:
 def draw(
     graph: Recorder,
     planes: Planes,
-    lit: Resources,
+    lit: Bindings,
     look: tuple[Any, Triple],
     centres: Any,
     constants: Constants = (),

@@ -9,8 +9,7 @@ from dermis.frame.passes.outputs import planes as outputs
 from dermis.frame.passes.outputs.geometry import look_of
 from dermis.frame.passes.outputs.planes import Planes
 from dermis.frame.projection import Triple
-from dermis.gpu import Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Recorder
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class LabelSpace:
 def draw(
     graph: Recorder,
     planes: Planes,
-    lit: Resources,
+    lit: Bindings,
     look: tuple[Any, Triple],
     centres: Any,
     space: LabelSpace,
@@ -47,7 +46,7 @@ def draw(
     outputs.draw(graph, planes, shader, bound | {"hair_labels": space.hairs})
 
 
-def of_hairs(space: LabelSpace, centres: Any) -> Resources:
+def of_hairs(space: LabelSpace, centres: Any) -> Bindings:
     """What the pass that draws the hairs is given, to find their class over each pixel.
 
     centres : texture of the triangles at the pixels' centres

@@ -9,8 +9,7 @@ from dermis.frame.passes import each, program
 from dermis.frame.passes.outputs.geometry import look_of
 from dermis.frame.projection import Triple
 from dermis.frame.shape import Shape
-from dermis.gpu import Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Recorder
 
 TOLERANCE_MM = 2.0
 """By which the mesh at the pixels around a landmark may lie before it where it still counts as seen."""
@@ -19,7 +18,7 @@ TOLERANCE_MM = 2.0
 def draw(
     graph: Recorder,
     space: LandmarkSpace,
-    lit: Resources,
+    lit: Bindings,
     look: tuple[Any, Triple],
     centres: Any,
     shape: Shape,

@@ -13,8 +13,7 @@ from dermis.frame.passes.outputs.geometry import look_of
 from dermis.frame.passes.outputs.pigments import Pigmented
 from dermis.frame.passes.outputs.planes import Planes
 from dermis.frame.projection import Triple
-from dermis.gpu import Constants, Device, Recorder, make_texture
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Constants, Device, Recorder, make_texture
 
 _MOST_LIGHTS = 64  # as in visibility.wgsl
 
@@ -47,7 +46,7 @@ class Shading(NamedTuple):
     scattered : light below the skin by place on the atlas, or the tables of pre-integrated skin
     """
 
-    lit: Resources
+    lit: Bindings
     view: Any
     centre_mm: Triple
     constants: Constants

@@ -11,8 +11,7 @@ from dermis.frame.passes.outputs.geometry import look_of
 from dermis.frame.passes.outputs.planes import Planes
 from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.projection import Triple
-from dermis.gpu import Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Recorder
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,10 +29,10 @@ class Before:
 def draw(
     graph: Recorder,
     planes: Planes,
-    lit: Resources,
+    lit: Bindings,
     look: tuple[Any, Triple],
     centres: Any,
-    before: tuple[Any, Resources],
+    before: tuple[Any, Bindings],
 ) -> None:
     """Fill the planes.
 

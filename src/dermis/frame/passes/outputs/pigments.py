@@ -8,8 +8,7 @@ from dermis.frame.passes.outputs import planes as outputs
 from dermis.frame.passes.outputs.geometry import look_of
 from dermis.frame.passes.outputs.planes import Planes
 from dermis.frame.projection import Triple
-from dermis.gpu import Recorder
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Recorder
 
 
 class Pigmented(NamedTuple):
@@ -24,7 +23,7 @@ class Pigmented(NamedTuple):
 def draw(
     graph: Recorder,
     planes: Planes,
-    lit: Resources,
+    lit: Bindings,
     look: tuple[Any, Triple],
     centres: Any,
     skin: Pigmented,

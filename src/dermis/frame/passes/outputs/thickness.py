@@ -12,8 +12,7 @@ from dermis.frame.passes.outputs import planes as outputs
 from dermis.frame.passes.outputs.geometry import look_of
 from dermis.frame.passes.outputs.planes import Planes
 from dermis.frame.projection import Triple
-from dermis.gpu import Device, Recorder, make_texture, upload
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Device, Recorder, make_texture, upload
 
 
 def make_map(device: Device, pairs: PairBuffers) -> Any:
@@ -43,7 +42,7 @@ def measure(graph: Recorder, thin: Translucency, into: Any) -> None:
 
 
 def draw(
-    graph: Recorder, planes: Planes, lit: Resources, look: tuple[Any, Triple], centres: Any, measured: Any
+    graph: Recorder, planes: Planes, lit: Bindings, look: tuple[Any, Triple], centres: Any, measured: Any
 ) -> None:
     """Fill the planes.
 

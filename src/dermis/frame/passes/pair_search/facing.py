@@ -10,8 +10,7 @@ import numpy as np
 from dermis.atlas.translucency.cells import Cells
 from dermis.frame.passes.pair_search.passes import CellTables, Index, SearchPasses, starts
 from dermis.frame.passes.translucency_points import space
-from dermis.gpu import Constants
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Constants
 
 _BOUNDS_BYTES = 48  # as in bounds.wgsl
 _LISTED: Constants = (("LISTED", 1),)
@@ -33,7 +32,7 @@ class Facing:
     listed: Any
 
 
-def find_facing(passes: SearchPasses, surface: Resources, cells: Cells, tables: CellTables) -> Facing:
+def find_facing(passes: SearchPasses, surface: Bindings, cells: Cells, tables: CellTables) -> Facing:
     """Which tiles may have pairs with which.
 
     surface : resources of geometry.wgsl
@@ -50,7 +49,7 @@ def find_facing(passes: SearchPasses, surface: Resources, cells: Cells, tables: 
     return Facing(tiles, tile, first, listed)
 
 
-def _near(passes: SearchPasses, surface: Resources, tables: CellTables, tiles: Any, count: int) -> Any:
+def _near(passes: SearchPasses, surface: Bindings, tables: CellTables, tiles: Any, count: int) -> Any:
     """Buffer of the blocks of tiles that may have pairs with each other.
 
     tiles, count : buffer to fill with the bounds of tiles, and how many there are

@@ -17,8 +17,7 @@ from dermis.frame.passes.translucency_points import (
     draw_sources,
     space,
 )
-from dermis.gpu import Device
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Device
 
 _COPIES = 8  # in gutters, of each source at most, as in map_places.wgsl
 
@@ -60,7 +59,7 @@ def _runs(first: Index, chosen: Index) -> tuple[Index, Index]:
     return np.arange(len(of)) + np.repeat(first[chosen] - starts(count)[:-1], count), of
 
 
-def draw_places(passes: SearchPasses, surface: Resources, cells: Cells, places: Places) -> Resources:
+def draw_places(passes: SearchPasses, surface: Bindings, cells: Cells, places: Places) -> Bindings:
     """Buffers of where receivers and sources lie, by the names in the shaders.
 
     surface : resources of geometry.wgsl and of the atlas
@@ -74,7 +73,7 @@ def draw_places(passes: SearchPasses, surface: Resources, cells: Cells, places: 
     return {"receiver_points": taken, "source_points": given}
 
 
-def looks(passes: SearchPasses, places: Places) -> tuple[Resources, int]:
+def looks(passes: SearchPasses, places: Places) -> tuple[Bindings, int]:
     """Buffers of what each receiver looks at, as hits.wgsl reads them, and how many words its hits take."""
     word = starts(places.end - places.first)
     none = np.zeros(len(places.receiver), np.int64)
@@ -86,7 +85,7 @@ def looks(passes: SearchPasses, places: Places) -> tuple[Resources, int]:
     return bound, int(word[-1])
 
 
-def draw_copies(passes: SearchPasses, cells: Cells, source: Index, bound: Resources) -> Any:
+def draw_copies(passes: SearchPasses, cells: Cells, source: Index, bound: Bindings) -> Any:
     """Buffer of the places in gutters that show sources, as copies.wgsl writes it.
 
     source : (n,) cells

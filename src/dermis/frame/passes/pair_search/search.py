@@ -12,8 +12,7 @@ from dermis.frame.passes.pair_search.facing import find_facing
 from dermis.frame.passes.pair_search.passes import CellTables, Index, SearchPasses, starts
 from dermis.frame.passes.pair_search.places import Places, draw_copies, draw_places, looks, places_of
 from dermis.frame.passes.translucency_points import RECEIVER_BYTES, space
-from dermis.gpu import Device
-from dermis.gpu.program import Resources
+from dermis.gpu import Bindings, Device
 
 _PAIR_BYTES = 12
 
@@ -34,7 +33,7 @@ class Found:
     pairs: Any
 
 
-def search(device: Device, surface: Resources, cells: Cells, tables: CellTables) -> Found | None:
+def search(device: Device, surface: Bindings, cells: Cells, tables: CellTables) -> Found | None:
     """All pairs that let light pass that counts; None where a buffer cannot hold them.
 
     surface : resources of geometry.wgsl, for the shape to search on, and of the atlas
@@ -58,7 +57,7 @@ def search(device: Device, surface: Resources, cells: Cells, tables: CellTables)
 
 
 def _listed(
-    passes: SearchPasses, cells: Cells, places: Places, number: Index, seen: Resources, bound: Resources
+    passes: SearchPasses, cells: Cells, places: Places, number: Index, seen: Bindings, bound: Bindings
 ) -> Found:
     """The hits as pairs, without the cells that have none.
 
