@@ -29,7 +29,7 @@ from dermis.cli.scene_options import AROUND
 from dermis.scene import Camera, Environment, Settings, Skin
 from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.lights import LIGHTS
-from dermis.scene.plain import Plain, help_of, shown, values_of
+from dermis.scene.plain import Plain, heading_of, help_of, shown, values_of
 from dermis.scene.pose_table import PoseTable
 from dermis.scene.skin import Pigments, TissueLayer
 from dermis.scene.toml_text import value_text
@@ -144,7 +144,8 @@ def table_of(model: type[Plain], names: dict[str, str] | None) -> str:
     """
     columns = ["key", *(["option"] if names is not None else []), "values", "default", "meaning"]
     rows = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
-    for field, info in model.model_fields.items():
+    for field in sorted(model.model_fields, key=lambda field: heading_of(model, field)):
+        info, heading = model.model_fields[field], heading_of(model, field)
         if info.exclude:
             continue
         cells = [f"`{field}`"]
@@ -152,7 +153,8 @@ def table_of(model: type[Plain], names: dict[str, str] | None) -> str:
             known = names.get(field) != "" and is_option(model, field)
             cells.append(f"`{option_name(field, names)}`" if known else "")
         default = "needed" if info.is_required() else _default(info.get_default())
-        cells += [values_of(model, field), default, help_of(model, field)]
+        meaning = f"*{heading}.* {help_of(model, field)}" if heading else help_of(model, field)
+        cells += [values_of(model, field), default, meaning]
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join([*rows, ""])
 

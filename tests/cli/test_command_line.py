@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,6 +14,11 @@ from typing import Any
 import pytest
 
 from dermis.base.citations import parse_bibtex
+from dermis.cli.options import option_name
+from dermis.scene.plain import fields_under
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
+from dermis.scene.talk import COMPARISONS
 
 Run = Callable[..., Any]
 
@@ -92,6 +98,14 @@ def test_help_of_render_explains_every_option(run: Run) -> None:
         option = line.removeprefix("│ ").split(" ")[0]
         assert not (option.startswith("--") and len(line.strip(" │").split()) < 4), line
     assert text.count("│ --") >= 24
+
+
+def test_comparisons_of_the_talk_are_a_group_of_their_own_after_all_others(run: Run) -> None:
+    *before, last = re.split(r"╭─+ ", run("render", "--help").stdout)
+    assert last.startswith(f"{COMPARISONS} ")
+    options = {option_name(name) for kind in (Skin, Settings) for name in fields_under(COMPARISONS, kind)}
+    assert set(re.findall(r"│ (--[\w-]+)", last)) == options
+    assert not options & set(re.findall(r"--[\w-]+", "".join(before)))
 
 
 def test_version(run: Run) -> None:

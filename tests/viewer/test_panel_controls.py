@@ -19,6 +19,7 @@ from dermis.scene.plain import Plain, help_of, slider
 from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
+from dermis.scene.talk import COMPARISONS
 
 BUTTONS = {"undo", "redo", "help", "hide", "save", "load", "screenshot", "reset", "freeze"}
 BUTTONS |= {"open", "search", "bones", "size", "head", "seed", "dice", "path", "open file"}
@@ -124,6 +125,24 @@ def test_every_control_is_a_step_that_undo_takes_back(
 @pytest.mark.parametrize("kind", [Skin, Pigments, TissueLayer, Settings, Environment])
 def test_every_field_has_a_help_text(kind: type[Plain]) -> None:
     assert all(help_of(kind, name) for name in kind.model_fields)
+
+
+def test_comparisons_of_the_talk_are_a_section_of_their_own_last_and_closed(driver: InputDriver) -> None:
+    assert SECTIONS[-1].title == COMPARISONS and not SECTIONS[-1].is_open
+    labels = {"energy", "reflection", "stretch", "seams", "gamma"}
+    session, opened = driver.viewer.session, ("Technique", "Picture")
+    for section in opened:
+        driver.press(section)
+    session.positions.clear()
+    driver.frame()
+    assert not labels & set(session.positions) and {"BRDF", "tone", "technique"} <= set(session.positions)
+    others = max(y for name, (_, y) in session.positions.items() if name != COMPARISONS)
+    assert session.positions[COMPARISONS][1] > others
+    driver.press(COMPARISONS)
+    driver.frame()
+    assert labels <= set(session.positions)
+    for section in (COMPARISONS, *opened):
+        driver.press(section)
 
 
 def test_a_control_under_the_pointer_shows_its_help(driver: InputDriver) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, get_args
 
-from cyclopts import CoercionError, Parameter, Token
+from cyclopts import CoercionError, Group, Parameter, Token
 
 from dermis.base.errors import DermisError, refuse
 from dermis.base.quantities import number
@@ -78,11 +78,15 @@ def options_of(
     names : options by field, where they are not called like it
     defaults : what the help shows in place of the model's own
     """
+    from dermis.scene.plain import heading_of
+
     options: dict[str, Any] = {}
     for field in only or model.model_fields:
         kind, how = _kind(model, field)
         if kind is not None and field not in without:
             name, text = option_name(field, names), _help(model, field, defaults or {})
+            if heading := heading_of(model, field):
+                how = how | {"group": Group(heading, sort_key=1)}  # after cyclopts' own groups
             options[field] = Annotated[kind, Parameter(name=name, help=text, **how)]
     made: Any = TypedDict  # mypy wants its names spelled out
     return Annotated[made(model.__name__, options, total=False), Parameter(name="*")]

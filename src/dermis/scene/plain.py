@@ -176,6 +176,11 @@ def heading_of(model: type[BaseModel], field: str) -> str:
     return next((one for one in model.model_fields[field].metadata if isinstance(one, Heading)), "")
 
 
+def fields_under(heading: str, model: type[BaseModel]) -> list[str]:
+    """Return the fields that are listed under a heading; those without one for an empty text."""
+    return [name for name in model.model_fields if heading_of(model, name) == heading]
+
+
 def signature_of(model: type[BaseModel]) -> Signature:
     """Return the parameters of a model's constructor; the one required field may come without its name."""
     alone = _required(model)

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from dermis.base.registry import Named
 from dermis.scene.findings import Because, Words
 from dermis.scene.plain import Colour, Plain, slider
+from dermis.scene.talk import Gamma, SeamColour, Seams, Stretch
 from dermis.scene.techniques import TECHNIQUES
 
 _Side = Annotated[int, Field(ge=1, le=16384), Because("pixels: what the largest GPUs hold")]
@@ -69,14 +70,9 @@ class Settings(Plain):
     """Samples of each pixel, for smooth edges."""
     technique: Annotated[str, Named(TECHNIQUES)] = "texture-space"
     """How light scatters below the surface."""
-    stretch: Literal["full", "axes", "none"] = "full"
-    """Correction of blurs for the uv layout: "full" for its stretch and shear, "axes" as if u and v were at
-    right angles, "none" to blur alike everywhere."""
-    seams: Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"] = "stitch"
-    """What is done at the seams of the uv layout: "stitch" lets light cross them; the others are the talk's
-    remedies, for comparison. Techniques that cannot stitch take "clear-colour" instead."""
-    seam_colour: Colour = (0.5, 0.35, 0.3)
-    """Light between the charts for "clear-colour" seams, as irradiance over pi."""
+    stretch: Stretch = "full"
+    seams: Seams = "stitch"
+    seam_colour: SeamColour = (0.5, 0.35, 0.3)
     transmission: Literal["thin", "none"] = "thin"
     """Light through the head: "thin" for thin parts such as ears and nostrils, "none" for no part."""
     shadow_size: Annotated[int, Field(ge=64, le=8192), Because("texels: finer than skin's pores")] = 2048
@@ -92,8 +88,7 @@ class Settings(Plain):
     """Share of the light that the lens scatters around."""
     tone: Literal["none", "filmic", "neutral"] = "none"
     """Tone curve before the encoding as bytes; "neutral" is the Khronos group's."""
-    gamma: Literal["right", "wrong"] = "right"
-    """Colour space: "wrong" takes the colour map to be linear and leaves the encoding out, for comparison."""
+    gamma: Gamma = "right"
     background: Background = "none"
     """What is behind the head, which sheds no light: "none", so that pictures have alpha, a studio's grey
     "gradient", the "environment", or a colour, linear Rec. 709 or #rrggbb."""

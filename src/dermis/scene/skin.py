@@ -9,7 +9,8 @@ from pydantic import Field
 from dermis.base.errors import refuse, shown_value
 from dermis.scene.findings import Because
 from dermis.scene.plain import Plain, slider
-from dermis.specular.models import EnergyName, FresnelName, SpecularName
+from dermis.scene.talk import Energy, SpecularColour
+from dermis.specular.models import FresnelName, SpecularName
 
 StructureName = Literal["dj2006", "donner2008", "biospec"]
 DirectionName = Literal["lambertian", "half-space"]
@@ -109,11 +110,8 @@ class Skin(Plain):
     """Model of the surface reflection; "none" leaves it out."""
     fresnel: FresnelName = "schlick"
     """Schlick's curve with F0 = 0.028, or the exact one of index 1.4."""
-    specular_colour: Literal["white", "wrong"] = "white"
-    """Colour of reflections; "wrong" tints them by the colour map, for comparison."""
-    energy: EnergyName = "full"
-    """Light that the surface reflects does not enter: "full" subtracts it all, "published" as the deck does,
-    pi times too much, "none" nothing."""
+    specular_colour: SpecularColour = "white"
+    energy: Energy = "full"
     direction: DirectionName = "half-space"
     """How skin returns light: "lambertian" alike from and to all directions; "half-space" as a half-space
     of the skin's mean colour: more of what arrives at a slant, and light scattered once leaves at a slant."""

@@ -20,10 +20,11 @@ from dermis.apps.viewer.panel.light import draw_lights
 from dermis.apps.viewer.panel.movement import can_move, draw_expressions, draw_motion, has_expressions
 from dermis.apps.viewer.panel.plots import draw_timing
 from dermis.apps.viewer.panel.skin import draw_profile, draw_surface
-from dermis.apps.viewer.panel.words import TECHNIQUE
+from dermis.apps.viewer.panel.words import SURFACE, TECHNIQUE
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.views import LAYERS, VIEWS
-from dermis.scene.plain import choices_of
+from dermis.scene.plain import choices_of, fields_under
+from dermis.scene.talk import COMPARISONS
 
 _BUTTONS_PER_ROW = 3
 _SIDES = (256, 512, 1024, 2048, 4096)
@@ -35,7 +36,7 @@ _SETTINGS = {
     "exposure": Style(own=lambda session: session.studio.exposure),
     "background": Style(own=lambda session: (0.2, 0.2, 0.2)),
 }
-_PICTURE = ("exposure", "tone", "gamma", "bloom", "background", "background_blur")
+_PICTURE = ("exposure", "tone", "bloom", "background", "background_blur")
 _NOWHERE = ("size", "parts")  # the window's, and a view
 
 
@@ -88,10 +89,8 @@ def draw_technique(session: Session) -> None:
     """All settings that no other section has, choices first: a new one appears here."""
     settings = session.state.settings
     kind, left_out = type(settings), {*_PICTURE, *_NOWHERE}
-    if settings.seams != "clear-colour":
-        left_out.add("seam_colour")
     names = sorted(
-        (name for name in kind.model_fields if name not in left_out),
+        (name for name in fields_under("", kind) if name not in left_out),
         key=lambda name: not choices_of(kind, name),
     )
     draw_fields(session, settings, session.state.with_settings, _SETTINGS, names)
@@ -100,6 +99,16 @@ def draw_technique(session: Session) -> None:
 def draw_picture(session: Session) -> None:
     """How linear light becomes the picture."""
     draw_fields(session, session.state.settings, session.state.with_settings, _SETTINGS, _PICTURE)
+
+
+def draw_talk(session: Session) -> None:
+    """Draw the comparisons of the talk of 2007: fields of the skin and of the settings."""
+    state, skin, settings = session.state, session.state.scene.skin, session.state.settings
+    draw_fields(session, skin, state.with_skin, SURFACE, fields_under(COMPARISONS, type(skin)))
+    names = fields_under(COMPARISONS, type(settings))
+    if settings.seams != "clear-colour":
+        names.remove("seam_colour")
+    draw_fields(session, settings, state.with_settings, _SETTINGS, names)
 
 
 def draw_files(session: Session) -> None:
@@ -137,4 +146,5 @@ SECTIONS = (
     Section("Picture", draw_picture),
     Section("Timing", draw_timing),
     Section("Scene", draw_files, is_open=True),
+    Section(COMPARISONS, draw_talk),
 )

@@ -17,6 +17,7 @@ from dermis.optics.pigments.skin import EXAMPLES, SkinParameters
 from dermis.optics.profiles import PUBLISHED, preset_names
 from dermis.optics.tissue import SPECTRAL
 from dermis.scene.head_table import AUTO, NO_REGIONS, names_regions
+from dermis.scene.plain import fields_under
 from dermis.scene.skin import MOST_LAYERS, Pigments, Skin, TissueLayer
 from dermis.scene.tissue import layers_of
 
@@ -64,7 +65,7 @@ def draw_surface(session: Session) -> None:
     replaced = {
         "rho_s": names_regions(state.head) and "rho_s comes from the regions",
     }
-    for name in type(state.scene.skin).model_fields:
+    for name in fields_under("", type(state.scene.skin)):
         if name == "rho_s":
             now = str(state.head.get("regions", AUTO))
             names = dict.fromkeys((AUTO, NO_REGIONS, DEFAULT, now))
