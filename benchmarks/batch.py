@@ -18,8 +18,8 @@ from typing import Annotated, Any
 import batch_sections as sections
 from batch_sections import Plan
 from cyclopts import Parameter, run
-from figures_file import write_figures
 
+from dermis.apps.validation.pages import write_figures
 from dermis.base.atomic_write import check_output
 from dermis.base.console import note, print_lines
 from dermis.base.errors import DermisError

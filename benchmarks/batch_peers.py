@@ -24,10 +24,10 @@ from statistics import mean
 from typing import Annotated, Any
 
 from cyclopts import Parameter, run
-from figures_file import write_figures
-from peers import cpu_model
 
 from dermis.apps.truths.blender_process import blender_python
+from dermis.apps.validation.pages import write_figures
+from dermis.apps.validation.peers.report import cpu_model
 from dermis.base.console import print_lines
 from dermis.base.errors import DermisError, refuse
 

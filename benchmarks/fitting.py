@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures_file import write_figures
 from fitting_scenes import SCENES, Case, case, photograph
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.fit import fit
 from dermis.apps.inverse.fitting.fitted import Fitted
+from dermis.apps.validation.pages import write_figures
 from dermis.frame.renderer import Renderer
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments

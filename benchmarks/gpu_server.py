@@ -17,10 +17,10 @@ from typing import Annotated, Any
 
 import gpu_sections
 from cyclopts import Parameter, run
-from figures_file import write_figures
 from gpu_sections import Plan, plan_of, quick_plan
 
 import dermis
+from dermis.apps.validation.pages import write_figures
 from dermis.base.atomic_write import check_output
 from dermis.base.console import note
 from dermis.base.errors import DermisError

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures_file import write_figures
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
@@ -25,6 +24,7 @@ from dermis.apps.inverse.unmixing.on_device import Unmixer
 from dermis.apps.inverse.unmixing.solve import solve, weights_of
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.truths.slab_mc import counted_profile
+from dermis.apps.validation.pages import write_figures
 from dermis.gpu import Device, Frame, open_device
 from dermis.gpu.textures import texture_from
 from dermis.images.difference import delta_e_2000

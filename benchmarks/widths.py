@@ -16,7 +16,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from figures_file import write_figures
 from numpy.typing import NDArray
 
 import dermis
@@ -24,6 +23,7 @@ from dermis.apps.inverse.unmixing.model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.inverse.unmixing.widths import widths_of
 from dermis.apps.truths.two_media import exchange
+from dermis.apps.validation.pages import write_figures
 from dermis.frame.renderer import Renderer
 from dermis.images.io import write_png
 

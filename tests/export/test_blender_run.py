@@ -16,10 +16,11 @@ from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import PYTHON_VARIABLE
+from dermis.apps.validation.engines import blender
 from dermis.base.errors import DermisError
 
 PYTHON = os.environ.get(PYTHON_VARIABLE, "")
-MEASURING = Path(__file__).parents[2] / "benchmarks" / "engines_blender_script.py"
+MEASURING = blender.SCRIPT
 ASKED = """
 import json, sys
 import bpy

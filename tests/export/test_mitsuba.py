@@ -117,9 +117,8 @@ def test_mitsuba_renders_the_scene(mi: Any, ball: Path, boundary: str) -> None:
         assert lit[:, 0].mean() > lit[:, 2].mean()
 
 
-def test_an_edge_of_light_is_as_predicted(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "benchmarks"))
-    import engines_mitsuba as bench
+def test_an_edge_of_light_is_as_predicted(mi: Any) -> None:
+    from dermis.apps.validation.engines import mitsuba as bench
 
     subject = subject_of("skin2")
     with variant_of(mi, "scalar_rgb"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from inspect import cleandoc
 from pathlib import Path
 from types import NoneType
@@ -62,20 +63,30 @@ def run_app(app: App, words: Sequence[str] | None = None) -> int:
 
 
 def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | None = None) -> NoReturn:
-    """Run the command line of a script and exit.
+    """Run the command line of a script, whose docstring is the help, and exit.
 
-    run : function, whose module's docstring is the help; or commands by name, as "module:function"
+    run : function; or summaries of commands by "module:function"
     name : of the script; that of its file when left out
     """
-    name = name or Path(sys.argv[0]).name
+    name, help_text = name or Path(sys.argv[0]).name, reflowed(sys.modules["__main__"].__doc__)
     if isinstance(run, Mapping):
-        app = make_app(name, reflowed(sys.modules["__main__"].__doc__))
-        for command, place in run.items():
-            app.command(place, name=command, version_flags=())
+        app = make_app(name, help_text)
+        for place, summary in run.items():
+            add_command(app, place.partition(":")[2].replace("_", "-"), place, summary)
     else:
-        app = make_app(name, reflowed(sys.modules[run.__module__].__doc__))
+        app = make_app(name, help_text)
         app.default(run)
     sys.exit(run_app(app))
+
+
+def add_command(app: App, name: str, place: str, summary: str) -> None:
+    """Add a command by the "module:function" it is, which is imported only when it is chosen."""
+    chosen = sys.argv[1:2] == [name]
+    if chosen:
+        module, _, function = place.partition(":")
+        command = getattr(import_module(module), function)
+        command.__doc__ = reflowed(command.__doc__)
+    app.command(place, name=name, help=None if chosen else summary, version_flags=())
 
 
 def failed(name: str, message: str) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from importlib import import_module
 
 import dermis
 
@@ -57,16 +56,11 @@ def main() -> None:
 
 def _run() -> int:
     """Return the exit status of the command that was typed."""
-    from dermis.base.command_line import make_app, reflowed, run_app
+    from dermis.base.command_line import add_command, make_app, run_app
 
     app = make_app("dermis", "Human skin: physically based, in real time, checked against the truth.")
     app.version = lambda: dermis.__version__
     app.version_flags = ("--version",)
-    if (chosen := next(iter(sys.argv[1:]), "")) in COMMANDS:
-        command = getattr(import_module(f"dermis.cli.{chosen}"), chosen)
-        command.__doc__ = reflowed(command.__doc__)
     for name, summary in COMMANDS.items():
-        # The list of commands must not import them; a command's own help is its docstring.
-        shown = None if sys.argv[1:2] == [name] else summary
-        app.command(f"dermis.cli.{name}:{name}", name=name, help=shown, version_flags=())
+        add_command(app, name, f"dermis.cli.{name}:{name}", summary)
     return run_app(app)

@@ -1,0 +1,1 @@
+"""Errors of the package's approximations against truths, for the pages of docs."""

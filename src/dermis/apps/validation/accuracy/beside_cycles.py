@@ -1,0 +1,223 @@
+"""Highlights and whole skins beside Cycles, with the share of light that the surface reflects.
+
+Both need Blender's Python, so docs/accuracy.md shows what was measured last (benchmarks/results).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+import dermis
+from dermis.apps.truths.cycles import cycles_passes
+from dermis.apps.truths.cycles_scene import Coated, Facets
+from dermis.apps.validation.accuracy.person import sheet_bytes
+from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_figures, write_figures
+from dermis.atlas.build import build_atlas
+from dermis.base.console import print_lines
+from dermis.frame.painted import with_painted_maps
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Mesh
+from dermis.optics.profiles import load_profile
+from dermis.scene import PointLight, Scene, Settings, Skin, load_camera
+from dermis.scene.camera import PRESETS
+from dermis.specular.two_lobe import NARROW, SHARE_OF_NARROW, WIDE
+
+HIGHLIGHTS, LOOKS = RESULTS / "highlights.json", RESULTS / "look.json"
+PICTURE = DOCS / "images" / "look.webp"
+MODELS = ("torrance-sparrow-smith", "kelemen", "two-lobe")
+VIEWS = ("cheek", "portrait")
+ROUGHNESS, PATHS = 0.3, 64
+LIGHT = PointLight(position=(-300, 250, 600), irradiance=(3, 3, 3))
+ONE_KIND = ((1.0, ROUGHNESS),)
+TWO_KINDS = ((SHARE_OF_NARROW, NARROW * ROUGHNESS), (1.0 - SHARE_OF_NARROW, WIDE * ROUGHNESS))
+BRIGHT = 0.6  # share of the lit pixels that are darker than those that count
+GRAIN = 6.0  # standard deviation of what counts as the picture without its grain [pixel]
+
+HEADS = {"scan": "lee_perry_smith", "human": "human"}
+LOOK_VIEWS = ("portrait", "three-quarter", "cheek", "profile")
+COLUMNS = ("deck-2007", "default", "Cycles")
+SIDE, PATHS_OF_SURFACE, MAP_SIDE = 256, 16, 1024
+
+Picture = NDArray[np.float32]
+
+
+class HighlightRow(TypedDict):
+    """Energy over Cycles', contrasts and correlation of a model's highlights."""
+
+    view: str
+    model: str
+    energy: float
+    grain: float
+    grain_of_cycles: float
+    correlation: float
+
+
+class Look(NamedTuple):
+    """A picture in linear light, and the share of its light that the surface reflects [-]."""
+
+    picture: Picture
+    share: float
+
+
+def highlights(adapter: str = "auto") -> None:
+    """Measure highlights beside those of Cycles; writes benchmarks/results/highlights.json."""
+    in_checkout(RESULTS)
+    renderer, head = dermis.Renderer(adapter), bumpy_head()
+    rows = [row for view in VIEWS for row in highlight_rows(renderer, head, view)]
+    write_figures(HIGHLIGHTS, {"paths": PATHS, "rows": rows})
+
+
+def looks(adapter: str = "auto") -> None:
+    """Draw skins beside Cycles; writes benchmarks/results/look.json and docs/images/look.webp."""
+    in_checkout(PICTURE.parent)
+    renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
+    found = {head: looks_of(renderer, head) for head in HEADS}
+    for view in LOOK_VIEWS:
+        for head in HEADS:
+            rows.append({"head": head, "view": view, "shares": [one.share for one in found[head][view]]})
+            for column, one in zip(COLUMNS, found[head][view], strict=True):
+                panels[f"{head} {view}, {column}: {100 * one.share:.1f} %"] = one.picture
+    write_figures(LOOKS, {"paths": PATHS, "rows": rows})
+    PICTURE.write_bytes(sheet_bytes(panels, 2 * len(COLUMNS)))
+
+
+def tables() -> dict[str, object]:
+    """Return the rows of docs/accuracy.md by their names in its template, from what was measured last."""
+    found, seen = read_figures(HIGHLIGHTS)["rows"], read_figures(LOOKS)["rows"]
+    shares = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in seen)
+    return {
+        "highlights": "\n".join(
+            f"| {row['view']} | {row['model']} | {row['energy']:.3f} | {row['grain']:.2f} "
+            f"| {row['grain_of_cycles']:.2f} | {row['correlation']:.3f} |"
+            for row in found
+        ),
+        "highlight_paths": PATHS,
+        "looks": "\n".join(
+            f"| {row['head']} | {row['view']} | {cells} |" for row, cells in zip(seen, shares, strict=True)
+        ),
+        "look_paths": PATHS,
+    }
+
+
+def bumpy_head() -> Head:
+    """Return the scan with its relief as a normal map, which both programs take, and no other map."""
+    head = dermis.load_head("lee_perry_smith", subdivide=1, regions="none")
+    assert head.maps.height is not None
+    return replace(head, maps=Maps(normal=slopes(head.mesh, head.maps.height)))
+
+
+def slopes(mesh: Mesh, height: Picture) -> Picture:
+    """Return (n, n, 2) slopes of a height map (n, n) on a mesh, a normal map."""
+    down, right = np.gradient(height)
+    stretch = build_atlas(mesh, len(height)).stretch.astype(np.float32)
+    return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)
+
+
+def grain(picture: Picture, lit: NDArray[np.bool_]) -> float:
+    """Return the contrast of fine detail: root mean square of picture less its blur, over the mean."""
+    smooth = gaussian_filter(picture, GRAIN)
+    return float(np.sqrt((((picture - smooth) / np.maximum(smooth, 1e-9))[lit] ** 2).mean()))
+
+
+def traced(scene: Scene, settings: Settings, kinds: tuple[tuple[float, float], ...]) -> Picture:
+    """Return the green light that facets reflect, path-traced.
+
+    kinds : share and roughness of each kind of facets
+    """
+    picture = np.zeros(settings.size[::-1], np.float32)
+    for share, roughness in kinds:
+        (passed,) = cycles_passes(scene, Facets(roughness), [PATHS], settings)
+        picture += share * passed.image[..., 1]
+    return picture
+
+
+def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[HighlightRow]:
+    """Return a row for each model of the surface."""
+    camera = load_camera(view, head)
+    settings = Settings(size=(384, 384), atlas=512, samples=16, parts="specular", transmission="none")
+    scene, rows = Scene(head, [LIGHT], camera), list[HighlightRow]()
+    alike, mixed = (traced(scene, settings, kinds) for kinds in (ONE_KIND, TWO_KINDS))
+    for model in MODELS:
+        truth = mixed if model == "two-lobe" else alike
+        lit = truth > np.quantile(truth[truth > 0], BRIGHT)
+        skin = Skin.model_validate(
+            {"specular": model, "fresnel": "exact", "rho_s": 1.0, "roughness": ROUGHNESS}
+        )
+        ours = renderer.draw(Scene(head, [LIGHT], camera, skin), settings).linear()[..., 1]
+        rows.append(
+            {
+                "view": view,
+                "model": model,
+                "energy": float(ours.sum() / truth.sum()),
+                "grain": grain(ours, lit),
+                "grain_of_cycles": grain(truth, lit),
+                "correlation": float(np.corrcoef(ours[lit], truth[lit])[0, 1]),
+            }
+        )
+    return rows
+
+
+def of_frame(renderer: dermis.Renderer, scene: Scene) -> Look:
+    """Return the scene as the frame draws it."""
+    how = {"size": (SIDE, SIDE), "atlas": 1024, "strands": False}
+    settings = Settings.model_validate(how), Settings.model_validate(how | {"parts": "specular"})
+    picture, surface = (renderer.draw(scene, one).linear() for one in settings)
+    return Look(picture, float(surface.sum() / picture.sum()))
+
+
+def of_cycles(scene: Scene, skin: Coated) -> Look:
+    """Return the scene by Cycles; a second pass with black skin shows what the surface reflects."""
+    settings = Settings(size=(SIDE, SIDE))
+    black = replace(skin, colour=np.zeros_like(skin.colour))
+    (whole,) = cycles_passes(scene, skin, [PATHS], settings)
+    (surface,) = cycles_passes(scene, black, [PATHS_OF_SURFACE], settings)
+    return Look(whole.image, float(surface.image.sum() / whole.image.sum()))
+
+
+def reduced(values: Picture) -> Picture:
+    """Return a map (h, w, ...) as means over squares of texels, at most `MAP_SIDE` rows."""
+    step = max(1, len(values) // MAP_SIDE)
+    blocks = values.reshape(len(values) // step, step, values.shape[1] // step, step, *values.shape[2:])
+    return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
+
+
+def bumpy(head: Head) -> Head:
+    """Return the head with its relief as one normal map."""
+    if head.maps.height is None:
+        return head
+    relief = slopes(head.mesh, reduced(head.maps.height))
+    return replace(head, maps=replace(head.maps, normal=relief, height=None))
+
+
+def coated(head: Head) -> Coated:
+    """Return Cycles' skin of a head: its colours, and the mean offset of exit points of the frame's profile.
+
+    By Burley's profile that is 2.5 d, d the mean free path over a factor of the colour.
+    """
+    assert head.maps.colour is not None and head.maps.mean_colour is not None
+    profile, colour = load_profile(Skin().profile), head.maps.mean_colour
+    spread_mm = (profile.weight * np.sqrt(0.5 * np.pi * profile.variance_mm2[:, None])).sum(axis=0)
+    walk_mm = spread_mm / 2.5 * (1.9 - colour + 3.5 * (colour - 0.8) ** 2)
+    red, green, blue = (float(part) for part in 4.0 * np.pi * walk_mm)
+    return Coated(reduced(head.maps.colour), (red, green, blue), ROUGHNESS)
+
+
+def looks_of(renderer: dermis.Renderer, title: str) -> dict[str, list[Look]]:
+    """Return the columns of a head's views."""
+    name = HEADS[title]
+    usual, alike = (dermis.load_head(name, subdivide=1, regions=regions) for regions in ("auto", "none"))
+    plain = bumpy(with_painted_maps(renderer.device, usual, MAP_SIDE))
+    skin, found = coated(plain), dict[str, list[Look]]()
+    for view in LOOK_VIEWS:
+        camera = PRESETS[view](usual)
+        deck = of_frame(renderer, Scene(alike, camera=camera, skin=Skin.preset("deck-2007")))
+        ours = of_frame(renderer, Scene(usual, camera=camera))
+        found[view] = [deck, ours, of_cycles(Scene(plain, camera=camera), skin)]
+        print_lines(f"{title} {view} {' '.join(f'{one.share:.3f}' for one in found[view])}")
+    return found

@@ -1,0 +1,270 @@
+"""Errors of the blur on the atlas: points of light, curvature and seams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import zoom
+
+import dermis
+from dermis.apps.validation.pages import data_file, print_tables, use_tests_folder
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
+from dermis.atlas.cached import cached_atlas
+from dermis.frame.atlas_textures import upload_atlas
+from dermis.frame.geometry import upload_geometry
+from dermis.frame.levels import Blur, Levels, halvings_of, make_levels, usual_texel
+from dermis.frame.passes import diffuse
+from dermis.frame.passes import stretch as stretched
+from dermis.frame.passes.shape import rest_shape
+from dermis.frame.renderer import Renderer
+from dermis.frame.seams import REMEDIES
+from dermis.frame.shape import shape_tables
+from dermis.gpu import Device, Frame, download, open_device, upload
+from dermis.gpu.probe import half_store_rounding
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import plane, uv_sphere
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.profiles import load_profile
+from dermis.scene import DirectionalLight, Light, Scene, Settings, Skin, StripeLight
+
+if TYPE_CHECKING:
+    from atlas_reading import Points  # of the folder tests, as other names are that functions import
+
+PROFILE = load_profile("gpu-gems-3")
+Array = NDArray[np.floating]
+Flags = NDArray[np.bool_]
+Choice = Callable[[Array], Flags]
+SIZE = 256  # texels along the side, of flat patches
+HUMAN = "heads/makehuman/head_young_male_light.obj"
+RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
+BALL_SIDE, HEAD_SIDE = 320, 1024
+SPACING_MM, WIDTH_MM = 12.0, 6.0  # of bands of light across seams
+LEAST_FACING = 0.4  # cosine between a seam and the light
+
+
+def blur(adapter: str = "auto") -> None:
+    """Print the tables of points of light, curvature and seams; the last two need the folder tests."""
+    print_tables({name: str(text) for name, text in point_tables(open_device(adapter)).items()})
+    print_tables(surface_tables(adapter))
+
+
+def point_tables(device: Device) -> dict[str, object]:
+    """Return the tables of docs/accuracy.md by their names in its template."""
+    return {
+        "rows": "\n".join(point_of_light(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
+        "leaning": "\n".join(sheared(device, degrees) for degrees in (90, 80, 60, 45)),
+        "constant": f"{constant_light(device):.1e}",
+        "rounding": half_store_rounding(device),
+    }
+
+
+def blurred_levels(device: Device, mesh: Mesh, light: Array, stretch: str = "full") -> list[Array]:
+    """Return all levels (n, n) of light (n, n) that is blurred on a mesh's atlas."""
+    levels, blur = spread(device, mesh, build_atlas(mesh, len(light)), light[..., None], stretch)
+    return [level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
+
+
+def point_of_light(device: Device, texels_per_mm: float) -> str:
+    """Return errors of a point of light on a flat patch against the analytic sum of Gaussians."""
+    profile = load_profile("gpu-gems-3")
+    light = np.zeros((SIZE, SIZE), np.float32)
+    middle = SIZE // 2
+    light[middle, middle] = 1.0
+    levels = blurred_levels(device, plane(SIZE / texels_per_mm), light)
+    y, x = np.mgrid[:SIZE, :SIZE] - middle
+    r2 = (x**2 + y**2) / texels_per_mm**2
+    blurred = GaussianSum("blurred levels", profile.variance_mm2[1:], profile.weight[1:])
+    exact = blurred.radiant_exitance(np.sqrt(r2))[..., 0] / texels_per_mm**2
+    total = np.tensordot(blurred.weight[:, 0], levels, axes=1)
+    beyond = x**2 + y**2 > 1.5**2
+    shape = np.abs(total - exact)[beyond].max() / exact.max()
+    energy = total.sum() / blurred.albedo[0] - 1
+    return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
+
+
+def sheared(device: Device, degrees: float) -> str:
+    """Return principal widths of a point of light where uv axes meet at `degrees`, over the width wanted."""
+    flat = plane(SIZE / 3.0)
+    lean = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    positions = flat.positions.copy()
+    positions[:, 0] += lean[0] * positions[:, 1]
+    positions[:, 1] *= lean[1]
+    mesh = build_mesh(positions, flat.uv, flat.triangles, flat.material, flat.materials)
+    light = np.zeros((SIZE, SIZE), np.float32)
+    light[SIZE // 2, SIZE // 2] = 1.0
+    y, x = np.mgrid[:SIZE, :SIZE] - SIZE // 2
+    place = np.stack([x - lean[0] * y, -lean[1] * y]) / 3.0  # v points down
+    wanted = load_profile("gpu-gems-3").variance_mm2[-1]
+    cells = []
+    for stretch in ("axes", "full"):
+        spot = blurred_levels(device, mesh, light, stretch)[-1].astype(float)
+        covariance = np.einsum("iyx,jyx,yx->ij", place, place, spot) / spot.sum()
+        cells += [f"{width:.3f}" for width in np.sqrt(np.linalg.eigvalsh(covariance) / wanted)]
+    return f"| {degrees:g}° | {' | '.join(cells)} |"
+
+
+def constant_light(device: Device) -> float:
+    """Return the largest deviation of a constant light on a sphere's atlas after all levels."""
+    atlas = build_atlas(uv_sphere(100.0), SIZE)
+    levels = blurred_levels(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
+    return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
+
+
+def surface_tables(adapter: str) -> dict[str, str]:
+    """Return the tables of curvature and seams by their names in docs/techniques.in.md."""
+    use_tests_folder()
+    renderer = dermis.Renderer(adapter)
+    curved = [first_harmonic(renderer, radius) for radius in RADII_MM]
+    return {"curvature": "\n".join(curved), "seams": "\n".join(seams(renderer))}
+
+
+def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
+    """Return how much the widest Gaussian keeps of light proportional to x on a sphere: map, heat, chords."""
+    from atlas_reading import shown
+    from cut_meshes import cut_sphere
+
+    mesh = cut_sphere(radius_mm, 20)
+    atlas = build_atlas(mesh, BALL_SIDE, "stitched")
+    light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
+    left = widest(renderer, *spread(renderer.device, mesh, atlas, light))
+    density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
+    area = atlas.own[..., None] / density
+    map_share = (area * left * light).sum() / (area * light**2).sum()
+    v = PROFILE.variance_mm2[-1] / radius_mm**2
+    whole = np.exp(-2 / v)
+    chords = (1 - whole) - v * (1 - (1 + 2 / v) * whole)
+    return f"| {radius_mm:g} | {map_share:.3f} | {np.exp(-v):.3f} | {chords:.3f} |"
+
+
+def spread(
+    device: Device, mesh: Mesh, atlas: Atlas, light: Array, stretch: str = "full"
+) -> tuple[Levels, Blur]:
+    """Blur grey light (n, n, 1) on a mesh's atlas by all Gaussians of PROFILE but the narrowest."""
+    textures, variance = upload_atlas(device, atlas, stretch), PROFILE.variance_mm2[1:]
+    most = len(textures.sheets("repeated")) - 1
+    halvings = halvings_of(variance, textures.usual_per_mm, most)
+    blur = Blur(variance, PROFILE.weight[1:], halvings)
+    levels = make_levels(device, len(light), (halvings,), usual_texel(device))
+    upload(device, levels.stacks[0], np.dstack([light, light, light, np.ones_like(light)]))
+    frame = Frame(device)
+    head = Head("", mesh, Maps())
+    shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
+    stretched.draw(frame, upload_geometry(device, mesh, atlas, shape), textures)
+    diffuse.draw(frame, levels, textures, blur)
+    frame.submit()
+    return levels, blur
+
+
+def level(device: Device, levels: Levels, blur: Blur, k: int) -> Array:
+    """Return level k (n, n), read between the texels of its own resolution."""
+    halvings = blur.halvings[k]
+    layer = download(device, levels.stacks[halvings], layer=k - levels.first[halvings])[..., 0]
+    return (
+        np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True)) if halvings else layer
+    )
+
+
+def widest(renderer: Renderer, levels: Levels, blur: Blur) -> Array:
+    """Return (n, n, 1) of the widest level."""
+    return level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
+
+
+def seams(renderer: Renderer) -> list[str]:
+    """Return rows of jumps of scattered light across seams [% of it]: mean and 95th percentile."""
+    from cut_meshes import cut_sphere
+
+    ball = cut_sphere(30.0, 20)
+    rows = row(renderer, "sphere in six charts", Head("sphere", ball, Maps()), BALL_SIDE, everywhere)
+    own = dermis.load_head("human")
+    rows += row(renderer, "human, neck and back of the head", own, HEAD_SIDE, seen)
+    rows += row(renderer, "human, eye sockets and inside of the mouth", own, HEAD_SIDE, hidden)
+    human = dermis.load_head(data_file(HUMAN), unit_mm=100, subdivide=0)
+    human = replace(human, maps=Maps())
+    rows += row(renderer, "MakeHuman, neck", human, HEAD_SIDE, at_neck)
+    return rows + row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, behind)
+
+
+def everywhere(places: Array) -> Flags:
+    """Choose all places (n, 3) [mm from the head's centre]."""
+    return np.ones(len(places), bool)
+
+
+def at_neck(places: Array) -> Flags:
+    """Choose places on the neck and below it."""
+    return np.asarray((places[:, 1] < -90.0) & (places[:, 2] < 60.0))
+
+
+def behind(places: Array) -> Flags:
+    """Choose places on the back of the head."""
+    return np.asarray((places[:, 1] > -90.0) & (places[:, 2] < -30.0))
+
+
+def seen(places: Array) -> Flags:
+    """Choose places of the human's seams that can be seen."""
+    return np.asarray(at_neck(places) | behind(places))
+
+
+def hidden(places: Array) -> Flags:
+    """Choose places of the human's other seams."""
+    return ~seen(places)
+
+
+def row(renderer: Renderer, name: str, head: Head, side: int, where: Choice) -> list[str]:
+    """Return one line of the table, a column for each remedy."""
+    one, other = judged(head, where)
+    cells = []
+    for remedy in REMEDIES:
+        found = jumps(renderer, banded(head), remedy, side, one, other)
+        cells.append(f"{100 * found.mean():.1f} / {100 * np.percentile(found, 95):.1f}")
+    return [f"| {name} | {len(one.triangle)} | {' | '.join(cells)} |"]
+
+
+def judged(head: Head, where: Choice) -> tuple[Points, Points]:
+    """Return both sides of the places along seams that face the lights."""
+    from atlas_reading import Points, seam_points
+
+    mesh = head.mesh
+    one, other = seam_points(mesh)
+    places = one.on(mesh.positions[mesh.triangles]) - head.centre_mm
+    kept = where(places) & (np.abs(one.on(mesh.normals[mesh.triangles])[:, 2]) > LEAST_FACING)
+    for size in (BALL_SIDE, HEAD_SIDE):
+        for layout in ("mesh", "stitched"):
+            mapped = cached_atlas(head.topology.mesh, size, layout).mapped
+            kept &= mapped[one.triangle] & mapped[other.triangle]
+    return Points(one.triangle[kept], one.weights[kept]), Points(other.triangle[kept], other.weights[kept])
+
+
+def banded(head: Head) -> Scene:
+    """Return a scene with bands of light with sharp ends from front and back, and a little even light."""
+    x = head.mesh.positions[:, 0] - head.centre_mm[0]
+    places = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), SPACING_MM)
+    stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=WIDTH_MM, shadows=False)
+    lights: list[Light] = []
+    for away in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
+        lights += [stripe(direction=away, position=(place, 0, 0)) for place in places]
+        lights.append(DirectionalLight(direction=away, irradiance=(1, 1, 1), shadows=False))
+    skin = Skin(profile="gpu-gems-3", albedo="profile", specular="none", direction="lambertian")
+    return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
+
+
+def jumps(renderer: Renderer, scene: Scene, remedy: str, side: int, one: Points, other: Points) -> Array:
+    """Return the change of red light from one side of each seam to the other, of the light there."""
+    from atlas_reading import lit_at
+
+    asked = {"size": (16, 16), "atlas": side, "seams": remedy, "transmission": "none"}
+    settings = Settings.model_validate(asked | {"interreflection": False})
+    renderer.draw(scene, settings)
+    scattered = renderer.prepare(scene, settings).resources.scattered
+    light = download(renderer.device, scattered).astype(float)[..., :3]
+    atlas = cached_atlas(scene.head.topology.mesh, side, REMEDIES[remedy].layouts[0])
+    a, b = (lit_at(light, atlas, points)[:, 0] for points in (one, other))
+    return np.abs(a - b) / np.maximum((a + b) / 2, 1e-9)

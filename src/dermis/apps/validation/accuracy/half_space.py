@@ -1,0 +1,153 @@
+"""Reflection of a half-space by direction under a surface of index 1.4, for docs/techniques.md."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.truths.half_space import reflected_radiance
+from dermis.base.console import print_lines
+from dermis.frame.renderer import Renderer
+from dermis.mesh.head import Head
+from dermis.optics.directions import directional_albedo, directions, mean_of_once, refracted
+from dermis.optics.media import media
+from dermis.scene import Scene, Settings, Skin
+from dermis.scene.heads import load_head
+
+Floats = NDArray[np.float64]
+ETA, ASLANT = 1.4, 0.15  # the cosine of 81 degrees
+PHOTONS = 200_000
+FORWARD = 0.8  # mean cosine of real skin's scattering
+_LEAST_WEIGHT = 0.01
+_NODES = 48
+
+
+def half_space(adapter: str = "auto") -> None:
+    """Print the table of reflection by direction, within a minute."""
+    print_lines(table(load_head("lee_perry_smith", subdivide=0), adapter))
+
+
+def table(head: Head, adapter: str) -> str:
+    """Return rows for skin1's channels, and for the default skin in the studio."""
+    layer = media()["skin1"].layers[0]
+    albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
+    forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD) + layer.sigma_s_prime)
+    usual, most = _brighter(head, adapter)
+    aslant = f"light from 81° over light from above, index {ETA:g}"
+    rows: dict[str, Sequence[float]] = {
+        "light from 81° over light from above, index-matched": [_ratio(one, 1.0) for one in albedo],
+        aslant: [_ratio(one, ETA) for one in albedo],
+        "the same, photons": [_by_photons(one, 0.0, ETA) for one in albedo],
+        f"the same, photons of mean cosine {FORWARD:g}": [_by_photons(one, FORWARD, ETA) for one in forward],
+        f"index-matched, photons of mean cosine {FORWARD:g}": [
+            _by_photons(one, FORWARD, 1.0) for one in forward
+        ],
+        "relative RMSE over all pairs of directions, lambertian": [_errors(one)[0] for one in albedo],
+        "relative RMSE over all pairs of directions, half-space": [_errors(one)[1] for one in albedo],
+        "default skin in the studio over lambertian, median": usual,
+        "the same, a hundredth of it more than": most,
+    }
+    lines = ["|  | red | green | blue |", "|---|---|---|---|"]
+    for name, row in rows.items():
+        lines.append(f"| {name} | " + " | ".join(f"{value:.3f}" for value in row) + " |")
+    return "\n".join(lines)
+
+
+def _ratio(albedo: float, eta: float) -> float:
+    aslant, above = directional_albedo([ASLANT, 1.0], albedo, eta)
+    return float(aslant / above)
+
+
+def _errors(albedo: float) -> tuple[float, float]:
+    """Return errors of lambertian and of half-space skin over all directions of light and view in air.
+
+    The exact radiance below the surface is that of the matched half-space and what the surface throws back,
+    again and again.
+    """
+    critical = float(np.sqrt(1.0 - 1.0 / ETA**2))
+    caught, escaping = _nodes(0.0, critical), _nodes(critical, 1.0)
+    mu, weight = (np.concatenate(both) for both in zip(caught, escaping, strict=True))
+    back, flux = _fresnel(mu, ETA), 2.0 * weight * mu
+    matched = np.pi * reflected_radiance(mu[None], mu[:, None], albedo)
+    inside = np.linalg.solve(np.eye(len(mu)) - matched * flux * back, matched)
+    free = slice(_NODES, None)  # of both light and view
+    through, area = (1.0 - back)[free], flux[free] / flux[free].sum()
+    exact = inside[free, free] * through[:, None] / ETA**2
+    above = float(directional_albedo(1.0, albedo, ETA))
+    usual = np.outer(through / (area @ through), np.full(_NODES, above))
+    law = directions([above], ETA)
+    cosine = np.sqrt(1.0 - ETA**2 * (1.0 - mu[free] ** 2))
+    entering = directional_albedo(cosine, albedo, ETA) / above
+    once = 1.0 / (mu[free, None] + mu[free]) - mean_of_once(cosine, ETA)
+    made = usual * (entering + law.once[0] * once)
+    importance = np.outer(area, area)
+
+    def error(one: Floats) -> float:
+        return float(np.sqrt((importance * (one - exact) ** 2).sum() / (importance * exact**2).sum()))
+
+    return error(usual), error(made)
+
+
+def _by_photons(albedo: float, mean_cosine: float, eta: float) -> float:
+    """Return the share of photons from 81 degrees that come back, over the share of those from above."""
+    aslant, above = (_returned(cosine, albedo, mean_cosine, eta) for cosine in (ASLANT, 1.0))
+    return aslant / above
+
+
+def _returned(cosine: float, albedo: float, mean_cosine: float, eta: float) -> float:
+    """Return the share of photons that enter a half-space at a cosine in the air that leave it."""
+    rng = np.random.default_rng(1)
+    depth, weight, given = np.zeros(PHOTONS), np.ones(PHOTONS), 0.0
+    down = np.full(PHOTONS, float(refracted(cosine, eta)))
+    while len(depth):
+        depth = depth - np.log(rng.random(len(depth))) * down
+        through = (depth < 0.0) & (rng.random(len(depth)) > _fresnel(np.abs(down), eta))
+        given += float(weight[through].sum())
+        down = np.where(depth < 0.0, -down, down)  # thrown back, the way goes on below
+        keep = ~through
+        depth, down, weight = np.abs(depth[keep]), down[keep], albedo * weight[keep]
+        down = _deflected(down, mean_cosine, rng)
+        lucky = (weight > _LEAST_WEIGHT) | (rng.random(len(weight)) < 0.1)
+        weight = np.where(weight > _LEAST_WEIGHT, weight, 10.0 * weight)
+        depth, down, weight = depth[lucky], down[lucky], weight[lucky]
+    return given / PHOTONS
+
+
+def _deflected(down: Floats, g: float, rng: np.random.Generator) -> Floats:
+    """Return cosines after scattering, by the phase function of [HenyeyGreenstein1941]."""
+    chance = rng.random(len(down))
+    if g == 0.0:
+        return 2.0 * chance - 1.0
+    cosine = (1.0 + g**2 - ((1.0 - g**2) / (1.0 - g + 2.0 * g * chance)) ** 2) / (2.0 * g)
+    sines = np.sqrt(np.maximum((1.0 - cosine**2) * (1.0 - down**2), 0.0))
+    turned = down * cosine + sines * np.cos(2.0 * np.pi * rng.random(len(down)))
+    return np.asarray(np.clip(turned, -1.0, 1.0))
+
+
+def _fresnel(cosine: Floats, eta: float) -> Floats:
+    """Return the reflectance of unpolarised light from inside, 1 where none leaves."""
+    outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
+    across = (eta * cosine - outside) / np.maximum(eta * cosine + outside, 1e-12)
+    along = (cosine - eta * outside) / np.maximum(cosine + eta * outside, 1e-12)
+    return np.asarray(0.5 * (across**2 + along**2))
+
+
+def _brighter(head: Head, adapter: str) -> tuple[list[float], list[float]]:
+    """Return half-space skin over lambertian in the studio: median and 99th percentile of pixels."""
+    renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
+
+    def picture(direction: Literal["lambertian", "half-space"]) -> Floats:
+        return renderer.draw(Scene(head, skin=Skin(direction=direction)), settings).linear().astype(float)
+
+    usual, turned = picture("lambertian"), picture("half-space")
+    seen = usual.min(axis=-1) > 0.02
+    middle, high = np.percentile(turned[seen] / usual[seen], (50.0, 99.0), axis=0)
+    return middle.tolist(), high.tolist()
+
+
+def _nodes(low: float, high: float) -> tuple[Floats, Floats]:
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights

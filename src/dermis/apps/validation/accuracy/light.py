@@ -1,0 +1,225 @@
+"""Errors of lighting: environments, furnaces, area lights, ambient occlusion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+import dermis
+from dermis.apps.validation.pages import print_tables
+from dermis.atlas.cached import cached_atlas
+from dermis.environment.mirror_fits import MIRROR_ROUGHNESSES, ROUGH, VIEWS
+from dermis.environment.mirrors import equivalent_mirrors
+from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles, split_suns
+from dermis.environment.prefilter import (
+    ROUGHEST,
+    ROUGHNESSES,
+    SMOOTHEST,
+    Prefiltered,
+    prefilter,
+)
+from dermis.frame.lights.rectangle import facing_irradiance
+from dermis.frame.passes.occlusion import DIRECTIONS, bake_occlusion
+from dermis.frame.projection import frame_of
+from dermis.mesh.head import Head
+from dermis.mesh.primitives import uv_sphere
+from dermis.scene import Environment, PointLight, RectangleLight, Scene, Settings, Skin, load_lights
+from dermis.specular.albedo import directional_albedo
+from dermis.specular.cosines import Cosines
+from dermis.specular.kelemen import kelemen
+
+MAPS = ("royal_esplanade", "lebombo")
+ANGLES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # degrees
+NARROW = 0.25  # roughness below which lobes are summed over finer texels
+Array = NDArray[np.floating]
+UP = np.array([0.0, 1.0, 0.0])
+
+
+def light(adapter: str = "auto") -> None:
+    """Print the tables of environments, furnaces, area lights and occlusion."""
+    print_tables(tables(adapter))
+
+
+def looked_up(layer: Array, towards: Array) -> Array:
+    """Return (n, 3) of a layer (h, w, 3) in n directions, interpolated as in the shader."""
+    height, width = layer.shape[:2]
+    x = (0.5 + np.arctan2(towards[:, 0], -towards[:, 2]) / (2 * np.pi)) * width - 0.5
+    y = np.arccos(np.clip(towards[:, 1], -1, 1)) / np.pi * height - 0.5
+    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
+    total = np.zeros((len(towards), 3))
+    for i in (0, 1):
+        for j in (0, 1):
+            weight = np.abs(1 - i - (y - top)) * np.abs(1 - j - (x - left))
+            total += weight[:, None] * layer[np.clip(top + i, 0, height - 1), (left + j) % width]
+    return total
+
+
+def unit(v: Array) -> Array:
+    """Return vectors of length 1."""
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+
+
+@cache
+def panorama(name: str, rows: int = 256) -> tuple[Array, Array, Prefiltered]:
+    """Return directions and light of a panorama's texels without its suns, and what the frame reads."""
+    radiance = resampled(split_suns(load_panorama(name))[0], rows)
+    light = radiance * solid_angles(*radiance.shape[:2])[..., None]
+    return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
+
+
+def irradiance_error(name: str, count: int = 200) -> float:
+    """Return the largest relative error of the irradiance over random normals."""
+    towards, light, made = panorama(name)
+    normals = unit(np.random.default_rng(1).normal(size=(count, 3)))
+    exact = np.array([np.maximum(towards @ normal, 0) @ light for normal in normals])
+    return float(np.abs(looked_up(made.layers[0], normals) / exact - 1).max())
+
+
+def reflection_error(name: str, m: float, angle: float, count: int = 320) -> float:
+    """Return the root mean square error of reflected radiance over random normals and views, over its mean.
+
+    angle : of the view from the normal [degrees]
+    """
+    cosine = float(np.cos(np.radians(angle)))
+    towards, light, made = panorama(name, 512 if m < NARROW else 256)
+    rng = np.random.default_rng(2)
+    normals = unit(rng.normal(size=(count, 3)))
+    along = unit(np.cross(normals, rng.normal(size=(count, 3))))
+    views = cosine * normals - np.sqrt(1 - cosine**2) * along
+    exact = [lobe_sum(towards, light, normal, view, m) for normal, view in zip(normals, views, strict=True)]
+    ahead, away = 2 * cosine * normals - views, cosine * along - np.sqrt(1 - cosine**2) * normals
+    aside, seen = np.cross(normals, along), np.zeros((count, 3))
+    for x, y, wide, weight in mirror(cosine, m):
+        to = unit(2 * (x * away + y * aside) + (1 - x**2 - y**2) * ahead)
+        seen += weight * reflected(made.layers, to, wide)
+    error = directional_albedo(cosine, m) * seen - np.array(exact)
+    return float(np.sqrt((error**2).mean()) / np.mean(exact))
+
+
+def lobe_sum(towards: Array, light: Array, normal: Array, view: Array, m: float) -> Array:
+    """Return reflected radiance, a sum over texels in reach of the lobe (to 1e-10 of its peak)."""
+    n_l, n_v, v_l = towards @ normal, float(normal @ view), towards @ view
+    n_h = (n_l + n_v) / np.sqrt(np.maximum(2 + 2 * v_l, 1e-12))
+    near = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * m) ** 2)))
+    v_h = np.sqrt(0.5 + 0.5 * v_l[near])
+    angles = Cosines(n_l[near], np.full(len(near), n_v), n_h[near], v_h)
+    return np.asarray((kelemen(angles, m) * n_l[near]) @ light[near])
+
+
+def mirror(cosine: float, m: float) -> Array:
+    """Return directions, roughness and weight of the round lobes, between the table's nodes."""
+    x = np.sqrt(cosine) * (VIEWS - 1)
+    y = np.interp(np.log(m), np.log(MIRROR_ROUGHNESSES), np.arange(ROUGH))
+    j, i = min(int(x), VIEWS - 2), min(int(y), ROUGH - 2)
+    rows = equivalent_mirrors()[i : i + 2, j : j + 2]
+    return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
+
+
+def reflected(layers: Array, towards: Array, m: float) -> Array:
+    """Return the mean radiance under round lobes."""
+    place = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
+    low = int(np.clip(place, 0, len(ROUGHNESSES) - 2))
+    f = float(np.clip(place - low, 0, 1))
+    near, far = (looked_up(layers[1 + k], towards) for k in (low, low + 1))
+    return np.asarray((1 - f) * near + f * far)
+
+
+def furnace(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -> Array:
+    """Return least, mean and largest outgoing over incoming radiance of a white head under uniform light."""
+    white = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
+    skin = Skin.preset("deck-2007").replace(energy=energy)
+    scene = Scene(white, environment=Environment(name="uniform"), skin=skin)
+    settings = Settings.model_validate({"size": (384, 384), "atlas": 1024, "samples": 1, **chosen})
+    shown = renderer.draw(scene, settings)
+    made = shown.linear_rgba()
+    inside = made[made[..., 3] == 1][:, 1]
+    return np.array([inside.min(), inside.mean(), inside.max()])
+
+
+def furnaces(renderer: dermis.Renderer) -> str:
+    """Return rows of the furnace table."""
+    ball = dermis.Head("ball", uv_sphere(115.0), dermis.load_head("lee_perry_smith", subdivide=0).maps)
+    ball = replace(ball, maps=replace(ball.maps, normal=None, height=None, specular=None, roughness=None))
+    heads = {"sphere": ball, "scan": dermis.load_head("lee_perry_smith", regions="none", subdivide=0)}
+    rows = []
+    for name, head in heads.items():
+        for energy, occlusion, transmission in (
+            ("none", "none", "none"),
+            ("published", "none", "none"),
+            ("full", "none", "none"),
+            ("full", "baked", "none"),
+            ("full", "none", "thin"),
+            ("full", "baked", "thin"),
+        ):
+            least, mean, most = furnace(
+                renderer, head, energy, occlusion=occlusion, transmission=transmission
+            )
+            cells = f"{name} | {energy} | {occlusion} | {transmission}"
+            rows.append(f"| {cells} | {least:.3f} | {mean:.4f} | {most:.3f} |")
+    return "\n".join(rows)
+
+
+def as_points(light: RectangleLight, side: int = 8) -> list[PointLight]:
+    """Return a rectangle as side x side points, each with a shadow map of its own."""
+    position, target = np.array(light.position), np.array(light.target)
+    distance = float(np.linalg.norm(target - position))
+    right, up, forward = frame_of(target - position, UP)
+    area = light.width_mm * light.height_mm / side**2
+    radiance = np.array(light.irradiance) / facing_irradiance(light.width_mm, light.height_mm, distance)
+    points = []
+    for index in range(side**2):
+        x, y = ((2 * k + 1) / side - 1 for k in divmod(index, side))
+        place = position + 0.5 * (x * light.width_mm * right + y * light.height_mm * up)
+        away = target - place
+        given = radiance * area * (unit(away) @ forward) / (away @ away)
+        points.append(PointLight(position=tuple(place), irradiance=tuple(given), softness_mm=2.0))
+    return points
+
+
+def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float]:
+    """Return bias and root mean square difference from 64 point lights, over the mean radiance."""
+    light = load_lights(rig)[0]
+    assert isinstance(light, RectangleLight)
+    head = dermis.load_head("lee_perry_smith", subdivide=0)
+    settings = Settings(size=(384, 384), atlas=256, samples=1, technique="none", shadow_size=1024)
+    made, exact = (
+        renderer.draw(Scene(head, lights=lights), settings).linear() for lights in ([light], as_points(light))
+    )
+    lit = exact.max(axis=-1) > 0
+    error = (made - exact)[lit]
+    return float(error.mean() / exact[lit].mean()), float(np.sqrt((error**2).mean()) / exact[lit].mean())
+
+
+def occlusion_error(renderer: dermis.Renderer) -> float:
+    """Return the root mean square error of the open share of the sky against 1024 directions, on the scan."""
+    head = dermis.load_head("lee_perry_smith", subdivide=0)
+    inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
+    texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")
+    few, many = (
+        bake_occlusion(renderer.device, head, atlas, inputs.lit, texels, 512, count)[:512]
+        for count in (DIRECTIONS, 1024)
+    )
+    return float(np.sqrt(np.nanmean((few - many) ** 2)))
+
+
+def tables(adapter: str = "auto") -> dict[str, str]:
+    """Return the tables by their names in the page's template."""
+    renderer = dermis.Renderer(adapter)
+    shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]
+    return {
+        "irradiance": f"{max(map(irradiance_error, MAPS)):.1e}",
+        "reflections": "\n".join(
+            f"| {name} | {m} | "
+            + " | ".join(f"{100 * reflection_error(name, m, angle):.1f}" for angle in ANGLES)
+            + " |"
+            for name in MAPS
+            for m in (0.15, 0.2, 0.3, 0.45, 0.6)
+        ),
+        "furnaces": furnaces(renderer),
+        "soft_shadows": "\n".join(f"| {rig} | {bias:+.1%} | {rms:.1%} |" for rig, bias, rms in shadows),
+        "occlusion": f"{occlusion_error(renderer):.3f}",
+        "directions": str(DIRECTIONS),
+    }

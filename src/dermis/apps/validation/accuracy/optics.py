@@ -1,0 +1,185 @@
+"""Errors of the diffusion models and of fits against photons that are counted one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.truths.slab_mc import counted_profile, trace_medium
+from dermis.apps.validation.pages import print_tables
+from dermis.optics.diffusion.models import Model, cut, through_gaussians, through_slab
+from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.fits.burley import fit_burley
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.fits.separable import fit_separable
+from dermis.optics.fits.targets import ring_error
+from dermis.optics.media import SKIN_ETA, media
+from dermis.optics.profiles import load_profile
+from dermis.optics.radial import RadialProfile
+from dermis.optics.tissue import Tissue, load_tissue
+
+Floats = NDArray[np.float64]
+PHOTONS, SPECTRAL_PHOTONS = 4_000_000, 400_000
+TISSUES = ("skin1", "skin2", "dj3", "light", "medium", "dark")
+MODELS: tuple[tuple[Model, Clamp], ...] = (
+    ("dipole", "layer"),
+    ("better-dipole", "layer"),
+    ("multipole", "none"),
+    ("multipole", "layer"),
+    ("layered", "layer"),
+    ("layered-point", "layer"),
+)
+THICK_MM = (0.5, 1.0, 2.0, 4.0)
+
+
+def optics() -> None:
+    """Print the tables of diffusion models, fits and light through thin parts."""
+    print_tables(tables())
+
+
+def named(name: str) -> Tissue:
+    """Return a tissue; homogeneous skin under the index of its measurement [Jensen2001]."""
+    tissue = load_tissue(name)
+    return Tissue(media()[name].with_eta(1.3)) if name.startswith("skin") else tissue
+
+
+def models_table() -> str:
+    """Return total and ring errors of each model for each tissue."""
+    return "\n".join(row for name in TISSUES for row in _rows(name, named(name)))
+
+
+def _rows(name: str, tissue: Tissue) -> Iterator[str]:
+    photons = PHOTONS if tissue.rgb is None else SPECTRAL_PHOTONS
+    truth = counted_profile(tissue.medium, tissue.rgb, photons, seed=1)
+    assert truth.total_error is not None
+    certain = " ".join(f"{value:.4f}" for value in truth.total)
+    doubt = float((truth.total_error / truth.total).max())
+    yield f"| **{name}** | Monte Carlo | {certain} | ± {doubt:.2%} |"
+    thin = any(np.any(layer.thickness_mm < layer.mean_free_path_mm) for layer in tissue.medium.layers)
+    for model, clamp in MODELS:
+        one_layer = len(tissue.medium.layers) == 1
+        if (model.endswith("dipole") and not one_layer) or (model == "multipole" and one_layer):
+            continue
+        if model == "multipole" and clamp == "none" and not thin:
+            continue
+        profile = tissue.profile(model, clamp)
+        source = {"none": ", source as printed", "layer": ", source clamped"}[clamp]
+        label = model + (source if model == "multipole" else "")
+        total = _percent(profile.total / truth.total - 1.0)
+        rings = _percent(ring_error(truth.rings(), profile.ring_energy), sign=False)
+        yield f"| | {label} | {total} | {rings} |"
+
+
+def counted_table() -> str:
+    """Return errors of tables of photons and of layered diffusion for homogeneous skin."""
+    rows = []
+    for name in ("skin1", "skin2"):
+        for eta in (1.0, SKIN_ETA):
+            tissue = Tissue(media()[name].with_eta(eta))
+            truth = counted_profile(tissue.medium, photons=PHOTONS, seed=1)
+            for model in ("counted", "layered"):
+                profile = tissue.profile(model)
+                total = " ".join(f"{100 * one:+.2f}" for one in profile.total / truth.total - 1.0)
+                rings = _percent(ring_error(truth.rings(), profile.ring_energy), sign=False)
+                rows.append(f"| {name}, index {eta:g} | {model} | {total} % | {rings} |")
+    return "\n".join(rows)
+
+
+def fits_table() -> str:
+    """Return errors of fits of each kind to the layered profiles, through rings."""
+    rows = []
+    for name in TISSUES:
+        profile = named(name).profile()
+        rings = profile.rings()
+        cells = [_percent(fit_gaussians(rings, n).error, sign=False) for n in (2, 4, 6, 8)]
+        cells += [_percent(fit(rings).error, sign=False) for fit in (fit_burley, fit_separable)]
+        rows.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def pointwise_table() -> str:
+    """Return E and energy error of six shared Gaussians for profiles that are finite at their centre."""
+    rows = []
+    for name, model, clamp in (
+        ("skin1", "dipole", "layer"),
+        ("marble", "dipole", "layer"),
+        ("dj3", "multipole", "none"),
+        ("dj3", "multipole", "layer"),
+        ("dj3", "layered-point", "layer"),
+    ):
+        profile = named(name).profile(model, clamp)  # type: ignore[arg-type]
+        free, kept = (fit_gaussians(profile.points(), 6, keep_energy=keep) for keep in (False, True))
+        label = f"{name}, {model}" + (", source as printed" if clamp == "none" else "")
+        cells = [
+            _percent(free.error, sign=False),
+            _percent(free.energy_error),
+            _percent(kept.error, sign=False),
+        ]
+        rows.append(f"| {label} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def transmission_table() -> str:
+    """Return light through a thickness, by Gaussians, slabs and photons."""
+    rows = []
+    for name in ("skin1", "dj3"):
+        tissue = named(name)
+        sum_ = fit_gaussians(tissue.profile().rings(), 6).profile
+        for thickness in THICK_MM:
+            slab = cut(tissue.medium, thickness)
+            runs = trace_medium(slab, PHOTONS // 4, seed=2)
+            truth = np.array([run.total_transmittance + run.unscattered_transmittance for run in runs])
+            truth = truth / (1.0 - runs[0].specular)
+            ways = [
+                truth,
+                through_slab(tissue.medium, [thickness])[0],
+                through_slab(tissue.medium, [thickness], "multipole")[0],
+                through_gaussians(sum_, [thickness])[0],
+            ]
+            rows.append(f"| {name} | {thickness:g} mm | {' | '.join(map(_row, ways))} |")
+    return "\n".join(rows)
+
+
+def shape_against_the_table(profile: RadialProfile) -> Floats:
+    """Return E between a white-normalised profile and the published six Gaussians, per channel."""
+    r, log_r = profile.radius_mm[:, None], np.log(profile.radius_mm)
+    table = load_profile("gpu-gems-3").radiant_exitance(profile.radius_mm)
+    miss = np.trapezoid((r * (profile.reflectance / profile.total - table)) ** 2, log_r, axis=0)
+    return np.sqrt(miss / np.trapezoid((r * table) ** 2, log_r, axis=0))
+
+
+def table_note() -> str:
+    """Return the errors of the printed layers against the published sum."""
+    ways: tuple[tuple[str, Model, Clamp], ...] = (
+        ("multipole as printed", "multipole", "none"),
+        ("multipole", "multipole", "layer"),
+        ("layered diffusion of a point source", "layered-point", "layer"),
+    )
+    errors = [shape_against_the_table(load_tissue("dj3").profile(model, clamp)) for _, model, clamp in ways]
+    return ", ".join(
+        f"{way[0]} {_percent(error, sign=False)}" for way, error in zip(ways, errors, strict=True)
+    )
+
+
+def tables() -> dict[str, str]:
+    """Return all tables by their names in the page's template."""
+    return {
+        "models": models_table(),
+        "counted": counted_table(),
+        "fits": fits_table(),
+        "pointwise": pointwise_table(),
+        "transmission": transmission_table(),
+        "published": table_note(),
+        "photons": f"{PHOTONS:,}",
+        "spectral_photons": f"{SPECTRAL_PHOTONS:,}",
+    }
+
+
+def _percent(values: Floats, sign: bool = True) -> str:
+    return " ".join(f"{100 * value:+.1f}" if sign else f"{100 * value:.1f}" for value in values) + " %"
+
+
+def _row(values: Floats) -> str:
+    return " ".join(f"{value:.3f}" for value in values)

@@ -1,0 +1,25 @@
+"""Writes docs/accuracy.md from docs/accuracy.in.md."""
+
+from __future__ import annotations
+
+from dermis.apps.validation.accuracy import beside_cycles, blur, light, optics, slabs, specular, thin
+from dermis.apps.validation.pages import DOCS, fill_page
+from dermis.gpu import open_device
+
+PAGE = DOCS / "accuracy.md"
+
+
+def page(adapter: str = "auto") -> None:
+    """Measure the approximations of the frame and write docs/accuracy.md."""
+    device = open_device(adapter)
+    fill_page(
+        PAGE,
+        adapter=f"{device.adapter.name}, {device.adapter.backend}",
+        **blur.point_tables(device),
+        **beside_cycles.tables(),
+        **specular.tables(),
+        **light.tables(adapter),
+        **optics.tables(),
+        **slabs.tables(adapter),
+        **thin.tables(adapter),
+    )

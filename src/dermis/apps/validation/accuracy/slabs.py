@@ -1,0 +1,165 @@
+"""Errors of light through slabs far from their rim, by direction of entry.
+
+The truth is adding and doubling (`optics/slabs.py`), which tests compare with photons.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import dermis
+from dermis.apps.truths.slab import ScatteringLayer
+from dermis.apps.truths.slab_mc import trace_slab
+from dermis.apps.validation.accuracy.thin import scattered
+from dermis.apps.validation.pages import print_tables
+from dermis.mesh.primitives import wedge
+from dermis.optics import slabs as adding_doubling
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.directions import ROWS, directional_albedo, mean_of_once, refracted
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.forward import forward_directions
+from dermis.optics.media import Medium, media
+from dermis.optics.profiles import TERMS, write_profile
+from dermis.scene import Skin
+
+Array = NDArray[np.float64]
+THICK_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
+DEGREES = (0.0, 40.0, 60.0, 80.0)
+PHOTONS = 100_000
+FORWARD = 0.8  # mean cosine of real flesh
+BODIES = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
+
+
+def slabs(adapter: str = "auto") -> None:
+    """Print the tables of light through slabs."""
+    print_tables(tables(adapter))
+
+
+def exact(body: Medium, thickness: float, g: float = 0.0) -> Array:
+    """Return (2, angles, 3) shares of entering light that leave scattered, on the near side and the far one.
+
+    g : mean cosine of scattering; the body's coefficients are reduced
+    """
+    layer, made = body.layers[0], np.empty((2, len(DEGREES), 3))
+    below = refracted(np.cos(np.radians(DEGREES)), body.eta)
+    for c in range(3):
+        cut = adding_doubling.slabs(
+            float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness, body.eta, g=g
+        )
+        made[..., c] = [np.interp(below, cut.cosine, part[0]) for part in (cut.back, cut.through)]
+    return made
+
+
+def drawn(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
+    """Return the same (2, angles, 3) of the frame."""
+    mesh, made = wedge(60.0, thickness, thickness), np.empty((2, len(DEGREES), 3))
+    for k, angle in enumerate(np.radians(DEGREES)):
+        way = np.array([np.sin(angle), 0.0, np.cos(angle)])
+        places, normals, leaving = scattered(renderer, mesh, way, skin, 256)
+        inner = np.abs(places[:, :2]).max(axis=1) < 8.0
+        for side in (0, 1):
+            facing = inner & ((2 * side - 1) * normals[:, 2] > 0.9)
+            made[side, k] = leaving[facing].mean(axis=0) / np.cos(angle)
+    return made
+
+
+def skins(body: Medium, folder: str) -> dict[str, Skin]:
+    """Return lambertian skin and half-spaces of a medium, in its own colour."""
+    file = Path(folder) / f"{body.name}_{body.eta:g}.toml"
+    write_profile(file, fit_gaussians(diffusion_profile(body).rings(), TERMS, name=body.name).profile, {})
+    usual = {"profile": str(file), "albedo": "profile", "energy": "none", "rho_s": 0.0}
+    usual |= {"specular": "none"} if body.eta == 1.0 else {}
+    return {way: Skin(direction=way, **usual) for way in ("lambertian", "half-space")}  # type: ignore[arg-type]
+
+
+def table(renderer: dermis.Renderer) -> str:
+    """Return rows of relative errors, root mean square over directions and channels."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, eta in BODIES:
+            body = media()[name].with_eta(eta)
+            for way, skin in skins(body, folder).items():
+                for thickness in THICK_MM:
+                    cells = _beside(drawn(renderer, skin, thickness), exact(body, thickness))
+                    rows.append(f"| {name}, index {eta:g} | {way} | {thickness:g} mm | {cells} |")
+    return "\n".join(rows)
+
+
+def forward_table(renderer: dermis.Renderer) -> str:
+    """Return rows of half-space skin against slabs of forward scattering, without and with `anisotropy`."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, eta in BODIES:
+            body = media()[name].with_eta(eta)
+            plain = skins(body, folder)["half-space"]
+            for g in (0.0, FORWARD):
+                skin = plain.model_copy(update={"anisotropy": g})
+                for thickness in THICK_MM:
+                    cells = _beside(drawn(renderer, skin, thickness), exact(body, thickness, FORWARD))
+                    rows.append(f"| {name}, index {eta:g} | {g:g} | {thickness:g} mm | {cells} |")
+    return "\n".join(rows)
+
+
+def forward_directions_table() -> str:
+    """Return errors of radiance below skin1's surface over all pairs of directions, forward scattering."""
+    rows = []
+    for g in (0.0, FORWARD):
+        cells = []
+        for eta in (1.0, 1.4):
+            albedos = media()["skin1"].layers[0].alpha_prime
+            cells.append(" ".join(f"{_pairs_error(float(one), eta, g):.3f}" for one in albedos))
+        rows.append(f"| anisotropy {g:g} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def _pairs_error(albedo: float, eta: float, g: float) -> float:
+    a, share, exact = adding_doubling.leaving_deep(albedo, eta, adding_doubling.NODES, FORWARD)
+    air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
+    law = forward_directions(float(directional_albedo(1.0, albedo, eta)), eta, g)
+    table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, ROWS), law.returned[:, 0])
+    made = table + law.once[0] * (1.0 / (a[:, None] + a) - mean_of_once(air, eta))
+    made *= (share @ exact @ share) / (table @ share)
+    weight = np.outer(share, share)
+    return float(np.sqrt((weight * (made - exact) ** 2).sum() / (weight * exact**2).sum()))
+
+
+def _beside(made: Array, truth: Array) -> str:
+    """Return error and red light by direction, of the far side and of the near one."""
+    flux, cells = np.sqrt(np.cos(np.radians(DEGREES)))[:, None], []
+    for side in (1, 0):
+        error = np.linalg.norm(flux * (made[side] - truth[side])) / np.linalg.norm(flux * truth[side])
+        red = made[side][:, 0] / truth[side][:, 0]
+        cells.append(f"{error:.3f} | {' '.join(f'{one:.2f}' for one in red)}")
+    return " | ".join(cells)
+
+
+def forward() -> str:
+    """Return rows of red light from above through slabs of forward and isotropic scattering, by photons."""
+    rows = []
+    for eta in (1.0, 1.4):
+        layer = media()["skin1"].layers[0]
+        absorbed, scattered = float(layer.sigma_a[0]), float(layer.sigma_s_prime[0])
+        for thickness in THICK_MM:
+            cells = []
+            for g in (0.0, FORWARD):
+                flesh = ScatteringLayer(absorbed, scattered / (1.0 - g), thickness, g, eta)
+                run = trace_slab([flesh], PHOTONS).per_entering
+                cells += [f"{run.total_transmittance:.3f}", f"{run.unscattered_transmittance:.3f}"]
+                cells.append(f"{run.total_reflectance:.3f}")
+            rows.append(f"| {eta:g} | {thickness:g} mm | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def tables(adapter: str = "auto") -> dict[str, str]:
+    """Return the tables by their names in the page's template."""
+    renderer = dermis.Renderer(adapter)
+    return {
+        "slab_errors": table(renderer),
+        "slab_forward": forward(),
+        "slab_forward_errors": forward_table(renderer),
+        "forward_directions": forward_directions_table(),
+    }

@@ -1,0 +1,98 @@
+"""Errors of the surface's tables against their functions, and the white furnace."""
+
+from __future__ import annotations
+
+import timeit
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+
+from dermis.apps.validation.pages import print_tables
+from dermis.specular.albedo import TABLE_COSINES, TABLE_ROUGHNESSES, albedo_table, directional_albedo
+from dermis.specular.beckmann import beckmann, beckmann_table
+from dermis.specular.energy import ENERGY, Energy
+from dermis.specular.fresnel import hemispherical_reflectance, schlick
+from dermis.specular.models import MODELS
+
+Floats = NDArray[np.float64]
+VIEWS = (np.arange(200) + 0.5) / 200
+LAWS = {
+    "none": ENERGY["none"],
+    "published": ENERGY["published"],
+    "divided by π, light thrown back inside lost": Energy(1.0, returned=False),
+    "full": ENERGY["full"],
+}
+SKINS = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
+DENSE = (96, 96)
+
+
+def specular() -> None:
+    """Print the tables of the surface's albedo and of the furnace."""
+    print_tables(tables())
+
+
+def read_albedo(model: str, cosine: Floats, m: Floats) -> Floats:
+    """Return albedo and its mean (..., 2) between the table's texels, as the shader reads them."""
+    axes = np.sqrt(TABLE_ROUGHNESSES), np.sqrt(TABLE_COSINES)
+    places = np.stack(np.broadcast_arrays(np.sqrt(m), np.sqrt(cosine)), axis=-1)
+    return np.asarray(RegularGridInterpolator(axes, albedo_table(model).astype(float))(places))
+
+
+def albedo_rows() -> str:
+    """Return rows of the models: errors of the quadrature and of the table between texels, and its time."""
+    m, c = np.linspace(0.1, 0.5, 17)[:, None], np.linspace(0.05, 1.0, 39)
+    rows = []
+    for name, model in MODELS.items():
+        if name == "kelemen-direct":
+            continue
+        dense = directional_albedo(c, m, model.lobe, nodes=DENSE)
+        ms = 1e3 * min(timeit.repeat(partial(albedo_table.__wrapped__, name), number=1, repeat=5))
+        errors = (directional_albedo(c, m, model.lobe), read_albedo(name, c, m)[..., 0])
+        cells = [f"{100 * np.abs(one / dense - 1).max():.1g} %" for one in errors]
+        rows.append(f"| {name} | {' | '.join(cells)} | {ms:.0f} ms |")
+    return "\n".join(rows)
+
+
+def peak_error() -> float:
+    """Return the largest relative error of the Beckmann table, interpolated, where the lobe can be seen."""
+    m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 1.0, 61), indexing="ij")
+    rows, columns = beckmann_table().shape
+    axes = [(np.arange(rows) + 0.5) / rows, np.arange(columns) / (columns - 1)]
+    peak = (2 * RegularGridInterpolator(axes, beckmann_table())(np.stack([m, c], axis=-1))) ** 10
+    truth = beckmann(c, m)
+    seen = truth > 1e-3  # below that the lobe adds nothing that could be seen
+    return float(np.abs(peak[seen] / truth[seen] - 1).max())
+
+
+def furnace_cell(law: Energy, m: float, rho_s: float) -> str:
+    """Return least, mean and largest outgoing over incoming light on a white sphere under uniform light."""
+    albedo, mean = (read_albedo("kelemen", VIEWS, np.array(m))[..., k] for k in (0, 1))
+    exact = directional_albedo(VIEWS, m)
+    entered = law.enters(mean, rho_s)
+    out = rho_s * exact + entered * law.leaves(albedo, mean, rho_s)
+    return f"{out.min():.3f} {(out * VIEWS).sum() / VIEWS.sum():.3f} {out.max():.3f}"
+
+
+def furnace_rows() -> str:
+    """Return rows of the furnace for each energy model."""
+    return "\n".join(
+        f"| {name} | {' | '.join(furnace_cell(law, m, rho_s) for m, rho_s in SKINS)} |"
+        for name, law in LAWS.items()
+    )
+
+
+def tables() -> dict[str, str]:
+    """Return all tables by their names in the page's template."""
+    below = (np.arange(4000) + 0.5) / 4000
+    kelemen = float((directional_albedo(below, 0.3) * below).sum() / below.sum())
+    return {
+        "albedos": albedo_rows(),
+        "peak": f"{100 * peak_error():.1f} %",
+        "furnace": furnace_rows(),
+        "smooth": f"{hemispherical_reflectance():.1%}",
+        "smooth_schlick": f"{hemispherical_reflectance(schlick):.1%}",
+        "rough": f"{kelemen:.1%}",
+        "rough_in_use": f"{0.18 * kelemen:.1%}",
+    }

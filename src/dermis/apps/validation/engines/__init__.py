@@ -1,0 +1,1 @@
+"""Exported skins and heads measured in other programs, for docs/engines.md."""

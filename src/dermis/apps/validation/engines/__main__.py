@@ -1,0 +1,19 @@
+"""Measure in other programs how wrong exported skins and heads are there, and write docs/engines.md."""
+
+from __future__ import annotations
+
+from dermis.base.command_line import run_script
+
+HERE = "dermis.apps.validation.engines"
+COMMANDS = {
+    f"{HERE}.page:page": "Write the tables of docs/engines.md between their marks.",
+    f"{HERE}.babylon:babylon": "Measure edges of light in Babylon.js; needs Chromium and DERMIS_BABYLON.",
+    f"{HERE}.blender:blender": "Measure edges, heads and a picture in Cycles; needs two Pythons with bpy.",
+    f"{HERE}.gltf:gltf": "Compute what glTF's draft of scattering can say of skins.",
+    f"{HERE}.heads:heads": "Draw one head in all programs that are here, beside ours.",
+    f"{HERE}.mitsuba:mitsuba": "Measure edges of light in Mitsuba.",
+    f"{HERE}.openpbr:openpbr": "Compute what OpenPBR, MaterialX's profile and pbrt make of skins.",
+}
+
+if __name__ == "__main__":
+    run_script(COMMANDS, f"python -m {HERE}")

@@ -1,0 +1,174 @@
+"""Edges of light on exported skin in Babylon.js itself, a half-lit plane in headless Chromium."""
+
+from __future__ import annotations
+
+import base64
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.export.fitting import fit_d, lobe
+from dermis.apps.export.registry import TARGETS
+from dermis.apps.export.subject import subject_of
+from dermis.apps.export.target import numbers_of
+from dermis.apps.export.targets.babylon.target import TOO_WIDE, spiral
+from dermis.apps.validation.pages import RESULTS, write_figures
+from dermis.base.errors import refuse
+from dermis.base.extras import needed
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+PAGE = Path(__file__).with_name("babylon.html")
+FIGURES = RESULTS / "engines_babylon.json"
+LIBRARY = "DERMIS_BABYLON"
+SIDE, PIXELS, LEVEL = 640, 14.0, 0.9  # of the canvas; in the widest d; radiance of what is lit
+TURNS = 5
+FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+Floats = NDArray[np.floating]
+
+
+def babylon_library() -> Path:
+    """Return the folder of the library.
+
+    Raises DermisError when DERMIS_BABYLON names none.
+    """
+    folder = Path(os.environ.get(LIBRARY, ""))
+    if not (folder / "babylonjs" / "babylon.js").is_file():
+        came = f"{folder} has no babylonjs/babylon.js" if os.environ.get(LIBRARY) else "it is not set"
+        refuse(LIBRARY, "a folder that npm has installed babylonjs into", came, "npm install babylonjs")
+    return folder
+
+
+@contextmanager
+def opened(library: Path) -> Iterator[Page]:
+    """Open the page with the library loaded."""
+    playwright = needed("playwright.sync_api", "a page in Chromium")
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=list(FLAGS))
+        one = browser.new_page(viewport={"width": SIDE, "height": SIDE})
+        one.goto(PAGE.as_uri())
+        one.add_script_tag(path=str(library / "babylonjs" / "babylon.js"))
+        yield one
+        browser.close()
+
+
+def radiance(page: Page, colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
+    """Return (SIDE, SIDE, 3) radiance of the canvas over that of lit parts, rows from below."""
+    told = {"colour": list(map(float, colour)), "metersPerUnit": metres, "pixel": pixel, "turn": turn}
+    data = base64.b64decode(page.evaluate("(told) => drawEdge(told)", told))
+    levels = np.frombuffer(data, np.uint8).reshape(SIDE, SIDE, 4)[..., :3]
+    return levels / (255.0 * LEVEL)
+
+
+def predicted(colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
+    """Return the same by the shader's samples, rounded to pixels; metersPerUnit is of scenes in mm."""
+    r, angle, weight = spiral(colour)
+    across = TOO_WIDE * 1e-3 * r / metres / pixel
+    right, upwards = np.round(across * np.cos(angle)), np.round(across * np.sin(angle))
+    middle = np.arange(SIDE) + 0.5 - 0.5 * SIDE
+    told = np.zeros((SIDE, SIDE, 3))
+    for one in range(len(r)):
+        x, y = middle[None, :] + right[one], middle[:, None] + upwards[one]
+        told += (x * np.cos(turn) + y * np.sin(turn) > 0.0)[..., None] * weight[one]
+    return told
+
+
+def along(picture: Floats, pixel: float, turn: float, at_mm: Floats, half_mm: float) -> Floats:
+    """Return means (n, 3) at distances from the edge, of a strip across it."""
+    middle = (np.arange(SIDE) + 0.5 - 0.5 * SIDE) * pixel
+    x, y = middle[None, :], middle[:, None]
+    away, beside = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
+    strip = np.abs(beside) < half_mm
+    bins = np.round((away[strip] - at_mm[0]) / (at_mm[1] - at_mm[0])).astype(int)
+    kept = (bins >= 0) & (bins < len(at_mm))
+    count = np.bincount(bins[kept], minlength=len(at_mm))
+    sums = [np.bincount(bins[kept], picture[strip][kept, c], len(at_mm)) for c in range(3)]
+    return np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
+
+
+def measured(page: Page, colour: Floats, metres: float, shown_d: Floats) -> dict[str, Any]:
+    """Return edge responses over all turns: measured, by the samples, and of true lobes of widths d.
+
+    metres : metersPerUnit of a scene in mm
+    """
+    widest = float(shown_d.max())
+    pixel = widest / PIXELS
+    at = np.arange(-84, 85) * pixel  # 6 d
+    found, told, worst = [], [], 0.0
+    for turn in np.arange(TURNS) * 2.0 * np.pi / TURNS + 0.1:
+        pictures = radiance(page, colour, metres, pixel, turn), predicted(colour, metres, pixel, turn)
+        two = [along(picture, pixel, turn, at, 3.0 * widest) for picture in pictures]
+        worst = max(worst, float(np.abs(two[0] - two[1]).max()))
+        found.append(two[0])
+        told.append(two[1])
+    mean, by_samples, true = np.mean(found, 0), np.mean(told, 0), lobe(shown_d, np.ones(3)).edge(at)
+    near = np.abs(at)[:, None] <= 6.0 * shown_d
+    keep = slice(0, None, 7)
+    return {
+        "colour": np.round(colour, 5).tolist(),
+        "metersPerUnit_mm": round(1e3 * metres, 5),
+        "expected_d_mm": np.round(shown_d, 5).tolist(),
+        "fitted_d_mm": fitted_widths(at, mean),
+        "x_mm": np.round(at[keep], 4).tolist(),
+        "edge": np.round(mean[keep], 4).tolist(),
+        "predicted": np.round(by_samples[keep], 4).tolist(),
+        "measured_less_predicted": _largest(mean - by_samples, near),
+        "measured_less_predicted_in_one_direction": round(worst, 4),
+        "measured_less_lobes": _largest(mean - true, near),
+    }
+
+
+def _largest(difference: Floats, near: NDArray[np.bool_]) -> list[float]:
+    return [round(float(x), 4) for x in np.abs(difference * near).max(axis=0)]
+
+
+def fitted_widths(at: Floats, edge: Floats) -> list[float]:
+    """Return widths of the lobes with the nearest edge responses [mm]."""
+    tried = np.geomspace(at[-1] / 600.0, at[-1], 241)
+    curves = np.stack([lobe(np.full(3, d), np.ones(3)).edge(at)[:, 0] for d in tried])
+    off = ((curves[:, :, None] - edge) ** 2).sum(axis=1)
+    return [round(float(x), 4) for x in tried[off.argmin(axis=0)]]
+
+
+def exported(page: Page, name: str) -> dict[str, Any]:
+    """Return the figures of a skin with its exported parameters, also against its profile."""
+    subject, target = subject_of(name), TARGETS["babylon"].with_variant(None)
+    rows = target.parameters(subject, target.known_version(None))
+    colour = np.array(numbers_of(rows, "subSurface.scatteringDiffusionProfile"))
+    metres = 1e-3 * numbers_of(rows, "subSurfaceConfiguration.metersPerUnit")[0]
+    told = measured(page, colour, metres, fit_d(subject.curve))
+    x, edge = np.array(told["x_mm"]), np.array(told["edge"])
+    near = np.abs(x)[:, None] <= 6.0 * fit_d(subject.curve)
+    return told | {"measured_less_profile": _largest(edge - subject.curve.edge(x), near)}
+
+
+def babylon() -> None:
+    """Measure edges of light in Babylon.js; writes benchmarks/results/engines_babylon.json.
+
+    DERMIS_BABYLON names the folder that npm has installed the package babylonjs into. Chromium draws with its
+    software WebGL.
+    """
+    with opened(babylon_library()) as page:
+        plain = {
+            name: measured(page, np.array(colour), 1e-3, TOO_WIDE / np.array(colour))
+            for name, colour in {
+                "white": (1, 1, 1),
+                "grey": (0.5, 0.5, 0.5),
+                "coloured": (1, 0.5, 0.25),
+            }.items()
+        }
+        skins = {name: exported(page, name) for name in ("skin1", "skin2", "dj3")}
+        told = {
+            "engine": "babylonjs " + page.evaluate("BABYLON.Engine.Version"),
+            "turns": TURNS,
+            "samples": 40,
+        }
+    told |= {"noise": 0.002, "plain": plain, "skins": skins}
+    write_figures(FIGURES, told)

@@ -1,0 +1,155 @@
+"""Skin and heads exported to Blender, measured in Cycles itself."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal, get_args
+
+import numpy as np
+from PIL import Image
+
+from dermis.apps.export.fitting import deviation, fit_d
+from dermis.apps.export.subject import painted, subject_of
+from dermis.apps.export.targets.blender.target import TARGET
+from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
+from dermis.apps.validation.engines.heads import TEXELS, Floats, compared, drawn, rendered
+from dermis.apps.validation.pages import DOCS, RESULTS, read_figures, write_figures
+from dermis.base.console import print_lines
+from dermis.images.colour import encode_srgb
+from dermis.optics.curve import Curve
+
+FIGURES = RESULTS / "engines_blender.json"
+PICTURE = DOCS / "images" / "engines_blender.webp"
+SCRIPT = Path(__file__).with_name("blender_script.py")
+Part = Literal["edges", "heads", "picture"]
+SKINS = "skin1", "skin2", "dj3"
+METHODS = "random-walk-skin", "random-walk", "burley"
+BINS, EACH, ROWS = 12, 8, 8  # from -6 d to 6 d; columns of pixels in each, and rows of them
+SAMPLES = {"burley": 512}
+USUAL_SAMPLES = 1024
+SEEDS = 2  # pictures of each channel, whose difference tells the noise
+SIDE, PATHS, SHOTS = 192, 32, 2  # of heads
+SHOWN, SHOWN_SAMPLES = 320, 48
+METHODS_OF = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
+ERRAND = Errand("Cycles", "to render a half-lit plane", "See what it said")
+
+
+def blender(python_45: Path, python_52: Path, *parts: Part) -> None:
+    """Measure exported skin in Cycles; writes benchmarks/results/engines_blender.json, in half an hour.
+
+    Parameters
+    ----------
+    python_45:
+        A Python with the module bpy of Blender 4.5.
+    python_52:
+        A Python with the module bpy of Blender 5.2.
+    parts:
+        Measured alone, while the others stay as they were written [all].
+    """
+    pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
+    parts = parts or get_args(Part)
+    found: dict[str, Any] = read_figures(FIGURES) if FIGURES.exists() else {}
+    found["columns_in_d"] = columns().reshape(BINS, EACH).mean(axis=1).tolist()
+    if "edges" in parts:
+        found["edges"] = list(edges(pythons))
+        write_figures(FIGURES, found)
+    if "heads" in parts:
+        found["heads"] = list(heads(pythons))
+        write_figures(FIGURES, found)
+    if "picture" in parts:
+        picture(pythons)
+
+
+def edges(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
+    """Yield the edge response of each skin by each method in each version."""
+    for version, python in pythons.items():
+        for method in METHODS:
+            for name in SKINS:
+                yield edge(python, version, method, name)
+                print_lines(f"{version} {method} {name}")
+
+
+def columns() -> Floats:
+    """Return (BINS EACH,) distances of columns of pixels from the edge, in d."""
+    return 12.0 * (np.arange(BINS * EACH) + 0.5) / (BINS * EACH) - 6.0
+
+
+def edge(python: Path, version: str, method: str, name: str) -> dict[str, Any]:
+    """Return the figures of one skin: measured, predicted and true."""
+    subject, target = subject_of(name), TARGET.with_variant(method)
+    rows, d = target.parameters(subject, version), fit_d(subject.curve)
+    shown = target.shown(rows, subject, version)
+    typed = target.shown(target.naive(subject, version), subject, version)
+    samples = SAMPLES.get(method, USUAL_SAMPLES)
+    passes = [
+        {"channel": c, "width_m": 12e-3 * d[c], "size": [BINS * EACH, ROWS], "samples": samples, "seed": k}
+        for k in range(SEEDS)
+        for c in range(3)
+    ]
+    with TemporaryDirectory() as place:
+        folder = Path(place)
+        target.write(subject, rows, folder, version)
+        (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
+        run_blender(python, SCRIPT, [str(folder)], 3600.0, ERRAND)
+        done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
+    seen = np.array([[done["columns"][3 * k + c] for c in range(3)] for k in range(SEEDS)])[..., 0]
+    means = seen.reshape(SEEDS, 3, BINS, EACH).mean(axis=-1)
+    wanted, true = (binned(curve, d) for curve in (shown, subject.curve))
+    lit = (means.mean(axis=0) * wanted).sum(axis=1) / (wanted**2).sum(axis=1)
+    measured = means.mean(axis=0) / lit[:, None]
+    noise = np.abs(means[0] - means[1]) / (2.0 * lit[:, None])
+    return {
+        "version": done["version"],
+        "method": method,
+        "skin": name,
+        "samples": SEEDS * EACH * ROWS * samples,
+        "d_mm": d.round(4).tolist(),
+        "measured": measured.round(4).tolist(),
+        "predicted": wanted.round(4).tolist(),
+        "against_predicted": np.abs(measured - wanted).max(axis=1).round(4).tolist(),
+        "against_true": np.abs(measured - true).max(axis=1).round(4).tolist(),
+        "noise": np.sqrt((noise**2).mean(axis=1)).round(4).tolist(),
+        "energy": (np.pi * lit / subject.curve.energy).round(4).tolist(),
+        "typed_in": deviation(subject.curve, typed).edge.round(4).tolist(),
+        "predicted_energy": (shown.energy / subject.curve.energy).round(4).tolist(),
+    }
+
+
+def binned(curve: Curve, d_mm: Floats) -> Floats:
+    """Return the (3, BINS) edge response of a curve, averaged as the columns are."""
+    each = [curve.edge(columns() * d_mm[c])[:, c].reshape(BINS, EACH).mean(axis=1) for c in range(3)]
+    return np.array(each)
+
+
+def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
+    """Yield outlines and colours of the head without hair, which both draw differently, by each method."""
+    subject = painted(subject_of("human"), TEXELS, "auto")
+    assert subject.head is not None
+    bald = subject.with_head(replace(subject.head, hair=None, strands=None))
+    ours = drawn(bald, SIDE)
+    for version, python in pythons.items():
+        for method in METHODS_OF[version]:
+            pictures = rendered(bald, method, version, python, SIDE, PATHS, SHOTS)
+            found = {
+                "version": version,
+                "method": method,
+                "samples": SHOTS * PATHS,
+                **compared(ours, np.stack(pictures)),
+            }
+            print_lines(str(found))
+            yield found
+
+
+def picture(pythons: dict[str, Path]) -> None:
+    """Write a picture of ours beside Cycles of each version, with hair."""
+    subject = painted(subject_of("human"), TEXELS, "auto")
+    seen = [drawn(subject, SHOWN)]
+    for version, python in pythons.items():
+        seen += rendered(subject, METHODS_OF[version][0], version, python, SHOWN, SHOWN_SAMPLES, 1)
+    shown = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in seen]
+    levels = encode_srgb(np.clip(np.concatenate(shown, axis=1), 0.0, 1.0))
+    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=88)

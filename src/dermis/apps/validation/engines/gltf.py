@@ -1,0 +1,42 @@
+"""Skins in glTF's draft of volume scattering: predicted errors, also of other readings of its parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dermis.apps.export.fitting import deviation
+from dermis.apps.export.subject import subject_of
+from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARGET
+from dermis.apps.export.targets.gltf.volume import fitted, walked
+from dermis.apps.validation.pages import RESULTS, write_figures
+
+FIGURES = RESULTS / "engines_gltf.json"
+SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"
+VERSION = TARGET.versions[-1]
+
+
+def figures_of(name: str) -> dict[str, Any]:
+    """Return a skin's fitted parameters and their errors, also of values typed in, and of A as the colour."""
+    subject = subject_of(name)
+    volume = fitted(subject.curve, subject.albedo)
+    coloured = walked(volume._replace(multiscatter=subject.curve.energy))
+    found: dict[str, Any] = {
+        "albedo": [round(float(x), 4) for x in subject.curve.energy],
+        "multiscatter": [round(float(x), 4) for x in volume.multiscatter],
+        "mean_free_path_mm": [round(float(x), 4) for x in volume.mean_free_path_mm],
+        "albedo_as_colour": deviation(subject.curve, coloured).as_json(),
+    }
+    for variant in (SCATTER, DIFFUSE):
+        target = TARGET.with_variant(variant)
+        best, naive = (
+            deviation(subject.curve, target.shown(rows, subject, VERSION)).as_json()
+            for rows in (target.parameters(subject, VERSION), target.naive(subject, VERSION))
+        )
+        found[variant] = {"error": best, "naive_error": naive}
+    return found
+
+
+def gltf() -> None:
+    """Compute the errors of skins by glTF's draft; writes benchmarks/results/engines_gltf.json."""
+    figures = {"version": VERSION, "draft": DRAFT, "skins": {name: figures_of(name) for name in SKINS}}
+    write_figures(FIGURES, figures, 4)

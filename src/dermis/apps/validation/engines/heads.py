@@ -1,0 +1,172 @@
+"""One exported head, camera and lights in dermis, Cycles, Babylon.js and Mitsuba.
+
+Hair is left out, which each draws differently. Lights are parallel, as Babylon's page has them.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.ndimage import distance_transform_edt, maximum_filter
+
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.subject import Subject, painted, subject_of
+from dermis.apps.truths.metrics import relative_rmse
+from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
+from dermis.apps.validation.engines.babylon import FLAGS, LIBRARY, babylon_library
+from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, write_figures
+from dermis.base.console import print_lines
+from dermis.base.extras import needed
+from dermis.frame.renderer import Renderer
+from dermis.images.colour import decode_srgb, encode_srgb
+from dermis.images.io import read_image
+from dermis.scene.lights import DirectionalLight
+from dermis.scene.settings import Settings
+
+FIGURES, PICTURE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
+TEXELS, SIDE = 1024, 256
+CYCLES_SAMPLES, MITSUBA_SAMPLES, PASSES = 64, 256, 2
+LIGHTS = (
+    DirectionalLight(direction=(0.8, -0.5, -0.7), irradiance=(3.4, 3.3, 3.1)),
+    DirectionalLight(direction=(-0.9, -0.2, -0.3), irradiance=(0.8, 0.85, 0.95)),
+)
+LIT = 0.25  # of the mean: what is darker lies in shadow
+BRIGHT, GROWN = 0.75, 9  # radiance of highlights, white skin being 1, and pixels across that they spoil
+Floats = NDArray[np.float64]
+
+
+def heads() -> None:
+    """Draw one head in all programs that are here, compare each with ours.
+
+    Writes benchmarks/results/engines_heads.json and docs/images/engines_heads.webp. DERMIS_BLENDER_PYTHONS
+    names Pythons with bpy 4.5 and 5.2, separated by a comma; DERMIS_BABYLON a folder that npm has installed
+    babylonjs into. Needs Mitsuba.
+    """
+    in_checkout(PICTURE.parent)
+    subject = painted(subject_of("human"), TEXELS, "auto")
+    assert subject.head is not None and subject.scene is not None
+    bald = replace(subject.head, hair=None, strands=None)
+    subject = replace(subject, scene=replace(subject.scene, head=bald, lights=LIGHTS))
+    ours = drawn(subject, SIDE)
+    shown, rows = [ours], []
+    for name, draw in programs(subject, ours).items():
+        pictures = np.stack(draw())
+        found = {"program": name, **compared(ours, pictures)}
+        print_lines(str(found))
+        shown.append(pictures.mean(axis=0))
+        rows.append(found)
+        write_figures(FIGURES, {"heads": rows}, 4)
+    levels = encode_srgb(np.clip(np.concatenate([on_grey(one) for one in shown], axis=1), 0.0, 1.0))
+    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=90)
+
+
+def programs(subject: Subject, ours: Floats) -> dict[str, Callable[[], list[Floats]]]:
+    """Return the programs that are here, each with a function that draws linear pictures (h, w, 4)."""
+    found: dict[str, Callable[[], list[Floats]]] = {}
+    named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
+    for version, python in zip(("4.5", "5.2"), named, strict=False):
+        found[f"Cycles {version}"] = lambda version=version, python=python: rendered(  # type: ignore[misc]
+            subject, "random-walk-skin", version, Path(python), SIDE, CYCLES_SAMPLES, PASSES
+        )
+    if os.environ.get(LIBRARY):
+        library = babylon_library()
+        found["Babylon.js 9.28"] = lambda: [in_babylon(subject, library, ours)] * 2
+    found["Mitsuba 3"] = lambda: in_mitsuba(subject, ours)
+    return found
+
+
+def in_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
+    """Return the exported page's canvas in Chromium as linear light, with the alpha of ours."""
+    playwright = needed("playwright.sync_api", "a page in Chromium")
+    with TemporaryDirectory() as place, playwright.sync_playwright() as play:
+        file = Path(place) / "head.html"
+        export_skin(subject, "babylon", file, library=library)
+        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=list(FLAGS))
+        page = browser.new_page(viewport={"width": SIDE, "height": SIDE}, offline=True)
+        page.goto(file.as_uri())
+        page.wait_for_selector("html[data-state]", state="attached", timeout=240_000)
+        page.evaluate("document.querySelectorAll('body > :not(canvas)').forEach((one) => one.remove())")
+        seen = Image.open(io.BytesIO(page.locator("canvas").screenshot())).convert("RGB")
+        browser.close()
+    light = decode_srgb(np.asarray(seen) / 255.0)
+    return np.dstack([light, np.where(light.any(axis=-1), ours[..., 3], 0.0)])
+
+
+def in_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
+    """Return the exported scene by several seeds, with the alpha of ours."""
+    mi = load_mitsuba()
+    with TemporaryDirectory() as place, variant_of(mi, "scalar_rgb"):
+        folder = Path(place) / "head"
+        export_skin(subject, "mitsuba", folder)
+        scene = mi.load_file(str(folder / "scene.xml"), width=SIDE, height=SIDE, samples=MITSUBA_SAMPLES)
+        seen = [np.array(mi.render(scene, seed=k, spp=MITSUBA_SAMPLES))[..., :3] for k in range(PASSES)]
+    return [np.dstack([one, ours[..., 3]]).astype(np.float64) for one in seen]
+
+
+def on_grey(picture: Floats) -> Floats:
+    """Return a picture (h, w, 4) over black before a grey wall."""
+    return np.asarray(picture[..., :3] * (picture[..., 3:] > 0) + 0.05 * (1.0 - picture[..., 3:]))
+
+
+def drawn(subject: Subject, side: int) -> Floats:
+    """Return (h, w, 4) of ours, linear."""
+    assert subject.scene is not None
+    settings = Settings(size=(side, side), atlas=TEXELS, samples=16)
+    return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
+
+
+def rendered(
+    subject: Subject, method: str, version: str, python: Path, side: int, samples: int, seeds: int
+) -> list[Floats]:
+    """Return (h, w, 4) of Cycles, linear, for each of as many seeds."""
+    with TemporaryDirectory() as place:
+        folder = Path(place) / "head"
+        export_skin(subject, "blender", folder, version=version, variant=method)
+        script = folder / "skin.py"
+        text = script.read_text(encoding="utf-8")
+        script.write_text(text.replace("'size': [1024, 1024]", f"'size': [{side}, {side}]"), encoding="utf-8")
+        found = []
+        for seed in range(seeds):
+            picture = folder / f"{seed}.exr"
+            words = ["--render", str(picture), "--samples", str(samples), "--seed", str(seed)]
+            command = [str(python), "-I", str(script), "--", *words]
+            subprocess.run(command, check=True, capture_output=True)
+            found.append(read_image(picture).astype(np.float64))
+    return found
+
+
+def compared(ours: Floats, theirs: Floats) -> dict[str, Any]:
+    """Return outline, colours and errors of another program's pictures.
+
+    theirs : (seeds, h, w, 4)
+    """
+    mean, variance = theirs.mean(axis=0), theirs.var(axis=0, ddof=1) / len(theirs)
+    a, b = ours[..., 3] > 0.5, mean[..., 3] > 0.5
+    apart = max(distance_transform_edt(~b)[a].max(), distance_transform_edt(~a)[b].max())
+    whole = (ours[..., 3] > 0.999) & (mean[..., 3] > 0.999)
+    light = ours[..., :3].mean(axis=-1)
+    lit = whole & (light > LIT * light[whole].mean())
+    bright = (ours[..., :3].max(axis=-1) > BRIGHT) | (mean[..., :3].max(axis=-1) > BRIGHT)
+    matte = whole & ~maximum_filter(bright, GROWN)
+    errors = [relative_rmse(ours[..., :3], mean[..., :3], on, variance[..., :3]) for on in (whole, matte)]
+    return {
+        "side": ours.shape[0],
+        "outline_px": float(apart),
+        "pixels_apart": int((a != b).sum()),
+        "pixels": int(a.sum()),
+        "lit_colour": (mean[lit][:, :3].mean(axis=0) / ours[lit][:, :3].mean(axis=0)).round(4).tolist(),
+        "relative_rmse": round(float(errors[0].value), 4),
+        "without_highlights": round(float(errors[1].value), 4),
+        "share_without_highlights": round(float(matte.sum() / whole.sum()), 4),
+    }

@@ -1,0 +1,107 @@
+"""Skins in OpenPBR, MaterialX's profile and pbrt, by their own formulas; files checked by their libraries."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dermis.apps.export.fitting import deviation
+from dermis.apps.export.run import export_skin, judged
+from dermis.apps.export.subject import subject_of
+from dermis.apps.export.target import numbers_of
+from dermis.apps.export.targets.openpbr import target as openpbr_target
+from dermis.apps.export.targets.openpbr.document import OPEN_PBR
+from dermis.apps.export.targets.openpbr.target import fitted_mm, profile_of_specification
+from dermis.apps.export.targets.pbrt import target as pbrt_target
+from dermis.apps.validation.pages import RESULTS, read_figures, write_figures
+from dermis.base.console import print_lines
+from dermis.base.extras import needed
+
+FIGURES = RESULTS / "engines_openpbr.json"
+SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"
+_NODES_OF_MATERIALX = "MissingShaderIdInRegistry"  # of a plug-in that usd-core comes without
+
+
+def figures() -> dict[str, Any]:
+    """Return by skin: radii, and errors as meant, as typed in, and read as a profile."""
+    found: dict[str, Any] = {}
+    for name in SKINS:
+        subject = subject_of(name)
+        walk = judged(subject, openpbr_target.TARGET, "1.1.1")
+        beam = judged(subject, pbrt_target.TARGET, "4")
+        misread = deviation(subject.curve, profile_of_specification(fitted_mm(subject), subject))
+        found[name] = {
+            "model": subject.model,
+            "d_mm": numbers(walk.d_mm),
+            "openpbr": {
+                "radius_mm": numbers(openpbr_target.radii_mm(walk.rows, OPEN_PBR)),
+                "error": walk.error.as_json(),
+                "naive": walk.naive_error.as_json(),
+                "as_a_profile": misread.as_json(),
+            },
+            "pbrt": {
+                "mfp_mm": numbers(numbers_of(beam.rows, "mfp")),
+                "error": beam.error.as_json(),
+                "naive": beam.naive_error.as_json(),
+            },
+        }
+    return found
+
+
+def checked() -> dict[str, Any]:
+    """Return what the libraries find in documents and stages, and their versions."""
+    MaterialX = needed("MaterialX", "checking its files")
+    needed("pxr", "checking USD")
+    from pxr import Usd, UsdValidation
+
+    with TemporaryDirectory() as folder:
+        export_skin("skin1", "openpbr", Path(folder) / "skin.mtlx")
+        export_skin("skin1", "usd", Path(folder) / "skin.usda")
+        document, library = MaterialX.createDocument(), MaterialX.createDocument()
+        places = MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath()
+        MaterialX.loadLibraries(*places, library)
+        MaterialX.readFromXmlFile(document, str(Path(folder) / "skin.mtlx"))
+        document.setDataLibrary(library)
+        stage = Usd.Stage.Open(str(Path(folder) / "skin.usda"))
+        validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+        errors = [one.GetName() for one in UsdValidation.ValidationContext(validators).Validate(stage)]
+    return {
+        "materialx": MaterialX.getVersionString(),
+        "valid": document.validate()[0],
+        "usd": ".".join(map(str, Usd.GetVersion()[1:])),
+        "validators": len(validators),
+        "errors": sorted(set(errors) - {_NODES_OF_MATERIALX}),
+    }
+
+
+def numbers(values: ArrayLike) -> list[float]:
+    """Return plain numbers."""
+    return [float(one) for one in np.ravel(values)]
+
+
+def table(found: dict[str, Any]) -> list[str]:
+    """Return a table of the largest error of an edge for each reading."""
+    lines = [
+        "| skin | radius [mm] | OpenPBR's walk | dmfp typed in | read as a profile | pbrt | dmfp typed in |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name, one in found.items():
+        walk, beam = one["openpbr"], one["pbrt"]
+        edges = [walk["error"], walk["naive"], walk["as_a_profile"], beam["error"], beam["naive"]]
+        told = [" / ".join(f"{x:.3f}" for x in edge["edge"]) for edge in edges]
+        radius = " / ".join(f"{x:.2f}" for x in walk["radius_mm"])
+        lines.append(f"| {name} | {' | '.join([radius, *told])} |")
+    return lines
+
+
+def openpbr() -> None:
+    """Compute the errors of skins, print their table; writes benchmarks/results/engines_openpbr.json.
+
+    Needs the packages usd-core and MaterialX. No renderer of these runs here.
+    """
+    write_figures(FIGURES, {"libraries": checked(), "skins": figures()}, 4)
+    print_lines(*table(read_figures(FIGURES)["skins"]))

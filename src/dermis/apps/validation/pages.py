@@ -1,0 +1,91 @@
+"""Pages of the documentation and files of figures that measurements write, in a checkout of the project."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from dermis.base.atomic_write import replacing
+from dermis.base.console import print_lines
+from dermis.base.errors import refuse
+
+CHECKOUT = Path(str(files("dermis"))).resolve().parents[1]
+DOCS, RESULTS = CHECKOUT / "docs", CHECKOUT / "benchmarks" / "results"
+_REMEDY = "Install the package from a clone of the project (make setup) and run this there"
+
+
+def in_checkout(path: Path) -> Path:
+    """Return a path of the checkout that has to exist.
+
+    Raises DermisError where the package was installed without the rest of the project.
+    """
+    if not path.exists():
+        refuse(path.name, "a checkout of the project", f"there is no {path}", _REMEDY)
+    return path
+
+
+def use_tests_folder() -> None:
+    """Make the modules of the tests importable: some measurements use their surfaces.
+
+    Raises DermisError where the tests are missing.
+    """
+    folder = str(in_checkout(CHECKOUT / "tests"))
+    if folder not in sys.path:
+        sys.path.append(folder)
+
+
+def data_file(name: str) -> Path:
+    """Return a file of the folder that DERMIS_DATA names.
+
+    Raises DermisError when it is not there.
+    """
+    path = Path(os.environ.get("DERMIS_DATA", "../shared")) / name
+    if not path.is_file():
+        refuse(str(path), "a file of the published data", "there is none", "Name its folder by DERMIS_DATA")
+    return path
+
+
+def write_page(page: Path, text: str) -> None:
+    """Write a page of the documentation, whole or not at all."""
+    in_checkout(page.parent)
+    with replacing(page) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
+
+
+def fill_page(page: Path, **parts: object) -> None:
+    """Write NAME.md from NAME.in.md with its parts filled in."""
+    write_page(page, in_checkout(page.with_suffix(".in.md")).read_text(encoding="utf-8").format(**parts))
+
+
+def print_tables(tables: Mapping[str, str]) -> None:
+    """Print the tables of a page by their names in its template."""
+    print_lines(*(f"{name}\n{text}\n" for name, text in tables.items()))
+
+
+def write_figures(path: Path, figures: Mapping[str, Any], digits: int | None = None) -> None:
+    """Write raw figures as JSON, whole or not at all.
+
+    figures : what JSON can have
+    digits : significant digits of floats; all of them when left out
+    """
+    values = figures if digits is None else _rounded(figures, digits)
+    with replacing(path) as unfinished:
+        unfinished.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+
+
+def read_figures(path: Path) -> Any:
+    """Return the figures that were written last."""
+    return json.loads(in_checkout(path).read_text(encoding="utf-8"))
+
+
+def _rounded(value: object, digits: int) -> object:
+    if isinstance(value, float):
+        return float(f"{value:.{digits}g}")
+    if isinstance(value, Mapping):
+        return {str(key): _rounded(one, digits) for key, one in value.items()}
+    return [_rounded(one, digits) for one in value] if isinstance(value, list | tuple) else value

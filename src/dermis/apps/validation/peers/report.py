@@ -1,0 +1,224 @@
+"""The report on the peers: what is rendered, the raw figures as JSON and their Markdown."""
+
+from __future__ import annotations
+
+import os
+import platform
+from dataclasses import asdict, replace
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+import dermis
+from dermis.apps.truths.blender_process import blender_python
+from dermis.apps.truths.mitsuba_scene import load_mitsuba
+from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
+from dermis.apps.validation.pages import DOCS, RESULTS, fill_page, write_figures
+from dermis.apps.validation.peers.figures import figures
+from dermis.apps.validation.peers.rendering import METHODS, Measured, Plan, measure
+from dermis.base.atomic_write import check_output
+from dermis.base.console import note, print_lines, progress
+from dermis.base.errors import DermisError, refuse
+
+FIGURES, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
+LIGHTS = ("front", "back")
+QUICK = Plan(side=160, samples=(4, 16), paths=16, frames=3)
+GOAL = 50.0
+_COLUMNS = ("renderer", "", "seconds", "noise", "relative RMSE", "energy ratio")
+
+
+def peers(
+    *,
+    head: str = "lee_perry_smith",
+    lights: str = ",".join(LIGHTS),
+    quick: Annotated[bool, Parameter(negative="")] = False,
+    side: int | None = None,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    adapter: str = "cpu",
+) -> None:
+    """Measure, print Markdown, and write the raw figures and docs/peers.md.
+
+    Parameters
+    ----------
+    head:
+        A sample or a file.
+    lights:
+        Names of front, back and laser, separated by commas.
+    quick:
+        A small image with few paths, to check that everything works. Writes only the file of -o.
+    side:
+        Of the images [pixel; 512, or 160 with --quick].
+    output:
+        JSON with the raw figures [benchmarks/results/peers.json, and docs/peers.md beside it].
+    adapter:
+        On which ours runs: cpu, so that all use the same processor.
+    """
+    target = output or (None if quick else FIGURES)
+    if target is not None:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        check_output(target, (".json",), "Choose such a name")
+    plan = QUICK if quick else Plan()
+    plan = plan if side is None else replace(plan, side=side)
+    report = compare_peers(head, lights.split(","), plan, adapter)
+    place, scenes = place_text(report), scenes_text(report)
+    if target is not None:
+        write_figures(target, report)
+    if target == FIGURES:
+        fill_page(PAGE, place=place, scenes=scenes)
+    print_lines(place, "", scenes)
+
+
+def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> dict[str, Any]:
+    """Return the whole report, ready for JSON; without Cycles its rows are left out.
+
+    Raises DermisError for unknown lights, and without Mitsuba, which gives the truth.
+    """
+    for light in lights:
+        if light not in SCENES:
+            refuse("--lights", f"names of {', '.join(SCENES)} with commas", f"{light!r} came", "Correct it")
+    load_mitsuba()
+    try:
+        blender_python()
+    except DermisError as fault:
+        note(f"Cycles is left out. {fault}")
+    loaded, renderer = dermis.load_head(head, subdivide=0), dermis.Renderer(adapter)
+    scenes: list[Measured] = []
+    with progress("measuring") as bar:
+        done = 0
+
+        def report(work: int) -> None:
+            nonlocal done
+            done += work
+            bar(done, len(lights) * plan.work)
+
+        scenes = [measure(loaded, light, plan, renderer, report) for light in lights]
+    return {
+        "date": date.today().isoformat(),
+        "head": head,
+        "cpu": cpu_model(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "adapter": renderer.device.adapter.name,
+        "versions": versions(scenes),
+        "denoising": False,
+        "plan": asdict(plan),
+        "scenes": [figures(one) for one in scenes],
+    }
+
+
+def versions(scenes: list[Measured]) -> dict[str, str]:
+    """Return the versions of everything that renders, and of Python."""
+    found = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
+    passes = [
+        turns[0][0] for one in scenes for method in METHODS for turns in [one.cycles.get(method)] if turns
+    ]
+    if passes:
+        found["Blender"] = passes[0].version
+    return found | {"Python": platform.python_version()}
+
+
+def cpu_model() -> str:
+    """Return the processor's name where the system states it, else its architecture."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def scenes_text(report: dict[str, Any]) -> str:
+    """Return a section for each light."""
+    return "\n\n".join(
+        f"## {scene['light'].capitalize()}\n\n{scene_text(scene)}" for scene in report["scenes"]
+    )
+
+
+def scene_text(scene: dict[str, Any]) -> str:
+    """Return the table of one scene and the sentences that follow from it."""
+    head = f"| {' | '.join(_COLUMNS)} |\n|{'---|' * len(_COLUMNS)}"
+    table = [head, *(_line(row) for row in scene["rows"])]
+    return "\n".join([*table, "", *(f"- {sentence}" for sentence in _sentences(scene))])
+
+
+def place_text(report: dict[str, Any]) -> str:
+    """Return the date, the machine and the versions of a measurement, in one line."""
+    versions = ", ".join(f"{name} {version}" for name, version in report["versions"].items())
+    side = report["plan"]["side"]
+    where = f"{report['cpu']}, {report['cores']} cores; ours on {report['adapter']}"
+    return f"{report['date']}, {side}x{side}, {where}; {versions}"
+
+
+def _line(row: dict[str, Any]) -> str:
+    seconds = "-" if row["seconds"] is None else f"{row['seconds']:.3g}"
+    noise = f"{row['noise']:.1%}" if row["noise"] > 0 else "-"
+    cells = (
+        row["renderer"],
+        row["setting"],
+        seconds,
+        noise,
+        _value(row, "relrmse"),
+        _value(row, "energy_ratio"),
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def _value(row: dict[str, Any], name: str) -> str:
+    return "-" if row[name] is None else f"{row[name]:.4f} ± {row[name + '_se']:.4f}"
+
+
+def _sentences(scene: dict[str, Any]) -> list[str]:
+    said = [_longer(setting, found) for setting, found in scene.get("as_near", {}).items()]
+    right = "; ".join(f"{name} {error:.3f}" for name, error in scene["ours_energy_put_right"].items())
+    said.append(f"Ours, each channel scaled to the truth's energy: {right}.")
+    said += [
+        f"The {name} take {ratio['ratio']:.2f} times as long as the first of ours, "
+        f"{ratio['core_ratio']:.2f} times by the cores' time."
+        for name, ratio in scene.get("published", {}).items()
+    ]
+    if "burley_against_random_walk" in scene:
+        said.append(_burley(scene))
+    return said + [f"Left out: {name}. {why}" for name, why in scene["left_out"].items()]
+
+
+def _longer(setting: str, found: dict[str, dict[str, float]]) -> str:
+    clean = f"to 5 % noise {_times(found['clean'])}"
+    if "same_error" not in found:
+        return f"{setting}: Cycles' random walk never comes as near, for its own bias is greater; {clean}."
+    same = found["same_error"]
+    reached = "reached" if same["ratio"] >= GOAL else "not reached"
+    return (
+        f"{setting}: Cycles' random walk comes as near in {_times(same)}, goal {GOAL:.0f} {reached}; {clean}."
+    )
+
+
+def _times(found: dict[str, float]) -> str:
+    """Return time, paths, and the ratio to our frame by the clock and by CPU time."""
+    spent = f"{found['seconds']:.3g} s ({found['samples']:.0f} paths a pixel)"
+    return (
+        f"{spent}: {_short(found['ratio'])} times our frame, {_short(found['core_ratio'])} by the cores' time"
+    )
+
+
+def _short(ratio: float) -> str:
+    return f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.1f}"
+
+
+def _burley(scene: dict[str, Any]) -> str:
+    """Return the distance of Burley's profile from the random walk, and of ours from path tracing."""
+    theirs, error = scene["burley_against_random_walk"]
+    ours = {
+        row["setting"]: row["relrmse"]
+        for row in scene["rows"]
+        if row["setting"] in scene["ours_energy_put_right"]
+    }
+    each = "; ".join(
+        f"{name} {found:.4f}, {'reached' if found <= theirs else 'not reached'}"
+        for name, found in ours.items()
+    )
+    return (
+        f"Burley's profile is {theirs:.4f} ± {error:.4f} from the random walk; ours shall be no farther "
+        f"from path tracing: {each}."
+    )

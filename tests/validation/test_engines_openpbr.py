@@ -1,0 +1,29 @@
+"""The table of OpenPBR and pbrt: the page has what the figures say, and the figures what is computed now."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from dermis.apps.validation.engines import openpbr as script
+from dermis.apps.validation.engines.openpbr import FIGURES
+from dermis.apps.validation.engines.page import PAGE
+
+CHANGED = 2e-3  # of an edge
+
+
+def test_the_page_has_the_figures() -> None:
+    figures = json.loads(FIGURES.read_text("utf-8"))
+    assert figures["libraries"]["valid"] and figures["libraries"]["errors"] == []
+    page = PAGE.read_text("utf-8")
+    assert all(line in page for line in script.table(figures["skins"]))
+
+
+def test_figures_are_those_of_today(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(script, "SKINS", ("skin1",))
+    known = json.loads(FIGURES.read_text("utf-8"))["skins"]["skin1"]
+    found = script.figures()["skin1"]
+    for target, reading in (("openpbr", "error"), ("openpbr", "as_a_profile"), ("pbrt", "error")):
+        edges = found[target][reading]["edge"]
+        assert edges == pytest.approx(known[target][reading]["edge"], abs=CHANGED)

@@ -1,0 +1,19 @@
+"""The page of engines says what the targets say."""
+
+from __future__ import annotations
+
+import pytest
+from figures_in_text import differences
+
+from dermis.apps.validation.engines.page import PAGE, blender_tables, filled
+
+
+@pytest.mark.skipif(not PAGE.is_file(), reason="this is no checkout")
+def test_the_table_is_what_the_command_writes() -> None:
+    assert differences(filled(PAGE.read_text("utf-8")), PAGE.read_text("utf-8")) == []
+
+
+@pytest.mark.skipif(not PAGE.is_file(), reason="this is no checkout")
+def test_tables_of_blender_are_those_of_the_measurement() -> None:
+    page = PAGE.read_text("utf-8")
+    assert [line for line in filter(None, blender_tables().splitlines()) if line not in page] == []
