@@ -25,7 +25,7 @@ from dermis.apps.inverse.unmixing.solve import solve, weights_of
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.truths.slab_mc import counted_profile
 from dermis.apps.validation.pages import write_figures
-from dermis.gpu import Device, Frame, open_device
+from dermis.gpu import CommandList, Device, open_device
 from dermis.gpu.textures import texture_from
 from dermis.images.difference import delta_e_2000
 from dermis.optics.diffusion.boundary import normal_reflectance
@@ -235,7 +235,7 @@ def speed_ms(device: Device, side: int) -> float:
     times = []
     for _ in range(6):
         started = time.process_time()
-        frame = Frame(device)
+        frame = CommandList(device)
         unmixer.record(frame, colours)
         frame.submit()
         frame.wait()

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 _UNSET = "DERMIS_DATA is not set"
 _BY_THE_CLOCK = [
-    "test_address_space",
     "test_browser",
     "test_browser_drags",
     "test_browser_files",
@@ -38,6 +37,7 @@ _BY_THE_CLOCK = [
     "test_lost_twice",
     "test_opening",
     "test_page",
+    "test_process_memory",
     "test_served",
     "test_streams",
     "test_viewer_heads",

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import dermis
 from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
-from dermis.gpu.listing import Listed, Listing
+from dermis.gpu.listing import ListedPass, Listing
 from dermis.mesh.samples import cached
 
 PAGE = Path(__file__).parent.parent / "docs" / "frame_graph.md"
@@ -49,7 +49,7 @@ def stage_rows(listing: Listing, ms: dict[str, float], marks: dict[str, set[str]
         yield f"| {stage} | {shaders} | {len(own)} | {time} | {cells} |"
 
 
-def pass_row(one: Listed) -> str:
+def pass_row(one: ListedPass) -> str:
     """A row of the table of passes."""
     bound = ", ".join(f"{name} {value}" for name, value in one.bindings.items() if value != "sampler")
     groups = " x ".join(map(str, one.groups))

@@ -9,7 +9,7 @@ from unittest.mock import patch
 
 from dermis.apps.batch.worker_pool import serve as draw
 from dermis.frame import renderer as renderer_module
-from dermis.gpu import Device, Frame, open_device
+from dermis.gpu import CommandList, Device, open_device
 
 LOSSES = 2  # of a worker's devices
 FOLDER, WORKERS = "LOSING_FOLDER", "LOSING_WORKERS"
@@ -25,16 +25,19 @@ def serve(pipe: Any, *given: Any) -> None:
         return
     (folder / str(number)).touch()
     opened: list[Device] = []
-    usual = Frame.submit
+    usual = CommandList.submit
 
     def open_noted(adapter: str) -> Device:
         opened.append(open_device(adapter))
         return opened[-1]
 
-    def submit(frame: Frame) -> None:
+    def submit(frame: CommandList) -> None:
         if len(opened) <= LOSSES:
             opened[-1].handle.destroy()
         usual(frame)
 
-    with patch.object(renderer_module, "open_device", open_noted), patch.object(Frame, "submit", submit):
+    with (
+        patch.object(renderer_module, "open_device", open_noted),
+        patch.object(CommandList, "submit", submit),
+    ):
         draw(pipe, *given)

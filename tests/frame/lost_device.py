@@ -26,7 +26,7 @@ from dermis.frame.passes import pack
 from dermis.frame.passes.painting import paint
 from dermis.frame.renderer import Renderer
 from dermis.frame.surface_points import surface_points
-from dermis.gpu import Device, Frame
+from dermis.gpu import CommandList, Device
 from dermis.human.person import Human
 from dermis.images.io import read_image
 from dermis.mesh.head import Head
@@ -76,17 +76,17 @@ def loading(renderer: Renderer) -> Any:
 
 
 def recording(renderer: Renderer) -> Any:
-    with losing(Frame, "run", 3):
+    with losing(CommandList, "run", 3):
         return renderer.draw(scene(), DRAWN, anew=True).linear()
 
 
 def between_passes(renderer: Renderer) -> Any:
-    with losing(Frame, "_end_pass", 2):
+    with losing(CommandList, "_end_pass", 2):
         return renderer.draw(scene(), DRAWN, anew=True).linear()
 
 
 def submitting(renderer: Renderer) -> Any:
-    with losing(Frame, "_flush"):
+    with losing(CommandList, "_flush"):
         return renderer.draw(scene(), DRAWN, anew=True, timed=False).linear()
 
 
@@ -129,7 +129,7 @@ def many(renderer: Renderer) -> Any:
     """Some frames are in flight when the device goes, wherever that is."""
     mixes, drawn = np.linspace(0.0, 1.0, MANY), DRAWN.model_dump()
     known = list(renderer.render_many(map(scene, mixes), **drawn))
-    for target, name, calls in ((Frame, "submit", 4), (pack.Leaving, "image", 2)):
+    for target, name, calls in ((CommandList, "submit", 4), (pack.Leaving, "image", 2)):
         with losing(target, name, calls):
             found = list(renderer.render_many(map(scene, mixes), **drawn))
         assert len(found) == MANY and all(map(np.array_equal, found, known))
@@ -139,7 +139,7 @@ def many(renderer: Renderer) -> Any:
 def beside_frames(renderer: Renderer) -> Any:
     """What else works on the renderer's device, as comparisons do."""
     known = surface_points(renderer, scene(), DRAWN)
-    with losing(Frame, "submit"):
+    with losing(CommandList, "submit"):
         found = surface_points(renderer, scene(), DRAWN)
     assert np.array_equal(found.triangle, known.triangle) and len(known.triangle)
     return renderer.draw(scene(), DRAWN).linear()
@@ -153,7 +153,7 @@ def observing(renderer: Renderer) -> Any:
     opened[-1].handle.destroy()
     assert depth.any() and np.array_equal(rendered.output("depth"), depth)
     known = list(renderer.observe(scenes, DRAWN, outputs=names))
-    for target, name, calls in ((Frame, "submit", 3), (pack.Leaving, "all", 2)):
+    for target, name, calls in ((CommandList, "submit", 3), (pack.Leaving, "all", 2)):
         with losing(target, name, calls):
             found = list(renderer.observe(scenes, DRAWN, outputs=names))
         assert len(found) == len(scenes)
@@ -184,7 +184,7 @@ def commands(folder: Path, adapter: str) -> Iterator[tuple[str, str]]:
     write_moving_head(Path("face.glb"))
     words = ["animate", "face.glb", *SMALL, "--adapter", adapter, "-o"]
     assert command(*words, "whole/%d.exr") == 0
-    with losing(Frame, "submit", 2):
+    with losing(CommandList, "submit", 2):
         assert command(*words, "lost/%d.exr") == 0
     pictures = [(read_image(f"whole/{k}.exr"), read_image(f"lost/{k}.exr")) for k in range(4)]
     yield "animate", "same" if all(np.array_equal(*two) for two in pictures) else "other pictures"

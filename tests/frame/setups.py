@@ -20,7 +20,7 @@ from dermis.frame.inputs import Inputs
 from dermis.frame.passes import SHARED_SHADERS, SPECULAR
 from dermis.frame.passes.stretch import draw_coarser
 from dermis.frame.renderer import Renderer
-from dermis.gpu import ComputeProgram, Constants, Device, Frame, download, make_texture, upload
+from dermis.gpu import CommandList, ComputeProgram, Constants, Device, download, make_texture, upload
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -84,7 +84,7 @@ def resting(device: Device, atlas: Atlas, stretch: str = "full", **more: Any) ->
     made = replace(upload_atlas(device, atlas, stretch), **more)
     metric = np.dstack([atlas.stretch, atlas.shear * (stretch == "full"), np.zeros_like(atlas.shear)])
     upload(device, made.resources["stretch_map"], metric)
-    frame = Frame(device)
+    frame = CommandList(device)
     draw_coarser(frame, made)
     frame.submit()
     return made
@@ -119,7 +119,7 @@ def probe(
     records = {
         key: program.record(key.title(), **v) if isinstance(v, dict) else v for key, v in bound.items()
     }
-    frame = Frame(device)
+    frame = CommandList(device)
     frame.compute(name, program, {**made, **records}, size)
     frame.submit()
     return [download(device, texture).astype(np.float64) for texture in made.values()]

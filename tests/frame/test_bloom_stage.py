@@ -13,7 +13,7 @@ from tolerances import TWIN
 
 from dermis.frame.passes import bloom
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Device, Frame, download, make_texture, upload
+from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
 
 Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ def bloomed(device: Device, picture: Floats, share: float) -> Floats:
     size = picture.shape[1], picture.shape[0]
     source, glow = make_texture(device, size, "rgba32float"), bloom.make_glow(device, size)
     upload(device, source, picture)
-    frame = Frame(device)
+    frame = CommandList(device)
     made = bloom.draw(frame, glow, source, share)
     frame.submit()
     return download(device, made).astype(float)

@@ -14,7 +14,7 @@ from dermis.frame.blur_chain import chain_cost, lead_up
 from dermis.frame.coarser import Sheet
 from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
 from dermis.frame.passes import combine, diffuse
-from dermis.gpu import Device, Frame, download, make_texture, upload
+from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
 from dermis.optics.profiles import load_profile
 
@@ -57,7 +57,7 @@ def test_a_wide_gaussian_in_steps_is_that_gaussian(device: Device, texels_per_mm
     blur = Blur(led, weight, halvings, steps=steps)
     space, into = make_levels(device, 256, (halvings,), FLOATS), make_texture(device, (256, 256), FLOATS)
     upload(device, space.stacks[0], np.dstack([source, np.ones((256, 256))]))
-    frame = Frame(device)
+    frame = CommandList(device)
     diffuse.draw(frame, space, textures, blur)
     combine.draw(frame, space, blur, into)
     frame.submit()

@@ -17,7 +17,7 @@ from dermis.frame.geometry import upload_geometry
 from dermis.frame.passes import curvature
 from dermis.frame.passes.shape import rest_shape
 from dermis.frame.shape import shape_tables
-from dermis.gpu import Device, Frame
+from dermis.gpu import CommandList, Device
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
@@ -31,7 +31,7 @@ def found(device: Device, mesh: Mesh, positions_mm: NDArray[np.float32] | None =
     head = head_of(mesh)
     points = head.positions_mm if positions_mm is None else positions_mm
     shape = rest_shape(device, shape_tables(device, head), points)
-    made, frame = make_curvature(device, mesh), Frame(device)
+    made, frame = make_curvature(device, mesh), CommandList(device)
     atlas = build_atlas(mesh, SIDE, "mesh")
     curvature.draw(frame, upload_geometry(device, mesh, atlas, shape), made)
     frame.submit()

@@ -17,7 +17,7 @@ from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
 from dermis.frame.passes import combine, diffuse
-from dermis.gpu import Device, Frame, download, make_texture, upload
+from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.profiles import load_profile
 
@@ -35,7 +35,7 @@ def blur(
     halvings = halvings_of(variances, atlas.usual_per_mm, most)
     space = make_levels(device, size, (halvings,), FLOATS)
     upload(device, space.stacks[0], np.dstack([source, np.ones((size, size))])[..., :4])
-    frame = Frame(device)
+    frame = CommandList(device)
     diffuse.draw(frame, space, atlas, Blur(variances, np.zeros((len(variances), 3)), halvings, **edge))
     frame.submit()
     return [
@@ -93,7 +93,7 @@ def test_combined_twin(device: Device) -> None:
     for k, value in enumerate(values):
         upload(device, space.stacks[0], value, layer=k + 1)
     weight = rng.random((5, 3))
-    into, frame = make_texture(device, (64, 64), "rgba32float"), Frame(device)
+    into, frame = make_texture(device, (64, 64), "rgba32float"), CommandList(device)
     combine.draw(frame, space, Blur(np.arange(1.0, 6.0), weight, (0,) * 6), into)
     frame.submit()
     twin = np.einsum("kyxc,kc->yxc", values[..., :3].astype(float), weight)

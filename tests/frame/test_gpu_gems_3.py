@@ -11,7 +11,7 @@ from setups import resting
 from dermis.atlas.build import build_atlas
 from dermis.frame.levels import Blur
 from dermis.frame.techniques.gpu_gems_3 import TECHNIQUE
-from dermis.gpu import Device, Frame, download, upload
+from dermis.gpu import CommandList, Device, download, upload
 from dermis.mesh.primitives import plane
 
 SIZE = 256
@@ -29,7 +29,7 @@ def levels(device: Device) -> list[np.ndarray]:
     light[..., 3] = 1.0
     light[SIZE // 2, SIZE // 2, :3] = 1000.0
     upload(device, space.stacks[0], light)
-    frame = Frame(device)
+    frame = CommandList(device)
     TECHNIQUE.fill(frame, space, resting(device, atlas), BLUR)
     frame.submit()
     return [
@@ -63,7 +63,7 @@ def test_the_clear_colour_takes_no_light_away(device: Device) -> None:
     """Weights of 1.001 make no texel more than covered, which would take that colour's light off."""
     space = TECHNIQUE.make_levels(device, SIZE, (BLUR.halvings,))
     upload(device, space.stacks[0], np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
-    frame = Frame(device)
+    frame = CommandList(device)
     atlas = resting(device, build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE))
     TECHNIQUE.fill(frame, space, atlas, replace(BLUR, edge="cleared", clear=(0.5, 0.35, 0.3)))
     frame.submit()

@@ -19,7 +19,7 @@ from dermis.frame.atlas_textures import AtlasTextures, _coarser, upload_atlas
 from dermis.frame.coarser import Sheet, halved
 from dermis.frame.levels import FLOATS, Blur, halvings_of, layers_of, make_levels, scale_of
 from dermis.frame.passes import combine, diffuse
-from dermis.gpu import Device, Frame, download, make_texture, upload
+from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
 from dermis.optics.profiles import load_profile
 
@@ -76,7 +76,7 @@ def combined(
     space = make_levels(device, side, (halvings,), texel)
     into = make_texture(device, (side, side), FLOATS)
     upload(device, space.stacks[0], light * [scale, scale, scale, 1.0])
-    frame = Frame(device)
+    frame = CommandList(device)
     diffuse.draw(frame, space, textures, blur)
     combine.draw(frame, space, blur, into)
     frame.submit()
@@ -118,7 +118,7 @@ def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) 
     space, light = make_levels(device, 256, (halvings,), FLOATS), np.zeros((256, 256, 4))
     light[..., 3], light[128, 128, :3] = 1.0, 1.0
     upload(device, space.stacks[0], light)
-    frame = Frame(device)
+    frame = CommandList(device)
     diffuse.draw(frame, space, textures, Blur(variances, np.zeros((3, 3)), halvings))
     frame.submit()
     assert halvings == (0, 0, 1, 1)

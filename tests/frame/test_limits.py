@@ -18,7 +18,7 @@ from dermis.frame import renderer as renderer_module
 from dermis.frame.passes import shader_folders
 from dermis.frame.renderer import Renderer
 from dermis.gpu import open_device
-from dermis.gpu.default_limits import DEFAULT_LIMITS
+from dermis.gpu.adapters import DEFAULT_LIMITS
 from dermis.gpu.shader_types import bindings, struct_dtype
 from dermis.gpu.wgsl_source import compose
 from dermis.mesh.head import Head

@@ -24,7 +24,7 @@ from dermis.frame.passes import diffuse, shape, stretch
 from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.renderer import Renderer
 from dermis.frame.shape import make_shape, shape_tables
-from dermis.gpu import Device, Frame, download, upload
+from dermis.gpu import CommandList, Device, download, upload
 from dermis.mesh.head import Head
 from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight
@@ -51,7 +51,7 @@ def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light:
     halvings = halvings_of(BLURRED, textures.usual_per_mm, most)
     space = make_levels(device, SIDE, (halvings,), FLOATS)
     upload(device, space.stacks[0], np.dstack([light, light, light, atlas.own[..., None]]))
-    frame = Frame(device)
+    frame = CommandList(device)
     shape.draw(frame, made, motion)
     stretch.draw(frame, upload_geometry(device, head.mesh, atlas, made), textures)
     diffuse.draw(frame, space, textures, Blur(BLURRED, np.zeros((len(BLURRED), 3)), halvings))

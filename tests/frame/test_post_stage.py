@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.frame.passes import post
-from dermis.gpu import Device, Frame, download, upload
+from dermis.gpu import CommandList, Device, download, upload
 from dermis.images.colour import encode_srgb, encode_srgb8
 from dermis.scene.settings import Settings
 
@@ -22,7 +22,7 @@ def finished(
 ) -> tuple[Floats, NDArray[np.uint8]]:
     picture = post.make_picture(device, (radiance.shape[1], radiance.shape[0]))
     upload(device, picture.radiance, radiance)
-    frame = Frame(device)
+    frame = CommandList(device)
     post.draw(frame, picture.radiance, picture, Settings(exposure=exposure, **settings))
     frame.submit()
     return download(device, picture.exposed), download(device, picture.bytes)

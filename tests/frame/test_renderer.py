@@ -15,7 +15,7 @@ from dermis.base.errors import DermisError
 from dermis.frame import resources
 from dermis.frame.renderer import Renderer, render
 from dermis.frame.seams import REMEDIES
-from dermis.gpu import Frame, download
+from dermis.gpu import CommandList, download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
@@ -63,15 +63,15 @@ def test_an_older_image_is_not_mistaken_for_the_newest(renderer: Renderer) -> No
 def test_a_failed_frame_leaves_no_half_drawn_shadows(monkeypatch: pytest.MonkeyPatch) -> None:
     renderer = Renderer(ADAPTER)
 
-    dispatch = Frame.dispatch
+    dispatch = CommandList.dispatch
 
-    def fail(frame: Frame, stage: str, *given: Any, **named: Any) -> None:
+    def fail(frame: CommandList, stage: str, *given: Any, **named: Any) -> None:
         if stage == "shade":
             raise ValueError
         dispatch(frame, stage, *given, **named)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Frame, "dispatch", fail)
+        patch.setattr(CommandList, "dispatch", fail)
         with pytest.raises(ValueError):
             renderer.draw(scene(), settings_of())
     assert drawn(renderer, scene()).tobytes() == drawn(Renderer(ADAPTER), scene()).tobytes()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tolerances import FLAT, TWIN
 
 from dermis.frame.techniques.screen_space import draw, kernel_table, make_apart, make_kernel
-from dermis.gpu import Device, Frame, download, make_texture, upload
+from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.optics.fits.separable import SeparableKernel, preintegrate
 from dermis.optics.profiles import load_profile
 from dermis.scene.camera import Window
@@ -48,7 +48,7 @@ def spread(device: Device, view: View, light: Floats, depth: Floats) -> Floats:
     apart = make_apart(device, view.size)
     upload(device, apart.layers, np.dstack([light, depth]), layer=0)
     upload(device, apart.layers, np.ones((*depth.shape, 4)), layer=1)
-    over, frame = make_texture(device, view.size, "rgba32float"), Frame(device)
+    over, frame = make_texture(device, view.size, "rgba32float"), CommandList(device)
     result = draw(frame, apart, make_kernel(device, PROFILE), Window(view.half, (0.0, 0.0)), over)
     frame.submit()
     return download(device, result)[..., :3].astype(float)

@@ -15,7 +15,7 @@ from tolerances import TWIN
 from dermis.frame import passes
 from dermis.frame.passes import shade
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Frame, download, upload
+from dermis.gpu import CommandList, download, upload
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
@@ -238,7 +238,7 @@ def test_a_strip_is_left_at_its_end(renderer: Renderer) -> None:
     resources = inputs.resources
     radiance, half = resources.picture.radiance, replace(resources.picture, size=(16, 128))
     upload(renderer.device, radiance, np.full((256, 16, 4), 7.0, np.float32))
-    frame, look = Frame(renderer.device), (inputs.lit, inputs.view, inputs.constants)
+    frame, look = CommandList(renderer.device), (inputs.lit, inputs.view, inputs.constants)
     shade.draw(frame, *look, resources.visibility, resources.scattered, half)
     frame.submit()
     renderer.graph.forget()  # it knows nothing of this

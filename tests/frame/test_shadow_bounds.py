@@ -11,7 +11,7 @@ from setups import head_of, joined, place, run_frame, scene_of
 
 from dermis.frame.passes import irradiance
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Frame, download, upload
+from dermis.gpu import CommandList, download, upload
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.lights import DirectionalLight, RectangleLight, SphereLight
 
@@ -55,7 +55,7 @@ def test_what_is_passed_over_hides_nothing(renderer: Renderer, name: str, shadow
     inputs = run_frame(renderer, scene_of(BALLS, LIGHTS[name]), atlas=256, shadow_size=shadow_size)
 
     def light() -> Any:
-        frame, into = Frame(renderer.device), inputs.resources.scattered
+        frame, into = CommandList(renderer.device), inputs.resources.scattered
         irradiance.draw(frame, inputs.layouts[0], inputs.light_constants, into, 256)
         frame.submit()
         return download(renderer.device, into)[..., :3]

@@ -20,7 +20,7 @@ from dermis.frame.gutters import make_walks, with_lists
 from dermis.frame.passes import gutters, shape, stretch
 from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.shape import Shape, make_shape, shape_tables
-from dermis.gpu import Device, Frame, download
+from dermis.gpu import CommandList, Device, download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -46,7 +46,7 @@ def anew(mesh: Mesh, points: Floats) -> Mesh:
 
 def evaluated(device: Device, head: Head, motion: MotionBytes) -> tuple[Shape, NDArray[np.float32]]:
     """The shape in motion, and (v, 16) its vertices."""
-    made, frame = make_shape(device, shape_tables(device, head)), Frame(device)
+    made, frame = make_shape(device, shape_tables(device, head)), CommandList(device)
     shape.draw(frame, made, motion)
     frame.submit()
     table = download(device, made.surface["vertex_table"]).reshape(-1, 16)
@@ -129,7 +129,7 @@ def test_targets_bones_and_stencils_are_those_of_the_rig(device: Device, head: H
 
 
 def stretched(device: Device, head: Head, atlas: Atlas, points: Floats) -> NDArray[np.float16]:
-    textures, frame = upload_atlas(device, atlas), Frame(device)
+    textures, frame = upload_atlas(device, atlas), CommandList(device)
     made = make_shape(device, shape_tables(device, head))
     shape.draw(frame, made, MotionBytes(words(points)))
     stretch.draw(frame, upload_geometry(device, head.mesh, atlas, made), textures)
@@ -166,7 +166,7 @@ def test_a_scaled_ball_has_the_density_of_its_size(device: Device, head: Head, s
 
 def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Floats]:
     """(a, 2) where each texel of the gutters has its light, at each resolution, walked on the device."""
-    textures, frame = upload_atlas(device, atlas), Frame(device)
+    textures, frame = upload_atlas(device, atlas), CommandList(device)
     made = make_shape(device, shape_tables(device, head))
     walks, walked = make_walks(device, head.mesh, atlas, textures), with_lists(device, textures)
     shape.draw(frame, made, MotionBytes(words(points)))

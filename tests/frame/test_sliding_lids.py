@@ -15,7 +15,7 @@ from dermis.frame.passes import shape
 from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.renderer import Renderer
 from dermis.frame.shape import make_shape, shape_tables
-from dermis.gpu import Device, Frame
+from dermis.gpu import CommandList, Device
 from dermis.human.model import human_head
 from dermis.human.skin.surface import lid_rings
 from dermis.mesh.eyes import EyeLook
@@ -39,7 +39,7 @@ def test_the_device_slides_lids_as_the_twin_does(device: Device) -> None:
     rig = head.control
     pose = Pose({"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.3, "eyeLookDownLeft": 0.6}, {"head": (5, 20, 0)})
     motion = pose.motion(rig)
-    made, frame = make_shape(device, shape_tables(device, head)), Frame(device)
+    made, frame = make_shape(device, shape_tables(device, head)), CommandList(device)
     words = (
         part.astype(np.float32).tobytes() for part in (rig.positions_mm, motion.weights, motion.matrices)
     )

@@ -35,7 +35,7 @@ from dermis.frame.passes.pair_search.passes import cell_tables
 from dermis.frame.passes.pair_search.search import search
 from dermis.frame.renderer import Renderer
 from dermis.frame.translucency import pairs_from, translucency_from
-from dermis.gpu import Device, Frame, download
+from dermis.gpu import CommandList, Device, download
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
 from dermis.optics.diffusion.models import through_gaussians
@@ -112,7 +112,7 @@ def thin(device: Device) -> Thin:
 def weighed(device: Device, pairs: PairBuffers, surface: dict[str, Any]) -> Translucency:
     """What the blurred levels let pass between pairs, on a surface."""
     made = translucency_from(device, surface, pairs, BLURRED.variance_mm2, BLURRED.weight)
-    frame = Frame(device)
+    frame = CommandList(device)
     translucency_weights.draw(frame, made)
     frame.submit()
     return made

@@ -19,7 +19,7 @@ from dermis.frame.atlas_layout import Translucency
 from dermis.frame.levels import FLOATS, Blur, make_levels
 from dermis.frame.passes import translucency, translucency_weights
 from dermis.frame.translucency import translucency_from
-from dermis.gpu import Constants, Device, Frame, download, make_texture, upload
+from dermis.gpu import CommandList, Constants, Device, download, make_texture, upload
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
 
@@ -59,7 +59,7 @@ def weighed_of(device: Device, mesh: Mesh) -> Weighed:
     surface = surface_of(device, mesh, atlas)
     pairs = pairs_on(device, surface, atlas, divide(atlas, float(np.sqrt(VARIANCE[-1]))))
     thin = translucency_from(device, surface, pairs, VARIANCE, WEIGHT)
-    frame = Frame(device)
+    frame = CommandList(device)
     translucency_weights.draw(frame, thin)
     frame.submit()
     words = read(device, thin.weights).reshape(-1, 2)[: pairs.count]
@@ -88,7 +88,7 @@ def summed(
     space = make_levels(device, 64, (BLUR.halvings,), FLOATS)
     for layer, level in enumerate(levels, start=1):
         upload(device, space.stacks[0], np.dstack([level, np.ones((64, 64))]), layer=layer)
-    frame = Frame(device)
+    frame = CommandList(device)
     translucency.draw(frame, space, BLUR, thin, constants)
     frame.submit()
     x, y = weighed.texel[weighed.source].T
@@ -129,7 +129,7 @@ def test_bright_and_dim_light_are_kept_alike(device: Device, weighed: Weighed) -
 def test_a_head_without_thin_parts_gets_nothing(device: Device) -> None:
     ball = weighed_of(device, uv_sphere(30.0, 24, 12))
     assert ball.thin.pairs.count == 0
-    frame = Frame(device)
+    frame = CommandList(device)
     translucency.draw(frame, make_levels(device, 64, (BLUR.halvings,), FLOATS), BLUR, ball.thin)
     frame.submit()
     light = download(device, ball.thin.light)

@@ -12,7 +12,7 @@ from setups import front_camera, frontal, head_of, joined, place, run_frame, sce
 from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.renderer import Renderer
 from dermis.frame.samples import pixel_samples
-from dermis.gpu import Frame, download
+from dermis.gpu import CommandList, download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
@@ -82,7 +82,7 @@ def nearest(
     """Layers for the samples of a pixel by one of the two ways there are."""
     inputs = run_frame(renderer, scene, size=SIZE, samples=samples)
     layers = make_layers(renderer.device, SIZE, samples, triangles=triangles, compute=compute)
-    frame = Frame(renderer.device)
+    frame = CommandList(renderer.device)
     draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
     frame.submit()
     return [download(renderer.device, layers.texture, layer=k) for k in range(samples)]
@@ -146,7 +146,7 @@ def test_nothing_is_left_of_the_view_before(renderer: Renderer, triangles: bool)
     used, fresh = (make_layers(renderer.device, SIZE, 2, **options) for _ in range(2))
     for turned, layers in ((False, used), (True, used), (True, fresh)):
         inputs = run_frame(renderer, view_of(HEADS["sphere"], turned), size=SIZE, samples=2)
-        frame = Frame(renderer.device)
+        frame = CommandList(renderer.device)
         draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
         frame.submit()
     for layer in range(2):

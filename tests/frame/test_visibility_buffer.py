@@ -15,7 +15,7 @@ from dermis.frame.passes import shape, visibility_buffer
 from dermis.frame.passes.visibility_buffer import Layers, draw_layers, make_layers
 from dermis.frame.projection import parallel_view
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Frame, download
+from dermis.gpu import CommandList, download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
@@ -74,7 +74,7 @@ def shown(layers: Layers, renderer: Renderer, head: Head, camera: Camera, sample
     """Layers after a view was drawn into them, and its matrices."""
     settings = settings_of(size=SIZE, samples=samples)
     inputs = renderer.prepare(scene_of(head, frontal(), camera=camera), settings)
-    frame = Frame(renderer.device)
+    frame = CommandList(renderer.device)
     shape.draw(frame, inputs.resources.shape, inputs.motion)
     draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
     frame.submit()

@@ -18,7 +18,7 @@ from dermis.frame.passes.pair_search.passes import cell_tables
 from dermis.frame.passes.shape import rest_shape
 from dermis.frame.shape import shape_tables
 from dermis.frame.translucency import find_pairs
-from dermis.gpu import Device, Frame
+from dermis.gpu import CommandList, Device
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
@@ -55,7 +55,7 @@ def surface_of(device: Device, mesh: Mesh, atlas: Atlas, positions_mm: Any = Non
     head, textures = Head("test", mesh, Maps()), upload_atlas(device, atlas)
     tables = shape_tables(device, head)
     shape = rest_shape(device, tables, head.positions_mm if positions_mm is None else positions_mm)
-    held, frame = upload_geometry(device, mesh, atlas, shape), Frame(device)
+    held, frame = upload_geometry(device, mesh, atlas, shape), CommandList(device)
     stretch.draw(frame, held, textures)
     frame.submit()
     return held.resources | textures.resources

@@ -15,8 +15,13 @@ import pytest
 from dermis.base.errors import DermisError
 from dermis.gpu import adapters as module
 from dermis.gpu import list_adapters, open_device
-from dermis.gpu.adapters import INSTALL_HINT, WANTED_FEATURES, alike_adapters, fitting_adapters
-from dermis.gpu.default_limits import DEFAULT_LIMITS
+from dermis.gpu.adapters import (
+    DEFAULT_LIMITS,
+    INSTALL_HINT,
+    WANTED_FEATURES,
+    alike_adapters,
+    fitting_adapters,
+)
 
 
 def fake(name: str, kind: str, backend: str = "Vulkan", features: tuple[str, ...] = WANTED_FEATURES) -> Any:

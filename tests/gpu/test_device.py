@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from dermis.gpu import ComputeProgram, Device, open_device
-from dermis.gpu.adapters import WANTED_FEATURES
-from dermis.gpu.default_limits import DEFAULT_LIMITS
+from dermis.gpu.adapters import DEFAULT_LIMITS, WANTED_FEATURES
 
 RAISED = {"max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size"}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.gpu import Device, FragmentProgram, Frame, download, make_texture
+from dermis.gpu import CommandList, Device, FragmentProgram, download, make_texture
 
 SIZE = (37, 21)
 
@@ -21,7 +21,7 @@ def test_every_texel_of_all_targets_is_drawn_at_its_place(device: Device) -> Non
     one = make_texture(device, SIZE, "rgba32float", use="raster")
     layered = make_texture(device, SIZE, "rgba16float", layers=3, use="raster")
     view = layered.create_view(dimension="2d", base_array_layer=1, array_layer_count=1)
-    frame = Frame(device)
+    frame = CommandList(device)
     frame.fill("places", program, {"added": program.record("Added", more=(0, 0, 5, 0))}, [one, view])
     frame.submit()
     frame.wait()

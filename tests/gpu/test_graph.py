@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.gpu import ComputeProgram, Device, Frame, Graph, download, make_texture, scratch
+from dermis.gpu import CommandList, ComputeProgram, Device, Graph, download, make_texture, scratch
 from dermis.gpu.shader_types import bindings, members_read, struct_dtype
 from dermis.gpu.textures import texture_from
 
@@ -164,7 +164,7 @@ def test_a_frame_that_failed_is_run_again(
         raise ValueError
 
     with monkeypatch.context() as patch:
-        patch.setattr(Frame, "submit", fail)
+        patch.setattr(CommandList, "submit", fail)
         with pytest.raises(ValueError):
             chain.frame((0, 1, 2.0), (1, 2, 7.0))
     assert chain.frame(*passes) == ["0-1", "1-2"]

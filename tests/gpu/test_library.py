@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 from tolerances import TWIN
 
-from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
+from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture
 from dermis.gpu.textures import texture_from
 from dermis.images.colour import encode_srgb
 
@@ -27,7 +27,7 @@ def run(device: Device, image: NDArray[np.float64], places: NDArray[np.float64])
         "read": read,
         "encoded": encoded,
     }
-    frame = Frame(device)
+    frame = CommandList(device)
     frame.compute("probe", program, bound, size)
     frame.submit()
     return download(device, read).astype(float), download(device, encoded).astype(float)

@@ -6,7 +6,7 @@ import cffi
 import pytest
 
 from dermis.gpu import native_types
-from dermis.gpu.native_types import tell_types
+from dermis.gpu.native_types import register_types
 
 HEADER = """
 typedef enum Colour { Red, Green, Force = 0x7FFFFFFF } Colour;
@@ -34,7 +34,7 @@ def test_types_are_cffis_own() -> None:
     told, plain = cffi.FFI(), cffi.FFI()
     for ffi in (told, plain):
         ffi.cdef(HEADER)
-    assert tell_types(told) > len(ASKED)
+    assert register_types(told) > len(ASKED)
     assert set(ASKED) <= set(told._parsed_types)  # type: ignore[attr-defined]
     for name in ASKED:
         a, b = told.typeof(name), plain.typeof(name)
@@ -58,7 +58,7 @@ def test_wgpu_is_told_what_it_asks_for() -> None:
 
     declared = ffi._parser._declarations
     told = {name for name, _ in (*native_types._types(declared), *native_types._callbacks(declared))}
-    assert tell_types(ffi) == len(told) and told <= set(ffi._parsed_types)
+    assert register_types(ffi) == len(told) and told <= set(ffi._parsed_types)
     assert {"WGPUBindGroupEntry *", "WGPUBindGroupEntry[]", "WGPUExtent3D *", "WGPUCommandBuffer[]"} <= told
     assert "void(WGPUDevice const *, WGPUErrorType, WGPUStringView, void *, void *)" in told
     assert "void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)" in told
@@ -66,4 +66,4 @@ def test_wgpu_is_told_what_it_asks_for() -> None:
 
 @pytest.mark.parametrize("broken", [object(), None])
 def test_another_cffi_is_left_alone(broken: object) -> None:
-    assert tell_types(broken) == 0
+    assert register_types(broken) == 0

@@ -10,7 +10,7 @@ import pytest
 
 import dermis
 from dermis.base.errors import DermisError
-from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
+from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture
 from dermis.gpu.shader_types import bindings, struct_dtype
 
 SHADERS = sorted(Path(dermis.__file__).parent.rglob("*.wgsl"))
@@ -71,7 +71,7 @@ def test_shader_reads_what_numpy_wrote(device: Device) -> None:
     for member in ("lone", "three", "matrix", "pair", "inner", "last"):
         flat += fill(record, member, numbers)
     read = make_texture(device, (len(flat), 1), "r32float")
-    frame = Frame(device)
+    frame = CommandList(device)
     frame.compute("probe", program, {"probe": record, "read": read}, (1, 1))
     frame.submit()
     assert download(device, read)[0].tolist() == flat

@@ -14,7 +14,7 @@ from tolerances import HALVES
 from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
 from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Frame, download
+from dermis.gpu import CommandList, download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 from dermis.scene.lights import DirectionalLight
@@ -59,13 +59,13 @@ def drawn(renderer: Renderer, scene: Scene, technique: str, seams: str) -> Drawn
     settings = settings_of(technique=technique, atlas=128, seams=seams)
     with pytest.MonkeyPatch.context() as patch:
         filled: list[str] = []
-        fill = Frame.fill
+        fill = CommandList.fill
 
-        def counted(frame: Frame, stage: str, *rest: Any) -> None:
+        def counted(frame: CommandList, stage: str, *rest: Any) -> None:
             filled.append(stage)
             fill(frame, stage, *rest)
 
-        patch.setattr(Frame, "fill", counted)
+        patch.setattr(CommandList, "fill", counted)
         renderer.draw(scene, settings, anew=True)
     inputs = renderer.prepare(scene, settings)
     device, levels, layout = renderer.device, inputs.resources.levels, inputs.layouts[0]

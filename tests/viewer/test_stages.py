@@ -14,7 +14,7 @@ from dermis.apps.viewer.navigation import orbit
 from dermis.apps.viewer.pace import QUALITY_LEVELS
 from dermis.apps.viewer.state import ViewerState
 from dermis.apps.viewer.studio import Studio
-from dermis.gpu.recording import Recording
+from dermis.gpu.replay import Recording
 from dermis.scene.environment import Environment
 from dermis.scene.pose import Pose
 

@@ -65,7 +65,7 @@ def _version(name: str) -> str:
 def _try_out(wanted: str) -> dict[str, Any]:
     """Open the adapter and use it."""
     from dermis.frame.renderer import Renderer
-    from dermis.gpu.probe import half_store_rounding
+    from dermis.gpu.textures import half_store_rounding
 
     try:
         renderer = Renderer(wanted)

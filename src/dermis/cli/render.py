@@ -74,9 +74,9 @@ def render(
     more = FrameOutputs(outputs, outputs_format, output)
     marked = FrameLandmarks(landmarks, output)
     from dermis.frame.renderer import Renderer
-    from dermis.gpu.address_space import check_listing
+    from dermis.gpu.memory import check_drivers
 
-    check_listing()  # before the head, which takes memory too
+    check_drivers()  # before the head, which takes memory too
     with _uncollected(), ThreadPoolExecutor(1) as beside:
         opening = beside.submit(Renderer, adapter)  # its driver starts and compiles while the head loads
         with working_on("loading"):

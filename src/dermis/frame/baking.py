@@ -18,7 +18,7 @@ from dermis.frame.inputs import Inputs
 from dermis.frame.passes import bake as baking_pass
 from dermis.frame.passes import curvature
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Frame
+from dermis.gpu import CommandList
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.tangents import uv_cross
 from dermis.scene.model import Scene
@@ -152,7 +152,7 @@ def _bound(renderer: Renderer, inputs: Inputs, scene: Scene) -> dict[str, Any]:
     """What the shader reads of the frame."""
     made, device = inputs.resources, renderer.device
     space = make_curvature(device, scene.head.topology.mesh)
-    frame = Frame(device, timed=False)
+    frame = CommandList(device, timed=False)
     curvature.draw(frame, made.head, space)
     frame.submit()
     measured = made.outputs.light.thickness if made.outputs else None

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from dermis.frame.passes.pack import Leaving
 from dermis.gpu import Device
-from dermis.gpu.failures import KeptOpen
+from dermis.gpu.failures import ReopeningDevice
 
 T = TypeVar("T")
 IN_FLIGHT = 3
@@ -19,7 +19,7 @@ Take = Callable[[Leaving], T]
 
 
 def arriving(
-    kept_open: KeptOpen, device: Callable[[], Device], frames: Iterable[tuple[Send, Take[T]]]
+    kept_open: ReopeningDevice, device: Callable[[], Device], frames: Iterable[tuple[Send, Take[T]]]
 ) -> Iterator[T]:
     """What is taken of each frame in turn; it is sent again where its device was lost meanwhile.
 

@@ -16,8 +16,7 @@ from dermis.frame.passes.surface_texels import SURFACE_BYTES
 from dermis.frame.profile_mixture import sums_of
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device
-from dermis.gpu.memory import check_memory, found_room, held_bytes
-from dermis.gpu.no_room import NoRoomError, in_words
+from dermis.gpu.memory import OutOfMemoryError, check_memory, format_bytes, held_bytes, probed_memory
 from dermis.scene.settings import Settings
 
 _DISTANCE = 4  # bytes of a texel: distance to the edge of its chart
@@ -46,16 +45,16 @@ def check_limits(device: Device, asked: Asked) -> None:
     check_memory(device, of_both, "atlas and size", sizes, partial(fitting, asked))
 
 
-def no_room(error: NoRoomError, device: Device, asked: Asked) -> NoRoomError:
+def no_room(error: OutOfMemoryError, device: Device, asked: Asked) -> OutOfMemoryError:
     """The same error, with what would fit in place of what did not; what was made of that is released."""
     for one in filter(None, (error, error.__cause__)):
         traceback.clear_frames(one.__traceback__)
     needed = sum(frame_bytes(asked).values())
-    found = found_room(device, needed)
+    found = probed_memory(device, needed)
     most = _SHARE * (held_bytes() + found)
     if needed <= most:  # and yet it did not fit: others of this process hold the rest
         most = _SHARE * found
-    return NoRoomError(error.expected, error.came, error.size, fitting(asked, most))
+    return OutOfMemoryError(error.expected, error.came, error.size, fitting(asked, most))
 
 
 def fitting(asked: Asked, most: float) -> str:
@@ -71,7 +70,7 @@ def fitting(asked: Asked, most: float) -> str:
         needed, changed = frame_bytes(smaller), changed | _written(halved, option)
     if not changed or sum(needed.values()) > most:
         return "Close other programs that use the memory, or try --adapter cpu"
-    return f"With {' '.join(changed.values())} it takes about {in_words(sum(needed.values()))}"
+    return f"With {' '.join(changed.values())} it takes about {format_bytes(sum(needed.values()))}"
 
 
 def frame_bytes(asked: Asked) -> dict[str, float]:

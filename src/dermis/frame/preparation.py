@@ -28,7 +28,7 @@ from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Constants, Device, Memo
 from dermis.gpu.memo import same
-from dermis.gpu.no_room import NoRoomError
+from dermis.gpu.memory import OutOfMemoryError
 from dermis.human.skin.movements import movements
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
@@ -108,7 +108,7 @@ class Preparation:
         asked = Asked(*who, settings, around, surroundings, technique, *counts, view, *mixed, *more)
         try:
             resources = keep(make_resources, self.memo, device, asked)
-        except NoRoomError as error:
+        except OutOfMemoryError as error:
             self.memo.forget()
             raise no_room(error, device, asked) from error
         seen_from = pinhole(scene.camera, head, settings)

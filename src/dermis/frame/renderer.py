@@ -22,8 +22,8 @@ from dermis.frame.passes.pack import Leaving
 from dermis.frame.rendered import Rendered, Shown
 from dermis.frame.submitter import Submitter
 from dermis.gpu import Device, open_device
-from dermis.gpu.failures import KeptOpen
-from dermis.gpu.frame import Timed
+from dermis.gpu.command_list import Timed
+from dermis.gpu.failures import ReopeningDevice
 from dermis.mesh.head import Head
 from dermis.scene.given import given_plain
 from dermis.scene.model import Scene
@@ -54,7 +54,7 @@ class Renderer(Submitter):
         self._depth = whole_number("depth", depth, 1, _DEEPEST)
         self._rounds = whole_number("rounds", rounds, 1, _DEEPEST)
         self._adapter, self._opening_ms = adapter, 0.0
-        self.kept_open = KeptOpen(self._open, self._adopt, reopens=reopens)
+        self.kept_open = ReopeningDevice(self._open, self._adopt, reopens=reopens)
 
     def _open(self) -> Device:
         self._opening_began = time.perf_counter()

@@ -15,8 +15,8 @@ from dermis.frame.passes.pack import Leaving
 from dermis.frame.passes.post import Picture
 from dermis.frame.preparation import Preparation
 from dermis.frame.rendered import Shown
-from dermis.gpu import Device, Frame, Graph
-from dermis.gpu.frame import Timed
+from dermis.gpu import CommandList, Device, Graph
+from dermis.gpu.command_list import Timed
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
@@ -44,7 +44,7 @@ class Submitter:
 
     def _submit(
         self, inputs: Inputs, timed: Timed, anew: bool, leave: Callable[[Graph, Picture], T] | None = None
-    ) -> tuple[Frame, T | None]:
+    ) -> tuple[CommandList, T | None]:
         """Declare a frame and run its stale passes.
 
         leave : starts reading the picture back in the same submission
@@ -57,7 +57,7 @@ class Submitter:
         frame, self._last = self.graph.submit(timed), None
         return frame, leaving
 
-    def _keep_pace(self, frame: Frame) -> None:
+    def _keep_pace(self, frame: CommandList) -> None:
         """Wait until no more frames than allowed are in flight."""
         self._in_flight.append(frame.submitted)
         while len(self._in_flight) > IN_FLIGHT:

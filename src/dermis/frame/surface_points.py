@@ -13,7 +13,7 @@ from dermis.frame.atlas_textures import AtlasTextures, packed_texels
 from dermis.frame.passes import irradiance, shadows, shape, surface_texels, visibility_buffer
 from dermis.frame.passes.surface_texels import make_surfaces
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Frame, download, make_texture
+from dermis.gpu import CommandList, download, make_texture
 from dermis.gpu.textures import texture_from
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -46,7 +46,7 @@ def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Surf
 def _surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
     single = settings.model_copy(update={"samples": 1, "technique": "none"})
     inputs = renderer.prepare(scene, single)
-    frame = Frame(renderer.device)
+    frame = CommandList(renderer.device)
     made = inputs.resources
     shape.draw(frame, made.shape, inputs.motion)
     visibility_buffer.draw(frame, made.visibility, inputs.camera, made.head)
@@ -102,7 +102,7 @@ def _lit(renderer: Renderer, scene: Scene, settings: Settings, records: NDArray[
     first = inputs.layouts[0]
     listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")})
     lit = make_texture(device, (side, side), "rgba32float")
-    frame = Frame(device)
+    frame = CommandList(device)
     made = inputs.resources
     shape.draw(frame, made.shape, inputs.motion)
     shadows.draw(frame, made.shadow_maps, inputs.shadow_views, made.head)

@@ -12,8 +12,8 @@ from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import map_mips
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Frame, upload
-from dermis.gpu.tape import Take, Tape
+from dermis.gpu import CommandList, upload
+from dermis.gpu.capture import CapturedFrame, FrameCapture
 from dermis.scene.techniques import TECHNIQUES
 
 _KEPT = 32  # of each resource: for all nodes of dials
@@ -31,13 +31,13 @@ def renderer_for(form: str, adapter: str) -> Renderer:
     return made
 
 
-def taken(tape: Tape, inputs: Inputs) -> Take:
+def taken(tape: FrameCapture, inputs: Inputs) -> CapturedFrame:
     """The passes of a frame; none of them runs."""
     technique = TECHNIQUES[inputs.settings.technique]
     return tape.take(lambda graph: draw_frame(graph, inputs, technique))
 
 
-def sparser(take: Take, times: int) -> Take:
+def sparser(take: CapturedFrame, times: int) -> CapturedFrame:
     """The same frame with one coarse hair for so many, as much wider; with all for 0."""
     for _, record in (one for one in take.records if one[0] == "StrandView" and times > 1):
         kept = int(record["coarse"]) // times
@@ -46,7 +46,7 @@ def sparser(take: Take, times: int) -> Take:
     return take
 
 
-def halving(tape: Tape, texture: Any) -> Take:
+def halving(tape: FrameCapture, texture: Any) -> CapturedFrame:
     """The passes that fill a map's mips from its first."""
     return tape.take(lambda graph: map_mips.halve(graph, map_mips.mipped(texture)))
 
@@ -60,6 +60,6 @@ def refill(renderer: Renderer, texture: Any, levels: list[NDArray[np.float16]]) 
         for layer, texels in enumerate(layers):
             upload(renderer.device, texture, texels, mip=mip, layer=layer)
     if len(levels) < texture.mip_level_count:
-        frame = Frame(renderer.device, timed=False)
+        frame = CommandList(renderer.device, timed=False)
         map_mips.halve(frame, map_mips.mipped(texture))
         frame.submit()

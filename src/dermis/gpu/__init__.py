@@ -1,13 +1,12 @@
 """A small toolkit over wgpu: it knows adapters, shaders, textures and passes, and nothing of skin."""
 
-from dermis.gpu.access import scratch
 from dermis.gpu.adapters import Adapter, list_adapters
+from dermis.gpu.command_list import CommandList
+from dermis.gpu.dependencies import scratch
 from dermis.gpu.device import Device, open_device
-from dermis.gpu.frame import Frame
 from dermis.gpu.graph import Graph
 from dermis.gpu.memo import Memo
-from dermis.gpu.program import ComputeProgram, Constants, compiled
-from dermis.gpu.raster_program import FragmentProgram, RasterProgram
+from dermis.gpu.program import ComputeProgram, Constants, FragmentProgram, RasterProgram, compiled
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.textures import download, make_texture, texture_from, upload, view_of
 from dermis.gpu.types import (
@@ -28,11 +27,11 @@ __all__ = [
     "Bindable",
     "Bindings",
     "Buffer",
+    "CommandList",
     "ComputeProgram",
     "Constants",
     "Device",
     "FragmentProgram",
-    "Frame",
     "Graph",
     "Memo",
     "MutableBindings",

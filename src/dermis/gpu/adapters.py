@@ -5,19 +5,60 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from dermis.base.errors import refuse
-from dermis.gpu.address_space import check_listing
-from dermis.gpu.native_types import tell_wgpus_types
+from dermis.gpu.memory import check_drivers
+from dermis.gpu.native_types import register_wgpu_types
 
 WANTED_FEATURES = ("timestamp-query",)
 """Optional features, requested where the adapter has them; everything works without them."""
 
-_KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
 INSTALL_HINT = "On Debian or Ubuntu: sudo apt-get install mesa-vulkan-drivers"
+
+DEFAULT_LIMITS = {
+    "max-texture-dimension-1d": 8192,
+    "max-texture-dimension-2d": 8192,
+    "max-texture-dimension-3d": 2048,
+    "max-texture-array-layers": 256,
+    "max-bind-groups": 4,
+    "max-bindings-per-bind-group": 1000,
+    "max-dynamic-uniform-buffers-per-pipeline-layout": 8,
+    "max-dynamic-storage-buffers-per-pipeline-layout": 4,
+    "max-sampled-textures-per-shader-stage": 16,
+    "max-samplers-per-shader-stage": 16,
+    "max-storage-buffers-per-shader-stage": 8,
+    "max-storage-textures-per-shader-stage": 4,
+    "max-uniform-buffers-per-shader-stage": 12,
+    "max-uniform-buffer-binding-size": 65536,
+    "max-storage-buffer-binding-size": 128 << 20,
+    "max-buffer-size": 256 << 20,
+    "min-uniform-buffer-offset-alignment": 256,
+    "min-storage-buffer-offset-alignment": 256,
+    "max-vertex-buffers": 8,
+    "max-vertex-attributes": 16,
+    "max-vertex-buffer-array-stride": 2048,
+    "max-inter-stage-shader-variables": 16,
+    "max-color-attachments": 8,
+    "max-color-attachment-bytes-per-sample": 32,
+    "max-compute-workgroup-storage-size": 16384,
+    "max-compute-invocations-per-workgroup": 256,
+    "max-compute-workgroup-size-x": 256,
+    "max-compute-workgroup-size-y": 256,
+    "max-compute-workgroup-size-z": 64,
+    "max-compute-workgroups-per-dimension": 65535,
+    "max-immediate-size": 0,
+}
+"""Limits that WebGPU guarantees on every machine ("Limits" in its specification)."""
+
+_NEEDED = tuple(
+    name for name in DEFAULT_LIMITS if any(word in name for word in ("stage", "compute", "group", "layout"))
+)
+"""What programs rely on; sizes of textures and buffers may be smaller."""
+
+_KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
 
 
 @dataclass(frozen=True)
@@ -51,12 +92,12 @@ def list_adapters() -> list[Adapter]:
 
     Raises DermisError where drivers fail, or would for want of address space.
     """
-    check_listing()
+    check_drivers()
     try:
         import wgpu
     except (ImportError, OSError) as error:
         refuse("wgpu", "its native library to load", f"it does not: {error}", "Install the package again")
-    tell_wgpus_types()
+    register_wgpu_types()
     try:
         with _quiet_drivers():
             found = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
@@ -104,6 +145,28 @@ def alike_adapters(wanted: str) -> list[Adapter]:
     if best.kind == "CPU":
         return [best]
     return [best, *(one for one in others if (one.kind, one.backend) == (best.kind, best.backend))]
+
+
+def check_limits(adapter: str, offered: Mapping[str, int]) -> None:
+    """Raises DermisError for an adapter that cannot run the programs of a frame.
+
+    adapter, offered : its name and its limits
+    """
+    for name in _NEEDED:
+        least = DEFAULT_LIMITS[name]
+        if offered.get(name, least) < least:
+            expected = f"{name} of at least {least}, as WebGPU promises"
+            remedy = "Choose another adapter, which dermis doctor lists, or update its driver"
+            refuse(f"adapter {adapter}", expected, f"it has {offered[name]}", remedy)
+
+
+def limits_within(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
+    """WebGPU's default limits; the adapter's own where it offers less or the limit is to be raised."""
+    fitting = {
+        name: (max if name.startswith("min-") else min)(default, offered.get(name, default))
+        for name, default in DEFAULT_LIMITS.items()
+    }
+    return fitting | {name: offered[name] for name in raised}
 
 
 def _numbered(adapters: list[Adapter], number: int) -> Adapter:

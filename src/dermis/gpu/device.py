@@ -15,14 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
-from dermis.gpu.adapters import Adapter, fitting_adapters
-from dermis.gpu.address_space import check_software
-from dermis.gpu.default_limits import check_limits, limits_within
-from dermis.gpu.no_room import room_for
+from dermis.gpu.adapters import Adapter, check_limits, fitting_adapters, limits_within
+from dermis.gpu.memory import allocation, check_software
 from dermis.gpu.types import Bindable, Buffer, Sampler
 
 if TYPE_CHECKING:
-    from dermis.gpu.access import Slot
+    from dermis.gpu.dependencies import Slot
     from dermis.gpu.readback import Fetched
 
 T = TypeVar("T")
@@ -201,7 +199,7 @@ class Device:
         flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST
         flags |= 0 if usage == "MAP_READ" else wgpu.BufferUsage.COPY_SRC
         most = self.max_storage_bytes if usage == "STORAGE" else self.max_buffer_bytes
-        with room_for(self.adapter.name, name, size, most):
+        with allocation(self.adapter.name, name, size, most):
             return create(usage=flags)
 
     def sampler(self, **options: str) -> Sampler:

@@ -55,7 +55,7 @@ def gpu_failures(device: Device) -> Iterator[None]:
         ) from error
 
 
-class KeptOpen:
+class ReopeningDevice:
     """A device that is opened again when it is lost.
 
     opening : opens one
@@ -99,7 +99,7 @@ class KeptOpen:
             raise
 
 
-class OneDevice:
+class LazyDevice:
     """A device for several jobs, opened for the first of them, and once more where it is lost.
 
     adapter : as `open_device` takes it
@@ -108,15 +108,15 @@ class OneDevice:
     def __init__(self, adapter: str) -> None:
         self._adapter = adapter
         self._opened: list[Device] = []
-        self._kept: KeptOpen | None = None
+        self._kept: ReopeningDevice | None = None
 
     def run(self, job: Callable[[Device], T]) -> T:
         """What a job returns on the device.
 
-        Raises DermisError as `open_device` and `KeptOpen.run`.
+        Raises DermisError as `open_device` and `ReopeningDevice.run`.
         """
         if self._kept is None:
-            self._kept = KeptOpen(partial(open_device, self._adapter), self._adopt)
+            self._kept = ReopeningDevice(partial(open_device, self._adapter), self._adopt)
         return self._kept.run(lambda: job(self._opened[0]))
 
     def _adopt(self, device: Device) -> None:
@@ -126,6 +126,6 @@ class OneDevice:
 def on_device(adapter: str, job: Callable[[Device], T]) -> T:
     """What a job returns on a device that is opened for it, and once more where it is lost.
 
-    Raises DermisError as `open_device` and `KeptOpen.run`.
+    Raises DermisError as `open_device` and `ReopeningDevice.run`.
     """
-    return OneDevice(adapter).run(job)
+    return LazyDevice(adapter).run(job)

@@ -6,16 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar, TypeVarTuple
 
-from dermis.gpu.access import Access, Slot, slot_of
-from dermis.gpu.dependencies import Declared, Dependencies
+from dermis.gpu.command_list import CommandList, Timed
+from dermis.gpu.dependencies import Access, Declared, Dependencies, Slot, slot_of
 from dermis.gpu.device import Device
-from dermis.gpu.frame import Frame, Timed
-from dermis.gpu.listing import Lister, Listing
-from dermis.gpu.program import ComputeProgram, Program
-from dermis.gpu.raster_program import FragmentProgram, RasterProgram
+from dermis.gpu.listing import Listing, ListingRecorder
+from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recorder import Recorder
-from dermis.gpu.recording import Recordings
+from dermis.gpu.replay import Recordings
 from dermis.gpu.types import Bindings, Buffer, TextureOrView, TextureView
 from dermis.gpu.uniforms import Uniforms
 
@@ -26,7 +24,7 @@ _MOST_KNOWN = 8  # kinds of frames in turn: pictures, their readback, and those 
 
 
 @dataclass(slots=True)
-class Pass:
+class DeclaredPass:
     """One pass of a frame, or a recorded run of them.
 
     run : does it
@@ -34,7 +32,7 @@ class Pass:
     """
 
     stages: tuple[str, ...]
-    run: Callable[[Frame], None]
+    run: Callable[[CommandList], None]
     key: Any
     declared: Declared
 
@@ -56,7 +54,7 @@ class Graph(Recorder):
         self.ran: list[str] = []
         self.listing: Listing | None = None
         self._epoch = 0
-        self._passes: list[Pass] = []
+        self._passes: list[DeclaredPass] = []
         self._uniforms = Uniforms(device)
         self._known: list[Dependencies] = []
         self._fetches: list[tuple[tuple[Buffer, ...], Fetched]] = []
@@ -81,7 +79,7 @@ class Graph(Recorder):
             filled = slot_of(self.device, resources[completes])
             writes = tuple(slot for slot in writes if slot is not filled)
 
-        def run(frame: Frame) -> None:
+        def run(frame: CommandList) -> None:
             frame.dispatch(stage, program, resources, groups, access=access)
 
         self._add(stage, program, resources, groups, access, writes, run)
@@ -93,12 +91,12 @@ class Graph(Recorder):
         """
         slot = slot_of(self.device, buffer)
 
-        def run(frame: Frame) -> None:
+        def run(frame: CommandList) -> None:
             frame.write(stage, buffer, data)
 
         if self.listing is not None:
             self.listing.add_write(stage, buffer, len(data), len(self._passes))
-        self._passes.append(Pass((stage,), run, data, (0, (), (slot,))))
+        self._passes.append(DeclaredPass((stage,), run, data, (0, (), (slot,))))
 
     def draw(
         self,
@@ -116,7 +114,7 @@ class Graph(Recorder):
         """Declare a pass that rasterises triangles into cleared targets, as `Frame.draw` does."""
         writes = tuple(slot_of(self.device, one) for one in (depth, target) if one is not None)
 
-        def run(frame: Frame) -> None:
+        def run(frame: CommandList) -> None:
             frame.draw(
                 stage,
                 program,
@@ -139,7 +137,7 @@ class Graph(Recorder):
         """Declare a pass for each texel of its targets, as `Frame.fill` does."""
         writes = tuple(slot_of(self.device, one) for one in targets)
 
-        def run(frame: Frame) -> None:
+        def run(frame: CommandList) -> None:
             frame.fill(stage, program, resources, targets)
 
         self._add(stage, program, resources, (3,), program.access(resources), writes, run)
@@ -151,10 +149,12 @@ class Graph(Recorder):
         """
         recording, result = self.recordings.find(self.device, record, args)
         if self.listing is not None:
-            record(Lister(self.device, self.listing, len(self._passes)), *args)
+            record(ListingRecorder(self.device, self.listing, len(self._passes)), *args)
         access, steps = recording.access, recording.steps
         declared = access.number, access.reads, access.writes
-        self._passes.append(Pass(recording.stages, lambda frame: frame.run(steps), access.number, declared))
+        self._passes.append(
+            DeclaredPass(recording.stages, lambda frame: frame.run(steps), access.number, declared)
+        )
         return result
 
     def fetch(self, *buffers: Buffer) -> Fetched:
@@ -163,9 +163,9 @@ class Graph(Recorder):
         self._fetches.append((buffers, fetched))
         return fetched
 
-    def submit(self, timed: Timed = False) -> Frame:
+    def submit(self, timed: Timed = False) -> CommandList:
         """Run what has to be run; returns the frame, which knows how long it took."""
-        frame = Frame(self.device, timed=timed, uniforms=self._uniforms)
+        frame = CommandList(self.device, timed=timed, uniforms=self._uniforms)
         try:
             needed = self._dependencies()
             versions = needed.versions(self._epoch, [one.key for one in self._passes])
@@ -205,10 +205,10 @@ class Graph(Recorder):
         size: tuple[int, ...],
         access: Access,
         writes: tuple[Slot, ...],
-        run: Callable[[Frame], None],
+        run: Callable[[CommandList], None],
         more: tuple[Any, ...] = (),
     ) -> None:
         if self.listing is not None:
             self.listing.add(stage, program, resources, size, len(self._passes))
         key = access.number, size, more, program.numbers(resources, self._uniforms)
-        self._passes.append(Pass((stage,), run, key, (access.number, access.reads, writes)))
+        self._passes.append(DeclaredPass((stage,), run, key, (access.number, access.reads, writes)))

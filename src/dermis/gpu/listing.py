@@ -13,7 +13,7 @@ from dermis.gpu.types import Bindings
 
 
 @dataclass
-class Listed:
+class ListedPass:
     """One pass.
 
     shader : name of its file
@@ -40,7 +40,7 @@ class Listing:
     resources : each described: "rgba32float 512 x 512 x 7", "buffer 4096"
     """
 
-    passes: list[Listed] = field(default_factory=list)
+    passes: list[ListedPass] = field(default_factory=list)
     resources: list[str] = field(default_factory=list)
     _numbers: dict[int, int] = field(default_factory=dict)
     _indices: list[int] = field(default_factory=list)
@@ -59,13 +59,13 @@ class Listing:
         index : of the graph's pass that it belongs to
         """
         bindings = {one.name: self._bound(resources[one.name]) for one in program.bindings}
-        listed = Listed(stage, program.name, dict(program.constants), bindings, tuple(groups), recorded)
+        listed = ListedPass(stage, program.name, dict(program.constants), bindings, tuple(groups), recorded)
         self.passes.append(listed)
         self._indices.append(index)
 
     def add_write(self, stage: str, buffer: Any, size: int, index: int) -> None:
         """Write down that the host puts `size` bytes into a buffer."""
-        self.passes.append(Listed(stage, "from the host", {}, {"written": self._bound(buffer)}, (size,)))
+        self.passes.append(ListedPass(stage, "from the host", {}, {"written": self._bound(buffer)}, (size,)))
         self._indices.append(index)
 
     def finish(self, ran: Sequence[bool]) -> None:
@@ -96,7 +96,7 @@ class Listing:
         return self._numbers[id(value)]
 
 
-class Lister(Recorder):
+class ListingRecorder(Recorder):
     """Lists the passes of a recording.
 
     index : of the recording among the graph's passes

@@ -14,15 +14,15 @@ _TYPEDEF = "typedef "
 _NUMBERS = ("char", "uint8_t", "uint32_t", "uintptr_t", "intptr_t")
 
 
-def tell_wgpus_types() -> None:
+def register_wgpu_types() -> None:
     """Register the types; to be called before wgpu is used."""
     with contextlib.suppress(ImportError):  # other builds of wgpu need nothing
         from wgpu.backends.wgpu_native import ffi
 
-        tell_types(ffi)
+        register_types(ffi)
 
 
-def tell_types(ffi: Any) -> int:
+def register_types(ffi: Any) -> int:
     """Register names of pointers, arrays and callbacks with cffi; returns how many.
 
     This uses cffi's internals. Where those differ it does nothing, and the first frame takes longer.

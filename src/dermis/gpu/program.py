@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
-from dermis.gpu.access import Access, new_number, slot_of
-from dermis.gpu.bind_groups import UNIFORM, make_group
-from dermis.gpu.by_resources import ByResources, key_of
+from dermis.gpu.bind_groups import UNIFORM, ResourceCache, key_of, make_group
+from dermis.gpu.dependencies import Access, new_number, slot_of
 from dermis.gpu.device import Device
 from dermis.gpu.shader_types import Binding, bindings, members_read, record_of
 from dermis.gpu.types import Bindable, Bindings, Record
@@ -24,23 +23,17 @@ from dermis.gpu.wgsl_source import Folder, Source, compose
 
 Records = Mapping[str, NDArray[np.generic]]
 """The uniforms of bindings, where a shader is known to declare them so."""
+
 P = TypeVar("P")
+
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
+
 _LARGE_RECORD = 2048  # bytes; a skin is smaller, of which few shaders read all
+
 _MOST_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
+
 Constants = tuple[tuple[str, float], ...]
 """Names and values of pipeline constants, a shader's `override`s; those left out keep their default."""
-
-
-def _reader(names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
-    """Takes what is named out of what is given."""
-    if len(names) > 1:
-        return itemgetter(*names)
-    return lambda resources: [resources[name] for name in names]  # of one name it would give no sequence
-
-
-def _is_uniform(binding: Binding) -> bool:
-    return binding.entry.get("buffer") == UNIFORM
 
 
 class Program:
@@ -62,8 +55,8 @@ class Program:
         self._others = [b for b in self.bindings if not _is_uniform(b)]
         self._read = _reader([b.name for b in self._others])
         self._numbers_of = [(one.name, members_read(self.source.text, one.name)) for one in self._uniforms]
-        self.kept_groups: ByResources[Any] = ByResources()
-        self._accesses: ByResources[Access] = ByResources()
+        self.kept_groups: ResourceCache[Any] = ResourceCache()
+        self._accesses: ResourceCache[Access] = ResourceCache()
         self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
@@ -189,6 +182,75 @@ class ComputeProgram(Program):
         return int(wgpu.ShaderStage.COMPUTE)
 
 
+class RasterProgram(Program):
+    """A vertex shader `vertex`, and a fragment shader `fragment` when there is a colour target.
+
+    target : format of the colour target, or None for depth only
+    depth_compare : wgpu's name ("less", "greater")
+    drawn : both
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        path: Path,
+        folders: Sequence[Folder] = (),
+        constants: Mapping[str, float] | None = None,
+        *,
+        target: str | None,
+        depth_compare: str,
+    ) -> None:
+        super().__init__(device, path, folders, constants)
+        self.drawn = {"target": target, "depth_compare": depth_compare}
+        fragment = {"module": self._module, "entry_point": "fragment", "targets": [{"format": target}]}
+        self.pipeline = device.handle.create_render_pipeline(
+            layout=self._layout,
+            vertex={"module": self._module, "entry_point": "vertex", "constants": self.constants},
+            fragment=fragment if target else None,
+            primitive={"topology": "triangle-list", "cull_mode": "none"},
+            depth_stencil={
+                "format": "depth32float",
+                "depth_write_enabled": True,
+                "depth_compare": depth_compare,
+            },
+        )
+
+    def _visibility(self) -> int:
+        import wgpu
+
+        return int(wgpu.ShaderStage.VERTEX | wgpu.ShaderStage.FRAGMENT)
+
+
+class FragmentProgram(Program):
+    """A shader whose `fragment` fills whole targets; its `vertex` makes the one triangle that covers them.
+
+    targets : their formats
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        path: Path,
+        folders: Sequence[Folder] = (),
+        constants: Mapping[str, float] | None = None,
+        *,
+        targets: Sequence[str],
+    ) -> None:
+        super().__init__(device, path, folders, constants)
+        stage = {"module": self._module, "entry_point": "fragment", "constants": self.constants}
+        self.pipeline = device.handle.create_render_pipeline(
+            layout=self._layout,
+            vertex={"module": self._module, "entry_point": "vertex"},
+            fragment={**stage, "targets": [{"format": texel} for texel in targets]},
+            primitive={"topology": "triangle-list"},
+        )
+
+    def _visibility(self) -> int:
+        import wgpu
+
+        return int(wgpu.ShaderStage.FRAGMENT)
+
+
 def compiled(device: Device, shader: Hashable, constants: Constants, make: Callable[[], P]) -> P:
     """What `make` compiles of a shader with these pipeline constants, unless it is one of those used last.
 
@@ -213,3 +275,14 @@ def declared(path: Path, folders: Sequence[Folder], constants: Constants) -> dic
 def source_of(path: Path, folders: Sequence[Folder]) -> Source:
     """The composed text of a shader, which may include the toolkit's own."""
     return compose(path, (*folders, _TOOLKIT_SHADERS))
+
+
+def _reader(names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
+    """Takes what is named out of what is given."""
+    if len(names) > 1:
+        return itemgetter(*names)
+    return lambda resources: [resources[name] for name in names]  # of one name it would give no sequence
+
+
+def _is_uniform(binding: Binding) -> bool:
+    return binding.entry.get("buffer") == UNIFORM

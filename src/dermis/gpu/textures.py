@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
+from dermis.gpu.command_list import CommandList
 from dermis.gpu.device import Device
-from dermis.gpu.no_room import room_for
+from dermis.gpu.memory import allocation
+from dermis.gpu.program import ComputeProgram
 from dermis.gpu.types import Texture, TextureView
 
 _FORMATS: dict[str, tuple[type[np.generic], int]] = {
@@ -36,6 +39,8 @@ FORMAT_BYTES = {name: np.dtype(kind).itemsize * channels for name, (kind, channe
 
 _LARGE = 1 << 24  # bytes
 
+_PROBE_SIDE = 64
+
 
 def make_texture(
     device: Device,
@@ -54,7 +59,7 @@ def make_texture(
     use : "compute" (stored to and read), "raster" (drawn to and read), "map" (uploaded and read)
     name : to be told where there is no room for it
 
-    Raises DermisError for sizes over the device's limit, NoRoomError where its memory has no room.
+    Raises DermisError for sizes over the device's limit, OutOfMemoryError where its memory has no room.
     """
     import wgpu
 
@@ -71,7 +76,7 @@ def make_texture(
     }[use]
     described = f"{name} of {size[0]}x{size[1]}x{layers} {texel}"
     texels = layers * sum(max(1, size[0] >> mip) * max(1, size[1] >> mip) for mip in range(mips))
-    with room_for(device.adapter.name, described, FORMAT_BYTES[texel] * texels, math.inf):
+    with allocation(device.adapter.name, described, FORMAT_BYTES[texel] * texels, math.inf):
         made: Texture = device.handle.create_texture(
             size=(*size, layers), format=texel, usage=usage, mip_level_count=mips, dimension="2d"
         )
@@ -131,3 +136,19 @@ def download(device: Device, texture: Texture, *, mip: int = 0, layer: int = 0) 
     rows = rows.reshape(height, -1)[:, :pitch]
     texels = np.ascontiguousarray(rows).view(kind)
     return texels.reshape((height, width, channels) if channels > 1 else (height, width))
+
+
+def half_store_rounding(device: Device) -> str:
+    """ "nearest", "toward zero" or "other": how stores to rgba16float round."""
+    program = ComputeProgram(device, Path(__file__).parent / "wgsl" / "store_probe.wgsl")
+    texture = make_texture(device, (_PROBE_SIDE, _PROBE_SIDE), "rgba16float")
+    frame = CommandList(device)
+    size = np.array([_PROBE_SIDE, _PROBE_SIDE, 0, 0], np.uint32)
+    frame.compute("probe", program, {"size": size, "rounded": texture}, (_PROBE_SIDE, _PROBE_SIDE))
+    frame.submit()
+    stored = download(device, texture)[..., 0].astype(np.float64).ravel()
+    exact = 1.0 + np.arange(_PROBE_SIDE * _PROBE_SIDE) / 65536.0
+    if np.array_equal(stored, exact.astype(np.float16).astype(np.float64)):
+        return "nearest"
+    down = 1.0 + np.floor((exact - 1.0) * 1024.0) / 1024.0  # halves are 1/1024 apart above 1
+    return "toward zero" if np.array_equal(stored, down) else "other"

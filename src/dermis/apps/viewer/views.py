@@ -16,7 +16,7 @@ from dermis.frame.inputs import Inputs
 from dermis.frame.passes import each, program
 from dermis.frame.passes.meter import read_meter
 from dermis.frame.renderer import Renderer
-from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture, upload
+from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture, upload
 from dermis.gpu.failures import gpu_failures
 from dermis.gpu.textures import texture_from
 from dermis.scene.model import Scene
@@ -83,7 +83,7 @@ class Views:
 
     def _computed(self, shader: ComputeProgram, bound: dict[str, Any], size: tuple[int, int]) -> Any:
         with gpu_failures(self._renderer.device):
-            frame = Frame(self._renderer.device)
+            frame = CommandList(self._renderer.device)
             frame.compute("view", shader, bound, size)
             frame.submit()
         return self._image
@@ -149,7 +149,7 @@ def draw_thickness(device: Device, thin: Translucency, into: Any) -> Any:
         "source_points": thin.source_points,
         "thickness": into,
     }
-    frame = Frame(device, timed=False)
+    frame = CommandList(device, timed=False)
     frame.dispatch("view", shader, bound, each(count))
     frame.submit()
     return into

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.baked_numbers import COUNT
 from dermis.frame.passes import each, program
-from dermis.gpu import Bindings, Constants, Device, Frame, make_texture
+from dermis.gpu import Bindings, CommandList, Constants, Device, make_texture
 
 
 def places_of(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
@@ -41,7 +41,7 @@ def bake(
     given = {"count": len(places), "footprint": footprint, "painted": pigments is None}
     record = shader.record("Baking", **given, everywhere=pigments or (0.0, 0.0))
     listed = device.buffer(places, "STORAGE")
-    frame = Frame(device, timed=False)
+    frame = CommandList(device, timed=False)
     here = {**bound, "baking": record, "places": listed, "baked": space}
     frame.dispatch("bake", shader, here, each(len(places)))
     frame.submit()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.levels import HALVES
 from dermis.frame.passes import program
-from dermis.gpu import Device, Frame, Recorder, make_texture, upload
+from dermis.gpu import CommandList, Device, Recorder, make_texture, upload
 from dermis.gpu.textures import texture_from, view_of
 from dermis.images.filters import mip_chain
 
@@ -36,7 +36,7 @@ def colours(device: Device, image: Floats) -> Any:
     """A texture of an (h, w, 3) picture."""
     made = empty(device, image.shape)
     upload(device, made.texture, np.dstack([image.astype(np.float16), np.ones(image.shape[:2], np.float16)]))
-    frame = Frame(device, timed=False)
+    frame = CommandList(device, timed=False)
     halve(frame, made)
     frame.submit()
     return made.texture
@@ -46,7 +46,7 @@ def slopes(device: Device, image: Floats | None) -> Any:
     """A texture of (h, w, 2) slopes and their squares; flat without any."""
     if image is None:
         return _flat(device)
-    made, frame = empty(device, image.shape), Frame(device, timed=False)
+    made, frame = empty(device, image.shape), CommandList(device, timed=False)
     bound = {"slopes": texture_from(device, image, "rg32float"), "stored": made.levels[0]}
     shader = program(device, "map_moments.wgsl", store=HALVES)
     frame.compute("maps", shader, bound, image.shape[1::-1])
@@ -84,7 +84,7 @@ def relief(device: Device, height: Floats | None) -> Any:
 
 def relief_of(device: Device, bands: Iterable[Any], shape: tuple[int, ...], band: int) -> Any:
     """The same of heights in buffers, of so many rows each, with a texel more on all sides."""
-    made, frame, (rows, columns) = empty(device, shape), Frame(device, timed=False), shape
+    made, frame, (rows, columns) = empty(device, shape), CommandList(device, timed=False), shape
     for index, heights in enumerate(bands):
         _relieve(frame, made, heights, index * band, min(band, rows - index * band))
     halve(frame, made, 1 if rows % 2 or columns % 2 else 2)

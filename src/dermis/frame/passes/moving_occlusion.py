@@ -13,7 +13,7 @@ from dermis.frame.geometry import HeadResources, upload_bare
 from dermis.frame.passes import TILE, each, program
 from dermis.frame.passes.visibility_buffer import Drawer, Layers, draw_layers, make_layers
 from dermis.frame.sky import SIDE, VIEWS, Look, look_around
-from dermis.gpu import Device, Frame, make_texture
+from dermis.gpu import CommandList, Device, make_texture
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
 from dermis.mesh.unrefined import coarse_triangles
@@ -46,7 +46,7 @@ def make_sky(device: Device, head: Head, resting: HeadResources) -> Sky:
 
     resting : its surface then
     """
-    count, rig, frame = len(head.mesh.positions), head.control, Frame(device, timed=False)
+    count, rig, frame = len(head.mesh.positions), head.control, CommandList(device, timed=False)
     layers = make_layers(device, (SIDE, SIDE), VIEWS, triangles=False)
     occluders = upload_bare(device, coarse_triangles(head, *_OCCLUDERS))
     sky = Sky(layers, occluders, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count)

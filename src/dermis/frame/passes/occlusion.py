@@ -14,7 +14,7 @@ from dermis.frame.passes.shape import rest_shape
 from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
 from dermis.frame.shape import shape_tables
-from dermis.gpu import Bindings, ComputeProgram, Device, Frame
+from dermis.gpu import Bindings, CommandList, ComputeProgram, Device
 from dermis.mesh.directions import fibonacci_sphere
 from dermis.mesh.head import Head
 
@@ -42,7 +42,7 @@ def bake_occlusion(
     lit : what the lighting passes read, the surface aside
     texels : texture of the atlas' texels, of which side x side are baked, then the vertices, row by row
     """
-    mesh, frame = head.mesh, Frame(device)
+    mesh, frame = head.mesh, CommandList(device)
     shape = rest_shape(device, shape_tables(device, head), head.control.positions_mm)
     resting = upload_geometry(device, mesh, atlas, shape)
     shader, towards = program(device, "occlusion.wgsl"), fibonacci_sphere(directions)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.passes import each, program
 from dermis.frame.shape import LEAST_ACROSS, Shape, ShapeTables, displacements, make_shape
-from dermis.gpu import Bindings, Device, Frame, Graph, Recorder
+from dermis.gpu import Bindings, CommandList, Device, Graph, Recorder
 from dermis.mesh.rig import Rig
 from dermis.mesh.tangents import MIN_UV_CROSS
 
@@ -34,7 +34,7 @@ class MotionBytes(NamedTuple):
         return MotionBytes(self.positions)
 
 
-def draw(graph: Frame | Graph, shape: Shape, motion: MotionBytes) -> None:
+def draw(graph: CommandList | Graph, shape: Shape, motion: MotionBytes) -> None:
     """Put the shape where the motion has it."""
     graph.write("shape", shape.rest, motion.positions)
     if motion.weights:
@@ -56,7 +56,7 @@ def rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.flo
 
     positions_mm : (p, 3) of the control points
     """
-    made, frame = still_shape(device, tables), Frame(device, timed=False)
+    made, frame = still_shape(device, tables), CommandList(device, timed=False)
     draw(frame, made, MotionBytes(positions_mm.tobytes()))
     frame.submit()
     return made

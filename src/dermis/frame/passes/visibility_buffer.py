@@ -16,11 +16,11 @@ import numpy as np
 from dermis.frame.geometry import HeadResources
 from dermis.frame.passes import PASSES, program, shader_folders, suited
 from dermis.frame.projection import Matrix, Views
-from dermis.gpu import Constants, Device, Frame, Graph, RasterProgram, Recorder, compiled, make_texture
+from dermis.gpu import CommandList, Constants, Device, Graph, RasterProgram, Recorder, compiled, make_texture
 from dermis.gpu.program import Program
 from dermis.gpu.textures import view_of
 
-Drawer = Frame | Graph
+Drawer = CommandList | Graph
 _GROUPS = 2048  # workgroups that keep a GPU busy; where there are more triangles, each takes more of them
 _TAKEN = (8, 128)  # triangles of a workgroup of visibility_buffer.wgsl: fewest and most
 _RUN = 16  # of them in a row in the mesh, where they are many and small

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.inverse.unmixing.model import BLOOD_SPREAD, DARKEST, USUAL_BLOOD, SkinModel
 from dermis.apps.inverse.unmixing.solve import FLOOR
-from dermis.gpu import ComputeProgram, Device, Frame, compiled, download, make_texture
+from dermis.gpu import CommandList, ComputeProgram, Device, compiled, download, make_texture
 from dermis.gpu.program import declared
 from dermis.gpu.textures import texture_from, upload
 
@@ -36,7 +36,7 @@ class Unmixer:
         self._found: tuple[Any, Any] | None = None
         self._starts = device.space(8 * _SIDE**2, "first guesses")
         shader = _program(device, "unmix_start", model)
-        frame = Frame(device, timed=False)
+        frame = CommandList(device, timed=False)
         frame.compute("start", shader, self._bound(shader, 0), (_SIDE, _SIDE))
         frame.submit()
 
@@ -56,12 +56,12 @@ class Unmixer:
 
     def strip(self, colours: Any) -> tuple[Any, Any]:
         """Two textures of what a texture's colours are made of: see `record`."""
-        frame = Frame(self.device, timed=False)
+        frame = CommandList(self.device, timed=False)
         made = self.record(frame, colours)
         frame.submit()
         return made
 
-    def record(self, frame: Frame, colours: Any) -> tuple[Any, Any]:
+    def record(self, frame: CommandList, colours: Any) -> tuple[Any, Any]:
         """Record the pass that finds, of a texture's colours, melanin, blood and their standard deviations,
         and the residual with the third number; in textures that the next of the same size takes again.
         """
@@ -96,7 +96,7 @@ def recoloured(
         texture = make_texture(device, first.size[:2], _TEXEL)
         bound = {"model": _record(shader, model, 1.0, 0), "table": table, "change": change}
         bound |= {"made": first, "residual": second, "recoloured": texture}
-        frame = Frame(device, timed=False)
+        frame = CommandList(device, timed=False)
         frame.compute("recolour", shader, bound, first.size[:2])
         frame.submit()
         found[rows] = download(device, texture)[..., :3]

@@ -17,7 +17,7 @@ from dermis.apps.inverse.unmixing.shading import shading_of
 from dermis.base.errors import refuse
 from dermis.base.quantities import number
 from dermis.gpu import Device
-from dermis.gpu.failures import OneDevice
+from dermis.gpu.failures import LazyDevice
 from dermis.images.difference import delta_e_2000
 from dermis.images.io import Picture
 from dermis.mesh.map_pixels import colour_map
@@ -56,7 +56,7 @@ class Unmixed:
     shading: Pixels | None
     skin: SkinParameters
     model: SkinModel
-    devices: dict[str, OneDevice] = field(default_factory=dict)
+    devices: dict[str, LazyDevice] = field(default_factory=dict)
 
     def maps(self) -> dict[str, Pixels]:
         """Those that are there, by the names of their files."""
@@ -98,7 +98,7 @@ class Unmixed:
 
         Raises DermisError as `dermis.gpu.open_device`.
         """
-        kept = self.devices.setdefault(adapter, OneDevice(adapter))
+        kept = self.devices.setdefault(adapter, LazyDevice(adapter))
         return kept.run(lambda device: self._recoloured(device, change))
 
     def _recoloured(self, device: Device, change: Change) -> Pixels:
@@ -162,7 +162,7 @@ def unmix(
         maps = (made[..., 0], made[..., 1], sd[..., 0], sd[..., 1])
         return Unmixed(*maps, residual, found, light, skin, model, {adapter: kept})
 
-    kept = OneDevice(adapter)
+    kept = LazyDevice(adapter)
     return kept.run(job)
 
 

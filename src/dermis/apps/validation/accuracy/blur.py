@@ -25,8 +25,8 @@ from dermis.frame.passes.shape import rest_shape
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import REMEDIES
 from dermis.frame.shape import shape_tables
-from dermis.gpu import Device, Frame, download, open_device, upload
-from dermis.gpu.probe import half_store_rounding
+from dermis.gpu import CommandList, Device, download, open_device, upload
+from dermis.gpu.textures import half_store_rounding
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -155,7 +155,7 @@ def spread(
     blur = Blur(variance, PROFILE.weight[1:], halvings)
     levels = make_levels(device, len(light), (halvings,), usual_texel(device))
     upload(device, levels.stacks[0], np.dstack([light, light, light, np.ones_like(light)]))
-    frame = Frame(device)
+    frame = CommandList(device)
     head = Head("", mesh, Maps())
     shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
     stretched.draw(frame, upload_geometry(device, mesh, atlas, shape), textures)

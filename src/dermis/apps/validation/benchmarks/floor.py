@@ -16,7 +16,7 @@ from dermis.frame.inputs import Inputs
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes.surface_texels import SURFACE_BYTES
 from dermis.frame.techniques.gpu_gems_3 import StretchedLevels
-from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
+from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture
 from dermis.gpu.textures import FORMAT_BYTES, texel_bytes
 
 _MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
@@ -149,7 +149,7 @@ def copy_rate(device: Device) -> float:
 
 def _copy(device: Device, program: ComputeProgram, textures: list[Any]) -> float:
     """Time of copying back and forth [ms]."""
-    frame, (one, other) = Frame(device), textures
+    frame, (one, other) = CommandList(device), textures
     for source, copied in ((one, other), (other, one)) * (_COPIES // 2):
         frame.compute("copy", program, {"source": source, "copied": copied}, one.size[:2])
     frame.submit()

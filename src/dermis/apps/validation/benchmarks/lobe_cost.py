@@ -9,7 +9,7 @@ from typing import Any
 
 from dermis.frame.passes import shader_folders
 from dermis.frame.surface import constants
-from dermis.gpu import ComputeProgram, Device, Frame, make_texture
+from dermis.gpu import CommandList, ComputeProgram, Device, make_texture
 from dermis.gpu.textures import texture_from
 from dermis.scene.skin import Skin
 from dermis.specular.albedo import albedo_table
@@ -58,7 +58,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
 
 def _pass_ms(device: Device, program: ComputeProgram, bound: dict[str, Any], side: int) -> float:
     """Time of one pass by the device's clock, or by the wall's without timestamps [ms]."""
-    frame = Frame(device)
+    frame = CommandList(device)
     started = time.perf_counter()
     frame.compute("lobe", program, bound, (side, side))
     frame.submit()

@@ -13,8 +13,8 @@ from dermis.apps.validation.benchmarks.cases import FRAGMENTS, Case, scenes_of, 
 from dermis.apps.validation.benchmarks.floor import moved_by, stage_bytes
 from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
 from dermis.frame.renderer import Renderer
+from dermis.gpu.command_list import Timed
 from dermis.gpu.failures import gpu_failures
-from dermis.gpu.frame import Timed
 from dermis.gpu.memory import held_bytes
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene

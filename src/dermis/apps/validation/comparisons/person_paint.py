@@ -14,7 +14,7 @@ from dermis.base.errors import refuse
 from dermis.frame.passes import program
 from dermis.frame.passes.painting import paint
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Frame, download, make_texture
+from dermis.gpu import CommandList, download, make_texture
 from dermis.human.skin.detail import TILE_MM, detail_heights_mm
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.painted import PaintedMaps
@@ -99,7 +99,7 @@ def _picture(renderer: Renderer, scene: Scene, part: int, reach: float) -> Float
     eye = inputs.view["eyes"][0]
     for name in ("eumelanin", "pupil_mm", "redness", "seed"):
         asked["eye"][name] = eye[name]
-    frame = Frame(device, timed=False)
+    frame = CommandList(device, timed=False)
     frame.compute("paint", shader, {**inputs.lit, "asked": asked, "painted": painted}, (_SIDE, _SIDE))
     frame.submit()
     return np.ascontiguousarray(download(device, painted)[..., :3], np.float32)

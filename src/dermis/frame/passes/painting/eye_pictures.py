@@ -6,7 +6,7 @@ import numpy as np
 
 from dermis.frame.passes import program
 from dermis.frame.surface import fill_eye
-from dermis.gpu import Device, Frame, download, make_texture
+from dermis.gpu import CommandList, Device, download, make_texture
 from dermis.mesh.eye_layout import FALLING, RIM, EyePictures
 from dermis.mesh.eyes import EyeLook
 
@@ -20,7 +20,7 @@ def eye_pictures(device: Device, look: EyeLook, side: int = SIDE) -> EyePictures
     asked = shader.record("Asked", rim=RIM, falling=FALLING)
     fill_eye(asked["eye"], look)
     made = {name: make_texture(device, (side, side), "rgba32float") for name in ("colours", "normals")}
-    frame = Frame(device, timed=False)
+    frame = CommandList(device, timed=False)
     frame.compute("paint", shader, {"asked": asked, **made}, (side, side))
     frame.submit()
     colours, normals = (download(device, texture)[..., :3] for texture in made.values())

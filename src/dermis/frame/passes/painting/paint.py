@@ -11,7 +11,7 @@ from dermis.frame.passes import map_mips
 from dermis.frame.passes.painting.expression import Face, make_face
 from dermis.frame.passes.painting.given import given_for
 from dermis.frame.passes.painting.resting import painted, resting
-from dermis.gpu import Device, Frame
+from dermis.gpu import CommandList, Device
 from dermis.gpu.textures import download
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.surface import Painting
@@ -56,7 +56,7 @@ def draw(
     """
     made = resting(device, given_for(painting, look, side), side, moving)
     colour = map_mips.empty(device, (side, side)) if moving else made.colour
-    frame = Frame(device, timed=False)
+    frame = CommandList(device, timed=False)
     for one in (made.specular, made.roughness) if moving else (colour, made.specular, made.roughness):
         map_mips.halve(frame, one)
     frame.submit()

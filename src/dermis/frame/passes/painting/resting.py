@@ -12,7 +12,7 @@ from dermis.base.progress import preparing
 from dermis.frame.levels import HALVES
 from dermis.frame.passes import each, map_mips, program
 from dermis.frame.passes.painting.given import OWNER, SKIN, Given, key_of
-from dermis.gpu import Device, Frame, make_texture, upload
+from dermis.gpu import CommandList, Device, make_texture, upload
 from dermis.gpu.textures import download
 from dermis.human.skin.surface import Painting
 
@@ -63,7 +63,7 @@ def painted(device: Device, given: Given, side: int) -> Resting:
     moved = make_texture(device, (side, side), HALVES, layers=2)
     into = {name: one.levels[0] for name, one in maps.items()} | {"heights": heights, "moved": moved}
     tables = {"tables": given.tables, "colour_tables": _colours(device, given)}
-    frame = Frame(device, timed=False)
+    frame = CommandList(device, timed=False)
     frame.compute("maps", program(device, SKIN), owned | tables | into, (side, side))
     frame.submit()
     return Resting(**maps, heights=heights, moved=moved)
@@ -81,7 +81,7 @@ def _owned(device: Device, given: Given, side: int) -> dict[str, Any]:
             "triangles": device.buffer(surface.triangles, "STORAGE"),
             "owners": device.space(_WORD * side * side),
         }
-        frame = Frame(device, timed=False)
+        frame = CommandList(device, timed=False)
         frame.dispatch("maps", program(device, OWNER), {"paint": given.paint} | made, each(surface.count))
         frame.submit()
         sides[side] = made

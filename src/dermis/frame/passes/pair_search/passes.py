@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.translucency.cells import BESIDE, TILE, Cells
 from dermis.frame.passes import each, program
-from dermis.gpu import Constants, Device, Frame
+from dermis.gpu import CommandList, Constants, Device
 
 Words = NDArray[np.uint32]
 Index = NDArray[np.int64]
@@ -48,7 +48,7 @@ class SearchPasses:
 
     def __init__(self, device: Device, cells: Cells) -> None:
         block = -(-cells.tiles // _MOST_BLOCKS)
-        self.device, self.frame = device, Frame(device, timed=False)
+        self.device, self.frame = device, CommandList(device, timed=False)
         self.blocks = -(-cells.tiles // block)
         self._told = {
             "radius_mm": cells.radius_mm,
@@ -69,7 +69,7 @@ class SearchPasses:
     def read(self, buffer: Any, count: int) -> Index:
         """The first words that the passes so far leave there."""
         self.frame.submit()
-        self.frame = Frame(self.device, timed=False)
+        self.frame = CommandList(self.device, timed=False)
         words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
         return words[:count].astype(np.int64)
 

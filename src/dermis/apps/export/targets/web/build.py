@@ -16,7 +16,7 @@ from dermis.apps.export.targets.web.packing import Packer
 from dermis.frame.inputs import Inputs, pinhole
 from dermis.frame.renderer import Renderer
 from dermis.frame.taping import FORMS, renderer_for, sparser, taken
-from dermis.gpu.tape import Tape
+from dermis.gpu.capture import FrameCapture
 from dermis.mesh.outline import Outline
 from dermis.scene.lights import SpotLight
 from dermis.scene.model import Scene
@@ -134,7 +134,7 @@ def built(asked: Asked, look: Callable[[Renderer, Scene, Settings], None] | None
 
 
 def _form(made: Built, renderer: Renderer, asked: Asked, form: str) -> Json:
-    tape, frames, turned = Tape(renderer.device), list[Named](), list[Json]()
+    tape, frames, turned = FrameCapture(renderer.device), list[Named](), list[Json]()
     base: Inputs | None = None
     for settings, fewer in asked.frames(form):
         inputs = renderer.prepare(asked.scene, settings)
@@ -158,7 +158,7 @@ def _turned(
     packer: Packer, renderer: Renderer, asked: Asked, settings: Settings, base: Inputs, one: Named
 ) -> Json:
     """What each dial's nodes change in a frame."""
-    found, beside = {}, Tape(renderer.device)
+    found, beside = {}, FrameCapture(renderer.device)
     for dial in asked.dials:
         nodes = node_inputs(dial, lambda scene: renderer.prepare(scene, settings), base)
         found[dial.name] = [
@@ -210,7 +210,7 @@ def _colour(
         return None
     key = f"{dial} {node}", 0, 0
     if key not in made.maps.pictures:
-        tape, texture = Tape(renderer.device), renderer.prepare(scene, settings).lit["colour_map"]
+        tape, texture = FrameCapture(renderer.device), renderer.prepare(scene, settings).lit["colour_map"]
         texels = texels_of(tape, tape.resource(texture), 0)[0]
         if made.maps.same("colour_map", texels):
             return None

@@ -10,10 +10,10 @@ import numpy as np
 
 from dermis.apps.export.targets.web.packing import Packer
 from dermis.frame.passes.post import Picture
-from dermis.gpu.tape import Take, Taken, Tape
+from dermis.gpu.capture import CapturedFrame, CapturedPass, FrameCapture
 
 
-def needed(tape: Tape, takes: list[Take]) -> list[int]:
+def needed(tape: FrameCapture, takes: list[CapturedFrame]) -> list[int]:
     """Numbers of textures and buffers that some pass reads before any writes it, in order."""
     found: set[int] = set()
     for take in takes:
@@ -24,7 +24,7 @@ def needed(tape: Tape, takes: list[Take]) -> list[int]:
     return sorted(found)
 
 
-def bound(tape: Tape, takes: list[Take], names: tuple[str, ...]) -> dict[int, str]:
+def bound(tape: FrameCapture, takes: list[CapturedFrame], names: tuple[str, ...]) -> dict[int, str]:
     """What is bound by some names."""
     found: dict[int, str] = {}
     for take in takes:
@@ -34,19 +34,19 @@ def bound(tape: Tape, takes: list[Take], names: tuple[str, ...]) -> dict[int, st
     return found
 
 
-def whole(tape: Tape, number: int) -> int:
+def whole(tape: FrameCapture, number: int) -> int:
     """The texture of a view; others themselves."""
     return int(tape.resources[number].get("of", number))
 
 
-def read_by(tape: Tape, one: Taken) -> Iterator[int]:
+def read_by(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
     """What a pass may read."""
     yield from (k for k, entry in _entries(tape, one) if _reads(entry))
     if one.raster and one.raster["indices"] >= 0:
         yield int(one.raster["indices"])
 
 
-def written_by(tape: Tape, one: Taken) -> Iterator[int]:
+def written_by(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
     """What a pass writes; of a buffer that the host fills from the start, the buffer."""
     if one.written:
         yield one.written[0]
@@ -55,7 +55,7 @@ def written_by(tape: Tape, one: Taken) -> Iterator[int]:
         yield from (int(one.raster[name]) for name in ("depth", "target") if one.raster[name] >= 0)
 
 
-def _entries(tape: Tape, one: Taken) -> Iterator[tuple[int, dict[str, Any]]]:
+def _entries(tape: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, dict[str, Any]]]:
     if one.program is not None:
         bindings = tape.programs[one.program]["bindings"]
         yield from ((k, entry) for k, (_, _, entry) in zip(one.bound, bindings, strict=True) if k >= 0)
@@ -69,7 +69,7 @@ def _writes(entry: dict[str, Any]) -> bool:
     return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}
 
 
-def _there(tape: Tape, number: int, written: set[int]) -> bool:
+def _there(tape: FrameCapture, number: int, written: set[int]) -> bool:
     """Whether a pass has written what is there, or any part of it."""
     return any(whole(tape, k) == whole(tape, number) for k in written)
 
@@ -87,13 +87,13 @@ class Named:
     """
 
     name: str
-    take: Take
+    take: CapturedFrame
     picture: Picture
     size: tuple[int, int]
     fewer: int = 0
 
 
-Mapped = dict[int, tuple[str, int, Take | None]]
+Mapped = dict[int, tuple[str, int, CapturedFrame | None]]
 """Maps that come as pictures: role, how many mips, and passes that fill the others, see `Pictured.put`."""
 
 
@@ -101,7 +101,9 @@ Stepped = dict[int, tuple[float, ...]]
 """Buffers of floats that are multiples of steps."""
 
 
-def described(tape: Tape, frames: list[Named], mapped: Mapped, steps: Stepped, packer: Packer) -> Json:
+def described(
+    tape: FrameCapture, frames: list[Named], mapped: Mapped, steps: Stepped, packer: Packer
+) -> Json:
     """The file's description; what it names by number lies in the packer.
 
     Of resources that hold nothing but zeros, as new ones do, no content is kept.
@@ -135,7 +137,7 @@ def _in_parts(packer: Packer) -> Callable[[Any], int]:
     return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mips(tape: Tape, number: int) -> list[Any]:
+def _mips(tape: FrameCapture, number: int) -> list[Any]:
     """A buffer's bytes, or a texture's mip by mip, each with all its layers."""
     parts, layers = tape.content(number), tape.resources[number].get("size")
     count = layers[2] if isinstance(layers, list) else 1
@@ -158,14 +160,14 @@ def _frame(one: Named, picture: list[int], packer: Packer) -> Json:
     }
 
 
-def _views(take: Take, stage: str) -> int:
+def _views(take: CapturedFrame, stage: str) -> int:
     """The record by which a stage's passes see the head, -1 for none."""
     views = [k for k, (struct, _) in enumerate(take.records) if struct == "Views"]
     records = (-1 - k for one in take.passes if one.stage == stage for k in one.bound if k < 0)
     return next((k for k in records if k in views), -1)
 
 
-def _pass(one: Taken, packer: Packer) -> Json:
+def _pass(one: CapturedPass, packer: Packer) -> Json:
     written = None if one.written is None else (one.written[0], packer.add(one.written[1]))
     return {
         "stage": one.stage,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dermis.apps.export.targets.web.packing import Packer
 from dermis.base.errors import refuse
 from dermis.frame.inputs import Inputs
-from dermis.gpu.tape import Take, Taken
+from dermis.gpu.capture import CapturedFrame, CapturedPass
 from dermis.human.skin.painted import PaintedMaps
 from dermis.scene.model import Scene
 from dermis.scene.pose import Pose
@@ -58,7 +58,7 @@ def node_inputs(dial: Dial, prepare: Callable[[Scene], Inputs], base: Inputs) ->
             yield prepare(scene)
 
 
-def changes(base: Take, node: Take, packer: Packer) -> Json:
+def changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
     """What a node changes: of records and of what the host writes, first word and differences as floats.
 
     Whole numbers stay those of the base, as do the pairs of places that light passes between.
@@ -92,7 +92,7 @@ def _is_float(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
     return found
 
 
-def _written(one: Taken) -> Floats:
+def _written(one: CapturedPass) -> Floats:
     return np.frombuffer(one.written[1] if one.written else b"", "<f4")
 
 

@@ -13,7 +13,7 @@ from dermis.apps.export.targets.web.described import bound
 from dermis.apps.export.targets.web.packing import stepped
 from dermis.frame.renderer import Renderer
 from dermis.frame.taping import halving, refill
-from dermis.gpu.tape import Take, Tape
+from dermis.gpu.capture import CapturedFrame, FrameCapture
 from dermis.images.filters import mip_chain
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -117,8 +117,8 @@ class Pictured:
         return bool(np.array_equal(self._given[role], texels))
 
     def put(
-        self, renderer: Renderer, tape: Tape, takes: list[Take]
-    ) -> dict[int, tuple[str, int, Take | None]]:
+        self, renderer: Renderer, tape: FrameCapture, takes: list[CapturedFrame]
+    ) -> dict[int, tuple[str, int, CapturedFrame | None]]:
         """Encode what is not yet encoded, and decode it into a tape's textures.
 
         Of each of these its role, how many mips come as pictures, and the passes that fill the others.
@@ -132,7 +132,7 @@ class Pictured:
             found[number] = role, mips, halving(tape, texture) if described["usage"] & _STORABLE else None
         return found
 
-    def _layers(self, tape: Tape, number: int, role: str, mip: int) -> NDArray[np.float16]:
+    def _layers(self, tape: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
         """(l, h, w, c) a mip as it is decoded."""
         layers = texels_of(tape, number, mip)
         for layer, texels in enumerate(layers):
@@ -157,7 +157,9 @@ def _halved(values: NDArray[np.float32], most: int) -> NDArray[np.float32]:
     return np.asarray(mip_chain(values)[times], np.float32)
 
 
-def shorten(renderer: Renderer, tape: Tape, takes: list[Take]) -> dict[int, tuple[float, ...]]:
+def shorten(
+    renderer: Renderer, tape: FrameCapture, takes: list[CapturedFrame]
+) -> dict[int, tuple[float, ...]]:
     """Round the places of hairs on a device; of each buffer of them the steps of its columns."""
     found: dict[int, tuple[float, ...]] = {}
     for number in bound(tape, takes, ("knots",)):
@@ -167,7 +169,7 @@ def shorten(renderer: Renderer, tape: Tape, takes: list[Take]) -> dict[int, tupl
     return found
 
 
-def texels_of(tape: Tape, number: int, mip: int) -> NDArray[np.float16]:
+def texels_of(tape: FrameCapture, number: int, mip: int) -> NDArray[np.float16]:
     """(l, h, w, c) what a texture of halves holds."""
     width, height, layers = tape.resources[number]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
@@ -175,7 +177,7 @@ def texels_of(tape: Tape, number: int, mip: int) -> NDArray[np.float16]:
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 
-def _rest(tape: Tape, number: int, mips: int) -> list[NDArray[np.float16]]:
+def _rest(tape: FrameCapture, number: int, mips: int) -> list[NDArray[np.float16]]:
     return [texels_of(tape, number, mip) for mip in range(mips, tape.resources[number]["mips"])]
 
 
@@ -185,7 +187,7 @@ def _large(described: dict[str, Any]) -> int:
     return sum(side >> mip >= LEAST for mip in range(described["mips"]))
 
 
-def _mapped(tape: Tape, takes: list[Take]) -> dict[int, str]:
+def _mapped(tape: FrameCapture, takes: list[CapturedFrame]) -> dict[int, str]:
     """Textures of halves bound as maps, large enough for pictures, with their roles."""
     return {
         number: role

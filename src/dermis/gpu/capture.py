@@ -11,21 +11,22 @@ from numpy.typing import NDArray
 
 from dermis.gpu.device import Device
 from dermis.gpu.graph import Graph
-from dermis.gpu.program import ComputeProgram, Program
-from dermis.gpu.raster_program import FragmentProgram, RasterProgram
+from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.shader_types import Binding, record_type
-from dermis.gpu.tape_content import content_of, described
+from dermis.gpu.textures import download
 from dermis.gpu.types import Bindings, Buffer, Record, TextureOrView, TextureView
 
 T = TypeVar("T")
+
 Ts = TypeVarTuple("Ts")
+
 Bound = list[int]
 """In the order of the program's bindings: numbers of resources, and -1 - k for the take's record k."""
 
 
 @dataclass
-class Taken:
+class CapturedPass:
     """One pass.
 
     program, bound : None and empty where the host writes bytes into a resource
@@ -47,17 +48,17 @@ class Taken:
 
 
 @dataclass
-class Take:
+class CapturedFrame:
     """A frame.
 
     records : what passes read besides resources, each with the structure that names its members
     """
 
-    passes: list[Taken] = field(default_factory=list)
+    passes: list[CapturedPass] = field(default_factory=list)
     records: list[tuple[str, Record]] = field(default_factory=list)
     _known: dict[int, int] = field(default_factory=dict)
 
-    def add(self, one: Taken, unit: int | None) -> None:
+    def add(self, one: CapturedPass, unit: int | None) -> None:
         """Add a pass, of a recording if it is part of one."""
         before = self.passes[-1].unit if self.passes else -1
         one.unit = before + 1 if unit is None else unit
@@ -71,7 +72,7 @@ class Take:
         return self._known[id(record)]
 
 
-class Tape(Graph):
+class FrameCapture(Graph):
     """Takes down frames that are declared on it, none of which runs.
 
     shaders : texts
@@ -88,14 +89,14 @@ class Tape(Graph):
         self.structs: dict[str, np.dtype[Any]] = {}
         self._objects: list[Any] = []
         self._numbers: dict[int, int] = {}
-        self._take = Take()
+        self._take = CapturedFrame()
         self._unit: int | None = None
         self._taken: dict[int, int] = {}
         self._kept: list[Program] = []
 
-    def take(self, declare: Callable[[Tape], Any]) -> Take:
+    def take(self, declare: Callable[[FrameCapture], Any]) -> CapturedFrame:
         """The frame that `declare` declares."""
-        self._take = take = Take()
+        self._take = take = CapturedFrame()
         self._unit = None
         declare(self)
         return take
@@ -112,7 +113,11 @@ class Tape(Graph):
         """The number of a texture, view, buffer or sampler."""
         if id(value) not in self._numbers:
             texture = getattr(value, "texture", None)
-            found = described(self.device, value) if texture is None else {"kind": "view", "part": value.part}
+            found = (
+                description_of(self.device, value)
+                if texture is None
+                else {"kind": "view", "part": value.part}
+            )
             if texture is not None:
                 found["of"] = self.resource(texture)
             self._numbers[id(value)] = len(self.resources)
@@ -135,7 +140,7 @@ class Tape(Graph):
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
         """Take down what the host writes."""
         written = self.resource(buffer), data
-        self._take.add(Taken(stage, None, [], (len(data),), written=written), self._unit)
+        self._take.add(CapturedPass(stage, None, [], (len(data),), written=written), self._unit)
 
     def draw(
         self,
@@ -173,9 +178,11 @@ class Tape(Graph):
         finally:
             self._unit = None
 
-    def _pass(self, stage: str, program: Program, resources: Bindings, groups: tuple[int, ...]) -> Taken:
+    def _pass(
+        self, stage: str, program: Program, resources: Bindings, groups: tuple[int, ...]
+    ) -> CapturedPass:
         bound = [self._bound(program, one, resources[one.name]) for one in program.bindings]
-        taken = Taken(stage, self._program(program), bound, groups)
+        taken = CapturedPass(stage, self._program(program), bound, groups)
         self._take.add(taken, self._unit)
         return taken
 
@@ -205,3 +212,31 @@ class Tape(Graph):
         if text not in self.shaders:
             self.shaders.append(text)
         return self.shaders.index(text)
+
+
+def description_of(device: Device, value: Any) -> dict[str, Any]:
+    """What it takes to make a resource: its kind, sizes and uses by WebGPU's numbers, or options."""
+    if hasattr(value, "mip_level_count"):
+        return {
+            "kind": "texture",
+            "format": value.format,
+            "size": list(value.size),
+            "mips": value.mip_level_count,
+            "usage": int(value.usage),
+        }
+    if hasattr(value, "size"):
+        return {"kind": "buffer", "size": value.size, "usage": int(value.usage)}
+    return {"kind": "sampler", "options": device.sampler_options(value)}
+
+
+def content_of(device: Device, value: Any) -> list[NDArray[np.uint8]]:
+    """The bytes of a buffer, or of a texture's layers, mip by mip and in a mip layer by layer."""
+    if not hasattr(value, "mip_level_count"):
+        return [np.frombuffer(device.handle.queue.read_buffer(value), np.uint8)]
+    layers = range(value.size[2])
+    texels = [
+        download(device, value, mip=mip, layer=layer)
+        for mip in range(value.mip_level_count)
+        for layer in layers
+    ]
+    return [np.ascontiguousarray(one).view(np.uint8).reshape(-1) for one in texels]

@@ -10,10 +10,9 @@ from typing import Any, TypeVar, TypeVarTuple
 
 import numpy as np
 
-from dermis.gpu.access import Access, Slot, new_number, slot_of
-from dermis.gpu.compute_pass import Step
+from dermis.gpu.command_list import Step, step_of
+from dermis.gpu.dependencies import Access, Slot, new_number, slot_of
 from dermis.gpu.device import Device
-from dermis.gpu.frame import step_of
 from dermis.gpu.memo import is_value, same
 from dermis.gpu.program import ComputeProgram
 from dermis.gpu.recorder import Recorder

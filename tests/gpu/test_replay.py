@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.gpu import ComputeProgram, Device, Frame, Graph, Recorder, download, make_texture, upload
+from dermis.gpu import CommandList, ComputeProgram, Device, Graph, Recorder, download, make_texture, upload
 
 SIZE = (19, 5)
 
@@ -85,7 +85,7 @@ def test_what_the_recording_returned_comes_again(device: Device, scale: ComputeP
 def test_numbers_of_other_frames_do_not_come_in_between(device: Device, scale: ComputeProgram) -> None:
     chain, other = Chain(device, scale), Chain(device, scale)
     chain.drawn(1.0)
-    frame = Frame(device)
+    frame = CommandList(device)
     other.record(frame, *other.textures, 7.0)
     frame.submit()
     assert chain.drawn(1.0)[0, 0] == 9.0

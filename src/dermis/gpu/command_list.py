@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from typing import Any, Literal
+from collections.abc import Iterable, Sequence
+from typing import Any, Literal, NamedTuple
 
-from dermis.gpu.access import Access
-from dermis.gpu.compute_pass import ComputePass, Step
+import numpy as np
+
+from dermis.gpu.dependencies import Access
 from dermis.gpu.device import Device
-from dermis.gpu.program import ComputeProgram
-from dermis.gpu.raster_program import FragmentProgram, RasterProgram
+from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recorder import Recorder
-from dermis.gpu.timing import Timestamps, WallClock
 from dermis.gpu.types import Bindings, Buffer, Texture, TextureOrView, TextureView
 from dermis.gpu.uniforms import Uniforms
 
 Timed = bool | Literal["whole"]
 """Whether stages are timed, each in a pass of its own, or the frame as it is when nobody asks, as a whole."""
+
 _MOST_STEPS = 16  # of a pass: its records lie elsewhere when other passes before it run
 
 
-class Frame(Recorder):
+class CommandList(Recorder):
     """Records passes, submits them together, then knows how long each stage took.
 
     On software adapters each stage is submitted and waited for by itself, to time it.
@@ -237,6 +237,21 @@ class Frame(Recorder):
         self._open = None
 
 
+class Step(NamedTuple):
+    """A dispatch as the native library takes it.
+
+    bound, uniforms, offsets : the bind group, how many uniforms it has, and their offsets
+    groups : workgroups along each axis
+    """
+
+    stage: str
+    pipeline: Any
+    bound: Any
+    uniforms: int
+    offsets: Any
+    groups: tuple[int, int, int]
+
+
 def step_of(
     stage: str, program: ComputeProgram, group: Any, offsets: Sequence[int], groups: tuple[int, int, int]
 ) -> Step:
@@ -244,3 +259,95 @@ def step_of(
     # as the native library takes them, so that no frame needs to convert them
     kept = program.device.ffi.new("uint32_t[]", offsets)
     return Step(stage, program.pipeline._internal, group._internal, len(offsets), kept, groups)
+
+
+class ComputePass:
+    """Dispatches in order.
+
+    wgpu wraps each call in Python to catch its errors. Here they are caught all the same: the library keeps
+    what is wrong in a pass until the encoder finishes. It also holds on to what a pass binds.
+    """
+
+    def __init__(self, device: Device, encoder: Any, label: str, timestamps: Any) -> None:
+        self._lib = lib = device.lib
+        if timestamps is None:
+            begun = lib.wgpuCommandEncoderBeginComputePass(encoder._internal, device.ffi.NULL)
+            self._handle = device.ffi.gc(begun, lib.wgpuComputePassEncoderRelease)
+        else:
+            self._pass = encoder.begin_compute_pass(label=label, timestamp_writes=timestamps)
+            self._handle = self._pass._internal
+
+    def run(self, steps: Iterable[Step]) -> None:
+        """Run pipelines one after the other."""
+        handle, set_pipeline = self._handle, self._lib.wgpuComputePassEncoderSetPipeline
+        set_bind_group = self._lib.wgpuComputePassEncoderSetBindGroup
+        dispatch = self._lib.wgpuComputePassEncoderDispatchWorkgroups
+        for _, pipeline, bound, uniforms, offsets, (x, y, z) in steps:
+            set_pipeline(handle, pipeline)
+            set_bind_group(handle, 0, bound, uniforms, offsets)
+            dispatch(handle, x, y, z)
+
+    def end(self) -> None:
+        """Close the pass."""
+        self._lib.wgpuComputePassEncoderEnd(self._handle)
+
+
+class Timestamps:
+    """A timestamp at the start of each pass; a pass lasts until the next one begins, so stages add up.
+
+    whole : True takes only the first and the last, as each takes time itself
+    """
+
+    def __init__(self, device: Device, *, whole: bool = False) -> None:
+        self._device, self._whole = device, whole
+        self._queries, self._resolved = device.timestamp_pool()
+        self._stages: list[str] = []
+
+    def begin(self, stage: str) -> dict[str, Any] | None:
+        """A pass descriptor's `timestamp_writes`; None for no timestamp."""
+        full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
+        if full or (self._whole and self._stages):
+            return None
+        return self._mark(stage)
+
+    def _mark(self, stage: str) -> dict[str, Any]:
+        self._stages.append(stage)
+        return {"query_set": self._queries, "beginning_of_pass_write_index": len(self._stages) - 1}
+
+    def end(self, encoder: Any) -> None:
+        """Mark the end of the last pass and resolve the timestamps."""
+        if self._stages:
+            encoder.begin_compute_pass(label="end", timestamp_writes=self._mark("end")).end()
+            encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
+
+    def stage_ms(self) -> dict[str, float]:
+        """Time of each stage, unless only the whole is timed, and "total" [ms]."""
+        if not self._stages:
+            return {"total": 0.0}
+        raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))
+        ticks = np.frombuffer(raw, dtype=np.uint64).astype(np.int64)
+        ms = 1e-6 * self._device.timestamp_period_ns
+        times: dict[str, float] = {}
+        for stage, lasted in zip(self._stages, np.diff(ticks), strict=False):
+            times[stage] = times.get(stage, 0.0) + float(lasted) * ms
+        times = {} if self._whole else times
+        times["total"] = float(ticks[-1] - ticks[0]) * ms
+        return times
+
+
+class WallClock:
+    """The time from submitting a stage to its end.
+
+    For software adapters: Mesa stamps compute passes before their work is done; waiting costs nothing there.
+    """
+
+    def __init__(self) -> None:
+        self._times: dict[str, float] = {}
+
+    def measure(self, stage: str, started: float) -> None:
+        """Add the time since `started` (time.perf_counter) to the stage."""
+        self._times[stage] = self._times.get(stage, 0.0) + 1e3 * (time.perf_counter() - started)
+
+    def stage_ms(self) -> dict[str, float]:
+        """Time of each stage, and "total" [ms]."""
+        return self._times | {"total": sum(self._times.values())}

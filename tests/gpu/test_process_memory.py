@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from dermis.base.errors import DermisError
-from dermis.gpu import address_space
+from dermis.gpu import memory
 
 resource = pytest.importorskip("resource", reason="Windows limits no address space")
 
@@ -74,22 +74,22 @@ def test_what_takes_no_device_works_under_a_limit(folder: Path, words: list[str]
 
 
 def test_more_threads_take_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(address_space, "_limit", lambda: 3.0 * GB)
-    monkeypatch.setattr(address_space, "_taken", lambda: 0.5 * GB)
+    monkeypatch.setattr(memory, "_limit", lambda: 3.0 * GB)
+    monkeypatch.setattr(memory, "_taken", lambda: 0.5 * GB)
     monkeypatch.setenv("LP_NUM_THREADS", "2")
-    address_space.check_software()
+    memory.check_software()
     monkeypatch.setenv("LP_NUM_THREADS", "16")
-    assert address_space.room() <= 2.5 * GB
+    assert memory.available_memory() <= 2.5 * GB
     with pytest.raises(DermisError, match=r"at least 5\.\d GB for graphics drivers"):
-        address_space.check_software()
+        memory.check_software()
 
 
 def test_a_group_has_less_than_the_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """As in containers: the system kills a process that takes more than its control group may."""
-    machine, group = address_space.main_memory(), tmp_path / "job"
+    machine, group = memory.main_memory(), tmp_path / "job"
     group.mkdir()
     (tmp_path / "memory.max").write_text("max\n")
     (group / "memory.max").write_text("1000000\n")
-    monkeypatch.setattr(address_space, "_GROUPS", tmp_path)
-    monkeypatch.setattr(address_space, "_own_groups", lambda: ["job"])
-    assert address_space.main_memory() == 1e6 < machine < math.inf
+    monkeypatch.setattr(memory, "_GROUPS", tmp_path)
+    monkeypatch.setattr(memory, "_own_groups", lambda: ["job"])
+    assert memory.main_memory() == 1e6 < machine < math.inf

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 from dermis.base.errors import DermisError
-from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
-from dermis.gpu.by_resources import ByResources, key_of
+from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture
+from dermis.gpu.bind_groups import ResourceCache, key_of
+from dermis.gpu.command_list import Timed
 from dermis.gpu.failures import gpu_failures
-from dermis.gpu.frame import Timed
-from dermis.gpu.probe import half_store_rounding
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import half_store_rounding, texture_from
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 SIZE = (37, 21)  # no multiple of a tile
@@ -30,7 +29,7 @@ def scale(device: Device) -> ComputeProgram:
 def test_passes_follow_each_other(device: Device, scale: ComputeProgram) -> None:
     image = np.random.default_rng(1).random(SIZE[::-1]).astype(np.float32)
     textures = [texture_from(device, image, "r32float")]
-    frame = Frame(device)
+    frame = CommandList(device)
     for factor in (2.0, 3.0, 0.5):
         textures.append(make_texture(device, SIZE, "r32float"))
         bound = {
@@ -44,7 +43,7 @@ def test_passes_follow_each_other(device: Device, scale: ComputeProgram) -> None
 
 
 def test_stage_times_add_up_to_the_total(device: Device, scale: ComputeProgram) -> None:
-    frame = Frame(device)
+    frame = CommandList(device)
     image, into = (make_texture(device, (512, 512), "r32float") for _ in range(2))
     for stage in ("one", "two", "one"):
         bound = {"factor": scale.record("Factor", value=1), "image": image, "scaled": into}
@@ -63,7 +62,7 @@ def test_stage_times_add_up_to_the_total(device: Device, scale: ComputeProgram) 
 def staged_times(device: Device, scale: ComputeProgram, timed: Timed) -> tuple[dict[str, float] | None, int]:
     """Times of a frame of two stages in turn, and how many timestamps it took."""
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
-    frame = Frame(device, timed=timed)
+    frame = CommandList(device, timed=timed)
     for stage in ("one", "two", "one"):
         bound = {"factor": scale.record("Factor", value=1), "image": image, "scaled": into}
         frame.compute(stage, scale, bound, SIZE)
@@ -93,7 +92,7 @@ def test_software_adapters_time_stages_even_so(device: Device, scale: ComputePro
 
 
 def test_an_empty_frame_takes_no_time(device: Device) -> None:
-    frame = Frame(device)
+    frame = CommandList(device)
     frame.submit()
     frame.wait()
     assert sum((frame.stage_ms() or {}).values()) == 0
@@ -114,7 +113,7 @@ def test_memory_for_records_is_used_again(device: Device, scale: ComputeProgram)
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
     spare = []
     for value in range(3):
-        frame = Frame(device, timed=False)
+        frame = CommandList(device, timed=False)
         bound = {"factor": record_of(scale, value), "image": image, "scaled": into}
         frame.compute("scale", scale, bound, SIZE)
         frame.submit()
@@ -125,7 +124,7 @@ def test_memory_for_records_is_used_again(device: Device, scale: ComputeProgram)
 def test_one_frame_may_have_more_uniforms_than_a_buffer_holds(device: Device, scale: ComputeProgram) -> None:
     count = CHUNK_BYTES // 256 + 3
     image = texture_from(device, np.ones((1, 1), np.float32), "r32float")
-    frame, made = Frame(device), [make_texture(device, (1, 1), "r32float") for _ in range(count)]
+    frame, made = CommandList(device), [make_texture(device, (1, 1), "r32float") for _ in range(count)]
     for value, into in enumerate(made):
         frame.compute(
             "scale", scale, {"factor": record_of(scale, value), "image": image, "scaled": into}, (1, 1)
@@ -139,7 +138,7 @@ def test_frames_in_flight_keep_their_uniforms(device: Device, scale: ComputeProg
     """All frames write to one buffer; each must read its own numbers, whichever was recorded first."""
     image = texture_from(device, np.ones((64, 64), np.float32), "r32float")
     made = [make_texture(device, (64, 64), "r32float") for _ in range(20)]
-    frames = [Frame(device, timed=False) for _ in made]
+    frames = [CommandList(device, timed=False) for _ in made]
     for value, (frame, into) in enumerate(zip(frames, made, strict=True)):
         bound = {"factor": record_of(scale, value), "image": image, "scaled": into}
         frame.compute("scale", scale, bound, (64, 64))
@@ -173,7 +172,7 @@ def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
 
 def test_what_goes_before_the_submit_is_still_read(device: Device, scale: ComputeProgram) -> None:
     """The library holds on to what a pass binds; here only the result is."""
-    into, frame = make_texture(device, SIZE, "r32float"), Frame(device, timed=False)
+    into, frame = make_texture(device, SIZE, "r32float"), CommandList(device, timed=False)
     image = texture_from(device, np.full(SIZE[::-1], 3.0, np.float32), "r32float")
     bound = {"factor": record_of(scale, 2.0), "image": image, "scaled": into}
     frame.compute("scale", scale, bound, SIZE)
@@ -190,7 +189,7 @@ class Resource:
 
 def test_resources_that_go_one_after_another_are_followed_no_more() -> None:
     """Else what takes their place in memory would be taken for them, with groups that bind what is gone."""
-    groups, first, second = ByResources[str](), Resource(), Resource()
+    groups, first, second = ResourceCache[str](), Resource(), Resource()
     groups.keep(key_of([first, second]), [first, second], "group")
     del first
     assert len(groups) == 0 and groups.followed == 1
@@ -204,7 +203,7 @@ def test_a_forgotten_resource_is_named(device: Device, scale: ComputeProgram) ->
 
 
 def test_untimed_frames_tell_no_times(device: Device, scale: ComputeProgram) -> None:
-    frame = Frame(device, timed=False)
+    frame = CommandList(device, timed=False)
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
     frame.compute("one", scale, {"factor": record_of(scale, 2), "image": image, "scaled": into}, SIZE)
     frame.submit()
