@@ -1,4 +1,7 @@
-"""The works that the package rests on: author-year keys to BibTeX."""
+"""The works that the package rests on: author-year keys to BibTeX.
+
+Entries are printed as they are written, which libraries that parse BibTeX do not keep.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Plain values as TOML."""
+"""Plain values as TOML.
+
+Data sets are known by the hash of this text, so that its form must not change with a library's.
+"""
 
 from __future__ import annotations
 
