@@ -23,7 +23,7 @@ from dermis.apps.validation.comparisons.person_paint import paint_of
 from dermis.environment.panorama import directions
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
-from dermis.images.exr import encode_exr
+from dermis.images.hdr import encode_exr
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight

@@ -24,7 +24,7 @@ from dermis.apps.validation.pages import write_figures
 from dermis.base.atomic_write import check_output
 from dermis.base.console import note
 from dermis.base.errors import DermisError
-from dermis.mesh.samples import cached
+from dermis.formats.samples import cached
 
 PARTS = ("bench", "lobes", "sequences", "lights", "options", "start", "viewer", "film")
 """What matters most first; lobes while the device is at work, for an idle one is three times as slow."""

@@ -26,7 +26,8 @@ from dermis.base.console import print_json
 from dermis.frame.renderer import Renderer
 from dermis.gpu.memory import held_bytes
 from dermis.mesh.head import Head
-from dermis.scene import Pose, Scene, Settings, Skin
+from dermis.mesh.pose import Pose
+from dermis.scene import Scene, Settings, Skin
 from dermis.scene.heads import load_head
 
 _ON_GPU = Case()  # 1920 x 1080, atlas 2048, three shadowed lights, six Gaussians

@@ -27,7 +27,7 @@ from dermis.apps.truths.slab_mc import counted_profile
 from dermis.apps.validation.pages import write_figures
 from dermis.gpu import CommandList, Device, open_device
 from dermis.gpu.textures import texture_from
-from dermis.images.difference import delta_e_2000
+from dermis.images.colour import delta_e_2000
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.pigments.skin import SkinParameters, spectral_medium

@@ -27,10 +27,10 @@ from dermis.cli.head_options import HEAD
 from dermis.cli.options import is_option, option_name
 from dermis.cli.scene_options import AROUND
 from dermis.scene import Camera, Environment, Settings, Skin
+from dermis.scene.files import PoseTable
 from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.lights import LIGHTS
 from dermis.scene.plain import Plain, heading_of, help_of, shown, values_of
-from dermis.scene.pose_table import PoseTable
 from dermis.scene.skin import Pigments, TissueLayer
 from dermis.scene.toml_text import value_text
 

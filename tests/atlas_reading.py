@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
+from dermis.mesh.geometry import uv_cross
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import uv_cross
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]

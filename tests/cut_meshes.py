@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from dermis.mesh.gltf.binary import CLAMPED, VERTICES, Binary, glb_bytes, placed
+from dermis.formats.gltf.binary import CLAMPED, VERTICES, Binary, glb_bytes, placed
 from dermis.mesh.mesh import Mesh
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from gltf_file import GltfFile, add_mesh
 from numpy.typing import NDArray
 
-from dermis.mesh.globe import globe
+from dermis.mesh.eyeball import globe
+from dermis.mesh.geometry import halves
 from dermis.mesh.primitives import uv_sphere
-from dermis.mesh.quads import halves
 
 Floats = NDArray[np.float64]
 

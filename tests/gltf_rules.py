@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.mesh.gltf.document import Document, read_document
+from dermis.formats.gltf.document import Document, read_document
 
 VALIDATOR_VARIABLE = "DERMIS_GLTF_VALIDATOR"
 """Names the folder of the npm package gltf-validator."""

@@ -7,9 +7,8 @@ import numpy as np
 from dermis.atlas.unwrap.charts import grow
 from dermis.atlas.unwrap.unwrap import unwrap
 from dermis.human.person import Human
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import triangle_areas
+from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.mesh import Mesh, build_mesh
 
 LEAST_MM2 = 1e-6
 """Triangles under it have no place on a layout."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
-from dermis.mesh.turns import quaternion_matrix
+from dermis.mesh.rotations import quaternion_matrix
 
 SIZE_MM = np.array([75.0, 110.0, 95.0])
 HEIGHTS_MM = np.array([-200.0, -120.0, -70.0, -40.0])

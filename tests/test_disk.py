@@ -20,7 +20,7 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.base import disk
 from dermis.base.disk import cached_array
-from dermis.mesh.cached import Rigged, cached_rigged
+from dermis.formats.load import Rigged, cached_rigged
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import plane, uv_sphere
 

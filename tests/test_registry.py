@@ -9,7 +9,7 @@ import pytest
 
 from dermis.base.errors import DermisError
 from dermis.base.registry import Named, Registry
-from dermis.scene.findings import ImpossibleError
+from dermis.scene.field_errors import ImpossibleError
 from dermis.scene.plain import Plain, choices_of, help_of
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES

@@ -13,12 +13,12 @@ from small_head import write_head
 
 import dermis
 from dermis.base.errors import DermisError
+from dermis.formats.motion.live_link import load_live_link
+from dermis.formats.motion.mediapipe import load_mediapipe
 from dermis.human.person_file import read_person
 from dermis.human.regions.labels import load_landmarks
 from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
-from dermis.scene.clips.live_link import load_live_link
-from dermis.scene.clips.mediapipe import load_mediapipe
 from dermis.scene.files import load_camera
 
 PAGE = (Path(__file__).parents[1] / "docs" / "formats.md").read_text("utf-8")

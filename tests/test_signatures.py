@@ -12,7 +12,7 @@ from pydantic import Field
 
 import dermis
 from dermis.base.registry import Named, Registry
-from dermis.scene.findings import Words
+from dermis.scene.field_errors import Words
 from dermis.scene.plain import Plain
 from dermis.scene.skin import Pigments, TissueLayer
 

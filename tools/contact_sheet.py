@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from dermis.formats.samples import SAMPLES, cached
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.images.io import write_png
 from dermis.mesh.head import Head
-from dermis.mesh.samples import SAMPLES, cached
 from dermis.scene import Environment, Scene, Settings, load_lights
 from dermis.scene.camera import preset
 from dermis.scene.heads import HUMAN, load_head

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import dermis
 from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
+from dermis.formats.samples import cached
 from dermis.gpu.listing import ListedPass, Listing
-from dermis.mesh.samples import cached
 
 PAGE = Path(__file__).parent.parent / "docs" / "frame_graph.md"
 SETTINGS, TARGETS = dermis.Settings(size=(1920, 1080), atlas=2048), 52

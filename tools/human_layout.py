@@ -12,7 +12,7 @@ from dermis.atlas.unwrap.flatten import flatten
 from dermis.atlas.unwrap.pack import pack
 from dermis.atlas.unwrap.seams import border_sides
 from dermis.atlas.unwrap.stretch import singular_values
-from dermis.mesh.quads import halves
+from dermis.mesh.geometry import halves
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -16,9 +16,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import dermis
+from dermis.formats.maps import load_maps
 from dermis.images.movie import exact_rate
 from dermis.mesh.head import Head
-from dermis.mesh.maps import load_maps
 
 DATA = Path(os.environ.get("DERMIS_DATA", "../shared")) / "heads"
 SKIN = DATA / "makehuman" / "skins" / "young_lightskinned_male_diffuse.png"

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from dermis.apps.export.run import export_skin
-from dermis.mesh.samples import cached
+from dermis.formats.samples import cached
 
 HEADS = {"human": "the human", "human-7": "human:7", "human-12": "human:12", "scan": "lee_perry_smith"}
 VIEWPORT = '<meta name="viewport" content="width=device-width, initial-scale=1">'

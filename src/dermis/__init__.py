@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from dermis.human.skin.look import SkinLook
     from dermis.images.io import write_image
     from dermis.images.movie import MovieWriter
+    from dermis.mesh.clip import Clip
     from dermis.mesh.eyes import EyeLook
     from dermis.mesh.head import Head
+    from dermis.mesh.pose import Pose
     from dermis.optics.profiles import load_profile
     from dermis.optics.tissue import Tissue, load_tissue
     from dermis.scene.camera import Camera, portrait, side, three_quarter
-    from dermis.scene.clips.clip import Clip
-    from dermis.scene.clips.load import load_motion
     from dermis.scene.environment import Environment
     from dermis.scene.files import load_lights, load_scene
     from dermis.scene.heads import load_head
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
         studio,
     )
     from dermis.scene.model import Scene
-    from dermis.scene.pose import Pose
+    from dermis.scene.motion import load_motion
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
@@ -74,8 +74,8 @@ _HOME = {
     "portrait": "scene.camera",
     "side": "scene.camera",
     "three_quarter": "scene.camera",
-    "Clip": "scene.clips.clip",
-    "load_motion": "scene.clips.load",
+    "Clip": "mesh.clip",
+    "load_motion": "scene.motion",
     "Environment": "scene.environment",
     "load_lights": "scene.files",
     "load_scene": "scene.files",
@@ -87,7 +87,7 @@ _HOME = {
     "StripeLight": "scene.lights",
     "studio": "scene.lights",
     "Scene": "scene.model",
-    "Pose": "scene.pose",
+    "Pose": "mesh.pose",
     "Settings": "scene.settings",
     "Skin": "scene.skin",
     "export_skin": "apps.export.run",

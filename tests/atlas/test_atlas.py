@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER, Atlas
 from dermis.atlas.build import build_atlas
+from dermis.atlas.uv_charts import charts
 from dermis.base.errors import DermisError
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Mesh
+from dermis.formats.samples import SAMPLES
+from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
-from dermis.mesh.samples import SAMPLES
-from dermis.mesh.uv import charts
 
 Square = tuple[float, float, float]  # left, top, side in uv
 
@@ -204,8 +203,8 @@ def test_small_atlases_are_refused(size: int) -> None:
 @pytest.mark.samples
 def test_the_scan() -> None:
     """Its eye shells are collapsed; the eight other islands fill most of the map."""
-    from dermis.mesh.load import load_mesh
-    from dermis.mesh.samples import fetch
+    from dermis.formats.load import load_mesh
+    from dermis.formats.samples import fetch
 
     sample = SAMPLES["lee_perry_smith"]
     mesh = load_mesh(

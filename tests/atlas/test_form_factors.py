@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from dermis.atlas.interreflection import SAMPLES, SIDE, Links, find_links
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 
 OPPOSITE, BESIDE = 0.199825, 0.200044  # form factors of a cube's faces, in closed form

@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Material, Mesh
+from dermis.atlas.uv_charts import charts
+from dermis.mesh.geometry import triangle_areas, uv_cross
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import plane
-from dermis.mesh.tangents import triangle_areas, uv_cross
-from dermis.mesh.uv import charts
 
 Floats = NDArray[np.float64]
 

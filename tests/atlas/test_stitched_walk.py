@@ -12,8 +12,7 @@ from dermis.atlas.stitched.conflicts import find_conflicts
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
 from dermis.atlas.stitched.surface import FlatSurface, survey
 from dermis.atlas.stitched.walk import walk
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Mesh, build_mesh
 
 Floats = NDArray[np.float64]
 RADIUS, HEIGHT, CELLS = 30.0, 80.0, 12

@@ -18,10 +18,9 @@ from dermis.atlas.unwrap.untangle import untangle
 from dermis.atlas.unwrap.unwrap import PADDING, Layout, unwrap
 from dermis.atlas.unwrap.validity import crossed, faults
 from dermis.base.errors import DermisError
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.mesh.tangents import triangle_areas
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -18,10 +18,10 @@ from dermis.apps.batch.spec import Spec, example_text, spec_of
 from dermis.base.errors import DermisError
 from dermis.human.person import Human
 from dermis.human.person_file import write_numbers
-from dermis.mesh.turns import angles_matrix
+from dermis.mesh.pose import Pose
+from dermis.mesh.rotations import angles_matrix
 from dermis.scene.lights import light_presets, preset_lights
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 
 WILD = """
 images_per_person = 40

@@ -14,7 +14,7 @@ import dermis
 from dermis.cli.pose_options import parse_turns, parse_weights
 from dermis.cli.scene_options import SceneOptions, assemble
 from dermis.images.io import read_image
-from dermis.scene.pose import Pose
+from dermis.mesh.pose import Pose
 
 Run = Callable[..., Any]
 

@@ -13,7 +13,7 @@ from dermis.apps.export.run import export_skin, judged
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.targets.pbrt.target import TARGET
 from dermis.base.errors import DermisWarning
-from dermis.mesh.load import load_mesh
+from dermis.formats.load import load_mesh
 from dermis.optics.tissue import load_tissue
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight, PointLight, RectangleLight, SphereLight, StripeLight

@@ -20,8 +20,8 @@ from dermis.apps.export.targets.usd.motion import valid_names
 from dermis.apps.export.targets.usd.stage import stage_of
 from dermis.human.person import Human
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
 from dermis.scene.heads import load_head
-from dermis.scene.pose import Pose
 from dermis.scene.skin import Skin
 
 HOSTILE = '"; import os\n)</x>@#usda {'

@@ -22,7 +22,7 @@ from dermis.apps.inverse.fitting.place import placed
 from dermis.apps.inverse.fitting.subject import subject_of
 from dermis.human.landmarks.points import landmark_points
 from dermis.images.colour import encode_srgb8
-from dermis.mesh.directions import fibonacci_sphere
+from dermis.mesh.geometry import fibonacci_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.files import load_scene
 from dermis.scene.people import skin_of

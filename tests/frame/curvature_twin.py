@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import edges
+from dermis.mesh.geometry import edges, sum_at, triangle_areas
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import sum_at, triangle_areas
 
 Floats = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from dermis.human.labels.classes import class_number
 from dermis.human.landmarks.sets import SETS
 from dermis.human.person import Human
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 
 Mask = NDArray[np.bool_]

@@ -21,10 +21,9 @@ from dermis.frame.passes import SHARED_SHADERS, SPECULAR
 from dermis.frame.passes.stretch import draw_coarser
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, ComputeProgram, Constants, Device, download, make_texture, upload
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, plane
 from dermis.scene.camera import Camera
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.mesh.geometry import build_mesh
+from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Material, Mesh
-from dermis.mesh.quads import halves
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.strands import Roots, Strands, frames, points_of, seen_from
 
 SIDE_MM = 100.0

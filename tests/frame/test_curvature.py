@@ -18,8 +18,7 @@ from dermis.frame.passes import curvature
 from dermis.frame.passes.shape import rest_shape
 from dermis.frame.shape import shape_tables
 from dermis.gpu import CommandList, Device
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
 
 Floats = NDArray[np.float64]

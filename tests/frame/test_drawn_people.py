@@ -11,10 +11,10 @@ from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.human.template import template
+from dermis.mesh.pose import Pose
 from dermis.scene.lights import preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
-from dermis.scene.pose import Pose
 
 SETTINGS = {"size": (128, 128), "atlas": 256, "shadow_size": 256}
 HAIR = HairLook(style="cropped", density=0.2, beard_mm=3.0)

@@ -13,7 +13,7 @@ from small_head import write_head
 import dermis
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
-from dermis.scene.findings import bounds_of, number_fields
+from dermis.scene.field_errors import bounds_of, number_fields
 from dermis.scene.lights import LIGHTS
 from dermis.scene.plain import Plain
 

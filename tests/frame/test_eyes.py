@@ -17,13 +17,13 @@ from dermis.mesh.eyeball import CORNEA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import plane
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.gaze import looking_at
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 
 Floats = NDArray[np.float64]
 SIZE = 32

@@ -23,13 +23,13 @@ from dermis.frame.sky import SIDE as MAP_SIDE
 from dermis.frame.sky import anchors_of, look_around, turn_of
 from dermis.gpu import download
 from dermis.human.person import Human
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import build_mesh
 from dermis.mesh.outline import Outline
-from dermis.mesh.turns import angles_matrix
+from dermis.mesh.pose import Pose
+from dermis.mesh.rotations import angles_matrix
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 
 Floats = NDArray[np.float64]
 SIDE = 64

@@ -19,7 +19,7 @@ from dermis.frame import surroundings
 from dermis.frame.passes.occlusion import bake_occlusion, whole_map
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
-from dermis.mesh.directions import fibonacci_sphere
+from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.environment import Environment

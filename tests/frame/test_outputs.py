@@ -18,11 +18,11 @@ from dermis.frame.outputs import OUTPUTS
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.gpu.listing import Listing
+from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
-from dermis.scene.pose import Pose
 
 Floats = NDArray[np.float64]
 STAGES = "geometry", "surface", "motion", "alpha"

@@ -22,7 +22,7 @@ from dermis.frame.techniques.pre_integrated import (
     spread_cosine,
 )
 from dermis.gpu import download
-from dermis.mesh.geometry import build_mesh
+from dermis.mesh.mesh import build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile

@@ -16,8 +16,8 @@ from dermis.frame import resources
 from dermis.frame.renderer import Renderer, render
 from dermis.frame.seams import REMEDIES
 from dermis.gpu import CommandList, download
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import build_mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene

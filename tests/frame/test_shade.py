@@ -16,8 +16,8 @@ from dermis.frame import passes
 from dermis.frame.passes import shade
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download, upload
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import build_mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
 from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight

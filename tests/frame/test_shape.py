@@ -21,9 +21,8 @@ from dermis.frame.passes import gutters, shape, stretch
 from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.shape import Shape, make_shape, shape_tables
 from dermis.gpu import CommandList, Device, download
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton, Stencils
 
 Floats = NDArray[np.float64]

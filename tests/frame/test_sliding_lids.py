@@ -21,11 +21,11 @@ from dermis.human.skin.surface import lid_rings
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.mesh.pose import Pose
 from dermis.mesh.subdivide import subdivide_head
 from dermis.scene.camera import Camera
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 
 Floats = NDArray[np.float64]
 

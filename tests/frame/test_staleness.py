@@ -19,13 +19,13 @@ from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu.listing import Listing
 from dermis.images.io import write_png
+from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import LIGHTS, PointLight, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain, choices_of
-from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 

@@ -18,9 +18,9 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 from dermis.specular.hair import attenuations, fibre, scattered

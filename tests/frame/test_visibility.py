@@ -13,8 +13,8 @@ from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.renderer import Renderer
 from dermis.frame.samples import pixel_samples
 from dermis.gpu import CommandList, download
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import build_mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene

@@ -16,8 +16,8 @@ from dermis.frame.passes.visibility_buffer import Layers, draw_layers, make_laye
 from dermis.frame.projection import parallel_view
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import build_mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
 from dermis.scene.camera import Camera
 

@@ -13,15 +13,14 @@ import pytest
 from gltf_rules import check_rules, khronos_issues
 
 from dermis import DermisError, Human, Pose, load_head
+from dermis.formats.gltf.document import Document
+from dermis.formats.gltf.primitives import Fibres
 from dermis.frame.passes.painting.eye_pictures import eye_pictures
 from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
 from dermis.human.head_file import write_person
-from dermis.mesh.eye_layout import EyePictures, eye_uv
-from dermis.mesh.eyeball import LIMBUS_MM, profile_mm
+from dermis.mesh.eyeball import LIMBUS_MM, EyePictures, eye_uv, profile_mm
 from dermis.mesh.eyes import EyeLook
-from dermis.mesh.gltf.document import Document
-from dermis.mesh.gltf.fibres import Fibres
 from dermis.mesh.strands import points_of
 
 LOOK = EyeLook(eumelanin=0.1, pupil_mm=2.5, redness=0.0, seed=3)

@@ -20,8 +20,8 @@ from dermis.human.skin.surface import lid_rings
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm, clearance_mm
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.mesh.pose import Pose
 from dermis.mesh.subdivide import subdivide_head
-from dermis.scene.pose import Pose
 
 Floats = NDArray[np.float64]
 PEOPLE = [None, 3, 7, 12, 21]

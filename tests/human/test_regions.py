@@ -331,8 +331,7 @@ def _table(m: float, rho_s: float) -> RegionTable:
 
 def _quad() -> Mesh:
     """A card of 200 mm that fills the uv square."""
-    from dermis.mesh.geometry import build_mesh
-    from dermis.mesh.mesh import Material
+    from dermis.mesh.mesh import Material, build_mesh
 
     uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
     place = np.column_stack((200 * uv[:, 0] - 100, 100 - 200 * uv[:, 1], np.zeros(4))).astype(np.float32)

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 
-from dermis.images.difference import delta_e_2000, lab
+from dermis.images.colour import delta_e_2000, lab
 
 
 def test_differences_are_those_of_the_library() -> None:

@@ -10,8 +10,8 @@ import pytest
 
 from dermis.base.errors import DermisError
 from dermis.images.codecs import encode_png, png_size
-from dermis.images.frame_files import FrameFiles
 from dermis.images.io import write_exr, write_png
+from dermis.images.writer import FrameFiles
 
 SIZE = (6, 4)
 PICTURE = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)

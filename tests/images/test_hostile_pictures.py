@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from dermis.base.errors import DermisError
+from dermis.formats.maps import load_maps
 from dermis.images.io import read_image, write_exr
-from dermis.mesh.maps import load_maps
 
 MAP_SIDE = 4096
 MOST_MEMORY = 3.0  # times the pixels that are kept

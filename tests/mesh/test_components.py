@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from dermis.mesh.components import components
+from dermis.mesh.geometry import components
 
 
 @pytest.mark.parametrize("links", [0, 1, 300, 700, 3000])

@@ -11,14 +11,14 @@ from eyed_head import EYE_MM, MIRROR, ball, ball_with_cornea, write_head
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
-from dermis.mesh.eye_names import names_eye
+from dermis.formats.load import names_eye
+from dermis.mesh.fitted_eyes.balls import Sphere, corneal_axis, fit_sphere
 from dermis.mesh.fitted_eyes.lids import lids_before
-from dermis.mesh.fitted_eyes.spheres import Sphere, corneal_axis, fit_sphere
 from dermis.mesh.head import Head
-from dermis.mesh.turns import angles_matrix
+from dermis.mesh.pose import Pose
+from dermis.mesh.rotations import angles_matrix
 from dermis.scene.gaze import looking_at
 from dermis.scene.heads import load_head
-from dermis.scene.pose import Pose
 
 Floats = NDArray[np.float64]
 AHEAD = np.array([0.0, 0.0, 1.0])

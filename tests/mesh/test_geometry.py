@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.mesh.geometry import build_mesh, edges, vertex_normals, weld
-from dermis.mesh.mesh import Material
+from dermis.mesh.geometry import edges, triangle_areas, vertex_normals, weld
+from dermis.mesh.mesh import Material, build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.mesh.tangents import triangle_areas
 
 SKIN = (Material("skin"),)
 

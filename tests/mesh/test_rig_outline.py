@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from random_rig import random_rig
 
+from dermis.mesh.outline import outermost
 from dermis.mesh.rig import Motion, Rig
-from dermis.mesh.rig_outline import outermost
 
 RNG = np.random.default_rng(11)
 ANYWHERE = RNG.normal(size=(300, 3))

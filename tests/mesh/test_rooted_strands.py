@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import build_mesh
+from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Material, Mesh
-from dermis.mesh.quads import halves
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.strands import Roots, Strands, finer_roots, frames, points_of, seen_from
 from dermis.mesh.subdivide import subdivide_head
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dermis.atlas.uv_charts import chart_uv_area, charts
 from dermis.base.errors import DermisError
-from dermis.mesh.check import check_mesh
-from dermis.mesh.geometry import build_mesh, edges, weld
-from dermis.mesh.mesh import Material, Mesh
+from dermis.formats.mesh_checks import check_mesh
+from dermis.mesh.geometry import edges, weld
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.mesh.subdivide import subdivide
-from dermis.mesh.uv import chart_uv_area, charts
 
 
 def _euler(mesh: Mesh) -> int:

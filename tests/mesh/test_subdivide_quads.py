@@ -9,16 +9,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from dermis.mesh.check import check_mesh
-from dermis.mesh.geometry import build_mesh, edges
-from dermis.mesh.load import load_mesh
-from dermis.mesh.mesh import Material, Mesh
+from dermis.atlas.uv_charts import chart_uv_area, charts
+from dermis.formats.load import load_mesh
+from dermis.formats.mesh_checks import check_mesh
+from dermis.mesh.geometry import edges, halves, triangle_areas
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import uv_sphere
-from dermis.mesh.quads import halves, polygons
-from dermis.mesh.subdivide import subdivide
+from dermis.mesh.subdivide import polygons, subdivide
 from dermis.mesh.subdivision_rules import Cage, refine_catmull_clark
-from dermis.mesh.tangents import triangle_areas
-from dermis.mesh.uv import chart_uv_area, charts
 
 SKIN = (Material("skin"),)
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))

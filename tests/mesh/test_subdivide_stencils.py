@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from dermis.mesh import subdivide as module
-from dermis.mesh.geometry import build_mesh
+from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.mesh.quads import halves
 from dermis.mesh.rig import MorphTargets, Rig
 from dermis.mesh.subdivide import subdivide, subdivide_head
 from dermis.scene.heads import load_head

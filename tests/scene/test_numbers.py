@@ -19,11 +19,11 @@ from dermis.mesh.eyes import EyeLook
 from dermis.optics.pigments.skin import SkinParameters
 from dermis.scene import Environment, Skin
 from dermis.scene.camera import Camera
-from dermis.scene.findings import Because, ImpossibleError, bounds_of, number_fields
+from dermis.scene.field_errors import Because, ImpossibleError, bounds_of, number_fields
+from dermis.scene.files import PoseTable
 from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.lights import LIGHTS
 from dermis.scene.plain import Plain
-from dermis.scene.pose_table import PoseTable
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, TissueLayer
 

@@ -14,6 +14,7 @@ from random_rig import random_rig
 from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
@@ -28,7 +29,6 @@ from dermis.scene.lights import (
 )
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
-from dermis.scene.pose import Pose
 from dermis.scene.saving import save_scene, scene_toml
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer

@@ -8,7 +8,7 @@ import pytest
 from dermis.base.errors import DermisError
 from dermis.frame.skin_profiles import SkinProfiles
 from dermis.optics.profiles import load_profile
-from dermis.scene.findings import ImpossibleError
+from dermis.scene.field_errors import ImpossibleError
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 from dermis.scene.tissue import layers_of, tissue_of
 

@@ -14,9 +14,8 @@ from dermis.cli.scene_options import SceneOptions, assemble, note_levels
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.mesh.silhouette import LIMIT_PX, MOST_TRIANGLES, Silhouette, silhouette, smooth_levels
 from dermis.scene.camera import Camera, portrait
-from dermis.scene.smoothness import SmoothIn
+from dermis.scene.smoothness import LIMIT_PX, MOST_TRIANGLES, Silhouette, SmoothIn, silhouette, smooth_levels
 
 RADIUS_MM, SIDES = 120.0, 24
 SIZES = {64: 0, 256: 1, 1024: 2}

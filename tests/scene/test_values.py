@@ -9,7 +9,7 @@ import pytest
 
 from dermis.base.errors import DermisError
 from dermis.scene import Camera, DirectionalLight, Environment, PointLight, Settings, Skin, SpotLight
-from dermis.scene.findings import ImpossibleError
+from dermis.scene.field_errors import ImpossibleError
 
 FORM = re.compile(r"\w+: (\S+: )?expected .+, but .+\. Correct it\.")
 BAD = [

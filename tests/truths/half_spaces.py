@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.path_traced import PathTraced, path_trace
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import build_mesh
 from dermis.mesh.primitives import SKIN, plane
 from dermis.optics.media import Layer, Medium
 from dermis.scene.camera import Camera

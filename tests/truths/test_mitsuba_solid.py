@@ -8,8 +8,8 @@ from half_spaces import pan
 
 from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.base.errors import DermisError
-from dermis.mesh.geometry import build_mesh, edges
-from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.geometry import edges
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 
 

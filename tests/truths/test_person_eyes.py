@@ -13,7 +13,7 @@ from painted_ball import ball, paint
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mesh_shape, sensor_of, variant_of
 from dermis.apps.truths.person import eyes
 from dermis.apps.truths.person.subject import Person
-from dermis.mesh.eye_limits import LIMITS
+from dermis.mesh.eye_look import LIMITS
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.scene.camera import Camera
 

@@ -16,9 +16,8 @@ from dermis.apps.truths.surface_diffusion import (
     welded,
 )
 from dermis.base.errors import DermisError
-from dermis.mesh.geometry import edges
+from dermis.mesh.geometry import edges, triangle_areas
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.mesh.tangents import triangle_areas
 from dermis.scene.heads import load_head
 
 Floats = NDArray[np.float64]

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.surface_diffusion import diffuse_on_surface, welded
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN
 
 Floats = NDArray[np.float64]

@@ -19,8 +19,8 @@ from dermis.apps.truths.surface_integral import (
     sample_irradiance,
 )
 from dermis.base.errors import DermisError
+from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.mesh.tangents import triangle_areas
 
 Floats = NDArray[np.float64]
 

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from dermis.apps.truths.irradiance_samples import IrradianceSamples, Places, sample_irradiance
 from dermis.apps.truths.octree import Tree, build_tree
 from dermis.base.errors import DermisError
-from dermis.mesh.geometry import edges
+from dermis.mesh.geometry import edges, triangle_areas
 from dermis.mesh.mesh import Material
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.mesh.tangents import triangle_areas
 
 Floats = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from dermis.apps.validation.comparisons.report import write_report
 from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, comparison_scene
 from dermis.apps.validation.comparisons.truths import TRUTHS
 from dermis.base.errors import DermisError
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 from dermis.scene.heads import load_head
 from dermis.scene.settings import Settings

@@ -15,7 +15,7 @@ from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
 from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download
-from dermis.mesh.geometry import build_mesh
+from dermis.mesh.mesh import build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene

@@ -16,8 +16,8 @@ from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.posing import weight_of
 from dermis.apps.viewer.state import ViewerState
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
 from dermis.scene import Scene
-from dermis.scene.pose import Pose
 
 PICTURE = np.s_[:380, 205:]
 

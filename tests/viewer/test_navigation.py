@@ -21,11 +21,11 @@ from dermis.apps.viewer.navigation import (
 )
 from dermis.apps.viewer.state import ViewerState
 from dermis.mesh.head import Head
-from dermis.mesh.turns import angles_matrix
+from dermis.mesh.pose import Pose
+from dermis.mesh.rotations import angles_matrix
 from dermis.scene import Camera, Environment, Scene
 from dermis.scene.camera import PRESETS, preset
 from dermis.scene.lights import DirectionalLight, SpotLight
-from dermis.scene.pose import Pose
 
 CAMERA = Camera(position=(0.0, 0.0, 1000.0), target=(0.0, 0.0, 0.0), frame_mm=300.0)
 

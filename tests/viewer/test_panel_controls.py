@@ -14,9 +14,9 @@ from pydantic import Field
 
 from dermis.apps.viewer.panel.sections import SECTIONS
 from dermis.apps.viewer.state import ViewerState, same
+from dermis.mesh.pose import Pose
 from dermis.scene.environment import Environment
 from dermis.scene.plain import Plain, help_of, slider
-from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 from dermis.scene.talk import COMPARISONS

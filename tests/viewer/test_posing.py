@@ -22,11 +22,11 @@ from dermis.apps.viewer.posing import (
 )
 from dermis.apps.viewer.state import ViewerState, load_state, same, save_state
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
 from dermis.mesh.rig import Rig
-from dermis.mesh.turns import angles_matrix
+from dermis.mesh.rotations import angles_matrix
 from dermis.scene import Scene
 from dermis.scene.heads import load_head
-from dermis.scene.pose import Pose
 
 
 def test_a_slider_changes_its_own_weight(rigged_head: Head) -> None:

@@ -20,9 +20,9 @@ from dermis.apps.viewer.studio import Studio
 from dermis.cli import main
 from dermis.human.regions.zones import REGIONS
 from dermis.images.io import read_image
+from dermis.mesh.pose import Pose
 from dermis.scene import Environment, Scene
 from dermis.scene.heads import load_head
-from dermis.scene.pose import Pose
 from dermis.scene.skin import TissueLayer
 
 SIZE = 72, 64

@@ -15,8 +15,8 @@ from dermis.apps.viewer.pace import QUALITY_LEVELS
 from dermis.apps.viewer.state import ViewerState
 from dermis.apps.viewer.studio import Studio
 from dermis.gpu.replay import Recording
+from dermis.mesh.pose import Pose
 from dermis.scene.environment import Environment
-from dermis.scene.pose import Pose
 
 SIZE = (96, 96)
 SPREAD = {"diffuse", "translucency", "combine"}

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER, MOST_SHEAR, Atlas
+from dermis.atlas.uv_charts import charts, usable
+from dermis.mesh.geometry import uv_cross
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import uv_cross
-from dermis.mesh.uv import charts, usable
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -21,7 +21,7 @@ from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_leve
 
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
-    from dermis.scene.clips.clip import Clip
+    from dermis.mesh.clip import Clip
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
 

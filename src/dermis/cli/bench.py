@@ -78,7 +78,7 @@ def bench(
 
 
 def _head(name: str) -> str:
-    from dermis.mesh.samples import cached
+    from dermis.formats.samples import cached
 
     if name != "auto":
         return name

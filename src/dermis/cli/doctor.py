@@ -35,8 +35,8 @@ def doctor(*, adapter: Adapter = "auto", as_json: Json = False) -> int:
 def examine(wanted: str) -> dict[str, Any]:
     """All findings as one JSON-ready object."""
     from dermis.base.private import cache_folder
+    from dermis.formats.samples import SAMPLES, cached
     from dermis.gpu.adapters import WANTED_FEATURES, list_adapters
-    from dermis.mesh.samples import SAMPLES, cached
 
     found = [
         {"number": a.number, "name": a.name, "driver": a.driver, "kind": a.kind, "backend": a.backend}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from dermis.base.console import note
-from dermis.mesh.eye_limits import LIMITS
+from dermis.mesh.eye_look import LIMITS
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head

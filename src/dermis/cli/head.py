@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook
     from dermis.human.person import Human
     from dermis.human.skin.look import SkinLook
-    from dermis.mesh.eye_layout import EyePictures
+    from dermis.mesh.eyeball import EyePictures
     from dermis.mesh.eyes import EyeLook
     from dermis.mesh.head import Head
 
@@ -188,7 +188,7 @@ def _hair(usual: HairLook, words: list[str] | None) -> HairLook:
 
 def _with_maps(made: Head, files: dict[str, Any]) -> Head:
     """The head with maps of files in place of its own; a normal map takes the place of its relief."""
-    from dermis.mesh.maps import load_maps
+    from dermis.formats.maps import load_maps
 
     loaded = load_maps(**files)
     chosen = {role: getattr(loaded, role) for role in files} | ({"height": None} if "normal" in files else {})
@@ -199,7 +199,7 @@ def _write(
     output: Path, person: Human, made: Head, expression: dict[str, float], eyes: EyePictures | None
 ) -> int:
     from dermis.human.head_file import write_person
-    from dermis.scene.pose import Pose
+    from dermis.mesh.pose import Pose
     from dermis.scene.skin import Skin
 
     Pose(expression).motion(made.control, EXPRESSION)  # names and weights that can be

@@ -13,8 +13,8 @@ from dermis.base.errors import refuse
 from dermis.base.quantities import number
 
 if TYPE_CHECKING:
+    from dermis.mesh.clip import Clip
     from dermis.mesh.head import Head
-    from dermis.scene.clips.clip import Clip
 
 _USUAL_RATE = 30.0
 
@@ -55,7 +55,7 @@ class Span:
 def parse_span(begin: float | None, end: float | None, fps: str | None, own_rate: float | None) -> Span:
     """The span that was typed."""
     from dermis.images.movie import exact_rate
-    from dermis.scene.clips.clip import LONGEST_S, check_rate
+    from dermis.mesh.clip import LONGEST_S, check_rate
 
     for option, seconds in (("--from", begin), ("--to", end)):
         if seconds is not None:
@@ -71,7 +71,7 @@ def parse_span(begin: float | None, end: float | None, fps: str | None, own_rate
 
 def motion_file(name: str, motion: str | None) -> str:
     """The file that was named, else the head's own where that can hold clips."""
-    from dermis.mesh.formats import is_gltf
+    from dermis.formats.parts import is_gltf
 
     if motion is not None:
         return motion
@@ -90,8 +90,8 @@ def clip_of(
     name : of the head as it was typed
     given : fields of its [head] that were typed, of which unit_mm and up hold for a sequence too
     """
-    from dermis.scene.clips.load import load_motion
-    from dermis.scene.clips.sequence import is_sequence
+    from dermis.formats.motion.sequence import is_sequence
+    from dermis.scene.motion import load_motion
 
     rate = span.own_rate
     if rate is None and span.rate and is_sequence(Path(motion)):  # a file for each frame
@@ -102,8 +102,8 @@ def clip_of(
 
 def names_of(name: str, head: Head) -> dict[str, tuple[str, ...]]:
     """What can move a head: names of its morph targets and bones, and of the clips in its file."""
-    from dermis.mesh.formats import is_gltf
-    from dermis.mesh.gltf.clips import clip_names
+    from dermis.formats.gltf.animations import clip_names
+    from dermis.formats.parts import is_gltf
 
     own = Path(str(_table(name).get("name", name)))
     clips = clip_names(own) if is_gltf(own) else ()

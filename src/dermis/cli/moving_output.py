@@ -39,8 +39,8 @@ class MovingOutput:
 
     def check(self, size: tuple[int, int]) -> None:
         """Refuse what cannot be written, before anything is drawn."""
-        from dermis.images.frame_files import FrameFiles
         from dermis.images.movie import DEFAULT_CRF, SUFFIX, check_movie
+        from dermis.images.writer import FrameFiles
 
         if self.numbered:
             if self.crf is not None:
@@ -56,7 +56,7 @@ class MovingOutput:
 
     def missing(self, numbers: range, size: tuple[int, int], made_of: str) -> Sequence[int]:
         """The frames to be drawn."""
-        from dermis.images.frame_files import FrameFiles
+        from dermis.images.writer import FrameFiles
 
         if not self.numbered:
             return numbers
@@ -67,9 +67,8 @@ class MovingOutput:
     @contextmanager
     def writing(self, size: tuple[int, int], rate: Fraction) -> Iterator[Write]:
         """What writes frames while others are drawn; at its end all of them are there."""
-        from dermis.images.frame_files import FrameFiles
         from dermis.images.movie import DEFAULT_CRF, MovieWriter
-        from dermis.images.writer import ImageWriter
+        from dermis.images.writer import FrameFiles, ImageWriter
 
         if self.numbered:
             files = FrameFiles(self.path)

@@ -109,7 +109,7 @@ def is_option(model: type[Plain], field: str) -> bool:
 
 def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
     """What cyclopts takes a field's words for, and how it makes the value of them; None for no option."""
-    from dermis.scene.findings import words_of
+    from dermis.scene.field_errors import words_of
     from dermis.scene.plain import choices_of
 
     if choices := choices_of(model, field):
@@ -140,7 +140,7 @@ def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
 
 def _help(model: type[Plain], field: str, defaults: Mapping[str, Any]) -> str:
     """A field's help with its bounds, where they say something, and its default."""
-    from dermis.scene.findings import words_of
+    from dermis.scene.field_errors import words_of
     from dermis.scene.plain import choices_of, help_of, shown, values_of
 
     text = help_of(model, field)
@@ -157,7 +157,7 @@ def check(model: type[Plain], values: Mapping[str, Any], names: Mapping[str, str
     values : by field
     names : options by field, where they are not called like it
     """
-    from dermis.scene.findings import ImpossibleError
+    from dermis.scene.field_errors import ImpossibleError
 
     try:
         model(**values)

@@ -11,8 +11,8 @@ from dermis.base.errors import DermisError, refuse
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head
+    from dermis.mesh.pose import Pose
     from dermis.scene.model import Scene
-    from dermis.scene.pose import Pose
 
 _FARTHEST = 1e10
 POSE, BONE, LOOK_AT = "--pose", "--bone", "--look-at"
@@ -75,7 +75,7 @@ def parse_turns(words: Sequence[str]) -> dict[str, list[float]]:
 
 def laid_over(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
     """A pose that keeps from another one what it says nothing of."""
-    from dermis.scene.pose import Pose
+    from dermis.mesh.pose import Pose
 
     under = Pose.of(base) or Pose()
     places = under.positions_mm if pose.positions_mm is None else pose.positions_mm
@@ -91,7 +91,7 @@ def pose_given(
 
     Raises DermisError for names that the head lacks, and says where all are listed.
     """
-    from dermis.scene.pose import Pose
+    from dermis.mesh.pose import Pose
 
     parts: dict[str, Any] = {POSE: Pose(weights), BONE: Pose(bones=turns)}
     for option, part in parts.items():

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file
+from dermis.formats.samples import SAMPLES, fetch
 from dermis.images.colour import luminance
 from dermis.images.io import read_image
-from dermis.mesh.samples import SAMPLES, fetch
 
 Floats = NDArray[np.float64]
 UNIFORM = "uniform"

@@ -19,8 +19,8 @@ from dermis.frame.passes import bake as baking_pass
 from dermis.frame.passes import curvature
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList
+from dermis.mesh.geometry import uv_cross
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import uv_cross
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.raster import rasterise
+from dermis.atlas.uv_charts import triangle_uv_area
 from dermis.frame.passes import map_mips
 from dermis.frame.passes.painting import paint
 from dermis.frame.surface import DEFAULT_COLOUR
@@ -19,10 +20,9 @@ from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import Painting, painting
 from dermis.images.colour import encode_srgb
 from dermis.images.filters import mip_chain
+from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import triangle_areas
-from dermis.mesh.uv import triangle_uv_area
 from dermis.specular.beckmann import beckmann_table
 
 _SOFTWARE_SIDE = 1024  # of painted maps on software adapters, which take over a second for so many texels

@@ -10,7 +10,7 @@ from dermis.frame.passes.painting.eye_pictures import eye_pictures
 from dermis.gpu import Device
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import painting
-from dermis.mesh.eye_layout import EyePictures
+from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.base.reading import named_path
+from dermis.formats.maps import share_map
 from dermis.frame.levels import FLOATS, HALVES, Levels
 from dermis.gpu import Device, make_texture, upload
 from dermis.images.filters import mip_chain
-from dermis.mesh.map_pixels import share_map
 
 _KEPT = 4
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.gpu import Device, make_texture
-from dermis.mesh.contact import Contact
+from dermis.mesh.eyeball import Contact
 from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.projection import MIDDLE, Views, frame_of
-from dermis.mesh.directions import fibonacci_sphere
+from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 from dermis.mesh.morph_targets import no_targets
-from dermis.mesh.outline import Outline
+from dermis.mesh.outline import Outline, RigOutline, outline_of
 from dermis.mesh.rig import Motion
-from dermis.mesh.rig_outline import RigOutline, outline_of
 
 Floats = NDArray[np.float64]
 VIEWS = 64

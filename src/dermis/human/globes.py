@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.lids import FORWARD_MM, SPLINE, Socket
-from dermis.mesh.globe import globe as true_globe
+from dermis.mesh.eyeball import globe as true_globe
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from dermis.atlas.build import SMALLEST, build_atlas
 from dermis.base.atomic_write import replacing
+from dermis.formats.gltf.write import encode_head
 from dermis.human.person import Human
 from dermis.human.person_file import numbers_of
-from dermis.mesh.eye_layout import EyePictures
-from dermis.mesh.gltf.write import encode_head
+from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 
 _STRETCH = 1024

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.human.published import EXPRESSIONS, Points, data, moves
 from dermis.human.skin.surface import average, lid_rings
-from dermis.mesh.contact import Contact
-from dermis.mesh.eyeball import SCLERA_MM, clearance_mm
+from dermis.mesh.eyeball import SCLERA_MM, Contact, clearance_mm
 
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]

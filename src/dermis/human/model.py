@@ -14,13 +14,12 @@ from dermis.human import globes, lids, teeth
 from dermis.human.lid_targets import conformed_targets
 from dermis.human.movement import expressions, gaze, skeleton
 from dermis.human.published import Points, count, data, places_mm
-from dermis.mesh import globe
+from dermis.mesh import eyeball as globe
 from dermis.mesh.eyes import EyeLook, Eyes
-from dermis.mesh.geometry import build_mesh
+from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Material
-from dermis.mesh.quads import halves
+from dermis.mesh.mesh import Material, build_mesh
 from dermis.mesh.rig import Rig
 
 Layout = Literal["own", "hm08"]

@@ -17,8 +17,7 @@ from dermis.base.errors import DermisError, refuse
 from dermis.base.reading import read_file
 from dermis.images.codecs import PILLOW_STARTS, Pixels, decode_with_pillow, encode_png, pillow_size
 from dermis.images.colour import encode_srgb8
-from dermis.images.exr import EXR_START, decode_exr, exr_size
-from dermis.images.radiance import RADIANCE_START, decode_radiance, radiance_size
+from dermis.images.hdr import EXR_START, RADIANCE_START, decode_exr, decode_radiance, exr_size, radiance_size
 from dermis.images.sizes import MOST_BYTES, TooLargeError
 
 OUTPUT_SUFFIXES = (".png", ".exr")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.base.quantities import check_numbers
 from dermis.base.summary import Summarised
-from dermis.mesh.eye_limits import LIMITS
+from dermis.mesh.eye_look import LIMITS
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm
 from dermis.mesh.rig import Motion, Rig
 

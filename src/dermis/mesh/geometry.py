@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from dermis.mesh.columns import crosses, dots
-from dermis.mesh.mesh import Floats, Ints, Material, Mesh
 
 
 def weld(rows: ArrayLike) -> Ints:
@@ -79,40 +78,126 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     return np.ascontiguousarray((summed / length).astype(np.float32).take(point, axis=1).T)
 
 
-def _trusted(given: Floats, computed: Floats) -> Floats:
-    """The given normals where they are finite and nearly unit, else the computed ones."""
-    length = np.linalg.norm(np.where(np.isfinite(given), given, 0).astype(np.float64), axis=1, keepdims=True)
-    good = np.isfinite(given).all(axis=1, keepdims=True) & (np.abs(length - 1) < 0.05)
-    return np.asarray(np.where(good, given / np.where(good, length, 1), computed).astype(np.float32))
+Doubles = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Ints = NDArray[np.int32]
+
+MIN_UV_CROSS = 1e-12
+"""Twice the signed uv area below which u and v have no direction on a triangle (1/70 texel at 8192)."""
 
 
-def build_mesh(
-    positions: ArrayLike,
-    uv: ArrayLike,
-    triangles: ArrayLike,
-    material: ArrayLike,
-    materials: tuple[Material, ...],
-    normals: ArrayLike | None = None,
-    point: ArrayLike | None = None,
-    quads: ArrayLike = (),
-) -> Mesh:
-    """A `Mesh` with its points welded and its normals computed.
+def sum_at(index: NDArray[np.integer], values: Doubles, count: int) -> Doubles:
+    """Sum of the rows of `values` (n, k) that carry each `index` (n,), as (count, k)."""
+    columns = [np.bincount(index, weights=column, minlength=count) for column in values.T]
+    return np.column_stack(columns)
 
-    positions : (v, 3) finite [mm]
-    uv : (v, 2) v down
-    triangles : (f, 3) corner vertices, at least one
-    material : (f,) index into `materials`
-    normals : (v, 3) kept where finite and of unit length; computed where not, or when None
-    point : (v,) welded points if known; positions that are equal are welded when None
-    quads : (q, 2) triangles that are the halves of a quad, as `Mesh` has them
+
+def triangle_areas(corners: NDArray[np.floating]) -> Doubles:
+    """Area of each triangle [mm2]; corners : (f, 3, 3) [mm]."""
+    places = np.asarray(corners, dtype=np.float64)
+    cross = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
+    return np.asarray(np.linalg.norm(cross, axis=1) / 2)
+
+
+def uv_cross(corners: NDArray[np.floating]) -> Doubles:
+    """Twice the signed uv area of each triangle; corners : (f, 3, 2)."""
+    places = np.asarray(corners, dtype=np.float64)
+    a, b = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def unit(vectors: Doubles, instead: Doubles) -> Doubles:
+    """`vectors` normalised, or `instead` where they have no length; both (n, 3)."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    usable = length > 0
+    return np.where(usable, vectors / np.where(usable, length, 1), instead)
+
+
+def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
+    """Change of position with u and with v, dpdu and dpdv, each (v, 3) [mm per unit of uv].
+
+    Averaged over the triangles of each corner vertex by area, without those that have no uv area; a vertex
+    with no others gets two orthogonal directions of 1 mm, so that nothing divides by 0.
+
+    positions, normals : (v, 3) [mm], unit
+    uv : (v, 2)
+    triangles : (f, 3)
     """
-    place = np.ascontiguousarray(positions, dtype=np.float32)
-    corner = np.ascontiguousarray(triangles, dtype=np.int32)
-    flat = np.ascontiguousarray(uv, dtype=np.float32)
-    points = weld(place) if point is None else np.asarray(point, dtype=np.int32)
-    normal = vertex_normals(place, points, corner)
-    if normals is not None:
-        normal = _trusted(np.asarray(normals, dtype=np.float32), normal)
-    groups = np.ascontiguousarray(material, dtype=np.int32)
-    pairs = np.asarray(quads, dtype=np.int32).reshape(-1, 2)
-    return Mesh(place, normal, flat, points, corner, groups, tuple(materials), pairs)
+    p, q = positions[triangles].astype(np.float64), uv[triangles].astype(np.float64)
+    cross, weight = uv_cross(q), triangle_areas(p)
+    valid = (np.abs(cross) > MIN_UV_CROSS) & (weight > 0)
+    p, q, cross, weight = p[valid], q[valid], cross[valid, None], weight[valid, None]
+    e1, e2, d1, d2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
+    dpdu = (e1 * d2[:, 1:] - e2 * d1[:, 1:]) / cross
+    dpdv = (e2 * d1[:, :1] - e1 * d2[:, :1]) / cross
+    corner = triangles[valid].ravel()
+    rows = np.repeat(np.hstack((dpdu * weight, dpdv * weight, weight)), 3, axis=0)
+    summed = sum_at(corner, rows, len(positions))
+    mean = summed[:, :6] / np.where(summed[:, 6:] > 0, summed[:, 6:], 1)
+    return _with_length(mean[:, :3], mean[:, 3:], normals.astype(np.float64))
+
+
+def _with_length(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[Floats, Floats]:
+    """The pair; where either has no length, two directions of 1 mm across the normal."""
+    # the axis least along the normal cannot be parallel to it
+    axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    across = unit(np.cross(axis, normals), axis)
+    short = np.minimum(np.linalg.norm(dpdu, axis=1), np.linalg.norm(dpdv, axis=1)) < 1e-6
+    u = np.where(short[:, None], across, dpdu)
+    v = np.where(short[:, None], np.cross(across, normals), dpdv)
+    return u.astype(np.float32), v.astype(np.float32)
+
+
+def halves(quads: NDArray[np.integer]) -> NDArray[np.int64]:
+    """(2q, 3) triangles (a, b, c) and (c, d, a) of each quad, side by side; quads : (q, 4)."""
+    return np.ascontiguousarray(quads[:, [0, 1, 2, 2, 3, 0]], np.int64).reshape(-1, 3)
+
+
+T = TypeVar("T", np.float32, np.float64)
+
+
+def dots(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
+    """(..., n) of vectors (..., 3, n)."""
+    x, y, z = (a[..., c, :] * b[..., c, :] for c in range(3))
+    return np.asarray(x + y + z)
+
+
+def crosses(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
+    """(..., 3, n) of vectors (3, n) and (..., 3, n)."""
+    found: NDArray[T] = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
+    for c in range(3):  # each into its place: to stack three new arrays takes ten times as long
+        one, other, into = (c + 1) % 3, (c + 2) % 3, found[..., c, :]
+        np.multiply(a[one], b[..., other, :], out=into)
+        into -= a[other] * b[..., one, :]
+    return found
+
+
+Index = NDArray[np.int64]
+
+
+def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
+    """Component of each of `count` nodes (n,), counted from 0 in the order of their first nodes.
+
+    a, b : (l,) nodes that are linked
+    """
+    label = np.arange(count)
+    while True:
+        before = label.copy()
+        least = np.minimum(before[a], before[b])
+        for ends in (a, b, before[a], before[b]):  # nodes, and the nodes that they are labelled by
+            np.minimum.at(label, ends, least)
+        label = label[label]
+        if np.array_equal(label, before):
+            return np.asarray(np.unique(label, return_inverse=True)[1].reshape(-1), dtype=np.int64)
+
+
+def fibonacci_sphere(count: int) -> NDArray[np.float64]:
+    """(count, 3) unit vectors along a golden spiral about +Y, each for an equal share of the sphere.
+
+    Source: [Keinert2015].
+    """
+    index = np.arange(count) + 0.5
+    y = 1.0 - 2.0 * index / count
+    phi = np.pi * (1.0 + np.sqrt(5.0)) * index
+    r = np.sqrt(1.0 - y**2)
+    return np.stack([r * np.cos(phi), y, r * np.sin(phi)], axis=-1)

@@ -8,11 +8,11 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dermis.base.summary import Summarised
+from dermis.mesh.geometry import tangents, vertex_normals, weld
 from dermis.mesh.outline import Outline, hull
-from dermis.mesh.tangents import tangents
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -106,3 +106,42 @@ class Mesh(Summarised):
     def _tangents(self) -> tuple[Floats, Floats]:
         # Only when asked: of a person, whose atlas is its template's, nobody does.
         return tangents(self.positions, self.uv, self.normals, self.triangles)
+
+
+def _trusted(given: Floats, computed: Floats) -> Floats:
+    """The given normals where they are finite and nearly unit, else the computed ones."""
+    length = np.linalg.norm(np.where(np.isfinite(given), given, 0).astype(np.float64), axis=1, keepdims=True)
+    good = np.isfinite(given).all(axis=1, keepdims=True) & (np.abs(length - 1) < 0.05)
+    return np.asarray(np.where(good, given / np.where(good, length, 1), computed).astype(np.float32))
+
+
+def build_mesh(
+    positions: ArrayLike,
+    uv: ArrayLike,
+    triangles: ArrayLike,
+    material: ArrayLike,
+    materials: tuple[Material, ...],
+    normals: ArrayLike | None = None,
+    point: ArrayLike | None = None,
+    quads: ArrayLike = (),
+) -> Mesh:
+    """A `Mesh` with its points welded and its normals computed.
+
+    positions : (v, 3) finite [mm]
+    uv : (v, 2) v down
+    triangles : (f, 3) corner vertices, at least one
+    material : (f,) index into `materials`
+    normals : (v, 3) kept where finite and of unit length; computed where not, or when None
+    point : (v,) welded points if known; positions that are equal are welded when None
+    quads : (q, 2) triangles that are the halves of a quad, as `Mesh` has them
+    """
+    place = np.ascontiguousarray(positions, dtype=np.float32)
+    corner = np.ascontiguousarray(triangles, dtype=np.int32)
+    flat = np.ascontiguousarray(uv, dtype=np.float32)
+    points = weld(place) if point is None else np.asarray(point, dtype=np.int32)
+    normal = vertex_normals(place, points, corner)
+    if normals is not None:
+        normal = _trusted(np.asarray(normals, dtype=np.float32), normal)
+    groups = np.ascontiguousarray(material, dtype=np.int32)
+    pairs = np.asarray(quads, dtype=np.int32).reshape(-1, 2)
+    return Mesh(place, normal, flat, points, corner, groups, tuple(materials), pairs)

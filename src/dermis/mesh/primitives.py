@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.base.errors import refuse
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Ints, Material, Mesh
+from dermis.mesh.mesh import Ints, Material, Mesh, build_mesh
 
 SKIN = (Material("skin"),)
 # Faces of a box: corners (x, y, z) in 0..1 from the top left as seen from outside, to the right, down; and

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from dermis.base.disk import cached_array
 from dermis.base.summary import Summarised
-from dermis.mesh.contact import Contact
+from dermis.mesh.eyeball import Contact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
-from dermis.mesh.rig_outline import RigOutline, corners_of, outline_of, outline_points
+from dermis.mesh.outline import RigOutline, corners_of, outline_of, outline_points
+from dermis.mesh.rotations import rigid_motion
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
-from dermis.mesh.turns import rigid_motion
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.summary import Summarised
-from dermis.mesh.turns import angles_matrix
+from dermis.mesh.rotations import angles_matrix
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.summary import Summarised
-from dermis.mesh.columns import crosses, dots
+from dermis.mesh.geometry import crosses, dots
 from dermis.mesh.mesh import Floats, Ints, Mesh
 
 Doubles = NDArray[np.float64]

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from dermis.scene.files import load_camera, load_lights, load_scene
     from dermis.scene.lights import *  # noqa: F403 each kind
     from dermis.scene.model import Scene
-    from dermis.scene.pose import Pose
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
@@ -22,7 +21,6 @@ _HOMES = {
     "environment": ("Environment",),
     "files": ("load_camera", "load_lights", "load_scene"),
     "model": ("Scene",),
-    "pose": ("Pose",),
     "settings": ("Settings",),
     "skin": ("Skin",),
 }
@@ -30,7 +28,6 @@ _HOMES = {
 __all__ = [  # besides those of dermis.scene.lights
     "Camera",
     "Environment",
-    "Pose",
     "Scene",
     "Settings",
     "Skin",

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from dermis.base.errors import refuse
 from dermis.mesh.head import Head
-from dermis.scene.findings import Because
+from dermis.scene.field_errors import Because
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
 from dermis.scene.plain import Direction, Plain, Vector
 

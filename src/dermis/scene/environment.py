@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from dermis.scene.findings import Because
+from dermis.scene.field_errors import Because
 from dermis.scene.plain import Plain, slider
 
 

@@ -5,23 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
+
+from pydantic import Field
 
 from dermis.base.errors import about, refuse
 from dermis.base.reading import is_file, named_path, read_toml
 from dermis.human.regions.apply import with_regions
 from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
+from dermis.mesh.pose import MOST_WEIGHT, Pose
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
-from dermis.scene.findings import ImpossibleError
+from dermis.scene.field_errors import Because, ImpossibleError
 from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable, names_regions
 from dermis.scene.heads import load_head
 from dermis.scene.lights import LIGHTS, NO_LIGHTS, Light, light_presets, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
-from dermis.scene.pose import Pose
-from dermis.scene.pose_table import PoseTable
 from dermis.scene.settings import Settings
 from dermis.scene.skin import PRESETS as SKINS
 from dermis.scene.skin import Skin
@@ -207,3 +208,15 @@ def _made(kind: type[P], culprit: object, part: str, table: Any) -> P:
 
 def _read(name: str | Path, expected: str) -> dict[str, Any]:
     return read_toml(named_path(name, expected), expected)
+
+
+_Weight = Annotated[float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT), Because("faces come apart long before")]
+
+
+class PoseTable(Plain):
+    """The [pose] of a scene: what `Pose` takes, without places of points, for which a text is too long."""
+
+    weights: dict[str, _Weight] = Field(default_factory=dict)
+    """Weights of morph targets by name, mostly 0 to 1."""
+    bones: dict[str, Any] = Field(default_factory=dict)
+    """By name of the bone: three angles about the head's x, y and z [degrees], or a (4, 4) matrix."""

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.base.errors import refuse
 from dermis.base.quantities import numbers
+from dermis.formats.motion.captures import matched
 from dermis.human.movement import gaze
 from dermis.mesh.head import Head
+from dermis.mesh.pose import FARTHEST_MM, Pose
 from dermis.mesh.rig import Rig, Turn
-from dermis.mesh.turns import angles_matrix
-from dermis.scene.clips.names import matched
-from dermis.scene.pose import FARTHEST_MM, Pose
+from dermis.mesh.rotations import angles_matrix
 
 Doubles = NDArray[np.float64]
 

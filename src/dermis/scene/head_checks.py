@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from dermis.base.errors import refuse, shown_value
-from dermis.scene.findings import ImpossibleError
+from dermis.scene.field_errors import ImpossibleError
 from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable
 
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4, "in": 25.4, "ft": 304.8}

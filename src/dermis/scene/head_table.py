@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from dermis.mesh.eye_limits import LIMITS
-from dermis.mesh.limits import MOST_RELIEF_MM
-from dermis.scene.findings import Because, Words
+from dermis.formats.size_limits import MOST_RELIEF_MM
+from dermis.mesh.eye_look import LIMITS
+from dermis.scene.field_errors import Because, Words
 from dermis.scene.plain import Plain
 
 _Relief = Annotated[

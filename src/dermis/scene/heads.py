@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any, Literal, NoReturn
 from dermis.base.errors import notify, refuse, shown_value
 from dermis.base.progress import preparing
 from dermis.base.reading import is_file
+from dermis.formats.gltf.embedded import embedded_maps, told_eyes
+from dermis.formats.load import load_rigged
+from dermis.formats.maps import load_maps
+from dermis.formats.mesh_checks import check_head_height
+from dermis.formats.obj import obj_maps
+from dermis.formats.parts import is_gltf
+from dermis.formats.samples import SAMPLES, Sample, fetch
 from dermis.human.regions.usual import with_usual_regions
-from dermis.mesh.check import check_head_height
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.fitted_eyes.fit import with_fitted_eyes
-from dermis.mesh.formats import is_gltf
-from dermis.mesh.gltf.notes import told_eyes
-from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
-from dermis.mesh.load import load_rigged
-from dermis.mesh.maps import Maps, load_maps
-from dermis.mesh.obj_maps import obj_maps
-from dermis.mesh.samples import SAMPLES, Sample, fetch
+from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import subdivide_head
 from dermis.scene.head_checks import check_given, check_options, check_relief, named
 from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.base.registry import Registry
-from dermis.scene.findings import Because
+from dermis.scene.field_errors import Because
 from dermis.scene.plain import Colour, Direction, Plain, Vector, slider
 
 __all__ = [

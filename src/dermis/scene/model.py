@@ -9,12 +9,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
 from dermis.mesh.rig import Motion
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.environment import Environment
 from dermis.scene.given import given_camera, given_environment, given_head, given_lights, given_plain
 from dermis.scene.lights import Light, studio
-from dermis.scene.pose import Pose
 from dermis.scene.skin import Skin
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ from pydantic_core import PydanticUndefined
 
 from dermis.base.errors import refuse, shown_value
 from dermis.base.registry import Named
-from dermis.scene.findings import (
+from dermis.scene.field_errors import (
     Because,
     ImpossibleError,
     bounds_of,

@@ -11,10 +11,10 @@ import numpy as np
 from dermis.base.atomic_write import replacing
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file
+from dermis.mesh.pose import Pose
 from dermis.scene.head_table import names_regions
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
-from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.toml_text import table_text
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.base.registry import Named
-from dermis.scene.findings import Because, Words
+from dermis.scene.field_errors import Because, Words
 from dermis.scene.plain import Colour, Plain, slider
 from dermis.scene.talk import Gamma, SeamColour, Seams, Stretch
 from dermis.scene.techniques import TECHNIQUES

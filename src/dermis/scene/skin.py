@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from dermis.base.errors import refuse, shown_value
-from dermis.scene.findings import Because
+from dermis.scene.field_errors import Because
 from dermis.scene.plain import Plain, slider
 from dermis.scene.talk import Energy, SpecularColour
 from dermis.specular.models import FresnelName, SpecularName

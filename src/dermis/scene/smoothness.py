@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
+from dermis.mesh.geometry import edges, sum_at
 from dermis.mesh.head import Head
-from dermis.mesh.silhouette import MOST_TRIANGLES, silhouette, smooth_levels
+from dermis.mesh.mesh import Mesh
 from dermis.mesh.subdivide import MAX_LEVELS
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.head_table import AUTO
@@ -54,3 +57,79 @@ def chosen_levels(subdivide: Subdivide) -> Levels:
     if isinstance(subdivide, str):
         refuse("subdivide", f"{AUTO} or 0 to {MAX_LEVELS} levels", f"{subdivide!r} came", "Choose one")
     return subdivide
+
+
+Doubles = NDArray[np.float64]
+
+MOST_TRIANGLES = 300_000
+"""Of a mesh that is subdivided for its silhouette's sake."""
+LIMIT_PX = 0.6
+"""How far a silhouette's edges may lie off the smooth curve: corners of less are lost in a pixel's filter."""
+_SHARE = 0.9  # of the silhouette's length that keeps to it; the rest are creases and what is hidden mostly
+_NEAREST_MM = 1.0  # before the eye
+
+
+class Silhouette(NamedTuple):
+    """The edges between what faces the eye and what does not, in a picture.
+
+    length_px : (e,) of each
+    off_px : (e,) how far each lies off the smooth curve through its ends, at most
+    """
+
+    length_px: Doubles
+    off_px: Doubles
+
+    @property
+    def coarseness_px(self) -> float:
+        """How far most of it lies off the smooth curve at most; 0 for a picture without a silhouette."""
+        if not len(self.off_px):
+            return 0.0
+        order = np.argsort(self.off_px)
+        reached = np.cumsum(self.length_px[order])
+        return float(self.off_px[order][np.searchsorted(reached, _SHARE * reached[-1])])
+
+
+def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, int]) -> Silhouette:
+    """The silhouette of a mesh but for its eyeballs, whether or not something is before it.
+
+    K, R, t : of the camera as OpenCV has them, t for places of the mesh itself [mm]
+    size : width and height of the picture [pixel]
+
+    The curve through two points bends as their normals n say: it leaves the chord d by |dn . dd| / 8.
+    """
+    count = int(mesh.point.max()) + 1
+    places, normals = np.zeros((count, 3)), sum_at(mesh.point, mesh.normals.astype(np.float64), count)
+    places[mesh.point] = mesh.positions
+    places = places @ R.T + t
+    normals = normals @ R.T / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    depth = np.maximum(places[:, 2], _NEAREST_MM)
+    pixels = (places @ K.T)[:, :2] / depth[:, None]
+    eye = np.array([one.eye for one in mesh.materials])[mesh.material]
+    ends, of_side, sides = edges(mesh.point[mesh.triangles[~eye]])
+    facing = np.tile(_faces_eye(pixels, mesh.point[mesh.triangles[~eye]]), 3)
+    turned = (sides == 2) & (np.bincount(of_side, facing, len(ends)) == 1)
+    a, b = ends[turned].T
+    middle = (pixels[a] + pixels[b]) / 2
+    seen = ((middle >= 0) & (middle < size)).all(axis=1) & (np.minimum(depth[a], depth[b]) > _NEAREST_MM)
+    a, b = a[seen], b[seen]
+    bend_mm = np.einsum("ek,ek->e", (normals[a] - normals[b])[:, :2], (places[a] - places[b])[:, :2]) / 8
+    scale = K[1, 1] / (0.5 * (depth[a] + depth[b]))
+    return Silhouette(np.linalg.norm(pixels[a] - pixels[b], axis=1), np.abs(bend_mm) * scale)
+
+
+def smooth_levels(coarseness_px: float, triangles: int) -> int:
+    """The fewest levels of subdivision with which a silhouette looks smooth.
+
+    coarseness_px : of the mesh as it is; a level leaves a quarter of it
+    triangles : of the mesh as it is; a level has four times as many
+    """
+    wanted = math.ceil(math.log(max(coarseness_px / LIMIT_PX, 1.0), 4))
+    room = math.floor(math.log(max(MOST_TRIANGLES / triangles, 1.0), 4))
+    return min(wanted, room, MAX_LEVELS)
+
+
+def _faces_eye(pixels: Doubles, triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(f,) whether each triangle faces the eye; y is down in the picture."""
+    a, b, c = (pixels[triangles[:, corner]] for corner in range(3))
+    one, other = b - a, c - a
+    return np.asarray(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0)

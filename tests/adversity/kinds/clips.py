@@ -71,7 +71,7 @@ def _head(name: str) -> Any:
 
 
 def _take_clip(plan: Plan) -> None:
-    from dermis.scene.clips.load import load_motion
+    from dermis.scene.motion import load_motion
 
     head = _head(plan["head"])
     clip = load_motion(plan["file"], head)

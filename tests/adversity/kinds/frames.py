@@ -32,8 +32,8 @@ def _sound(rng: Random) -> Input:
 def _take(plan: Plan) -> None:
     """Go on where it was: what is kept is whole, and the record is as it must be."""
     from dermis.base.errors import DermisError
-    from dermis.images.frame_files import FrameFiles
     from dermis.images.io import read_image
+    from dermis.images.writer import FrameFiles
 
     files = FrameFiles(Path(plan["file"]))
     files.prepare()

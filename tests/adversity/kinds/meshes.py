@@ -113,7 +113,7 @@ def _gltf_heads() -> tuple[bytes, ...]:
 
 
 def _with_pictures(path: Path) -> bytes:
-    from dermis.mesh.load import load_mesh
+    from dermis.formats.load import load_mesh
 
     pictures = {name: picture_bytes(kind) for name, kind in _MAPS.items()}
     surface = {"baseColorTexture": {"index": "skin.png"}, "baseColorFactor": [1, 1, 1, 1]}
@@ -141,8 +141,8 @@ def _plan(name: str) -> Plan:
 
 def take_head(plan: Plan) -> Any:
     """The head of a file, with its maps and what moves it."""
+    from dermis.mesh.pose import Pose
     from dermis.scene.heads import load_head
-    from dermis.scene.pose import Pose
 
     head = load_head(plan["file"])
     check_finite((head.mesh, head.maps, head.rig), "head")

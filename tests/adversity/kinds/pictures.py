@@ -110,7 +110,7 @@ def _roles(name: str) -> tuple[str, ...]:
 
 
 def _take_map(plan: Plan) -> None:
-    from dermis.mesh.maps import load_maps
+    from dermis.formats.maps import load_maps
 
     how = {"height_mm": 0.02} if plan["role"] == "height" else {}
     check_finite(load_maps(**{plan["role"]: plan["file"]}, **how), "maps")
@@ -121,7 +121,7 @@ def _labels(rng: Random) -> Input:
 
 
 def _take_labels(plan: Plan) -> None:
-    from dermis.mesh.maps import load_labels
+    from dermis.formats.maps import load_labels
 
     load_labels(plan["file"])
 

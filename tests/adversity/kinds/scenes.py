@@ -186,9 +186,9 @@ def _regions(rng: Random) -> Input:
 
 def _take_regions(plan: Plan) -> None:
     """The table and the files that it names; painting a head by them takes seconds."""
+    from dermis.formats.maps import load_labels
     from dermis.human.regions.labels import load_landmarks
     from dermis.human.regions.table import load_table
-    from dermis.mesh.maps import load_labels
 
     table = load_table(plan["file"])
     check_finite(table.values, "regions")

@@ -18,17 +18,17 @@ from dermis.apps.batch.lighting import lights_of, towards
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import ANGLES, NONE
 from dermis.base.reading import is_file
+from dermis.formats.motion.captures import turning_bones
 from dermis.human.person import Human
 from dermis.mesh.head import Head
-from dermis.mesh.turns import angles_matrix, matrix_angles
-from dermis.scene.clips.turning import turning_bones
+from dermis.mesh.pose import Pose
+from dermis.mesh.rotations import angles_matrix, matrix_angles
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_scene
 from dermis.scene.gaze import looking_at
 from dermis.scene.heads import LEAST_OF_PEOPLE, load_head
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
-from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn

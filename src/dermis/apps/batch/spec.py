@@ -32,7 +32,7 @@ from dermis.base.errors import about, refuse, shown_value
 from dermis.base.quantities import whole_number
 from dermis.base.reading import is_file, named_path, read_file, read_toml
 from dermis.human.landmarks.sets import SETS
-from dermis.scene.findings import Because, ImpossibleError
+from dermis.scene.field_errors import Because, ImpossibleError
 from dermis.scene.plain import Plain
 from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text

@@ -12,6 +12,7 @@ from dermis.apps.batch.spec_tables import MIXTURE, NONE
 from dermis.base.errors import DermisError, about, refuse, shortened
 from dermis.base.reading import is_file
 from dermis.environment.panorama import UNIFORM
+from dermis.formats.samples import SAMPLES
 from dermis.frame.outputs import asked_outputs
 from dermis.human.hair.look import HairLook
 from dermis.human.landmarks.points import table_points
@@ -19,10 +20,9 @@ from dermis.human.landmarks.sets import SETS
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eyes import EyeLook
-from dermis.mesh.samples import SAMPLES
+from dermis.mesh.pose import MOST_WEIGHT
 from dermis.scene.heads import HUMAN
 from dermis.scene.lights import NO_LIGHTS
-from dermis.scene.pose import MOST_WEIGHT
 from dermis.scene.skin import Skin
 
 _ANCESTRY = "person.african", "person.asian", "person.caucasian"

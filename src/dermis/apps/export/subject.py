@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from dermis.base.errors import refuse, shown_value
 from dermis.base.reading import named_path
+from dermis.formats.gltf.materials import skin_pictures
+from dermis.formats.samples import SAMPLES
 from dermis.human.head_file import relief_slopes
-from dermis.mesh.gltf.textures import skin_pictures
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.mesh.samples import SAMPLES
 from dermis.optics.counted import counted_curve
 from dermis.optics.curve import Curve
 from dermis.optics.diffusion.boundary import normal_reflectance

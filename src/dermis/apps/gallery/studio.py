@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.formats.samples import cached
 from dermis.frame.painted import with_painted_maps
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
-from dermis.mesh.samples import cached
 from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.mesh.geometry import vertex_normals
+from dermis.mesh.geometry import triangle_areas, vertex_normals
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import triangle_areas
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.irradiance_samples import IrradianceSamples
-from dermis.mesh.tangents import triangle_areas
+from dermis.mesh.geometry import triangle_areas
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.apps.truths.surface_diffusion import edge_for, margin_for, welded
 from dermis.apps.truths.triangles import Floats, Index, divide, sides
 from dermis.base.errors import refuse
+from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import triangle_areas
 
 MOST_TRIANGLES = 8_000_000
 _ROUNDING = 1e-9

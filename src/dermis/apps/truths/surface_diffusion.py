@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.apps.truths.surface_diffusion_operators import delaunay, intrinsic, mass_and_stiffness
 from dermis.apps.truths.triangles import Floats, Index, sides
 from dermis.base.errors import refuse
+from dermis.mesh.geometry import sum_at
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import sum_at
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.triangles import Floats, Index, sides
-from dermis.mesh.tangents import sum_at
+from dermis.mesh.geometry import sum_at
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

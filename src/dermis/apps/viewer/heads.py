@@ -10,8 +10,8 @@ from pathlib import Path
 
 from dermis.apps.viewer.state import ViewerState, load_state
 from dermis.base.errors import DermisError
+from dermis.formats.samples import SAMPLES, cached
 from dermis.mesh.head import Head
-from dermis.mesh.samples import SAMPLES, cached
 from dermis.scene.heads import HUMAN, load_head
 
 HEAD_FILES = (".glb", ".obj", ".ply", ".json", ".toml")

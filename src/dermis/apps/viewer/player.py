@@ -9,9 +9,9 @@ from pathlib import Path
 from dermis.apps.viewer.history import History
 from dermis.apps.viewer.state import ViewerState
 from dermis.base.errors import DermisError
+from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
-from dermis.scene.clips.clip import Clip
-from dermis.scene.clips.load import load_motion
+from dermis.scene.motion import load_motion
 
 
 class MotionFile:

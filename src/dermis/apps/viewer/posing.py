@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.mesh.head import Head
-from dermis.mesh.turns import matrix_angles
+from dermis.mesh.pose import Pose
+from dermis.mesh.rotations import matrix_angles
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 
 Angles = tuple[float, float, float]
 AT_REST = Pose()

@@ -12,9 +12,10 @@ from dermis.apps.viewer.chart import Chart
 from dermis.apps.viewer.posing import same_pose, with_moves
 from dermis.base.errors import refuse
 from dermis.human.person import Human
+from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
 from dermis.scene.camera import Camera
-from dermis.scene.clips.clip import Clip
 from dermis.scene.environment import Environment
 from dermis.scene.files import head_table, load_lights, load_scene
 from dermis.scene.head_table import names_regions
@@ -23,7 +24,6 @@ from dermis.scene.lights import NO_LIGHTS, Light
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.plain import Plain
-from dermis.scene.pose import Pose
 from dermis.scene.saving import save_scene
 from dermis.scene.settings import PHOTOGRAPHED, Settings
 from dermis.scene.skin import Pigments

@@ -7,7 +7,7 @@ import numpy as np
 from dermis.atlas.stitched.conflicts import Conflicts, find_conflicts
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 from dermis.atlas.unwrap.charts import pieces as connected
-from dermis.mesh.components import components
+from dermis.mesh.geometry import components
 
 _CELL, _FINE = 0.7, 8  # of the reach, conflicts in cells beside each other are near; cells in a reach
 _LEAST = 1.0  # length of conflicts, in reaches, that is worth a cut

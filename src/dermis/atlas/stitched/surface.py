@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.unwrap.charts import across
-from dermis.mesh.geometry import weld
+from dermis.mesh.geometry import MIN_UV_CROSS, tangents, triangle_areas, uv_cross, weld
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import MIN_UV_CROSS, tangents, triangle_areas, uv_cross
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]

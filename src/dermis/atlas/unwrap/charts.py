@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.components import components
-from dermis.mesh.geometry import edges
-from dermis.mesh.tangents import sum_at, triangle_areas
+from dermis.mesh.geometry import components, edges, sum_at, triangle_areas
 
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]

@@ -6,9 +6,8 @@ import numpy as np
 
 from dermis.atlas.unwrap.charts import grow, tidy
 from dermis.atlas.unwrap.unwrap import unwrap
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Mesh
-from dermis.mesh.tangents import triangle_areas
+from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.mesh import Mesh, build_mesh
 
 _CHARTS = 16
 _LEAST_MM2 = 1e-6

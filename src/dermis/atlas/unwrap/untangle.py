@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import edges
-from dermis.mesh.tangents import uv_cross
+from dermis.mesh.geometry import edges, uv_cross
 
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]

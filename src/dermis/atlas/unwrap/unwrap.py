@@ -11,7 +11,7 @@ from dermis.atlas.unwrap.pack import pack
 from dermis.atlas.unwrap.seams import border_sides
 from dermis.atlas.unwrap.settle import Flat, Surface, lay_flat
 from dermis.base.errors import refuse
-from dermis.mesh.tangents import triangle_areas
+from dermis.mesh.geometry import triangle_areas
 
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.unwrap.seams import border_sides
-from dermis.mesh.tangents import uv_cross
+from dermis.mesh.geometry import uv_cross
 
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]

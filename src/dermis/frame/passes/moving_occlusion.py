@@ -16,7 +16,7 @@ from dermis.frame.sky import SIDE, VIEWS, Look, look_around
 from dermis.gpu import CommandList, Device, make_texture
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
-from dermis.mesh.unrefined import coarse_triangles
+from dermis.mesh.subdivide import coarse_triangles
 
 _VERTICES = "moving_occlusion_vertices.wgsl"
 _OCCLUDERS = (

@@ -15,7 +15,7 @@ from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
 from dermis.frame.shape import shape_tables
 from dermis.gpu import Bindings, CommandList, ComputeProgram, Device
-from dermis.mesh.directions import fibonacci_sphere
+from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 
 DIRECTIONS = 128

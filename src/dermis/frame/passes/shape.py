@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from dermis.frame.passes import each, program
 from dermis.frame.shape import LEAST_ACROSS, Shape, ShapeTables, displacements, make_shape
 from dermis.gpu import Bindings, CommandList, Device, Graph, Recorder
+from dermis.mesh.geometry import MIN_UV_CROSS
 from dermis.mesh.rig import Rig
-from dermis.mesh.tangents import MIN_UV_CROSS
 
 
 class MotionBytes(NamedTuple):

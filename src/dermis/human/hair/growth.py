@@ -12,8 +12,7 @@ from dermis.human.hair.combing import Combed, along_skin
 from dermis.human.hair.grown import Ground, Rooted
 from dermis.human.hair.hairy_skin import told
 from dermis.human.hair.skin import Skin
-from dermis.mesh.columns import crosses, dots
-from dermis.mesh.geometry import compacted
+from dermis.mesh.geometry import compacted, crosses, dots
 from dermis.mesh.mesh import Floats
 from dermis.mesh.strands import Doubles, Roots, corners, weights
 

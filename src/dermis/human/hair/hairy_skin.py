@@ -13,7 +13,7 @@ from dermis.base.tables import read_rows
 from dermis.human.hair.rooting import Index, Rooting
 from dermis.human.skin.face import AMOUNTS, DEGREES, hairline, zones
 from dermis.human.skin.surface import FIELDS, average
-from dermis.mesh.columns import crosses, dots
+from dermis.mesh.geometry import crosses, dots
 from dermis.mesh.mesh import Floats, Mesh
 from dermis.mesh.strands import Doubles, Roots, between, corners, points_of
 

@@ -11,7 +11,7 @@ from dermis.human.hair.combing import combed, combed_beard
 from dermis.human.hair.grown import Ground, Grown, Rooted
 from dermis.human.hair.growth import Roughness, grown
 from dermis.human.hair.look import HairLook
-from dermis.mesh.columns import dots
+from dermis.mesh.geometry import dots
 from dermis.mesh.mesh import Floats
 
 MOST_PER_CM2 = 200.0

@@ -16,6 +16,7 @@ from dermis.base.errors import refuse
 from dermis.base.quantities import numbers
 from dermis.base.reading import read_text, understood
 from dermis.base.tables import parse_rows
+from dermis.formats.maps import load_labels
 from dermis.human.regions.average import (
     average_head,
     average_skin,
@@ -28,7 +29,6 @@ from dermis.human.regions.average import (
 from dermis.human.regions.table import RegionTable
 from dermis.human.regions.zones import REGIONS, Doubles
 from dermis.mesh.head import Head
-from dermis.mesh.maps import load_labels
 
 Place = tuple[float, float, float]
 Places = Mapping[str, Place]

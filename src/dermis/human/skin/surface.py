@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.tables import numbers, read_rows
-from dermis.mesh.geometry import vertex_normals
+from dermis.mesh.geometry import triangle_areas, vertex_normals
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Stencils
-from dermis.mesh.tangents import triangle_areas
 
 Floats = NDArray[np.float32]
 

@@ -9,17 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.progress import preparing
-from dermis.mesh import globe
+from dermis.mesh import eyeball as globe
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, plane_mm
 from dermis.mesh.eyes import EyeLook, Eyes
-from dermis.mesh.fitted_eyes.balls import Ball, find_balls
+from dermis.mesh.fitted_eyes.balls import Ball, Sphere, find_balls
+from dermis.mesh.fitted_eyes.globe_rig import Globe, with_globes
 from dermis.mesh.fitted_eyes.lids import axes_along, lids_before
-from dermis.mesh.fitted_eyes.rigging import Globe, with_globes
-from dermis.mesh.fitted_eyes.spheres import Sphere
-from dermis.mesh.geometry import build_mesh
+from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Material, Mesh
-from dermis.mesh.quads import halves
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 
 Doubles = NDArray[np.float64]

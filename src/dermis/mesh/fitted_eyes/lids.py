@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.eyeball import CORNEA_MM, plane_mm
-from dermis.mesh.fitted_eyes.spheres import Sphere
+from dermis.mesh.fitted_eyes.balls import Sphere
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]

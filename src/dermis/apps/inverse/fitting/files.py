@@ -15,7 +15,7 @@ from dermis.apps.inverse.fitting.unknowns import skinned, suns_of
 from dermis.base.atomic_write import replacing
 from dermis.base.errors import refuse
 from dermis.human.person_file import write_numbers
-from dermis.images.exr import encode_exr
+from dermis.images.hdr import encode_exr
 from dermis.images.io import write_image
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene

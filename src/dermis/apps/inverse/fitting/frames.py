@@ -14,7 +14,7 @@ from dermis.apps.inverse.fitting.unknowns import Point, skinned, suns_of
 from dermis.base.atomic_write import replacing
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
-from dermis.images.exr import encode_exr
+from dermis.images.hdr import encode_exr
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

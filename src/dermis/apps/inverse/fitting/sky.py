@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.environment.panorama import directions
-from dermis.mesh.directions import fibonacci_sphere
+from dermis.mesh.geometry import fibonacci_sphere
 
 Floats = NDArray[np.float64]
 ROWS = 32

@@ -13,7 +13,7 @@ from dermis.apps.inverse.fitting.frames import Frames
 from dermis.apps.inverse.fitting.linear import fault_by, strengths_by
 from dermis.apps.inverse.fitting.unknowns import SKIN, Point, tangents
 from dermis.human.skin.colours import EPIDERMIS_MM, colours
-from dermis.mesh.directions import fibonacci_sphere
+from dermis.mesh.geometry import fibonacci_sphere
 
 Floats = NDArray[np.float64]
 _AROUND = 28

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.inverse.unmixing.unmix import Unmixed
 from dermis.base.atomic_write import replacing
-from dermis.images.exr import encode_exr
+from dermis.images.hdr import encode_exr
 from dermis.images.io import write_image
 
 SUMMARY = "unmixed.json"

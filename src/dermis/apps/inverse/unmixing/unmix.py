@@ -16,11 +16,11 @@ from dermis.apps.inverse.unmixing.on_device import Unmixer, recoloured
 from dermis.apps.inverse.unmixing.shading import shading_of
 from dermis.base.errors import refuse
 from dermis.base.quantities import number
+from dermis.formats.maps import colour_map
 from dermis.gpu import Device
 from dermis.gpu.failures import LazyDevice
-from dermis.images.difference import delta_e_2000
+from dermis.images.colour import delta_e_2000
 from dermis.images.io import Picture
-from dermis.mesh.map_pixels import colour_map
 from dermis.optics.media import Floats
 from dermis.optics.pigments.skin import SkinParameters
 

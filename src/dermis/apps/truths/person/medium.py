@@ -13,7 +13,7 @@ from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.person.subject import Person
 from dermis.apps.truths.slab import ScatteringLayer
 from dermis.apps.truths.slab_mc import trace_slab
-from dermis.mesh.tangents import triangle_areas
+from dermis.mesh.geometry import triangle_areas
 from dermis.optics.media import SKIN_ETA
 from dermis.scene.camera import Camera
 

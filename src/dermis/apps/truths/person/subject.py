@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.mesh.geometry import build_mesh
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float32]

@@ -27,10 +27,9 @@ from dermis.frame.seams import REMEDIES
 from dermis.frame.shape import shape_tables
 from dermis.gpu import CommandList, Device, download, open_device, upload
 from dermis.gpu.textures import half_store_rounding
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile

@@ -12,14 +12,15 @@ import dermis
 from dermis.apps.validation.accuracy import blur
 from dermis.apps.validation.pages import DOCS, data_file, fill_page, in_checkout, use_tests_folder
 from dermis.atlas.cached import cached_atlas
+from dermis.formats.maps import load_maps
 from dermis.frame.passes.occlusion import bake_occlusion
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.human.person import Human
-from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
-from dermis.mesh.maps import load_maps
-from dermis.scene import Environment, Pose, Scene, Settings
+from dermis.mesh.mesh import build_mesh
+from dermis.mesh.pose import Pose
+from dermis.scene import Environment, Scene, Settings
 from dermis.scene.files import load_camera, load_lights
 
 Points = NDArray[np.float32]

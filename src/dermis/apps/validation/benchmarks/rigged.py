@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
 from dermis.mesh.rig import MorphTargets, Skeleton
-from dermis.scene.pose import Pose
 
 BONES = 4
 _SHARE = 1 / 6  # of the points that a target moves, as faces' own targets do

@@ -9,13 +9,13 @@ import numpy as np
 
 from dermis.environment.panorama import UNIFORM
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
 from dermis.scene.camera import PRESETS, Camera, side, three_quarter
 from dermis.scene.camera import cheek as at_cheek
 from dermis.scene.camera import portrait as from_front
 from dermis.scene.environment import Environment
 from dermis.scene.lights import Light, PointLight, RectangleLight, preset_lights
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 
 _SOFTBOX_MM = 500.0
 EYE_MM = 30.0

@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.state import ViewerState
 from dermis.base.errors import DermisError
-from dermis.scene.findings import words_of
+from dermis.scene.field_errors import words_of
 from dermis.scene.plain import Colour, Plain, Range, choices_of, help_of, range_of
 
 Apply = Callable[..., ViewerState]

@@ -11,7 +11,7 @@ from dermis.apps.viewer.panel.fields import Style, attempt, button, combo, draw_
 from dermis.apps.viewer.panel.words import LIGHT, LIGHT_KINDS
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.state import ViewerState, changed
-from dermis.mesh.samples import SAMPLES
+from dermis.formats.samples import SAMPLES
 from dermis.scene.environment import Environment
 from dermis.scene.lights import LIGHTS, Light, SpotLight, light_presets
 from dermis.scene.plain import Range

@@ -7,7 +7,7 @@ import numpy as np
 from dermis.frame.passes import program
 from dermis.frame.surface import fill_eye
 from dermis.gpu import CommandList, Device, download, make_texture
-from dermis.mesh.eye_layout import FALLING, RIM, EyePictures
+from dermis.mesh.eyeball import FALLING, RIM, EyePictures
 from dermis.mesh.eyes import EyeLook
 
 SIDE = 1024

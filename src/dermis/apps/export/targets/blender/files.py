@@ -207,10 +207,10 @@ def _write(subject: Subject, described: dict[str, Any], script: Path, head: str)
 
 def _glb(head: Head, scene: Scene | None) -> bytes:
     """The head with all that moves it, its eyes and its hairs."""
+    from dermis.formats.gltf.write import encode_head
     from dermis.frame.passes.painting.eye_pictures import eye_pictures
     from dermis.gpu.failures import on_device
     from dermis.human.head_file import relief_slopes
-    from dermis.mesh.gltf.write import encode_head
 
     assert scene is not None
     pose, eyes = scene.pose, head.eyes

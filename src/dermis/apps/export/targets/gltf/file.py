@@ -9,13 +9,13 @@ import numpy as np
 
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.targets.gltf.volume import colour_for
+from dermis.formats.gltf.materials import Added, colours_png
+from dermis.formats.gltf.write import encode_head
 from dermis.frame.passes.painting.eye_pictures import eye_pictures
 from dermis.gpu.failures import on_device
 from dermis.human.head_file import relief_slopes
 from dermis.human.person_file import numbers_of
-from dermis.mesh.eye_layout import EyePictures
-from dermis.mesh.gltf.textures import Added, colours_png
-from dermis.mesh.gltf.write import encode_head
+from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 from dermis.scene.heads import is_person, person_of
 from dermis.scene.skin import Skin

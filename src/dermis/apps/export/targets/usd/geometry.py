@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.extras import needed
-from dermis.mesh.eye_layout import eye_uv
-from dermis.mesh.gltf.moved_points import MovedPoints
+from dermis.formats.moved_points import MovedPoints
+from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Strands, points_of

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.targets.usd.geometry import METRES, TASK, corner_of_point, metres
 from dermis.base.extras import needed
-from dermis.mesh.gltf.influences import influences
-from dermis.mesh.gltf.moved_points import MovedPoints
+from dermis.formats.moved_points import MovedPoints, influences
 from dermis.mesh.skeleton import Skeleton
 
 Doubles = NDArray[np.float64]

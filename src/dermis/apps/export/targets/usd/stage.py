@@ -12,7 +12,7 @@ from dermis.apps.export.targets.usd.geometry import TASK, add_hairs, add_mesh
 from dermis.apps.export.targets.usd.materials import add_material
 from dermis.apps.export.targets.usd.motion import add_motion, valid_names
 from dermis.base.extras import needed
-from dermis.mesh.gltf.moved_points import MovedPoints
+from dermis.formats.moved_points import MovedPoints
 from dermis.mesh.head import Head
 
 

@@ -14,8 +14,8 @@ from dermis.base.errors import refuse
 from dermis.frame.inputs import Inputs
 from dermis.gpu.capture import CapturedFrame, CapturedPass
 from dermis.human.skin.painted import PaintedMaps
+from dermis.mesh.pose import Pose
 from dermis.scene.model import Scene
-from dermis.scene.pose import Pose
 
 Json = dict[str, Any]
 Floats = NDArray[np.float32]

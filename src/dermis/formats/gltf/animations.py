@@ -1,0 +1,198 @@
+"""Animation clips of a glTF file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.errors import refuse
+from dermis.base.reading import BROKEN, understood
+from dermis.formats.gltf.document import Document, Tree, numbered, read_document
+from dermis.formats.gltf.nodes import Nodes, read_nodes
+from dermis.formats.gltf.rigs import target_names
+from dermis.formats.parts import Array
+from dermis.formats.size_limits import MOST_CHANNELS
+from dermis.mesh.rotations import slerp
+
+_WIDTH = {"translation": 3, "rotation": 4, "scale": 3}
+_KINDS = ("STEP", "LINEAR", "CUBICSPLINE")
+_DAMAGED = "The file is damaged: export it again"
+
+
+class Track(NamedTuple):
+    """What one curve moves: `path` of the named nodes, or "weights" of the named morph targets."""
+
+    path: str
+    names: tuple[str, ...]
+    curve: Curve
+
+
+@dataclass(frozen=True, eq=False)
+class Animation:
+    """A clip of a file."""
+
+    name: str
+    tracks: tuple[Track, ...]
+
+
+class _Keys(NamedTuple):
+    times_s: Array
+    values: Array
+    kind: str
+
+    @property
+    def plain(self) -> Array:
+        """(k, n) the values without tangents."""
+        return self.values[:, 1] if self.kind == "CUBICSPLINE" else self.values
+
+
+def clip_names(path: Path) -> tuple[str, ...]:
+    """Names of the file's clips; those without are numbered."""
+    return _names(read_document(path))
+
+
+def read_clip(path: Path, name: str | None) -> Animation:
+    """A clip of a .glb or .gltf file; the only one when no name is given.
+
+    Raises DermisError for a clip that is not there, and for one that is damaged.
+    """
+    document = read_document(path)
+    names = _names(document)
+    if not names:
+        refuse(path, "a file with animation clips", "it has none", "Export it with its animation")
+    if name is None and len(names) > 1:
+        came, remedy = f"it has {', '.join(names)}", f"Name one, as in {path.name}#{names[0]}"
+        refuse(path, "to know which of its clips is meant", came, remedy)
+    if name is not None and name not in names:
+        refuse(path, f"one of its clips ({', '.join(names)})", f"{name!r} came", "Correct the name")
+    index = 0 if name is None else names.index(name)
+    with understood(f"{path}: clip {names[index][:80]!r}", "a sound animation", *BROKEN):
+        return Animation(names[index], tuple(_tracks(document, index, names[index])))
+
+
+def _names(document: Document) -> tuple[str, ...]:
+    clips = document.all("animations")
+    return tuple(str(clip.get("name") or f"clip {k}") for k, clip in enumerate(clips))
+
+
+def _tracks(document: Document, index: int, name: str) -> list[Track]:
+    """The clip's curves, those of the same kind and keys side by side in one."""
+    clip, nodes = document.one("animations", index), read_nodes(document)
+    if len(clip["channels"]) > MOST_CHANNELS:
+        came = f"{name!r} has {len(clip['channels']):,}"
+        refuse(document.path, f"clips of at most {MOST_CHANNELS:,} channels", came, "Export it again")
+    groups: dict[tuple[object, ...], list[tuple[str, _Keys]]] = {}
+    found, names = [], dict[int, tuple[str, ...]]()
+    for number, channel in enumerate(clip["channels"]):
+        target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {number}"
+        if "node" not in target or target["path"] not in (*_WIDTH, "weights"):
+            continue  # of an extension
+        _check_node(nodes, target["node"], culprit)
+        sampler = clip["samplers"][numbered(channel["sampler"], len(clip["samplers"]), "samplers")]
+        if target["path"] == "weights":
+            found.append(_weights(document, target["node"], sampler, culprit, names))
+            continue
+        keys = _keys(document, sampler, _WIDTH[target["path"]], culprit)
+        if target["path"] == "rotation" and not keys.plain.any(axis=-1).all():
+            refuse(culprit, "rotations as unit quaternions", "one is 0", _DAMAGED)
+        group = (target["path"], keys.kind, keys.times_s.tobytes())
+        groups.setdefault(group, []).append((nodes.names[target["node"]], keys))
+    return found + [_side_by_side(str(path), members) for (path, *_), members in groups.items()]
+
+
+def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
+    if not 0 <= node < len(nodes.names):
+        refuse(culprit, f"nodes from 0 to {len(nodes.names) - 1}", f"it moves node {node}", _DAMAGED)
+
+
+def _weights(
+    document: Document, node: int, sampler: Tree, culprit: str, known: dict[int, tuple[str, ...]]
+) -> Track:
+    """Weights of a node's targets; known : names by mesh, of those that were met."""
+    mesh = document.all("nodes")[node].get("mesh")
+    if mesh is not None and mesh not in known:
+        known[mesh] = target_names(document.one("meshes", mesh))
+    names = () if mesh is None else known[mesh]
+    if not names:
+        came = f"node {node} has no morph targets"
+        refuse(culprit, "weights of a mesh with morph targets", came, _DAMAGED)
+    keys = _keys(document, sampler, len(names), culprit)
+    return Track("weights", names, Curve(keys.times_s, keys.values[..., None, :], keys.kind))  # type: ignore[arg-type]
+
+
+def _side_by_side(path: str, members: list[tuple[str, _Keys]]) -> Track:
+    keys = members[0][1]
+    values = np.stack([one.values for _, one in members], axis=-2)
+    curve = Curve(keys.times_s, values, keys.kind, turns=path == "rotation")  # type: ignore[arg-type]
+    return Track(path, tuple(name for name, _ in members), curve)
+
+
+def _keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keys:
+    """Times and values of a sampler, (k, n), or (k, 3, n) with the tangents of a spline."""
+    kind = sampler.get("interpolation", "LINEAR")
+    if kind not in _KINDS:
+        refuse(culprit, f"an interpolation of {', '.join(_KINDS)}", f"{kind!r} came", _DAMAGED)
+    times, values = document.real(sampler["input"]).ravel(), document.real(sampler["output"])
+    shape = (len(times), 3, width) if kind == "CUBICSPLINE" else (len(times), width)
+    if len(times) == 0 or values.size != np.prod(shape):
+        came = f"{len(times)} and {values.size} came"
+        refuse(culprit, f"a time and {np.prod(shape[1:])} numbers for each key", came, _DAMAGED)
+    if not (np.isfinite(times).all() and np.isfinite(values).all()):
+        refuse(culprit, "finite keys", "some are NaN or infinite", _DAMAGED)
+    if (np.diff(times) < 0).any():
+        late = int(np.flatnonzero(np.diff(times) < 0)[0])
+        came = f"key {late + 1} at {times[late + 1]:g} s comes after {times[late]:g} s"
+        refuse(culprit, "keys in the order of time", came, _DAMAGED)
+    return _Keys(times, values.reshape(shape), kind)
+
+
+Doubles = NDArray[np.float64]
+Interpolation = Literal["STEP", "LINEAR", "CUBICSPLINE"]
+_TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Values that change over time, several with the same keys side by side.
+
+    times_s : (k,) of the keys, growing
+    values : (k, m, n); of a cubic spline (k, 3, m, n): tangent in, value, tangent out
+    turns : whether the values are quaternions (n = 4), which go round on arcs
+
+    Source: glTF 2.0, appendix C.
+    """
+
+    times_s: Doubles
+    values: Doubles
+    kind: Interpolation = "LINEAR"
+    turns: bool = False
+
+    def at(self, seconds: float) -> Doubles:
+        """(m, n) the values at a time; before the first key and after the last theirs."""
+        index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
+        keys = self.values[:, _VALUE] if self.kind == "CUBICSPLINE" else self.values
+        if index < 0 or index + 1 >= len(self.times_s):
+            return self._unit(keys[max(index, 0)])
+        if self.kind == "STEP":
+            return self._unit(keys[index])
+        step = float(self.times_s[index + 1] - self.times_s[index])
+        share = (seconds - float(self.times_s[index])) / step
+        if self.kind == "CUBICSPLINE":
+            return self._unit(self._spline(index, share, step))
+        if self.turns:
+            return slerp(self._unit(keys[index]), self._unit(keys[index + 1]), share)
+        return np.asarray((1 - share) * keys[index] + share * keys[index + 1])
+
+    def _spline(self, index: int, s: float, step: float) -> Doubles:
+        here, there = self.values[index], self.values[index + 1]
+        mixed = (2 * s**3 - 3 * s**2 + 1) * here[_VALUE] + (3 * s**2 - 2 * s**3) * there[_VALUE]
+        mixed += step * (s**3 - 2 * s**2 + s) * here[_TANGENT_OUT]
+        mixed += step * (s**3 - s**2) * there[_TANGENT_IN]
+        return np.asarray(mixed)
+
+    def _unit(self, values: Doubles) -> Doubles:
+        return values / np.linalg.norm(values, axis=-1, keepdims=True) if self.turns else values

@@ -1,0 +1,208 @@
+"""A .glb or .gltf file as its tree and its numbers.
+
+An accessor may lie anywhere in a buffer, with gaps, be mostly zero or the same as another (sparse), and hold
+integers that stand for fractions.
+"""
+
+from __future__ import annotations
+
+import base64
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.errors import refuse
+from dermis.base.reading import BROKEN, parse_json, read_file, understood
+from dermis.formats.named_files import named_by_uri
+from dermis.formats.parts import Array, fractions
+from dermis.formats.size_limits import MOST_BYTES, MOST_JSON, MOST_NUMBERS
+
+Tree = dict[str, Any]
+
+_MAGIC = 0x46546C67
+_JSON, _BINARY = 0x4E4F534A, 0x004E4942
+_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_LEAST_READ = 512  # numbers that take as long as reading any
+_LISTS = (
+    "accessors",
+    "animations",
+    "buffers",
+    "bufferViews",
+    "images",
+    "materials",
+    "meshes",
+    "nodes",
+    "samplers",
+    "scenes",
+    "skins",
+    "textures",
+)
+
+
+@dataclass
+class Document:
+    """A file that was read.
+
+    tree : its JSON
+    binary : the chunk that a .glb file holds besides
+    """
+
+    path: Path
+    tree: Tree
+    binary: bytes = b""
+    _buffers: dict[int, bytes] = field(default_factory=dict)
+    _asked: int = 0
+
+    def all(self, key: str) -> list[Tree]:
+        """Things of one kind, none where the file has none."""
+        found: list[Tree] = self.tree.get(key, [])
+        return found
+
+    def one(self, key: str, index: Any) -> Tree:
+        """A thing by its kind and number.
+
+        Raises ValueError where there is none of that number.
+        """
+        return self.all(key)[numbered(index, len(self.all(key)), key)]
+
+    def buffer(self, index: int) -> bytes:
+        """One of its buffers, wherever it lies."""
+        if index not in self._buffers:
+            self._buffers[index] = self._read(self.one("buffers", index).get("uri"))
+        return self._buffers[index]
+
+    def view(self, index: int) -> memoryview:
+        """The bytes of a buffer view, all of them."""
+        view = self.one("bufferViews", index)
+        start, length = _whole(view.get("byteOffset", 0)), _whole(view["byteLength"])
+        data = memoryview(self.buffer(view["buffer"]))[start : start + length]
+        if len(data) != length:
+            raise ValueError(f"buffer view {index} ends outside of its buffer")
+        return data
+
+    def numbers(self, index: int) -> NDArray[Any]:
+        """(n, k) the values of an accessor as they are stored; sparse ones in their places."""
+        accessor = self.one("accessors", index)
+        kind, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
+        shape = _whole(accessor["count"]), width
+        self._asked += max(shape[0] * width, _LEAST_READ)
+        if self._asked > MOST_NUMBERS:
+            came = f"accessor {index} takes it beyond"
+            remedy = "Export it with fewer instances or targets, or decimated"
+            refuse(self.path, f"accessors of at most {MOST_NUMBERS / 1e6:.0f} million numbers", came, remedy)
+        if "bufferView" in accessor:
+            stride = _whole(self.one("bufferViews", accessor["bufferView"]).get("byteStride", 0))
+            values = self._rows(accessor, shape, kind, stride)
+        else:
+            values = np.zeros(shape, kind)
+        if "sparse" not in accessor:
+            return values
+        return self._with_sparse(values, accessor["sparse"])
+
+    def real(self, index: int) -> Array:
+        """(n, k) the values of an accessor; integers that are normalised are fractions of the largest."""
+        values = self.numbers(index)
+        if not self.one("accessors", index).get("normalized", False):
+            return values.astype(np.float64)
+        return fractions(values)
+
+    def _with_sparse(self, values: NDArray[Any], sparse: Tree) -> NDArray[Any]:
+        count = _whole(sparse["count"])
+        if count > len(values):
+            raise ValueError(f"{count} of {len(values)} values are said to differ")
+        places = np.dtype(_TYPES[sparse["indices"]["componentType"]])
+        index = self._rows(sparse["indices"], (count, 1), places).ravel()
+        changed = values.copy()
+        changed[index] = self._rows(sparse["values"], (count, values.shape[1]), values.dtype)
+        return changed
+
+    def _rows(
+        self, place: Tree, shape: tuple[int, int], kind: np.dtype[Any], stride: int = 0
+    ) -> NDArray[Any]:
+        """(n, k) numbers that begin at a place in a buffer view; stride [byte] 0 where they lie close."""
+        data, start = self.view(place["bufferView"]), _whole(place.get("byteOffset", 0))
+        size = kind.itemsize
+        if 0 in shape:
+            return np.zeros(shape, kind)
+        return np.ndarray(shape, kind, data, start, (stride or size * shape[1], size))
+
+    def _read(self, uri: str | None) -> bytes:
+        if uri is None:
+            return self.binary
+        left = MOST_BYTES - sum(map(len, self._buffers.values()))
+        if uri.startswith("data:"):
+            data = base64.b64decode(uri.partition(",")[2])
+        else:
+            data = read_file(named_by_uri(self.path, uri), "a buffer", left, f"{self.path}, {uri[:80]!r}")
+        if len(data) > left:
+            came = "they have more"
+            refuse(self.path, f"buffers of at most {MOST_BYTES >> 20} MiB", came, "Make them smaller")
+        return data
+
+
+def numbered(index: Any, count: int, kind: str) -> int:
+    """The number of one of so many things.
+
+    Raises ValueError where it is none of them.
+    """
+    if not (isinstance(index, int) and 0 <= index < count):
+        raise ValueError(f"there are {count} {kind}, and {str(index)[:40]!r} is none of them")
+    return index
+
+
+def _whole(value: Any) -> int:
+    if not (isinstance(value, int) and 0 <= value <= MOST_BYTES):
+        raise ValueError(f"{str(value)[:40]!r} came for a number of bytes or values")
+    return value
+
+
+def read_document(path: Path) -> Document:
+    """The file's tree and binary chunk.
+
+    Raises DermisError when it is no glTF, is cut short, or says more than any head needs.
+    """
+    data = read_file(path, "a glTF file", MOST_BYTES)
+    with understood(path, "a glTF file", *BROKEN):
+        if path.suffix.lower() != ".glb":
+            return Document(path, _object(path, data))
+        magic, version, length = struct.unpack_from("<III", data)
+        if magic != _MAGIC or version != 2:
+            raise ValueError("it does not begin as a .glb file of version 2")
+        if length > len(data):
+            raise ValueError(f"it should have {length} bytes and has {len(data)}")
+        chunks = dict(_chunks(data))
+        return Document(path, _object(path, chunks[_JSON]), chunks.get(_BINARY, b""))
+
+
+def _object(path: Path, text: bytes) -> Tree:
+    """The tree that a text says, with lists of objects where there are to be some."""
+    values = sum(text.count(mark) for mark in (b",", b"[", b"{"))
+    if values > MOST_JSON:
+        came, remedy = f"it has {values:,}", "Export it with fewer nodes, materials or clips"
+        refuse(path, f"JSON of at most {MOST_JSON:,} values", came, remedy)
+    tree = parse_json(text, path, "a glTF file")
+    if not isinstance(tree, dict):
+        raise ValueError("its JSON is no object")
+    for key in _LISTS:
+        listed = tree.get(key, [])
+        if not (isinstance(listed, list) and all(isinstance(one, dict) for one in listed)):
+            raise ValueError(f"its {key} are no list of objects")
+    return tree
+
+
+def _chunks(data: bytes) -> list[tuple[int, bytes]]:
+    """Kind and content of each chunk, the last of a kind first, so that of two the first counts."""
+    found, place = [], 12
+    while place + 8 <= len(data):
+        length, kind = struct.unpack_from("<II", data, place)
+        content = data[place + 8 : place + 8 + length]
+        if len(content) != length:
+            raise ValueError("a chunk is cut short")
+        found.append((kind, content))
+        place += 8 + length
+    return found[::-1]

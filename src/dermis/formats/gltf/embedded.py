@@ -1,0 +1,110 @@
+"""The pictures that a glTF file brings with it."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from dermis.base.errors import about, refuse
+from dermis.base.reading import BROKEN, is_file, understood
+from dermis.formats.gltf.document import Document, read_document
+from dermis.formats.named_files import named_by_uri
+from dermis.formats.size_limits import MOST_RELIEF_MM
+from dermis.images.io import Picture, read_size
+from dermis.images.sizes import MOST_TOGETHER
+from dermis.mesh.eyes import EyeLook
+
+_READABLE = {"image/png", "image/jpeg"}
+ROLES = ("normal", "height", "specular", "roughness", "region")
+
+
+def embedded_maps(path: Path) -> dict[str, Any]:
+    """Options of `load_maps` that a .glb or .gltf file gives itself, {} for one without pictures.
+
+    The skin's material gives its base colour and, when the package wrote the file, the maps that its extras
+    name: a normal map only where it is no picture of the height; any other file gives its normal map.
+
+    Raises DermisError when the file is damaged.
+    """
+    document = read_document(path)
+    with understood(path, "sound textures", *BROKEN):
+        found = _maps(document)
+    texels = 0
+    for picture in (one for one in found.values() if isinstance(one, Picture) or is_file(str(one))):
+        width, height = read_size(picture)
+        texels += width * height
+    if texels > MOST_TOGETHER:
+        came, remedy = (
+            f"they have {texels / 1e6:.0f} million",
+            "Resize them, or name them yourself (--colour, ...)",
+        )
+        refuse(path, f"textures of at most {MOST_TOGETHER / 1e6:.0f} million texels together", came, remedy)
+    return found
+
+
+def _maps(document: Document) -> dict[str, Any]:
+    materials = document.all("materials") or [{}]
+    skin = next((one for one in materials if "skin" in one.get("name", "").lower()), materials[0])
+
+    def picture(reference: dict[str, Any] | None) -> Picture | Path | None:
+        if reference is None or reference.get("texCoord", 0) != 0:
+            return None
+        source = document.one("textures", reference["index"]).get("source")
+        return None if source is None else _picture(document, source)
+
+    found: dict[str, Any] = {"colour": picture(skin.get("pbrMetallicRoughness", {}).get("baseColorTexture"))}
+    own = skin.get("extras", {}).get("dermis")
+    if own is None:
+        found["normal"] = picture(skin.get("normalTexture"))
+    else:
+        found |= {role: picture(own.get(role)) for role in ROLES}
+        found["colour"] = picture(own.get("colour")) or found["colour"]
+        found["height_mm"] = _relief(own.get("height_mm"))
+    return {role: value for role, value in found.items() if value is not None}
+
+
+def _relief(height_mm: Any) -> float | None:
+    """The relief of a grey level [mm] that a file tells."""
+    if height_mm is None:
+        return None
+    if (
+        isinstance(height_mm, bool)
+        or not isinstance(height_mm, int | float)
+        or not 0 < height_mm <= MOST_RELIEF_MM
+    ):
+        raise ValueError(
+            f"height_mm is {str(height_mm)[:40]!r}, not a number above 0 and up to {MOST_RELIEF_MM:g}"
+        )
+    return float(height_mm)
+
+
+def _picture(document: Document, source: int) -> Picture | Path | None:
+    image = document.one("images", source)
+    name = f"{document.path}, image {image.get('name', source)}"
+    if "bufferView" in image:
+        if image.get("mimeType") not in _READABLE:
+            return None
+        return Picture(name, bytes(document.view(image["bufferView"])))
+    uri = image["uri"]
+    if uri.startswith("data:"):
+        kind, _, text = uri[5:].partition(";base64,")
+        return Picture(name, base64.b64decode(text)) if kind in _READABLE else None
+    file = named_by_uri(document.path, uri)
+    return file if file.suffix.lower() in (".png", ".jpg", ".jpeg") else None
+
+
+def told_eyes(path: Path) -> EyeLook:
+    """What a .glb or .gltf file tells of the eyes of its person; the usual look for others.
+
+    Raises DermisError for such that no eyes can have.
+    """
+    notes = read_document(path).tree.get("asset", {}).get("extras")
+    person = notes.get("person") if isinstance(notes, dict) else None
+    eyes = person.get("eyes") if isinstance(person, dict) else None
+    if not isinstance(eyes, dict):
+        return EyeLook()
+    told = {one.name: eyes[one.name] for one in fields(EyeLook) if one.name in eyes}
+    with about(path), understood(path, "sound numbers of eyes", *BROKEN):
+        return EyeLook(**told)

@@ -1,0 +1,248 @@
+"""Pixels of picture files as the numbers that maps hold."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.errors import refuse
+from dermis.images.codecs import strips
+from dermis.images.colour import decode_srgb_levels
+from dermis.images.filters import without_steps
+from dermis.images.io import Picture, read_bytes, read_image, read_size
+from dermis.images.sizes import MOST_PIXELS
+from dermis.mesh.maps import Maps
+
+Floats = NDArray[np.float32]
+PathLike = str | Path | Picture
+
+MOST_SIDE = 8192
+"""Texels of a map's side: as many as any device takes."""
+_ALIKE = 2.5 / 255  # JPEG may separate the channels of a grey picture by a level or two
+_MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
+
+
+def finite(path: PathLike, values: NDArray[Any]) -> NDArray[Any]:
+    """A map whose numbers are all finite.
+
+    DermisError : some are not, after whatever was done to those of the file
+    """
+    if values.size and not (np.isfinite(values.min()) and np.isfinite(values.max())):
+        refuse(
+            path, "a map of finite numbers", "some are infinite or NaN", "Export it again, scaled to 0 to 1"
+        )
+    return values
+
+
+def _converted(image: NDArray[Any], shape: tuple[int, ...], convert: Callable[[NDArray[Any]], Any]) -> Floats:
+    """(H, W, *shape) of what a picture becomes, some rows at a time, so that little is in memory twice."""
+    found = np.empty((*image.shape[:2], *shape), np.float32)
+    for rows in strips(image):
+        found[rows] = convert(image[rows])
+    return found
+
+
+def colour_map(path: PathLike) -> Floats:
+    image = _read(path, "a colour map")
+    if image.shape[2] < 3:
+        refuse(path, "a colour map with red, green and blue", "it is grey", "Save it as RGB")
+    image = image[..., :3]
+    if image.dtype == np.float32:
+        return _within_unit(path, "a colour map", np.ascontiguousarray(image))
+    return _converted(image, (3,), decode_srgb_levels)
+
+
+def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
+    """(H, W) of so many mm for the full scale; 8-bit steps are smoothed away, finer ones stay."""
+    image = _read(path, "a height map")
+    grey = _grey(path, "a height map", image)
+    height = without_steps(grey) if image.dtype == np.uint8 else grey
+    with np.errstate(over="ignore"):
+        height *= relief_mm
+    return height
+
+
+def share_map(path: PathLike) -> Floats:
+    """(H, W, 2) shares of two others in a mixture, 0..1, together at most 1: red and green, or grey and 0."""
+    role = "a map of profiles"
+    image = _as_unit(_read(path, role))
+    shares = np.zeros((*image.shape[:2], 2), np.float32)
+    given = 2 if image.shape[2] >= 3 and _apart(image) > _ALIKE else 1
+    shares[..., :given] = image[..., :given]
+    shares = _within_unit(path, role, shares)
+    return np.asarray(shares / np.maximum(shares.sum(axis=-1, keepdims=True), 1.0))
+
+
+def plain_map(path: PathLike, role: str) -> Floats:
+    """(H, W) values 0..1 [-], not through the sRGB curve."""
+    return _within_unit(path, role, _grey(path, role, _read(path, role)))
+
+
+def label_map(path: PathLike) -> NDArray[np.uint8]:
+    image = _read(path, "a map of labels")
+    if image.dtype != np.uint8 or image.shape[2] != 1:
+        refuse(path, "labels in 8-bit grey", f"{image.dtype} x {image.shape[2]} came", "Save it as such")
+    return image[..., 0]
+
+
+def slope_map(path: PathLike, normal_y: str) -> Floats:
+    """(H, W, 2) slopes of a normal map of 0..1 or -1..1; texels without an outward normal are flat."""
+    image = _read(path, "a normal map")
+    if image.shape[2] < 3:
+        refuse(path, "a normal map with red, green and blue", "it is grey", "If it is a height map, say so")
+    image = image[..., :3]
+    signed = image.dtype == np.float32 and bool(image.min() < -0.01)
+    slopes, found = np.empty((*image.shape[:2], 2), np.float32), np.zeros(4)
+    for rows in strips(image):
+        value = _as_unit(image[rows])
+        normals = value if signed else 2 * value - 1
+        found += _outward(normals)
+        np.divide(-normals[..., :2], np.maximum(normals[..., 2:], _MIN_NORMAL_Z), out=slopes[rows])
+        slopes[rows][normals[..., 2] <= 0] = 0
+    _check_normals(path, *found.tolist())
+    if normal_y == "down":
+        slopes[..., 1] *= -1
+    return slopes
+
+
+def _outward(normals: Floats) -> NDArray[np.float64]:
+    """How many texels there are, how many are unit vectors that point outwards, and the sums of both's z."""
+    length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
+    z = normals[..., 2]
+    outward = (np.abs(length - 1) < 0.15) & (z > 0)
+    return np.array([z.size, outward.sum(), z.sum(dtype=np.float64), z[outward].sum(dtype=np.float64)])
+
+
+def _check_normals(path: PathLike, texels: float, outward: float, z: float, outward_z: float) -> None:
+    """Refuse pictures that are no normal maps: few of their texels are unit vectors that point outwards."""
+    # A quarter is enough: the rest may be empty space between uv islands.
+    if outward < 0.25 * texels or outward_z < 0.7 * outward:
+        came = f"its mean blue is {(z / texels + 1) / 2:.2f} and its colours are no unit vectors"
+        refuse(path, "a tangent-space normal map, which looks light blue", came, "Check which map this is")
+
+
+def _read(path: PathLike, role: str) -> NDArray[Any]:
+    width, height = read_size(path)
+    if max(width, height) > MOST_SIDE:
+        expected = f"{role} of at most {MOST_SIDE} texels a side"
+        refuse(path, expected, f"it has {width} x {height}", "Resize it")
+    image = read_image(path)
+    return finite(path, image) if image.dtype == np.float32 else image
+
+
+def _grey(path: PathLike, role: str, image: NDArray[Any]) -> Floats:
+    """(H, W) in units of the full scale, of a grey picture or of RGB whose channels agree."""
+    if image.shape[2] > 1:
+        apart = max(_apart(image[rows]) for rows in strips(image))
+        if apart > _ALIKE:
+            came = f"its red, green and blue differ by up to {apart:.2f} of the full scale"
+            refuse(path, f"{role} in grey", came, "Check which map this is, or save it as grey")
+    return _converted(image[..., 0], (), _as_unit)
+
+
+def _apart(image: NDArray[Any]) -> float:
+    """How much green and blue differ from red at most, in units of the full scale."""
+    channels = _as_unit(image[..., :3])
+    return max(float(np.abs(channels[..., k] - channels[..., 0]).max()) for k in (1, 2))
+
+
+def _as_unit(image: NDArray[Any]) -> Floats:
+    if image.dtype == np.float32:
+        return image
+    return image.astype(np.float32) / np.float32(np.iinfo(image.dtype).max)
+
+
+def _within_unit(path: PathLike, role: str, values: Floats) -> Floats:
+    low, high = float(values.min()), float(values.max())
+    if low < -1e-3 or high > 1 + 1e-3:
+        refuse(path, f"{role} with values of 0 to 1", f"they go from {low:.4g} to {high:.4g}", "Scale them")
+    return np.clip(values, 0, 1, out=values)
+
+
+Load = Callable[[PathLike], NDArray[Any]]
+
+
+_MOST_AT_ONCE = MOST_PIXELS  # texels of all maps, for maps to be decoded side by side
+
+
+_LARGE = 1 << 14  # bytes; maps of larger files are kept on disk, to be read faster than decoded
+
+
+_FORM = 1  # increment when the same files give other maps
+
+
+def load_maps(
+    colour: PathLike | None = None,
+    normal: PathLike | None = None,
+    height: PathLike | None = None,
+    height_mm: float | None = None,
+    specular: PathLike | None = None,
+    roughness: PathLike | None = None,
+    region: PathLike | None = None,
+    normal_y: Literal["up", "down"] = "up",
+) -> Maps:
+    """The maps in these picture files.
+
+    colour : RGB in sRGB, or linear when the file holds floats; alpha is left out
+    normal : tangent-space normals, red towards +u, green as `normal_y` says
+    height : grey, white outwards; needs `height_mm`
+    height_mm : relief of one grey level of an 8-bit map, 1/255 of the full scale at any depth, so that
+        the same picture gives the same relief in 8 bits, 16 bits or floats of 0..1 [mm]
+    specular, roughness : grey, taken as plain numbers and not through the sRGB curve
+    region : grey of 8 bits, the labels themselves
+    normal_y : "up" when green points to row 0 (OpenGL, Blender), "down" when away from it (DirectX)
+    DermisError : a file is not what its role asks for; the message names it
+    """
+    relief_mm = np.float32(255 * (height_mm or 0.0))
+    if height is not None and not (np.isfinite(relief_mm) and relief_mm > 0):
+        came = "none was given" if height_mm is None else f"it is {height_mm}"
+        remedy = "Skin maps have about 0.02 to 0.03; the map's author knows"
+        refuse(height, "a height map with height_mm, the mm per grey level, above 0", came, remedy)
+    if normal is not None and normal_y not in ("up", "down"):
+        refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Try the other if bumps look like dents")
+    roles: dict[str, tuple[PathLike | None, str, Load]] = {  # the largest first
+        "height": (height, f"height {relief_mm!r}", partial(height_map, relief_mm=relief_mm)),
+        "colour": (colour, "colour", colour_map),
+        "normal": (normal, f"normal {normal_y}", partial(slope_map, normal_y=normal_y)),
+        "specular": (specular, "grey", partial(plain_map, role="a specular map")),
+        "roughness": (roughness, "grey", partial(plain_map, role="a roughness map")),
+        "region": (region, "labels", label_map),
+    }
+    files = [path for path, _, _ in roles.values() if path is not None]
+    few = sum(_texels(path) for path in files) <= _MOST_AT_ONCE
+    with ThreadPoolExecutor(os.cpu_count() if few else 1) as pool:  # decoders do not hold other threads up
+        return Maps(**dict(zip(roles, pool.map(lambda role: _kept(*role), roles.values()), strict=True)))
+
+
+def load_labels(path: PathLike) -> NDArray[np.uint8]:
+    """(H, W) labels of a grey picture of 8 bits."""
+    labels: NDArray[np.uint8] = _kept(path, "labels", label_map)
+    return labels
+
+
+def _texels(path: PathLike) -> int:
+    width, height = read_size(path)
+    return width * height
+
+
+def _kept(path: PathLike | None, how: str, load: Load) -> Any:
+    """The map that `load` returns for a picture file, kept on disk when the file is large; None for no file.
+
+    how : all that the map depends on besides the file
+    """
+    if path is None:
+        return None
+    data = read_bytes(path)
+    if len(data) < _LARGE:
+        return finite(path, load(path))
+    from dermis.base.disk import cached_array
+
+    source = np.frombuffer(data, np.uint8)
+    return cached_array(source, f"map {_FORM} {how}", lambda: finite(path, load(path)))

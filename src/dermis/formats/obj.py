@@ -1,0 +1,260 @@
+"""The text of OBJ files: what of it is refused before it is parsed, and its groups by number."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.errors import DermisError, refuse
+from dermis.base.reading import read_file
+from dermis.formats.maps import Floats, finite, load_maps
+from dermis.formats.mtl import MtlMaterial, Texture, read_materials
+from dermis.formats.named_files import beside
+from dermis.formats.parts import GREY, Group, Model, Part, colour_of, find_pairs, trimesh_parts
+from dermis.formats.size_limits import MOST_BYTES, MOST_CORNERS, MOST_GROUPS, MOST_TRIANGLES, MOST_VERTICES
+from dermis.images.io import read_image, read_size
+from dermis.images.sizes import MOST_TOGETHER
+from dermis.mesh.maps import Maps
+
+Index = NDArray[np.int64]
+
+_COMMENTED = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILINE)
+_NAMED = re.compile(r"^[ \t]*(usemtl|g)(?:[ \t]([^\n]*))?$", re.MULTILINE)
+_FACE_OR_NUMBER = re.compile(r"^(?:usemtl (\d+)|f([ \t].*))$", re.MULTILINE)
+_LONGEST, _LONGEST_VERTEX = 1 << 17, 256  # characters of a line
+_ZERO = re.compile(r"(?<![^ \t/])0+(?![^ \t/])")
+_UNPARSED = re.compile(r"^[ \t]*(usemtl|g|f)(?:[ \t]([^\n]*))?$", re.MULTILINE)
+
+
+def read_obj_text(path: Path) -> str:
+    """The text of a .obj file with line feeds alone.
+
+    Raises DermisError when it cannot be read or is too large.
+    """
+    text = read_file(path, "an OBJ file", MOST_BYTES).decode("utf-8", errors="replace")
+    return text.replace("\r\n", "\n")
+
+
+def joined_lines(path: Path, text: str) -> str:
+    """The text with continued lines joined, and numbers without comments behind them.
+
+    Raises DermisError for lines that are longer than any that means something, and for too many vertices.
+    """
+    text = text.replace("\\\n", " ")
+    _check_lines(path, np.frombuffer(text.encode("utf-8", "replace"), np.uint8))
+    commented = text.count("#") != text.count("\n#") + text.startswith("#")
+    return _COMMENTED.sub(r"\1", text) if commented else text
+
+
+def _check_lines(path: Path, data: NDArray[np.uint8]) -> None:
+    ends = np.flatnonzero(data == ord("\n"))
+    starts = np.concatenate([[0], ends + 1])
+    long = np.diff(starts, append=len(data) + 1)
+    vertex = data[np.minimum(starts, len(data) - 1)] == ord("v") if len(data) else np.zeros(1, bool)
+    if long.max() > _LONGEST or long[vertex].max(initial=0) > _LONGEST_VERTEX:
+        came, remedy = f"one has {long.max():,}", "The file is damaged: export it again"
+        expected = f"lines of at most {_LONGEST:,} characters, {_LONGEST_VERTEX} for vertices"
+        refuse(path, expected, came, remedy)
+    if int(vertex.sum()) > 3 * MOST_VERTICES:
+        came, remedy = f"it has {int(vertex.sum()):,}", "Decimate it (in Blender: Modifiers > Decimate)"
+        refuse(path, f"at most {3 * MOST_VERTICES:,} lines of vertices, uv and normals", came, remedy)
+
+
+def groups_of_faces(text: str) -> Iterator[tuple[str, str]]:
+    """The names `usemtl` and `g` of each face."""
+    current = {"usemtl": "", "g": ""}
+    for line in _UNPARSED.finditer(text):
+        if line[1] == "f":
+            yield current["usemtl"], current["g"]
+        else:
+            current[line[1]] = (line[2] or "").strip()
+
+
+def numbered(path: Path, text: str) -> tuple[str, list[tuple[str, str]]]:
+    """Each `usemtl` and `g` as `usemtl` of a number, one for each pair of names, and these pairs.
+
+    Raises DermisError when they are too many.
+    """
+    current = {"usemtl": "", "g": ""}
+    numbers: dict[tuple[str, str], int] = {("", ""): 0}
+
+    def number(match: re.Match[str]) -> str:
+        current[match[1]] = (match[2] or "").strip()
+        key = (current["usemtl"], current["g"])
+        return f"usemtl {numbers.setdefault(key, len(numbers))}"
+
+    marked = _NAMED.sub(number, text)
+    if len(numbers) > MOST_GROUPS:
+        came, remedy = f"it has {len(numbers):,}", "Export it with fewer, or without groups"
+        refuse(path, f"at most {MOST_GROUPS:,} groups", came, remedy)
+    return f"mtllib marked.mtl\nusemtl 0\n{marked}", list(numbers)
+
+
+def face_sides(path: Path, text: str, groups: int) -> list[Index]:
+    """How many corners each face of each group has; the text names groups by number, `usemtl 0` first.
+
+    Raises DermisError for indices that are relative or 0, and for too many corners.
+    """
+    sides: list[list[int]] = [[] for _ in range(groups)]
+    current, triangles = sides[0], 0
+    for line in _FACE_OR_NUMBER.finditer(text):
+        number, face = line.groups()
+        if number:
+            current = sides[int(number)]
+            continue
+        if "-" in face:
+            came = "it has relative (negative) ones"
+            refuse(path, "faces by absolute index", came, "Export it again, in Blender")
+        if (" 0" in face or "/0" in face or "\t0" in face) and _ZERO.search(face):
+            refuse(path, "faces by indices from 1", "it has a 0", "The file is damaged: export it again")
+        count = len(face.split())
+        current.append(count)
+        triangles += max(count - 2, 0)
+        if count > MOST_CORNERS or triangles > MOST_TRIANGLES:
+            _refuse_faces(path, count)
+    return [np.array(one, dtype=np.int64) for one in sides]
+
+
+def _refuse_faces(path: Path, corners: int) -> None:
+    if corners > MOST_CORNERS:
+        came = f"one has {corners:,}"
+        refuse(path, f"faces of at most {MOST_CORNERS:,} corners", came, "Cut it into smaller ones")
+    came, remedy = "it has more", "Decimate it (in Blender: Modifiers > Decimate)"
+    refuse(path, f"a mesh of at most {MOST_TRIANGLES:,} triangles", came, remedy)
+
+
+def read_obj(path: Path) -> Model:
+    """Parts of a .obj file by `usemtl` and `g`; colours are Kd of its .mtl, taken as linear."""
+    return obj_model(path, read_obj_text(path))
+
+
+def obj_model(path: Path, text: str) -> Model:
+    """The same of a file's text."""
+    text = joined_lines(path, text)
+    materials = read_materials(path, text).materials
+    colours = {name: colour_of(one.kd) for name, one in materials.items() if len(one.kd) >= 3}
+    text, pairs = numbered(path, text)
+    sides = face_sides(path, text, len(pairs))
+    names = [tuple(dict.fromkeys(name for name in pair if name)) for pair in pairs]
+    groups = [Group(name, colours.get(pair[0], GREY)) for name, pair in zip(names, pairs, strict=True)]
+    numbers = "\n".join(f"newmtl {k}" for k in range(len(groups)))
+    # trimesh pops groups from the end: file order again
+    parts = list(trimesh_parts(text.encode(), "obj", groups, resolver={"marked.mtl": numbers.encode()}))[::-1]
+    faces = {id(group): each for group, each in zip(groups, sides, strict=True)}
+    parts = [replace(part, quads=find_pairs(faces[id(part.group)], part.triangles)) for part in parts]
+    full, none = [part.group for part in parts], np.empty((0, 3))
+    empty = [Part(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
+    return Model(parts + empty)
+
+
+_RELIEF = ("normal", "height")
+_ENOUGH = 256  # texels a side
+
+
+def obj_maps(
+    path: Path,
+    *,
+    opaque: Collection[str] = (),
+    given: Collection[str] = (),
+    height_mm: float | None = None,
+    normal_y: Literal["up", "down"] = "up",
+) -> tuple[Maps, str]:
+    """Maps of the skin's material: map_Kd, norm, map_Bump or bump, map_Ks and map_Pr.
+
+    A bump map may hold normals, as many programs write it, or heights, which need `height_mm`; -bm multiplies
+    either. map_Pr is the root of the roughness m. What cannot be used is left out; the second result says
+    why, if need be.
+
+    opaque : groups that are not skin
+    given : roles of maps that are not wanted
+    height_mm, normal_y : see `load_maps`
+    """
+    text = read_obj_text(path)
+    library, faults = read_materials(path, text), list[str]()
+    faults += [f"mtllib: {name} is not in its folder" for name in library.missing]
+    wanted = _skin(text, library.materials, opaque).textures
+    maps, roles = Maps(), [role for role in ("colour", "specular", "roughness") if role not in given]
+    if not set(_RELIEF) & set(given):
+        roles.append("normal" if "normal" in wanted else "bump")
+    left = MOST_TOGETHER
+    for role in (one for one in roles if one in wanted):
+        texture = wanted[role]
+        file = beside(path, texture.name)
+        if file is None:
+            faults.append(f"{texture.key}: {texture.name} is not in its folder")
+            continue
+        try:
+            left -= _texels(file, left)
+            maps = replace(maps, **_loaded(role, file, texture, height_mm, normal_y))
+        except DermisError as fault:
+            faults.append(f"{texture.key}: {fault}")
+        if texture.moved:
+            faults.append(f"{texture.key}: {texture.name} is taken without its -s, -o or -t")
+    return maps, _notice(path, faults)
+
+
+def _texels(file: Path, left: int) -> int:
+    """How many texels a picture has, of those that are left to a mesh file."""
+    width, height = read_size(file)
+    if width * height > left:
+        expected = f"pictures of at most {MOST_TOGETHER / 1e6:.0f} million texels together"
+        refuse(file, expected, "with this one there are more", "Resize them")
+    return width * height
+
+
+def _notice(path: Path, faults: list[str]) -> str:
+    if not faults:
+        return ""
+    remedy = "Put the files beside it, or name maps yourself (--colour, --normal, ...)"
+    return "\n  ".join([f"{path}: not all that its .mtl names is used. {remedy}.", *faults])
+
+
+def _loaded(
+    role: str, file: Path, texture: Texture, height_mm: float | None, normal_y: Literal["up", "down"]
+) -> dict[str, Any]:
+    """The map in a file, by its role."""
+    if role == "roughness":
+        made = load_maps(roughness=file).roughness
+        return {} if made is None else {role: made * made}
+    if role == "bump" and _is_grey(file):
+        made = load_maps(height=file, height_mm=height_mm).height
+        return {} if made is None else {"height": _times(made, texture, file)}
+    if role in ("bump", "normal"):
+        made = load_maps(normal=file, normal_y=normal_y).normal
+        return {} if made is None else {"normal": _times(made, texture, file)}
+    return {role: getattr(load_maps(**{role: file}), role)}  # type: ignore[arg-type]
+
+
+def _times(made: Floats, texture: Texture, file: Path) -> Floats:
+    """A relief multiplied as its material says."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return finite(file, made * np.float32(texture.factor))
+
+
+def _is_grey(file: Path) -> bool:
+    """Whether a picture's channels agree, but for what JPEG does to them; of a large one few texels tell."""
+    whole = read_image(file)
+    apart = max(min(whole.shape[:2]) // _ENOUGH, 1)
+    image = whole[::apart, ::apart, :3].astype(float)
+    most = float(image.max()) or 1.0
+    return bool((abs(image - image[..., :1]) <= 0.02 * most).all())
+
+
+def _skin(text: str, materials: dict[str, MtlMaterial], opaque: Collection[str]) -> MtlMaterial:
+    """The material of the skin: of groups called so, else of all, the one with the most faces."""
+    faces = Counter(groups_of_faces(text))
+    unwanted = {name.casefold() for name in opaque}
+    left = {names: count for names, count in faces.items() if not unwanted & set(map(str.casefold, names))}
+    named = {names: count for names, count in left.items() if "skin" in " ".join(names).casefold()}
+    counts = Counter[str]()
+    for (material, _), count in (named or left).items():
+        if material in materials and materials[material].textures:
+            counts[material] += count
+    return materials[counts.most_common(1)[0][0]] if counts else MtlMaterial()

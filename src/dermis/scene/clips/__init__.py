@@ -1,1 +1,0 @@
-"""Motion from files: animation clips, face captures, sequences of meshes."""

@@ -1,0 +1,193 @@
+"""Sequences of mesh files on a head of their topology."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_head import obj_text
+
+import dermis
+from dermis.base.errors import DermisError
+from dermis.formats.motion.sequence import FrameReader, frame_files
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
+
+
+def _scaled(text: str, factor: float) -> str:
+    """The places of an OBJ file times a factor."""
+    lines = []
+    for line in text.splitlines():
+        kind, *numbers = line.split()
+        places = [f"{factor * float(one):.6g}" for one in numbers] if kind == "v" else []
+        lines.append(" ".join([kind, *places]) if kind == "v" else line)
+    return "\n".join([*lines, ""])
+
+
+FACTORS = (1.0, 1.1, 0.9, 1.2)
+
+
+def _frames(folder: Path, factors: tuple[float, ...] = FACTORS) -> Path:
+    folder.mkdir()
+    for number, factor in enumerate(factors, start=8):  # 8, 9, 10, 11: not the order of letters
+        (folder / f"face_{number}.obj").write_text(_scaled(obj_text(), factor))
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return _frames(tmp_path / "take")
+
+
+def _head(folder: Path, name: str = "face_8.obj") -> Head:
+    return dermis.load_head(folder / name, subdivide=0)
+
+
+def test_frames_come_in_the_order_of_their_numbers(folder: Path) -> None:
+    names = [f"face_{k}.obj" for k in (8, 9, 10, 11)]
+    (folder / "notes.txt").write_text("")
+    (folder / "other_5.obj").write_text("")
+    for pattern in ("face_%d.obj", "face_%05d.obj", "face_*.obj"):
+        assert [one.name for one in frame_files(folder / pattern)] == names
+    (folder / "other_5.obj").unlink()
+    assert [one.name for one in frame_files(folder)] == names
+
+
+def test_a_sequence_moves_the_points(folder: Path) -> None:
+    head = _head(folder)
+    clip = dermis.load_motion(folder, head, fps=10)
+    assert (clip.name, clip.duration_s, clip.rate) == ("take", pytest.approx(0.3), 10)
+    for index, factor in enumerate(FACTORS):
+        places = clip.pose_at(index / 10).motion(head.control).positions_mm
+        np.testing.assert_allclose(places, factor * head.positions_mm, rtol=1e-5, atol=1e-3)
+    between = clip.pose_at(0.125).motion(head.control).positions_mm
+    np.testing.assert_allclose(between, 1.05 * head.positions_mm, rtol=1e-5, atol=1e-3)
+    assert clip.frame_count(10) == 4
+    assert dermis.load_motion(folder, head).duration_s == pytest.approx(3 / 30)
+
+
+def test_a_posed_frame_is_that_file_as_a_head(folder: Path) -> None:
+    head, other = _head(folder), _head(folder, "face_11.obj")
+    motion = dermis.Scene(head, pose=dermis.load_motion(folder, head).pose_at(1.0)).motion
+    assert motion is not None
+    np.testing.assert_array_equal(motion.positions_mm[head.mesh.point], other.mesh.positions)
+
+
+def test_units_and_axes_are_those_of_the_head(tmp_path: Path) -> None:
+    small = _frames(tmp_path / "small", (0.01, 0.011))
+    head = dermis.load_head(small / "face_8.obj", unit_mm=100, up="z", subdivide=0)
+    places = dermis.load_motion(small, head, unit_mm=100, up="z").pose_at(1.0).positions_mm
+    np.testing.assert_allclose(places, 1.1 * head.positions_mm, rtol=1e-4, atol=1e-2)
+    with pytest.raises(
+        DermisError, match=r"face_8\.obj: .*about as large as the head, but it is 0\.01 times"
+    ):
+        dermis.load_motion(small, head, up="z")
+
+
+def test_ply_frames(tmp_path: Path) -> None:
+    import trimesh
+
+    folder = _frames(tmp_path / "obj")
+    (tmp_path / "ply").mkdir()
+    for file in folder.iterdir():
+        mesh = trimesh.load(file, process=False)
+        (tmp_path / "ply" / f"{file.stem}.ply").write_bytes(mesh.export(file_type="ply", vertex_normal=False))
+    head = dermis.load_head(tmp_path / "ply" / "face_8.ply")
+    places = dermis.load_motion(tmp_path / "ply", head).pose_at(1.0).positions_mm
+    np.testing.assert_allclose(places, 1.2 * head.positions_mm, rtol=1e-5, atol=1e-3)
+
+
+def test_places_alone_are_read_as_whole_files_are(folder: Path) -> None:
+    reader = FrameReader(unit_mm=2.0, up="z")
+    files = frame_files(folder)
+    first = reader.read(files[0])
+    for file in files:
+        whole, quick = FrameReader(unit_mm=2.0, up="z").read(file), reader.read(file)
+        assert quick.triangles is first.triangles  # which were not parsed again
+        for mine, other in zip(quick, whole, strict=True):
+            assert mine.dtype == other.dtype
+            np.testing.assert_array_equal(mine, other)
+
+
+def _without_last_face(text: str) -> str:
+    return "\n".join(text.splitlines()[:-1]) + "\n"
+
+
+def _other_face(text: str) -> str:
+    *lines, last = text.splitlines()
+    kind, a, b, c = last.split()
+    return "\n".join([*lines, f"{kind} {b} {c} {a}", ""])
+
+
+def _other_uv(text: str) -> str:
+    return text.replace("vt 0.5 ", "vt 0.51 ", 1)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            _without_last_face,
+            r"face_10\.obj: expected the head's topology, \d+ vertices .* it has \d+ and \d+ tri",
+        ),
+        (_other_face, r"face_10\.obj: expected the head's topology"),
+        (
+            _other_uv,
+            r"face_10\.obj: expected frames of one topology, but its faces or uv differ from .*face_8\.obj",
+        ),
+        (lambda text: text.replace("vt ", "# ").replace("f ", "# f "), r"face_10\.obj: "),
+    ],
+)
+def test_mixed_topologies_name_the_file(folder: Path, change, words: str) -> None:
+    head = _head(folder)
+    file = folder / "face_10.obj"
+    file.write_text(change(file.read_text()))
+    with pytest.raises(DermisError, match=words):
+        dermis.load_motion(folder, head)
+
+
+def test_a_frame_that_breaks_later_names_its_file(folder: Path) -> None:
+    clip = dermis.load_motion(folder, _head(folder), fps=1)
+    (folder / "face_9.obj").write_text("v 0 0")
+    with pytest.raises(DermisError, match=r"face_9\.obj"):
+        clip.pose_at(1.0)
+
+
+def test_a_sequence_of_another_head_is_refused(folder: Path) -> None:
+    other = Head("ball", uv_sphere(100.0, 8, 6), Maps())
+    with pytest.raises(DermisError, match=r"face_8\.obj: expected the head's topology"):
+        dermis.load_motion(folder, other)
+
+
+def test_a_subdivided_head_moves_by_its_control_points(folder: Path) -> None:
+    head = dermis.load_head(folder / "face_8.obj", subdivide=1)
+    pose = dermis.load_motion(folder, head, fps=1).pose_at(1.0)
+    assert pose.positions_mm is not None and pose.positions_mm.shape == head.positions_mm.shape
+    assert len(head.positions_mm) < len(np.unique(head.mesh.point))
+
+
+def test_places_that_part_are_refused(tmp_path: Path) -> None:
+    """Lips that touch in the head's own frame and open in another: one point cannot be at two places."""
+    folder = _frames(tmp_path / "take", (1.0, 1.0))
+    twin = "v 0 300 0\nv 20 300 0\nv 0 320 0\nv 0 300 0\nv 20 300 0\nv 0 280 0\n"
+    count = obj_text().count("\nv ") + 1
+    faces = f"f {count + 1}/1 {count + 2}/2 {count + 3}/3\nf {count + 5}/1 {count + 4}/2 {count + 6}/3\n"
+    for name, lower in (("face_8.obj", "280"), ("face_9.obj", "280")):
+        text = (folder / name).read_text() + "usemtl skin\n" + twin.replace("280", lower) + faces
+        (folder / name).write_text(text)
+    head = _head(folder)
+    file = folder / "face_9.obj"
+    file.write_text(file.read_text()[::-1].replace("v 0 300 0"[::-1], "v 0 295 0"[::-1], 1)[::-1])
+    with pytest.raises(DermisError, match=r"face_9\.obj: .*stay together, but \d+ part by up to 5 mm"):
+        dermis.load_motion(folder, head)
+
+
+def test_nothing_and_several_kinds(folder: Path) -> None:
+    head = _head(folder)
+    with pytest.raises(DermisError, match=r"no_%d\.obj: expected frames .* there are none"):
+        dermis.load_motion(folder / "no_%d.obj", head)
+    (folder / "face_3.ply").write_text("")
+    with pytest.raises(DermisError, match=r"frames of one kind .*, but there are \.obj, \.ply"):
+        dermis.load_motion(folder, head)

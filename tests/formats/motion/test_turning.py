@@ -1,0 +1,97 @@
+"""Which bones turn head and eyes, by the names that programs give them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_rig import random_rig
+from scipy.spatial.transform import Rotation
+
+from dermis.formats.motion.captures import head_turns, matched, matrix_turns, turning_bones
+from dermis.mesh.pose import Pose
+from dermis.mesh.rig import Rig
+
+SKELETON = random_rig().skeleton
+assert SKELETON is not None
+
+
+def _named(*names: str):
+    return replace(SKELETON, names=names)
+
+
+@pytest.mark.parametrize(
+    ("names", "shares"),
+    [
+        (("root", "neck", "head", "jaw"), {"neck": 0.5, "head": 0.5}),
+        (
+            ("mixamorig:Spine", "mixamorig:Neck", "mixamorig:Head", "x"),
+            {"mixamorig:Neck": 0.5, "mixamorig:Head": 0.5},
+        ),
+        (("neck01", "neck02", "Head", "HeadTop_End"), {"neck01": 0.25, "neck02": 0.25, "Head": 0.5}),
+        (
+            ("a", "CC_Base_NeckTwist01", "CC_Base_Head", "b"),
+            {"CC_Base_NeckTwist01": 0.5, "CC_Base_Head": 0.5},
+        ),
+        (("a", "b", "Bip01 Head", "Forehead"), {"Bip01 Head": 1.0}),
+        (("a", "DEF-neck", "b", "c"), {"DEF-neck": 1.0}),
+        (("a", "b", "head", "neck"), {"head": 1.0}),  # a neck that is not above the head
+        (("a", "b", "c", "d"), {}),
+    ],
+)
+def test_heads_and_necks(names: tuple[str, ...], shares: dict[str, float]) -> None:
+    assert turning_bones(_named(*names)).head == shares
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [("LeftEye", "RightEye"), ("eye.L", "eye.R"), ("CC_Base_L_Eye", "CC_Base_R_Eye"), ("Eye_l", "Eye_r")],
+)
+def test_eyes(pair: tuple[str, str]) -> None:
+    assert turning_bones(_named("Eyelid_L", "LeftEyeBrow", *pair)).eyes == {"left": pair[0], "right": pair[1]}
+
+
+def test_no_bones_turn_nothing() -> None:
+    assert turning_bones(None).head == {} and turning_bones(None).eyes == {}
+
+
+@pytest.mark.parametrize("names", [("root", "neck", "head", "jaw"), ("neck1", "neck2", "head", "jaw")])
+def test_the_shares_make_the_whole_turn(names: tuple[str, ...]) -> None:
+    """Neck and head together turn the head as the capture says; places differ, the way it looks does not."""
+    skeleton = _named(*names)
+    turns = Rotation.from_euler("zxy", [[10, 20, 60], [0, -30, 5]], degrees=True)
+    angles = head_turns(turning_bones(skeleton), turns.as_quat())
+    for frame, turn in enumerate(turns):
+        pose = Pose(bones={name: rows[frame] for name, rows in angles.items()})
+        matrices = pose.motion(Rig(random_rig().positions_mm, skeleton=skeleton)).matrices
+        np.testing.assert_allclose(matrices[2, :, :3], turn.as_matrix(), atol=1e-5)
+
+
+def test_turns_of_matrices_leave_scale_aside() -> None:
+    turns = Rotation.random(5, random_state=4)
+    matrices = np.tile(np.eye(4), (5, 1, 1))
+    matrices[:, :3, :3] = 1.7 * turns.as_matrix()
+    matrices[:, :3, 3] = 40
+    found = Rotation.from_quat(matrix_turns(list(matrices)))
+    np.testing.assert_allclose((found.inv() * turns).magnitude(), 0, atol=1e-6)
+
+
+def test_names_in_other_letters() -> None:
+    targets = ("eyeBlinkLeft", "jawOpen", "JAWOPEN", "mouthSmile_L", "browInnerUp")
+    names = (
+        "EyeBlinkLeft",
+        "jawopen",
+        "JAWOPEN",
+        "mouthSmileLeft",
+        "Face.brow_inner_up",
+        "tongueOut",
+        "BrowInnerUp",
+    )
+    assert matched(names, targets) == {
+        "EyeBlinkLeft": "eyeBlinkLeft",
+        "jawopen": "jawOpen",
+        "JAWOPEN": "JAWOPEN",
+        "mouthSmileLeft": "mouthSmile_L",
+        "Face.brow_inner_up": "browInnerUp",
+    }
