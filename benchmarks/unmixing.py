@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from dermis.apps.inverse.unmixing.model import FACE, SkinModel, Third, skin_model
+from dermis.apps.inverse.unmixing.model import SkinModel, Third, skin_model
 from dermis.apps.inverse.unmixing.on_device import Unmixer
 from dermis.apps.inverse.unmixing.solve import solve, weights_of
 from dermis.apps.inverse.unmixing.unmix import unmix
@@ -30,7 +30,8 @@ from dermis.gpu.textures import texture_from
 from dermis.images.colour import delta_e_2000
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.pigments.skin import SkinParameters, spectral_medium
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
+from dermis.optics.pigments.skin import spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.tissue import load_tissue
 
@@ -65,7 +66,7 @@ def main(words: list[str]) -> int:
         sys.stdout.write(json.dumps(speed) + "\n")
         return 0
     told |= {"skins": SKINS, "noise": NOISE, "photons": _PHOTONS}
-    told["known"] = {str(mm): known(replace(FACE, epidermis_mm=mm)) for mm in THICK_MM}
+    told["known"] = {str(mm): known(replace(DEFAULT_SKIN, epidermis_mm=mm)) for mm in THICK_MM}
     told["mistaken"] = mistaken()
     told["counted"] = counted()
     told["shading"] = shading(asked.adapter)
@@ -139,14 +140,14 @@ def mistaken() -> dict[str, Any]:
     m, b = m[usual], b[usual]
     told = {}
     for name, other in cases.items():
-        skin = replace(FACE, **other)
+        skin = replace(DEFAULT_SKIN, **other)
         colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
         told[name] = {third: _off(third, colours, m, b) for third in ("none", "oxygen")}
     return told
 
 
 def _off(third: Third, colours: Floats, m: Floats, b: Floats) -> dict[str, float]:
-    found = solve(skin_model(FACE, third), colours, NOISE)
+    found = solve(skin_model(DEFAULT_SKIN, third), colours, NOISE)
     ratios = {"melanin": found.melanin / m, "blood": found.blood / b}
     left = delta_e_2000(colours, colours / found.residual)
     return {name: float(np.median(one)) for name, one in ratios.items()} | {"delta_e": float(np.median(left))}
@@ -156,7 +157,7 @@ def counted() -> list[dict[str, Any]]:
     """Skins whose colour was counted photon by photon: what diffusion itself is off by is in it."""
     told = []
     for m, b in _COUNTED:
-        pigments = {"melanin": m, "blood": b, "epidermis_mm": FACE.epidermis_mm}
+        pigments = {"melanin": m, "blood": b}
         tissue = load_tissue("spectral", pigments=pigments)
         colour = counted_profile(tissue.medium, tissue.rgb, _PHOTONS, seed=SEED).total[None]
         found = solve(skin_model(), colour, NOISE)
@@ -181,7 +182,7 @@ def supplied(folder: Path) -> list[dict[str, Any]]:
     )
     m, b = (table[name].astype(np.float64) for name in ("f_mel", "f_blood"))
     colours = np.stack([table[f"lin_{channel}"] for channel in "RGB"], axis=-1)
-    model = skin_model(replace(FACE, eumelanin=1.0, epidermis_mm=0.06))
+    model = skin_model(replace(DEFAULT_SKIN, eumelanin=1.0, epidermis_mm=0.06))
     found, forward = solve(model, colours, NOISE), delta_e_2000(model.colours(m, b), colours)
     left = delta_e_2000(colours / found.residual, colours)
     told = []

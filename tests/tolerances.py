@@ -147,3 +147,6 @@ FORWARD_CONTINUOUS = 0.005
 
 PRINTED = 1e-6
 """Computed figures in a text, relative, beside one in the last digit: processors add in other orders."""
+
+UNMIXED = 0.03
+"""Melanin and blood found in a colour of known skin, relative: the table is linear between its nodes."""

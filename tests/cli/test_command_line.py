@@ -59,7 +59,7 @@ def test_a_process_renders(folder: Path) -> None:
     "words",
     [
         ["--help"],
-        *([name, "--help"] for name in ("render", "batch", "export", "unmix", "fit", "cite")),
+        *([name, "--help"] for name in ("render", "batch", "export", "profile", "unmix", "fit", "cite")),
         ["--version"],
     ],
 )

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tolerances import UNMIXED
 
 from dermis.apps.inverse.unmixing.model import skin_model
 from dermis.images.io import read_image, write_image
@@ -40,6 +41,26 @@ def test_writes_maps_a_table_and_other_colours(run: Run, picture: Path, folder: 
     assert melanin.shape == (24, 32, 1) and melanin[12, 20] == pytest.approx(0.02, rel=0.1)
     assert (read_image(folder / "maps" / "recoloured.png")[12, 20] < read_image(picture)[12, 20]).all()
     assert not [one for one in (folder / "maps").iterdir() if one.name.startswith(".")]
+
+
+def test_a_colour_of_profile_is_unmixed_back_by_defaults(run: Run, folder: Path) -> None:
+    words = ("profile", "spectral", "--melanin", 0.02, "--blood", 0.01, "--json")
+    colour = json.loads(run(*map(str, words)).stdout)["total"]
+    write_image(folder / "skin.exr", np.broadcast_to(np.float32(colour), (8, 8, 3)))
+    told = json.loads(run("unmix", "skin.exr", "--adapter", "cpu", "--noise", "0.001", "--json").stdout)
+    assert told["melanin"]["median"] == pytest.approx(0.02, rel=UNMIXED)
+    assert told["blood"]["median"] == pytest.approx(0.01, rel=UNMIXED)
+
+
+def test_help_prints_the_default_skin(run: Run) -> None:
+    shown = {
+        name: " ".join(run(name, "--help").stdout.replace("│", " ").split()) for name in ("profile", "unmix")
+    }
+    assert "[default: 0.05, light 0.25, medium 0.25, dark 0.25]" in shown["profile"]
+    assert "[default: 0.018, light 0.005, medium 0.15, dark 0.5]" in shown["profile"]
+    assert "[default: 0.75]" in shown["profile"] and "[default: dj2006]" in shown["profile"]
+    assert "Thickness of its epidermis [mm]. [default: 0.05]" in shown["unmix"]
+    assert "[default: 0.75]" in shown["unmix"] and "[default: 0.7]" in shown["unmix"]
 
 
 def test_tells_medians_in_words(run: Run, picture: Path) -> None:

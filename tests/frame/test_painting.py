@@ -16,13 +16,14 @@ from dermis.frame.painted import with_painted_maps
 from dermis.frame.passes.painting import given, paint
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
-from dermis.human.skin.colours import EPIDERMIS_MM, colours, mean_colour
+from dermis.human.skin.colours import colours, mean_colour
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.movements import MOVEMENTS, movements
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import FIELDS, Painting, painting
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.scene.lights import studio
 from dermis.scene.model import Scene
 
@@ -83,7 +84,7 @@ def test_colours_are_those_of_the_pigments(device: Device, surface: Painting, he
     outside = on & (fields(head, surface, "lips") < -6) & (fields(head, surface, "lids") > 0.5)
     assert outside.sum() > 0.9 * on.sum()
     bare = maps.colour[outside][::37]
-    table = colours(BARE.eumelanin, BARE.oxygen, EPIDERMIS_MM)
+    table = colours(BARE.eumelanin, BARE.oxygen, DEFAULT_SKIN.epidermis_mm)
     melanin, blood = np.meshgrid(
         BARE.melanin * 2 ** np.linspace(-2, 2, 81), BARE.blood * 2 ** np.linspace(-2, 4, 121)
     )

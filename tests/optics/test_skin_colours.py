@@ -11,12 +11,13 @@ from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.hankel import STILL
 from dermis.optics.diffusion.models import transform
 from dermis.optics.media import Floats
-from dermis.optics.pigments.skin import SkinParameters, mixed_layers, spectral_medium
+from dermis.optics.pigments.parameters import DEFAULT_SKIN as FACE
+from dermis.optics.pigments.parameters import SkinParameters
+from dermis.optics.pigments.skin import mixed_layers, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.skin_colours import colour_table
 from dermis.optics.tissue import load_tissue
 
-FACE = SkinParameters(epidermis_mm=0.05)
 WORST, WORST_LIVING = 0.004, 0.0015
 """What the table's docstring promises: anywhere, and for skin with at least 0.001 of melanin and blood."""
 
@@ -57,9 +58,7 @@ def test_table_is_near_what_it_stands_for(thickness: float, least: float, worst:
 def test_nodes_are_the_tissues_own_colours() -> None:
     table = colour_table(FACE)
     melanin, blood = (8 / 64) ** 2, (4 / 64) ** 2
-    tissue = load_tissue(
-        "spectral", pigments={"melanin": melanin, "blood": blood, "epidermis_mm": FACE.epidermis_mm}
-    )
+    tissue = load_tissue("spectral", pigments={"melanin": melanin, "blood": blood})
     assert table.read(np.array([melanin]), np.array([blood]))[0] == pytest.approx(
         tissue.profile().total, abs=1e-9
     )

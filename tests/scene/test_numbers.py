@@ -16,7 +16,7 @@ from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eyes import EyeLook
-from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.pigments.parameters import SkinParameters
 from dermis.scene import Environment, Skin
 from dermis.scene.camera import Camera
 from dermis.scene.field_errors import Because, ImpossibleError, bounds_of, number_fields

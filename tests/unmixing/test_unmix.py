@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.unmixing.change import Change, Share, share_of
-from dermis.apps.inverse.unmixing.model import FACE, Third, skin_model
+from dermis.apps.inverse.unmixing.model import Third, skin_model
 from dermis.apps.inverse.unmixing.on_device import Unmixer
 from dermis.apps.inverse.unmixing.solve import solve, weights_of
 from dermis.apps.inverse.unmixing.unmix import unmix
@@ -18,6 +18,7 @@ from dermis.gpu import failures
 from dermis.gpu.device import Device
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.optics.pigments.skin import spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
@@ -33,7 +34,7 @@ def shares(count: int, seed: int = 3) -> tuple[Floats, Floats]:
 
 def exact(melanin: float, blood: float) -> Floats:
     """The colour by diffusion at each wavelength, without a table."""
-    medium = spectral_medium("dj2006", replace(FACE, melanin=melanin, blood=blood))
+    medium = spectral_medium("dj2006", replace(DEFAULT_SKIN, melanin=melanin, blood=blood))
     total = diffusion_profile(medium, "layered", "layer").total
     return np.asarray((1.0 - normal_reflectance(1.4)) * total @ rgb_weights(WAVELENGTHS_NM).T)
 
@@ -93,14 +94,14 @@ def test_the_device_finds_what_float64_finds(device: Device, colours: Pixels, th
 
 
 def test_blood_that_melanin_hides_is_what_is_usual() -> None:
-    thick = replace(FACE, epidermis_mm=0.25)
+    thick = replace(DEFAULT_SKIN, epidermis_mm=0.25)
     found = solve(skin_model(thick), skin_model(thick).colours(np.array([0.4]), np.array([0.1])))
     assert 0.005 < found.blood[0] < 0.03 and found.blood_sd[0] > found.blood[0]
     assert found.melanin[0] == pytest.approx(0.4, rel=0.02)
 
 
 def test_oxygen_is_found_where_it_shows() -> None:
-    pale = replace(FACE, oxygen=0.4)
+    pale = replace(DEFAULT_SKIN, oxygen=0.4)
     colour = skin_model(pale).colours(np.array([0.01]), np.array([0.03]))
     held, free = (solve(skin_model(third=one), colour) for one in ("none", "oxygen"))
     assert 0.35 < free.third[0] < 0.6

@@ -72,9 +72,11 @@ def check_numbers(owner: object, ranges: Mapping[str, tuple[float, float]], pref
 
 def _within(value: object, low: float, high: float) -> int | float | None:
     """The value as Python's number; None for what is none, or not in the range."""
-    import numpy as np
+    found: Any = value
+    if type(value) not in (int, float):  # numbers of a default need no NumPy
+        import numpy as np
 
-    found: Any = value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
+        found = value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
     is_number = isinstance(found, int | float) and not isinstance(found, bool)
     return found if is_number and low <= found <= high else None
 

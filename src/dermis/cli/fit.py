@@ -35,7 +35,8 @@ def fit(
 
     The head must be of the right shape, before the camera that took the photograph. Written are scene.toml,
     which dermis render takes, with its light and person, the table fit.json, and photo, fit and difference
-    as PNG.
+    as PNG. Eumelanin, oxygen and the thickness of the epidermis are held at the scene's, or else at the
+    default skin's, which dermis profile --help prints.
 
     Examples:
 

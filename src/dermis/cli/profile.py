@@ -12,9 +12,21 @@ from dermis.base.console import note, print_json, print_lines, progress
 from dermis.base.errors import refuse
 from dermis.base.quantities import number, whole_number
 from dermis.cli.options import NOTHING, Json, Output, Whole, option_name, options_of, parse_lengths
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.scene.skin import Pigments
 
 _NAMES = {"structure": "skin"}
+
+
+def _defaults() -> dict[str, str]:
+    """Default of each pigment: the default skin's, and those of other skins where they differ."""
+    found: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
+    for field in Pigments.model_fields.keys() - found.keys():
+        usual, own = getattr(DEFAULT_SKIN, field), {name: getattr(one, field) for name, one in SKINS.items()}
+        others = [f"{name} {value:g}" for name, value in own.items() if value != usual]
+        found[field] = ", ".join([f"{usual:g}", *others])
+    return found
+
 
 if TYPE_CHECKING:
     from dermis.optics.media import Floats
@@ -23,7 +35,7 @@ if TYPE_CHECKING:
 
     PigmentOptions = dict[str, Any]
 else:
-    PigmentOptions = options_of(Pigments, names=_NAMES)
+    PigmentOptions = options_of(Pigments, names=_NAMES, defaults=_defaults())
 
 Model = Literal["counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
 Flag = Annotated[bool, Parameter(negative="")]

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from dermis.base.console import print_json, print_lines, progress
 from dermis.cli.options import Adapter, Json
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
     from dermis.apps.inverse.unmixing.change import Change
@@ -28,9 +29,9 @@ def unmix(
     oxygen: float | None = None,
     eumelanin: float | None = None,
     find: Literal["none", "oxygen"] = "none",
-    model_oxygen: float | None = None,
-    model_eumelanin: float | None = None,
-    epidermis_mm: float | None = None,
+    model_oxygen: float = DEFAULT_SKIN.oxygen,
+    model_eumelanin: float = DEFAULT_SKIN.eumelanin,
+    epidermis_mm: float = DEFAULT_SKIN.epidermis_mm,
     noise: float = 0.01,
     shading: Annotated[bool, Parameter(negative="")] = False,
     widths: Annotated[bool, Parameter(negative="")] = False,
@@ -72,11 +73,11 @@ def unmix(
     find:
         oxygen: find that too, as far as colour tells; 0.1 around the model's is held likely.
     model_oxygen:
-        Of the skin in the picture, 0 to 1 [0.75].
+        Of the skin in the picture, 0 to 1.
     model_eumelanin:
-        Of the skin in the picture, 0 to 1 [0.7].
+        Of the skin in the picture, 0 to 1.
     epidermis_mm:
-        Thickness of its epidermis [0.05].
+        Thickness of its epidermis [mm].
     noise:
         Standard deviation of a channel, relative; what is known of melanin and blood follows from it.
     shading:
@@ -86,22 +87,18 @@ def unmix(
     adapter:
         Which adapter computes: auto, cpu or part of a name.
     """
-    from dataclasses import replace
-
     from dermis.apps.inverse.unmixing.files import SUMMARY, save
-    from dermis.apps.inverse.unmixing.model import FACE
     from dermis.apps.inverse.unmixing.unmix import unmix as unmixed
     from dermis.base.atomic_write import check_folder
-    from dermis.cli.options import given
 
     started = time.perf_counter()
     check_folder(output, SUMMARY)
     change = _change(melanin, blood, oxygen, eumelanin)
-    own = given(oxygen=model_oxygen, eumelanin=model_eumelanin, epidermis_mm=epidermis_mm)
+    skin = SkinParameters(oxygen=model_oxygen, eumelanin=model_eumelanin, epidermis_mm=epidermis_mm)
     with progress("unmixing") as told:
         found = unmixed(
             colour_map,
-            skin=replace(FACE, **own),
+            skin=skin,
             third=find,
             noise=noise,
             shading=shading,

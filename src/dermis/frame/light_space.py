@@ -12,8 +12,7 @@ from dermis.frame.passes.outputs.light import LightSpace
 from dermis.frame.passes.outputs.pigments import Pigmented
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
-from dermis.optics.pigments.skin import EXAMPLES, SkinParameters
-from dermis.optics.tissue import SPECTRAL
+from dermis.optics.pigments.parameters import SKINS, SkinParameters
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 from dermis.scene.tissue import tissue_of
@@ -75,7 +74,7 @@ def _pigmented(asked: Asked) -> Pigmented:
     found = _parameters(asked.skin)
     if found is None:
         culprit = next(name for name in asked.outputs if name in _PIGMENTS)
-        skins = ", ".join((SPECTRAL, *EXAMPLES))
+        skins = ", ".join(SKINS)
         expected = f"a person's painted skin, or a profile made of pigments ({skins} or a file's)"
         came = f"profile {asked.skin.profile} on {asked.head.name}"
         refuse(f"output {culprit}", expected, came, "Choose one of them, or leave the output out")

@@ -11,7 +11,8 @@ from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.hankel import STILL
 from dermis.optics.diffusion.models import transform
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
-from dermis.optics.pigments.skin import SkinParameters, mixed_layers
+from dermis.optics.pigments.parameters import SkinParameters
+from dermis.optics.pigments.skin import mixed_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _NODES = 65

@@ -19,12 +19,10 @@ from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.fits.targets import Rings
 from dermis.optics.half_space import ALBEDOS
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium, media, medium_from_toml
-from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
+from dermis.optics.pigments.parameters import DEFAULT_STRUCTURE, SKINS, SkinParameters, Structure
+from dermis.optics.pigments.skin import spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.radial import RadialProfile
-
-SPECTRAL = "spectral"
-_STRUCTURE: Structure = "dj2006"
 
 ProfileModel = Model | Literal["counted"]
 """A diffusion model, or photons counted beforehand for half-spaces of one medium."""
@@ -117,7 +115,7 @@ class Tissue:
 
 def names() -> tuple[str, ...]:
     """Names that `load_tissue` knows without a file."""
-    return (*media(), SPECTRAL, *EXAMPLES)
+    return (*media(), *SKINS)
 
 
 def load_tissue(
@@ -132,9 +130,8 @@ def load_tissue(
     """
     named_path(name, "a tissue")
     given = _known(pigments or {})
-    if str(name) == SPECTRAL or str(name) in EXAMPLES:
-        example = EXAMPLES.get(str(name), SkinParameters())
-        return _spectral(str(name), structure or _STRUCTURE, example, given)
+    if str(name) in SKINS:
+        return _spectral(str(name), structure or DEFAULT_STRUCTURE, SKINS[str(name)], given)
     if str(name) not in media() and Path(name).suffix.lower() != ".toml":
         known = ", ".join(names())
         refuse(f"tissue {name}", f"one of {known}, or a .toml file", "it is none of these", "Check the name")
@@ -143,7 +140,7 @@ def load_tissue(
         return _from_skin_table(Path(name), document, structure, given)
     if given:
         option = "--" + next(iter(given)).replace("_", "-")
-        skins = ", ".join((SPECTRAL, *EXAMPLES))
+        skins = ", ".join(SKINS)
         refuse(option, f"a skin made of pigments ({skins})", f"{name} came", "Leave it out, or take a skin")
     medium = media()[str(name)] if str(name) in media() else medium_from_toml(Path(name), document)
     return Tissue(medium)
@@ -171,7 +168,7 @@ def _from_skin_table(
     if not isinstance(table, dict) or set(document) - {"skin", "name"}:
         refuse(path, "a table [skin] and a name only", "it holds something else", "Take the rest out")
     own = dict(table)
-    structure = own.pop("structure", _STRUCTURE)
+    structure = own.pop("structure", DEFAULT_STRUCTURE)
     unknown = sorted(set(own) - fields)
     if unknown:
         known = ", ".join(sorted({"structure", *fields}))

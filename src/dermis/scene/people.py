@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.human.person import Human
-from dermis.human.skin.colours import EPIDERMIS_MM
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL
 from dermis.scene.skin import Pigments, Skin
 
 
@@ -20,6 +20,6 @@ def skin_of(person: Human, base: Skin | None = None) -> Skin:
         eumelanin=look.eumelanin,
         blood=look.blood,
         oxygen=look.oxygen,
-        epidermis_mm=EPIDERMIS_MM,
+        epidermis_mm=DEFAULT_SKIN.epidermis_mm,
     )
-    return Skin(**((base or Skin()).model_dump() | {"profile": "spectral", "pigments": own}))
+    return Skin(**((base or Skin()).model_dump() | {"profile": SPECTRAL, "pigments": own}))

@@ -7,12 +7,12 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from dermis.base.errors import refuse, shown_value
+from dermis.optics.pigments.parameters import Structure
 from dermis.scene.field_errors import Because
 from dermis.scene.plain import Plain, slider
 from dermis.scene.talk import Energy, SpecularColour
 from dermis.specular.models import FresnelName, SpecularName
 
-StructureName = Literal["dj2006", "donner2008", "biospec"]
 DirectionName = Literal["lambertian", "half-space"]
 MOST_LAYERS = 8
 MOST_OTHERS = 2
@@ -36,7 +36,7 @@ _COEFFICIENT = Field(json_schema_extra=slider(1e-4, 50, log=True))
 class Pigments(Plain):
     """What replaces the pigments of a skin made of them; None leaves the skin's own."""
 
-    structure: StructureName | None = None
+    structure: Structure | None = None
     """Layers of the skin: "dj2006" has two, "donner2008" a sheet of melanin too, "biospec" four."""
     melanin: Annotated[_Share, Field(json_schema_extra=slider(0.0005, 0.6, log=True))] = None
     """Share of the epidermis' volume that is melanosomes."""

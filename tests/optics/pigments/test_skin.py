@@ -13,7 +13,8 @@ from dermis.base.errors import DermisError
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.media import Floats, Layer
 from dermis.optics.pigments.chromophores import baseline, blood, donner_jensen_2006, jacques_1998, melanosome
-from dermis.optics.pigments.skin import EXAMPLES, LEAKED_MELANIN, SkinParameters, Structure, spectral_medium
+from dermis.optics.pigments.parameters import SKINS, SkinParameters, Structure
+from dermis.optics.pigments.skin import LEAKED_MELANIN, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 STRUCTURES: tuple[Structure, ...] = get_args(Structure)
@@ -130,13 +131,14 @@ def test_oil_changes_nothing_below_the_surface(structure: Structure) -> None:
 
 
 def test_examples_are_the_published_rows() -> None:
-    rows = {n: (p.melanin, p.eumelanin, p.blood, p.oiliness) for n, p in EXAMPLES.items()}
-    assert rows == {
-        "light": (0.005, 0.7, 0.005, 0.3),
-        "medium": (0.15, 0.0, 0.01, 0.3),
-        "dark": (0.5, 0.7, 0.05, 0.3),
+    rows = {
+        n: (p.melanin, p.eumelanin, p.blood, p.oiliness, p.oxygen, p.epidermis_mm) for n, p in SKINS.items()
     }
-    colours = [colour(layer("dj2006", "epidermis", EXAMPLES[n])) for n in ("light", "medium", "dark")]
+    assert list(rows) == ["spectral", "light", "medium", "dark"]
+    assert rows["light"] == (0.005, 0.7, 0.005, 0.3, 0.75, 0.25)
+    assert rows["medium"] == (0.15, 0.0, 0.01, 0.3, 0.75, 0.25)
+    assert rows["dark"] == (0.5, 0.7, 0.05, 0.3, 0.75, 0.25)
+    colours = [colour(layer("dj2006", "epidermis", SKINS[n])) for n in ("light", "medium", "dark")]
     assert (np.diff(colours, axis=0) < 0.0).all()
 
 

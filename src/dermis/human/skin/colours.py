@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.skin.look import SkinLook
-from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.skin_colours import ColourTable, colour_table
 
-EPIDERMIS_MM = 0.05
-"""Thickness of the epidermis of the face, an artist's value within what is measured, 0.05 to 0.1 [mm]."""
 LIP_EPIDERMIS_MM = 0.03
 """What stands over the blood of the lips, which shows through more than elsewhere [mm]."""
 _ALONE = Lock()  # the frame and the painting ask for the same table at the same time
@@ -32,11 +30,12 @@ def _colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTabl
 
 def mean_colour(look: SkinLook) -> NDArray[np.float64]:
     """(3,) colour of the skin of usual places, linear Rec. 709 [-]."""
-    table = colours(look.eumelanin, look.oxygen, EPIDERMIS_MM)
+    table = colours(look.eumelanin, look.oxygen, DEFAULT_SKIN.epidermis_mm)
     return np.asarray(table.read(np.array([look.melanin]), np.array([look.blood]))[0])
 
 
 def colour_tables(look: SkinLook) -> NDArray[np.float32]:
     """(2, n, n, 3) colours of the face's skin and of the lips', as `ColourTable` has them."""
-    both = [colours(look.eumelanin, look.oxygen, mm).colours for mm in (EPIDERMIS_MM, LIP_EPIDERMIS_MM)]
+    thick = DEFAULT_SKIN.epidermis_mm, LIP_EPIDERMIS_MM
+    both = [colours(look.eumelanin, look.oxygen, mm).colours for mm in thick]
     return np.stack(both).astype(np.float32)

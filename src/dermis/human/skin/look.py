@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 from dermis.base.quantities import check_numbers
+from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
 RANGES = {"seed": (0, 2**32 - 1)}
 """Least and greatest values of fields that do not go from 0 to 1."""
@@ -31,13 +32,13 @@ class SkinLook:
     age : depth of folds and lines, from youth to old age, 0 to 1 [-]
     seed : which spots and lines, any integer from 0
 
-    The epidermis is `colours.EPIDERMIS_MM` thick; absorption goes with melanin times thickness.
+    The epidermis is as thick as the default skin's; absorption goes with melanin times thickness.
     """
 
-    melanin: float = 0.018
-    eumelanin: float = 0.7
-    blood: float = 0.010
-    oxygen: float = 0.75
+    melanin: float = DEFAULT_SKIN.melanin
+    eumelanin: float = DEFAULT_SKIN.eumelanin
+    blood: float = DEFAULT_SKIN.blood
+    oxygen: float = DEFAULT_SKIN.oxygen
     redness: float = 0.5
     freckles: float = 0.1
     moles: float = 0.3

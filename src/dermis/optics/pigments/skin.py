@@ -1,16 +1,14 @@
-"""Skin from a handful of parameters: structures of layers with an absorption and scattering spectrum each."""
+"""Structures of the layers of a skin, each with an absorption and a scattering spectrum."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Final, Literal, get_args
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final, get_args
 
 import numpy as np
 
 from dermis.base.errors import refuse, shown_value
-from dermis.base.quantities import number
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
 from dermis.optics.pigments.chromophores import (
     DERMIS_SHARE,
@@ -20,9 +18,8 @@ from dermis.optics.pigments.chromophores import (
     donner_jensen_2006,
     melanosome,
 )
+from dermis.optics.pigments.parameters import SkinParameters, Structure
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, visible
-
-Structure = Literal["dj2006", "donner2008", "biospec"]
 
 LEAKED_MELANIN: Final = 0.175
 """Absorption of the sheet under the epidermis over that of the epidermis' melanin, after [Donner2008] [-]."""
@@ -30,57 +27,8 @@ LEAKED_MELANIN: Final = 0.175
 _SHEET_MM = 0.001
 _CORNEUM_MM, _PAPILLARY_MM = 0.01, 0.2
 _RETICULAR_BLOOD = 0.0091 / 0.012
-EPIDERMIS_MM = 1e-3, 2.0
-"""From less than a cell to a callous heel."""
 _ONE_INDEX = f"all layers have the index {SKIN_ETA:g}: light meets no surface between them"
 _THIN = "the multipole misjudges so thin a layer: take layered diffusion"
-
-
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
-
-
-@dataclass(frozen=True)
-class SkinParameters:
-    """What a skin is made of.
-
-    melanin : share of the epidermis' volume that is melanosomes, 0 to 1 [-]
-    eumelanin : share of the melanosomes that hold eumelanin, the rest holds pheomelanin, 0 to 1 [-]
-    blood : share of the dermis' volume that is blood, 0 to 1 [-]
-    oxygen : share of the haemoglobin that carries oxygen, 0 to 1 [-]
-    epidermis_mm : thickness of the epidermis; 0.25 is a scene's of public code, others take 0.05 to 0.2 [mm]
-    epidermal_blood : share of the epidermis' volume that is blood, in "donner2008" only, 0 to 1 [-]
-    oiliness : gain of the surface's reflection (rho_s), 0 to 1; nothing below the surface depends on it [-]
-
-    Source: [DonnerJensen2006, DonnerJensen2006a]; [Donner2008] for blood in the epidermis.
-    """
-
-    melanin: float = 0.005
-    eumelanin: float = 0.7
-    blood: float = 0.005
-    oxygen: float = 0.75
-    epidermis_mm: float = 0.25
-    epidermal_blood: float = 0.0
-    oiliness: float = 0.3
-
-    def __post_init__(self) -> None:
-        for name in ("melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "oiliness"):
-            number(_option(name), getattr(self, name), 0.0, 1.0, "a share")
-        number(_option("epidermis_mm"), self.epidermis_mm, *EPIDERMIS_MM, "mm")
-        if self.melanin + self.epidermal_blood > 1.0:
-            both = f"{_option('melanin')} and {_option('epidermal_blood')}"
-            came = f"{self.melanin:g} and {self.epidermal_blood:g} came"
-            refuse(both, "at most 1 together", came, "Lower one")
-
-
-EXAMPLES: Final[Mapping[str, SkinParameters]] = MappingProxyType(
-    {
-        "light": SkinParameters(melanin=0.005, eumelanin=0.7, blood=0.005),
-        "medium": SkinParameters(melanin=0.15, eumelanin=0.0, blood=0.01),
-        "dark": SkinParameters(melanin=0.5, eumelanin=0.7, blood=0.05),
-    }
-)
-"""The three skins that [DonnerJensen2006a] tabulates; of light that meets the last, 2 % return."""
 
 
 def spectral_medium(

@@ -12,7 +12,7 @@ from dermis.apps.inverse.fitting import sky
 from dermis.apps.inverse.fitting.frames import Frames
 from dermis.apps.inverse.fitting.linear import fault_by, strengths_by
 from dermis.apps.inverse.fitting.unknowns import SKIN, Point, tangents
-from dermis.human.skin.colours import EPIDERMIS_MM, colours
+from dermis.human.skin.colours import colours
 from dermis.mesh.geometry import fibonacci_sphere
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,9 @@ class Start:
         self._total = float((wanted**2).sum())
         self._lights = len(below)
         pigments = frames.scene.skin.pigments
-        self._table = colours(pigments.eumelanin, pigments.oxygen, EPIDERMIS_MM)  # type: ignore[union-attr, arg-type]
+        assert pigments is not None
+        held = pigments.given()
+        self._table = colours(held["eumelanin"], held["oxygen"], held["epidermis_mm"])
 
     def best(self, count: int) -> Point:
         """The best of all, with so many suns."""

@@ -11,9 +11,9 @@ import numpy as np
 
 from dermis.base.errors import refuse, shown_value
 from dermis.human.person import Human
-from dermis.human.skin.colours import EPIDERMIS_MM
 from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.head import Head
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL
 from dermis.scene.camera import Camera
 from dermis.scene.files import head_table, load_camera, load_scene
 from dermis.scene.given import given_head
@@ -81,11 +81,11 @@ def _person(head: Head) -> Human | None:
 
 def _plain(scene: Scene) -> Scene:
     """Without light, and with what is held of the skin's pigments."""
-    own: dict[str, Any] = {"epidermis_mm": EPIDERMIS_MM, "eumelanin": 0.7, "oxygen": 0.75}
+    own = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):
         look = scene.head.maps.look
         own |= {"eumelanin": look.eumelanin, "oxygen": look.oxygen}
     if scene.skin.pigments is not None:
         own |= scene.skin.pigments.given()
-    held = {"profile": "spectral", "pigments": Pigments(**own)}
+    held = {"profile": SPECTRAL, "pigments": Pigments(**own)}
     return replace(scene, lights=(), environment=None, skin=Skin(**(scene.skin.model_dump() | held)))

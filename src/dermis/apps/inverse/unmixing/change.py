@@ -9,7 +9,7 @@ import numpy as np
 from dermis.base.errors import refuse
 from dermis.base.quantities import number
 from dermis.optics.media import Floats
-from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.pigments.parameters import SkinParameters
 
 _FACTORS = 0.0, 100.0
 

@@ -10,14 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse, shown_value
-from dermis.human.skin.colours import EPIDERMIS_MM
 from dermis.optics.media import Floats
-from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.skin_colours import colour_table
 
 Third = Literal["none", "oxygen", "shade"]
-FACE = SkinParameters(melanin=0.0, blood=0.0, epidermis_mm=EPIDERMIS_MM)
-"""The skin whose melanin and blood are looked for, unless another is given."""
 DARKEST = 1e-4
 """What darker colours are taken for: no skin is [-]."""
 USUAL_BLOOD, BLOOD_SPREAD = 0.1, 0.1
@@ -90,7 +87,7 @@ def _mixed(pair: Floats, share: Floats) -> Floats:
     return np.asarray(pair[0] + share * (pair[1] - pair[0]))
 
 
-def skin_model(skin: SkinParameters = FACE, third: Third = "none") -> SkinModel:
+def skin_model(skin: SkinParameters = DEFAULT_SKIN, third: Third = "none") -> SkinModel:
     """The colours of all skins like this one, by layered diffusion; its own melanin and blood are ignored.
 
     third : what colour is to tell beside melanin and blood; "none" holds the skin's own oxygen

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from dermis.apps.inverse.unmixing.model import skin_model
 from dermis.apps.inverse.unmixing.on_device import Unmixer
 from dermis.gpu import Device
-from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.pigments.parameters import SkinParameters
 
 Pixels = NDArray[np.float32]
 _SIDE = 256  # of the picture that is looked at

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.inverse.unmixing.change import Change
-from dermis.apps.inverse.unmixing.model import FACE, SkinModel, Third, skin_model
+from dermis.apps.inverse.unmixing.model import SkinModel, Third, skin_model
 from dermis.apps.inverse.unmixing.on_device import Unmixer, recoloured
 from dermis.apps.inverse.unmixing.shading import shading_of
 from dermis.base.errors import refuse
@@ -22,7 +22,7 @@ from dermis.gpu.failures import LazyDevice
 from dermis.images.colour import delta_e_2000
 from dermis.images.io import Picture
 from dermis.optics.media import Floats
-from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 Pixels = NDArray[np.float32]
 NOISE = 0.01
@@ -128,7 +128,7 @@ def _spread(values: Floats) -> dict[str, float]:
 def unmix(
     picture: str | Path | Picture | ArrayLike,
     *,
-    skin: SkinParameters = FACE,
+    skin: SkinParameters = DEFAULT_SKIN,
     third: Third = "none",
     noise: float = NOISE,
     shading: bool = False,

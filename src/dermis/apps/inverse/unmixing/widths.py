@@ -18,7 +18,7 @@ from dermis.images.hdr import encode_exr
 from dermis.optics.fits.shared import shared_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
-from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.profiles import fit_profile, write_profile
 from dermis.optics.tissue import Tissue, load_tissue
 

@@ -13,9 +13,8 @@ from dermis.apps.viewer.session import Session, apply_regions
 from dermis.apps.viewer.state import ViewerState, changed
 from dermis.base.errors import DermisError
 from dermis.human.regions.table import DEFAULT
-from dermis.optics.pigments.skin import EXAMPLES, SkinParameters
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.optics.profiles import PUBLISHED, preset_names
-from dermis.optics.tissue import SPECTRAL
 from dermis.scene.head_table import AUTO, NO_REGIONS, names_regions
 from dermis.scene.plain import fields_under
 from dermis.scene.skin import MOST_LAYERS, Pigments, Skin, TissueLayer
@@ -23,7 +22,6 @@ from dermis.scene.tissue import layers_of
 
 Layers = tuple[TissueLayer, ...]
 _PROFILE_FIELDS = ("profile", "profile_map", "other_profiles", "albedo", "pigments", "layers")
-_FIRST_STRUCTURE = "dj2006"
 _BLOODY_STRUCTURE = "donner2008"  # the one with blood in its epidermis
 _DERMIS = ("blood", "oxygen")
 _PERCENT = {name: Style(unit=0.01, form="%.2f %%") for name in Pigments.model_fields if "_" not in name}
@@ -34,7 +32,7 @@ _PIGMENTS = _PERCENT | {
     "epidermis_mm": Style("thickness"),
     "epidermal_blood": Style("blood##epidermis", unit=0.01, form="%.2f %%"),
 }
-_SKINS = (PUBLISHED, "skin1", "skin2", "dj3", SPECTRAL, *EXAMPLES)
+_SKINS = (PUBLISHED, "skin1", "skin2", "dj3", *SKINS)
 _NEW_MM = 0.2
 
 
@@ -48,7 +46,7 @@ def draw_profile(session: Session) -> None:
     foods = (name for name in preset_names() if name not in _SKINS)  # and other materials
     combo(session, "profile", skin.profile, (*_SKINS, "", *foods), take, PROFILES)
     draw_fields(session, skin, with_skin, ALBEDO, ["albedo"])
-    if skin.profile in (SPECTRAL, *EXAMPLES):
+    if skin.profile in SKINS:
         _pigments(session, skin)
     elif layers := skin.layers or _named_layers(skin.profile):
         _stack(session, layers)
@@ -78,9 +76,9 @@ def draw_surface(session: Session) -> None:
 
 def _pigments(session: Session, skin: Skin) -> None:
     given = skin.pigments or Pigments()
-    own = EXAMPLES.get(skin.profile, SkinParameters())
+    own = SKINS.get(skin.profile, DEFAULT_SKIN)
     numbers = [name for name in Pigments.model_fields if name != "structure"]
-    defaults = {name: getattr(own, name) for name in numbers} | {"structure": _FIRST_STRUCTURE}
+    defaults = {name: getattr(own, name) for name in numbers} | {"structure": DEFAULT_STRUCTURE}
     values = Pigments(**defaults | given.model_dump(exclude_none=True))
     apply = session.state.with_pigments
     draw_fields(session, values, apply, _PIGMENTS, ["structure"])

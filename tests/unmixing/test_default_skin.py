@@ -1,0 +1,44 @@
+"""One default skin: what one command makes with defaults, the others read with defaults."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tolerances import UNMIXED
+
+import dermis
+from dermis.apps.inverse.fitting.subject import subject_of
+from dermis.human.skin.look import SkinLook
+from dermis.optics.pigments.parameters import DEFAULT_SKIN
+from dermis.optics.tissue import load_tissue
+from dermis.scene.people import skin_of
+
+PIGMENTS = "melanin", "eumelanin", "blood", "oxygen"
+
+
+@pytest.mark.parametrize(("melanin", "blood"), [(0.02, 0.01), (0.1, 0.02)])
+def test_a_colour_of_spectral_skin_is_unmixed_back(melanin: float, blood: float) -> None:
+    colour = load_tissue("spectral", pigments={"melanin": melanin, "blood": blood}).profile().total
+    found = dermis.unmix(np.broadcast_to(colour, (4, 4, 3)), noise=1e-3, adapter="cpu")
+    assert found.melanin == pytest.approx(melanin, rel=UNMIXED)
+    assert found.blood == pytest.approx(blood, rel=UNMIXED)
+
+
+def test_tissue_people_and_fits_start_from_the_same_skin() -> None:
+    assert load_tissue("spectral").parameters == DEFAULT_SKIN
+    look = SkinLook()
+    assert {name: getattr(look, name) for name in PIGMENTS} == {
+        name: getattr(DEFAULT_SKIN, name) for name in PIGMENTS
+    }
+    own = skin_of(dermis.Human()).pigments
+    assert own is not None and own.epidermis_mm == DEFAULT_SKIN.epidermis_mm
+    held = subject_of(dermis.Scene(dermis.Human().head())).scene.skin.pigments
+    assert held is not None and held.epidermis_mm == DEFAULT_SKIN.epidermis_mm
+
+
+def test_the_published_skins_keep_their_thickness() -> None:
+    for name in ("light", "medium", "dark"):
+        parameters = load_tissue(name).parameters
+        assert parameters == replace(parameters, epidermis_mm=0.25, oxygen=0.75)  # type: ignore[type-var]
