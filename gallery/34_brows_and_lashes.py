@@ -11,8 +11,9 @@ Columns: 2
 
 import dermis
 from dermis.apps.gallery.picture import main
+from dermis.human.expressions import expression
 
-BLINK = {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}
+BLINK = expression("closed-eyes")
 PEOPLE = {
     "brown": (dermis.Human(), None),
     "closed": (dermis.Human(), BLINK),

@@ -9,12 +9,12 @@ Columns: 3
 
 import dermis
 from dermis.apps.gallery.picture import main
+from dermis.human.expressions import expression
 from dermis.scene.gaze import looking_at
 
-SMILE = {f"{name}{side}": 0.35 for name in ("mouthSmile", "cheekSquint") for side in ("Left", "Right")}
 PEOPLE = {
     4: dermis.Pose(bones={"neck03": (0, 8, 2), "head": (0, 8, 0)}),
-    14: dermis.Pose(SMILE, {"neck03": (0, 3, -2)}),
+    14: dermis.Pose(expression("faint-smile"), {"neck03": (0, 3, -2)}),
     18: dermis.Pose(bones={"neck03": (0, -8, -2), "head": (2, -8, 0)}),
 }
 

@@ -7,8 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dermis.apps.batch.expressions import mixed, mixture, package_expressions, performed, targets_of
+from dermis.apps.batch.expressions import mixed, mixture, performed
 from dermis.apps.batch.sampling import uniform
+from dermis.human.expressions import EXPRESSIONS, targets_of
 from dermis.human.person import Human
 
 MANY = 3000
@@ -37,7 +38,7 @@ def targets() -> set[str]:
 
 
 def test_all_that_the_package_moves_the_human_has(targets: set[str]) -> None:
-    moved = [name for weights in package_expressions().values() for name in weights]
+    moved = [name for weights in EXPRESSIONS.values() for name in weights]
     moved += [name for part in mixture().values() for one in part for name in one.moves]
     assert set(targets_of(moved)) <= targets
     assert targets_of(["mouthSmile", "jawOpen", "mouthLeft"]) == (
@@ -69,7 +70,7 @@ def test_in_mixtures_nothing_works_against_itself() -> None:
 
 
 def test_left_and_right_differ_by_the_asymmetry_alone() -> None:
-    smile = package_expressions()["smile"]
+    smile = EXPRESSIONS["smile"]
     even = performed(smile, 1.0, 0.0, 0.0, none)
     assert even["mouthSmileLeft"] == even["mouthSmileRight"] == smile["mouthSmile"]
     leaning = performed(smile, 0.5, 0.2, 0.0, none)

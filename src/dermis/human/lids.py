@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.published import EXPRESSIONS, Points, data, moves
+from dermis.human.published import FACE_UNITS, Points, data, moves
 from dermis.human.skin.surface import average, lid_rings
 from dermis.mesh.eyeball import SCLERA_MM, Contact, clearance_mm
 
@@ -185,7 +185,7 @@ def _side(rings: Index, places: Points, body: Index, name: str) -> Side:
 
 def _sliding(rings: Index, point: Index, name: str) -> Index:
     """(c,) points of the lids' skin beyond the rings that a blink moves."""
-    index = moves().names.index(f"{EXPRESSIONS}eyeBlink{name}")
+    index = moves().names.index(f"{FACE_UNITS}eyeBlink{name}")
     part = slice(*moves().first[index : index + 2])
     far = np.linalg.norm(moves().delta_mm[part], axis=1) > _MOVED_MM
     moved = np.intersect1d(moves().point[part][far], point)

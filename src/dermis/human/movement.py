@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.published import EXPRESSIONS, Points, data, moves
+from dermis.human.published import FACE_UNITS, Points, data, moves
 from dermis.mesh.rig import MorphTargets, Skeleton, Turn
 
 _BEGINS: dict[str, tuple[str, str, float]] = {  # a joint, or how far on the way between two
@@ -49,9 +49,9 @@ def expressions() -> MorphTargets:
     """The ARKit blend shapes of the skin, the teeth and the tongue; eyeballs turn by `gaze` instead."""
     moved, names, rows = moves(), list[str](), list[NDArray[np.intp]]()
     for index, name in enumerate(moved.names):
-        if name.startswith(EXPRESSIONS):
+        if name.startswith(FACE_UNITS):
             part = np.arange(*moved.first[index : index + 2])
-            names.append(name.removeprefix(EXPRESSIONS))
+            names.append(name.removeprefix(FACE_UNITS))
             rows.append(part[_moving()[moved.point[part]]])
     first, chosen = np.cumsum([0, *map(len, rows)]), np.concatenate(rows)
     point, delta_mm = moved.point[chosen].astype(np.int32), moved.delta_mm[chosen]

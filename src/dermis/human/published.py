@@ -20,7 +20,7 @@ YOUNG, OLD = 25.0, 90.0
 DELTA_MM = 0.01
 """Of a unit of displacements, here as in the published files."""
 
-EXPRESSIONS = "faceunits/"
+FACE_UNITS = "faceunits/"
 """How the names of the ARKit blend shapes begin."""
 
 
@@ -75,7 +75,7 @@ def check_targets(names: Iterable[str]) -> None:
 @cache
 def human_targets() -> tuple[str, ...]:
     """Names of the published targets by which people differ, for `Human(targets=...)`."""
-    return tuple(name for name in moves().names if not name.startswith((EXPRESSIONS, "expression/")))
+    return tuple(name for name in moves().names if not name.startswith((FACE_UNITS, "expression/")))
 
 
 @cache

@@ -1,20 +1,17 @@
-"""What faces do: expressions by name, and muscles at random that do not work against each other."""
+"""What faces of data sets do: an expression as one face makes it, and muscles at random that do not work
+against each other."""
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from math import exp
 
 from dermis.base.tables import read_rows
-from dermis.human.published import EXPRESSIONS, moves
+from dermis.human.expressions import SIDES, Weights, sided
 
-Weights = Mapping[str, float]
 _JAW = "jawOpen"
-_SIDES = "Left", "Right"
 _SCARCE = 1.5  # power of a uniform number that a weight at random is
 
 
@@ -29,13 +26,6 @@ class Movement:
 
 
 @cache
-def package_expressions() -> Mapping[str, Weights]:
-    """The package's expressions: weights by names of targets or of pairs of them."""
-    text = resources.files(__package__).joinpath("expressions.toml").read_text("utf-8")
-    return dict(tomllib.loads(text))
-
-
-@cache
 def mixture() -> Mapping[str, tuple[Movement, ...]]:
     """Movements by part of the face."""
     found: dict[str, tuple[Movement, ...]] = {}
@@ -45,11 +35,6 @@ def mixture() -> Mapping[str, tuple[Movement, ...]]:
         made = Movement(float(row["chance"]), float(row["most"]), weights, float(row["shuts"]))
         found[row["part"]] = (*found.get(row["part"], ()), made)
     return found
-
-
-def targets_of(names: Iterable[str]) -> tuple[str, ...]:
-    """Targets by name; "mouthSmile" is two of them, left and right."""
-    return tuple(dict.fromkeys(target for name in names for target in _both(name)))
 
 
 def mixed(share: Callable[[str], float]) -> dict[str, float]:
@@ -81,25 +66,14 @@ def performed(
     found = {}
     for name, weight in weights.items():
         much = weight * intensity * exp(variation * normal(name)) if weight else 0.0
-        for target in _both(name):
+        for target in sided(name):
             side = 0.0 if target == name and not _is_side(name) else 1.0 - 2.0 * target.endswith("Right")
             found[target] = min(max(much * (1.0 + asymmetry * side), 0.0), 1.0)
     return found
 
 
-def _both(name: str) -> tuple[str, ...]:
-    return tuple(f"{name}{side}" for side in _SIDES) if f"{name}Left" in _arkit() else (name,)
-
-
 def _is_side(name: str) -> bool:
     """Whether it is one of a pair, which mouthLeft and jawRight are not."""
-    return any(name.endswith(side) for side in _SIDES) and not name.startswith(
+    return any(name.endswith(side) for side in SIDES) and not name.startswith(
         ("jaw", "mouthLeft", "mouthRight")
     )
-
-
-@cache
-def _arkit() -> frozenset[str]:
-    """Names of the human's targets of expressions."""
-    names = moves().names
-    return frozenset(name.removeprefix(EXPRESSIONS) for name in names if name.startswith(EXPRESSIONS))

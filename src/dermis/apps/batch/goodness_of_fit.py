@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, kolmogorov, ndtr
 
 from dermis.apps.batch.distributions import Choice, Constant, Distribution, Files, Normal, Truncated, Uniform
-from dermis.apps.batch.expressions import targets_of
 from dermis.apps.batch.index import index_file
 from dermis.apps.batch.sampling import rounded
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import NONE
+from dermis.human.expressions import targets_of
 
 LEAST_CHANCE = 1e-6
 """Below it, what was drawn is not what is stated."""

@@ -11,8 +11,9 @@ from typing import Any
 from scipy.special import ndtr, ndtri
 
 from dermis.apps.batch.distributions import Constant, Distribution
-from dermis.apps.batch.expressions import Weights, mixed, mixture, performed, targets_of
+from dermis.apps.batch.expressions import mixed, mixture, performed
 from dermis.apps.batch.spec_tables import ANGLES, MIXTURE, NONE, RIG
+from dermis.human.expressions import Weights, targets_of
 
 _BITS = 52  # which a double holds with a half more
 _DIGITS = 6

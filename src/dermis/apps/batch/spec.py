@@ -12,7 +12,6 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, Field, PrivateAttr
 
 from dermis.apps.batch.distributions import Distribution, Files
-from dermis.apps.batch.expressions import package_expressions, targets_of
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
 from dermis.apps.batch.spec_checks import check_spec
@@ -31,6 +30,7 @@ from dermis.apps.batch.spec_tables import (
 from dermis.base.errors import about, refuse, shown_value
 from dermis.base.quantities import whole_number
 from dermis.base.reading import is_file, named_path, read_file, read_toml
+from dermis.human.expressions import EXPRESSIONS, targets_of
 from dermis.human.landmarks.sets import SETS
 from dermis.scene.field_errors import Because, ImpossibleError
 from dermis.scene.plain import Plain
@@ -112,7 +112,7 @@ class Spec(Plain):
 
     def model_post_init(self, context: Any) -> None:
         drawn = _drawn("", self)
-        expressions = {**package_expressions(), **self.expressions}
+        expressions = {**EXPRESSIONS, **self.expressions}
         check_spec(self, drawn, expressions)
         rows = {name: row for group in self.correlated for name, row in group.rows().items()}
         drawing = Sampler(self.seed, self.images_per_person, drawn, rows, expressions)

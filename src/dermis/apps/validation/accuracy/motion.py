@@ -16,6 +16,7 @@ from dermis.formats.maps import load_maps
 from dermis.frame.passes.occlusion import bake_occlusion
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
+from dermis.human.expressions import expression
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import build_mesh
@@ -33,16 +34,16 @@ PEOPLE = {
     "heavy man": Human(0, 0, 1, sex=1, age=25, weight=1),
 }
 EXPRESSIONS: dict[str, dict[str, float]] = {
-    "open jaw": {"jawOpen": 0.8},
-    "smile": {"mouthSmileLeft": 1, "mouthSmileRight": 1, "cheekSquintLeft": 0.7, "cheekSquintRight": 0.7},
-    "blink": {"eyeBlinkLeft": 1, "eyeBlinkRight": 1},
-    "pucker": {"mouthPucker": 1, "mouthFunnel": 0.3},
-    "frown": {"mouthFrownLeft": 1, "mouthFrownRight": 1, "browDownLeft": 1, "browDownRight": 1},
-    "surprise": {"browInnerUp": 1, "eyeWideLeft": 1, "eyeWideRight": 1, "jawOpen": 0.4},
-    "sneer": {"noseSneerLeft": 1, "noseSneerRight": 1, "mouthUpperUpLeft": 0.8, "mouthUpperUpRight": 0.8},
-    "puffed cheeks": {"cheekPuff": 1, "mouthClose": 0.2},
-    "jaw aside": {"jawLeft": 0.8, "jawOpen": 0.2, "mouthLeft": 0.5},
-    "wink": {"eyeBlinkLeft": 1, "mouthSmileLeft": 0.6, "cheekSquintLeft": 1},
+    "open jaw": expression("open-jaw"),
+    "smile": expression("full-smile"),
+    "blink": expression("closed-eyes"),
+    "pucker": expression("full-pucker"),
+    "frown": expression("full-frown"),
+    "surprise": expression("full-surprise"),
+    "sneer": expression("full-sneer"),
+    "puffed cheeks": expression("full-puff"),
+    "jaw aside": expression("jaw-aside"),
+    "wink": expression("wink"),
 }
 VIEWS = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
 SETTINGS = Settings(size=(384, 384), atlas=1024, samples=4)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dermis.environment.panorama import UNIFORM
+from dermis.human.expressions import expression
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.scene.camera import PRESETS, Camera, side, three_quarter
@@ -21,11 +22,6 @@ _SOFTBOX_MM = 500.0
 EYE_MM = 30.0
 """Height of the pictures of an eye."""
 _LIPS_MM, _EAR_MM = 72.0, 120.0
-SMILE = {"jawOpen": 0.18} | {
-    f"{name}{side}": weight
-    for name, weight in (("mouthSmile", 0.7), ("mouthUpperUp", 0.4))
-    for side in ("Left", "Right")
-}
 
 
 @dataclass(frozen=True)
@@ -34,13 +30,13 @@ class View:
 
     camera : before a head
     light : a preset's name, or a panorama's
-    pose : weights of morph targets
+    pose : name of an expression
     times : by how much more paths it takes than others
     """
 
     camera: Callable[[Head], Camera]
     light: str
-    pose: dict[str, float] | None = None
+    pose: str | None = None
     times: float = 1.0
 
 
@@ -93,7 +89,7 @@ VIEWS: dict[str, View] = {
     "profile": View(side, "studio"),
     "eye": View(at_eye, "window", times=2.0),
     "eye from its side": View(at_eye_beside, "window", times=2.0),
-    "lips and teeth": View(at_lips, "studio", SMILE),
+    "lips and teeth": View(at_lips, "studio", "smile-with-teeth"),
     "cheek": View(at_cheek, "studio"),
     "ear from behind": View(behind_ear, "studio"),
     "portrait, window": View(from_front, "window"),
@@ -105,7 +101,7 @@ PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
 
 def scene_of(head: Head, view: View) -> Scene:
     """A head in a view, in lights that have a size: through a refracting cornea no path finds a point."""
-    given = {"camera": view.camera(head), "pose": None if view.pose is None else Pose(view.pose)}
+    given = {"camera": view.camera(head), "pose": None if view.pose is None else Pose(expression(view.pose))}
     if view.light in PANORAMAS:
         return Scene(head, environment=Environment(name=view.light), **given)  # type: ignore[arg-type]
     lights = tuple(softbox(light) for light in preset_lights(view.light))

@@ -13,18 +13,15 @@ from dermis.apps.export.targets.web.packing import Packer
 from dermis.base.errors import refuse
 from dermis.frame.inputs import Inputs
 from dermis.gpu.capture import CapturedFrame, CapturedPass
+from dermis.human.expressions import expression
 from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.pose import Pose
 from dermis.scene.model import Scene
 
 Json = dict[str, Any]
 Floats = NDArray[np.float32]
-EXPRESSIONS = {
-    "smile": {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0, "cheekSquintLeft": 0.6, "cheekSquintRight": 0.6},
-    "open mouth": {"jawOpen": 0.7},
-    "frown": {"browDownLeft": 1.0, "browDownRight": 1.0, "mouthFrownLeft": 0.8, "mouthFrownRight": 0.8},
-}
-"""Weights of morph targets at a dial's end."""
+_EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown": "full-frown"}
+"""Expressions at a dial's end, by the dial's name."""
 _ROUGHER = (0.5, 1.0, 1.7)
 FACTORS = (0.4, 1.0, 3.0)
 """Of a person's own melanin and blood."""
@@ -126,9 +123,10 @@ def _roughness(scene: Scene) -> Dial:
 
 def _expressions(scene: Scene) -> list[Dial]:
     known = set(scene.head.targets)
+    ends = {dial: expression(name) for dial, name in _EXPRESSIONS.items()}
     return [
         Dial(name, (0.0, 1.0), 0.0, (None, replace(scene, pose=Pose(weights))), moves=True)
-        for name, weights in EXPRESSIONS.items()
+        for name, weights in ends.items()
         if known >= set(weights)
     ]
 
