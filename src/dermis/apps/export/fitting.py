@@ -1,4 +1,4 @@
-"""Burley's lobe R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r), which most engines have, and its fit."""
+"""Fits of what a target can show (a lobe, a medium, a curve of one shape) to a profile, and their errors."""
 
 from __future__ import annotations
 
@@ -14,14 +14,18 @@ from dermis.optics.half_space import Kind, albedo_of, half_space
 from dermis.optics.media import Floats
 from dermis.optics.radial import TINY
 
-_HALF = 1.58  # radius within which half of the light leaves, by d
-_FACTOR = 30.0  # between the width that fits the median alone and any that is tried
-_HALVINGS = 40
+_BURLEY_MEDIAN = 1.58  # radius within which half of the light leaves, by d
+_REACH = np.log(30.0)  # of sizes about the one of the same median
+_HALVINGS, _MEDIUM_HALVINGS = 40, 30
 _THINNEST_MM = 1e-9
+_FARTHEST, _DISTANCES = 12.0, 97  # of an edge's distances, in median radii
+_LEAST, _MOST, _NODES = 1e-2, 60.0, 400  # radii that a fit is judged at, by the true median
+_KNOWN = np.geomspace(1e-4, 1e4, 2000)
+_SPAN, _EXACT = 2.0, 1e-4  # logarithms of lengths: about the one of the same median, and the tolerance
 
 
 def lobe(d_mm: ArrayLike, energy: ArrayLike) -> Curve:
-    """The curve of a lobe of a width d for each channel.
+    """Return the curve of Burley's lobe R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
 
     d_mm : (3,) above 0 [mm]
     energy : (3,) A [-]
@@ -31,32 +35,23 @@ def lobe(d_mm: ArrayLike, energy: ArrayLike) -> Curve:
 
 
 def fit_d(curve: Curve) -> Floats:
-    """Widths d (3,) of the lobes whose cumulative profiles differ least from the curve at their worst [mm].
+    """Return the widths d (3,) of the lobes with the least largest difference from a cumulative profile [mm].
 
-    A wider lobe has less light within each radius, so its largest surplus falls with d and its largest lack
-    grows: where they are equal, the difference is least. Least squares would weigh radii as they are spaced.
+    Least squares would weigh radii as they are spaced.
     """
-    return np.array([_fit(curve.radii_mm, curve.share[:, i]) for i in range(3)])
-
-
-def _fit(radius_mm: Floats, share: Floats) -> float:
-    middle = np.log(np.interp(0.5, share, radius_mm) / _HALF)
-    low, high = middle - np.log(_FACTOR), middle + np.log(_FACTOR)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        one = BurleyProfile(np.ones(1), np.exp(np.array([-middle])))
-        surplus = one.within(radius_mm)[:, 0] - share
-        low, high = (middle, high) if surplus.max() > -surplus.min() else (low, middle)
-    return float(np.exp(0.5 * (low + high)))
-
-
-_ROUNDS = 40
-_REACH = np.log(30.0)  # of sizes about that with the same median
+    median = np.array([np.interp(0.5, curve.share[:, i], curve.radii_mm) for i in range(3)])
+    middle = np.log(median / _BURLEY_MEDIAN)
+    return _balanced(
+        lambda d: BurleyProfile(np.ones(3), np.exp(-d)).within(curve.radii_mm) - curve.share,
+        middle - _REACH,
+        middle + _REACH,
+        _HALVINGS,
+    )
 
 
 def resized(unit: Curve, size_mm: ArrayLike) -> Curve:
-    """A curve whose lengths are in a unit, with a unit (3,) for each channel."""
-    size = np.maximum(np.asarray(size_mm, np.float64), 1e-9)
+    """Return a curve whose lengths are in a unit, with a unit (3,) for each channel."""
+    size = np.maximum(np.asarray(size_mm, np.float64), _THINNEST_MM)
 
     def within(radius_mm: Floats) -> Floats:
         return np.stack([unit.within(radius_mm / size[i])[:, i] for i in range(3)], axis=-1)
@@ -65,77 +60,65 @@ def resized(unit: Curve, size_mm: ArrayLike) -> Curve:
 
 
 def nearest_size(curve: Curve, unit: Curve) -> Floats:
-    """Units (3,) with the least largest difference from a curve: surplus and lack are equal there [mm]."""
+    """Return the units (3,) with the least largest difference from a curve [mm]."""
     middle = np.log(curve.radius_of(0.5) / unit.radius_of(0.5))
-    low, high = middle - _REACH, middle + _REACH
-    for _ in range(_ROUNDS):
-        middle = 0.5 * (low + high)
-        over = resized(unit, np.exp(middle)).share - curve.share
-        wider = over.max(axis=0) > -over.min(axis=0)
-        low, high = np.where(wider, middle, low), np.where(wider, high, middle)
-    return np.asarray(np.exp(middle))
+    return _nearest(curve, unit, middle, _REACH, _HALVINGS - 1)
 
 
 @dataclass(frozen=True)
 class Homogeneous:
-    """A half-space of one medium, scattering made isotropic.
+    """A half-space of one medium with isotropic scattering.
 
-    albedo : (3,) of one scattering, reduced [-]
+    albedo : (3,) single-scattering albedo, reduced [-]
     mfp_mm : (3,) reduced mean free path [mm]
-    curve : what it shows
+    curve : of the light that leaves it
     """
 
     albedo: Floats
     mfp_mm: Floats
     curve: Curve
 
-    @property
-    def sigma_s_prime(self) -> Floats:
-        """(3,) reduced scattering [1/mm]."""
-        return self.albedo / self.mfp_mm
-
-    @property
-    def sigma_a(self) -> Floats:
-        """(3,) absorption [1/mm]."""
-        return (1.0 - self.albedo) / self.mfp_mm
-
 
 def homogeneous(curve: Curve, energy: Floats | None = None, kind: Kind = "skin") -> Homogeneous:
-    """The medium with a curve's energy whose cumulative profile is nearest to the curve.
+    """Return the medium with a curve's energy whose cumulative profile is nearest to the curve.
 
     energy : (3,) total that it has instead, a colour's [-]
     kind : surface and light of the half-space
     """
     albedo = albedo_of(kind, curve.energy if energy is None else energy)
-    wide = fit_d(half_space(kind, albedo, np.ones(3)))
-    mfp = fit_d(curve) / wide  # both are as wide as the same lobe
-    mfp = _nearest(curve, kind, albedo, mfp)
+    unit = half_space(kind, albedo, np.ones(3))
+    middle = np.log(fit_d(curve) / fit_d(unit))  # both are as wide as the same lobe
+    mfp = _nearest(curve, unit, middle, 2.0, _MEDIUM_HALVINGS)
     return Homogeneous(albedo, mfp, half_space(kind, albedo, mfp))
 
 
-def _nearest(curve: Curve, kind: Kind, albedo: Floats, guess: Floats) -> Floats:
-    """Mean free paths of the least largest difference: surplus and lack are equal there, as in `fit_d`."""
-    unit = half_space(kind, albedo, np.ones(3))
-    low, high = np.log(guess) - 2.0, np.log(guess) + 2.0
-    for _ in range(30):
+def _nearest(curve: Curve, unit: Curve, middle: Floats, reach: float, halvings: int) -> Floats:
+    return _balanced(
+        lambda size: resized(unit, np.exp(size)).share - curve.share, middle - reach, middle + reach, halvings
+    )
+
+
+def _balanced(surplus: Callable[[Floats], Floats], low: Floats, high: Floats, halvings: int) -> Floats:
+    """Return the sizes (3,) at which the largest surplus and the largest deficit of light are equal.
+
+    A wider curve has less light within each radius, so that its largest surplus falls with the size and its
+    largest deficit grows: where they are equal, the largest difference is least.
+
+    surplus : (n, 3) of the light within some radii, by the logarithms of the sizes (3,)
+    low, high : logarithms of the sizes (3,)
+    """
+    for _ in range(halvings):
         middle = 0.5 * (low + high)
-        scaled = curve.radii_mm[:, None] / np.exp(middle)
-        over = np.stack([unit.within(scaled[:, i])[:, i] for i in range(3)], axis=-1) - curve.share
+        over = surplus(middle)
         wider = over.max(axis=0) > -over.min(axis=0)
         low, high = np.where(wider, middle, low), np.where(wider, high, middle)
     return np.asarray(np.exp(0.5 * (low + high)))
 
 
-_LEAST, _MOST, _NODES = 1e-2, 60.0, 400  # radii that a fit is judged at, by the true median
-_KNOWN = np.geomspace(1e-4, 1e4, 2000)
-_SPAN, _EXACT = (
-    2.0,
-    1e-4,
-)  # logarithms of lengths: around the one of the same median, and as far as they matter
-
-
 def fit_length(curve: Curve, channel: int, within: Callable[[Floats], Floats]) -> float:
-    """The length by which a cumulative profile is nearest to one channel's: least squares over log r [mm].
+    """Return the length at which a cumulative profile is nearest to one channel's [mm].
+
+    Least squares over log r.
 
     within : share of what leaves anywhere, within radii (n,) of a length of 1
     """
@@ -154,16 +137,13 @@ def fit_length(curve: Curve, channel: int, within: Callable[[Floats], Floats]) -
     return float(np.exp(found.x))
 
 
-_FARTHEST, _DISTANCES = 12.0, 97  # of an edge's distances, in median radii
-
-
 @dataclass(frozen=True)
 class Deviation:
-    """What a target shows against what is true, in red, green and blue.
+    """Differences of a target's curve from the true one, in red, green and blue.
 
     cdf : (3,) largest difference of the share of light that leaves within a radius [-]
-    edge : (3,) largest difference of what leaves beside a straight edge of light: a shadow's [-]
-    energy : (3,) light that leaves in all over the true one's, less 1 [-]
+    edge : (3,) largest difference beside a straight edge of light, such as a shadow's [-]
+    energy : (3,) relative error of all the light that leaves [-]
     """
 
     cdf: Floats
@@ -171,12 +151,12 @@ class Deviation:
     energy: Floats
 
     def as_json(self) -> dict[str, list[float]]:
-        """Plain lists of three by name."""
+        """Return plain lists of three by name."""
         return {name: [round(float(x), 6) for x in getattr(self, name)] for name in ("cdf", "edge", "energy")}
 
 
 def deviation(true: Curve, shown: Curve) -> Deviation:
-    """How far what is shown is from what is true."""
+    """Return how far a target's curve is from the true one."""
     steps = np.geomspace(1e-3, 1.0, _DISTANCES)
     widest = _FARTHEST * np.maximum(true.radius_of(0.5), shown.radius_of(0.5))
     edge = np.zeros(3)

@@ -1,11 +1,10 @@
-"""What an export tells: parameters, what they mean, and how wrong they are."""
+"""Report of an export: parameters, their meanings, and their errors."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from dermis.apps.export.fitting import Deviation
 from dermis.apps.export.target import Rows, Value
@@ -24,15 +23,15 @@ _ERRORS = {
 class Report:
     """One export.
 
-    target, title, version, variant : what for; the variant is "" where there is only one
-    subject, model : what of, and where its profile comes from
-    rows : what was written
-    naive_rows : what a user would have typed
+    target, title, version, variant : of the program; the variant is "" where there is only one
+    subject, model : name, and where its profile comes from
+    rows : parameters that were written
+    naive_rows : parameters that a user would have typed
     d_mm : (3,) of the one lobe that is nearest to the profile [mm]
     error, naive_error : against the profile, by the target's own formulas
     wrong : what stays wrong, in words
     not_run : whether nobody has run the program with it
-    files : what was written
+    files : all that were written
     """
 
     target: str
@@ -50,8 +49,8 @@ class Report:
     not_run: bool
     files: tuple[Path, ...] = ()
 
-    def as_json(self) -> dict[str, Any]:
-        """Everything in plain numbers, lists and words."""
+    def as_json(self) -> dict[str, object]:
+        """Return everything in plain numbers, lists and words."""
         return {
             "target": self.target,
             "version": self.version,
@@ -70,7 +69,7 @@ class Report:
         }
 
     def lines(self, naive: bool = False) -> list[str]:
-        """The report to read.
+        """Return the lines of the report.
 
         naive : also what a user would have typed
         """
@@ -81,13 +80,13 @@ class Report:
             lines += ["", "what one would type", *_table(self.naive_rows)]
         lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNELS)]
         lines.append(f"{'d [mm]':12}{_numbers(self.d_mm)}  of the nearest lobe")
-        for name, told in _ERRORS.items():
-            lines.append(f"{name:12}{_numbers(getattr(self.error, name))}  {told}")
+        for name, meaning in _ERRORS.items():
+            lines.append(f"{name:12}{_numbers(getattr(self.error, name))}  {meaning}")
             lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  as one would type it")
         return [*lines, "", *self.words()]
 
     def words(self) -> list[str]:
-        """What stays wrong, of this skin and of the target."""
+        """Return what stays wrong, of this skin and of the target."""
         worst = int(self.error.cdf.argmax())
         share = float(self.error.cdf[worst])
         if share < _NOTABLE:
@@ -96,7 +95,7 @@ class Report:
         return [f"Whatever is typed, {what} at another radius.", self.wrong]
 
     def markdown(self) -> str:
-        """The report as a page to lie beside what was written."""
+        """Return the report as a Markdown page."""
         lines = [f"# {_plain(self.subject)} for {self.title} {self.version}".rstrip(), ""]
         lines += [f"```\n{chr(10).join(map(_plain, self.lines(naive=True)))}\n```", ""]
         return "\n".join(lines)
@@ -109,7 +108,7 @@ def _table(rows: Rows) -> Sequence[str]:
 
 
 def shown(value: Value) -> str:
-    """A parameter's value as it is printed."""
+    """Return a parameter's value as it is printed."""
     if isinstance(value, tuple):
         return ", ".join(f"{x:.4g}" for x in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
@@ -120,5 +119,5 @@ def _numbers(values: Floats) -> str:
 
 
 def _plain(words: str) -> str:
-    """Without what would end a line or a block of code."""
+    """Return words without what would end a line or a block of code."""
     return words.replace("`", "'").replace("\n", " ").replace("\r", " ")

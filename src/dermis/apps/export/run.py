@@ -1,4 +1,4 @@
-"""Exports: from a word to files and a report."""
+"""Export of a skin or head by name: files and a report of errors."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import Any
 from dermis.apps.export.fitting import deviation, fit_d
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.report import Report
-from dermis.apps.export.subject import ModelName, Subject, painted, subject_of
+from dermis.apps.export.subject import ModelName, Subject, subject_of
 from dermis.apps.export.target import Target
 from dermis.base.atomic_write import check_output, folder_beside, replacing, replacing_folder
 from dermis.base.errors import refuse
 
-TOLD = "export.json"
+REPORT = "export.json"
 _PAGE = "README.md"
 _SIDE = 2048
 
@@ -54,25 +54,25 @@ def export_skin(
     """
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     target = target if library is None else target.with_library(library)
-    known, place = target.known_version(version), _checked(target, output)
+    known, place = target.known_version(version), _checked_place(target, output)
     told = {"model": model, "profile": profile, **head}
     if not isinstance(subject, Subject):
         subject = subject_of(subject, **told)
     elif given := [name for name, value in told.items() if value is not None]:
         refuse(given[0], "a subject that is still to be made", "it came with one", "Leave it out")
     if target.needs_maps:
-        subject = painted(subject, side, adapter)
+        subject = subject.painted(side, adapter)
     report = judged(subject, target, known)
-    with _made(place) as inside:
+    with _staged(place) as inside:
         home = inside.parent if place.suffix else inside
         files = target.write(subject, report.rows, inside, known)
         ends = place.parent if place.suffix else place
-        files += _tell(replace(report, files=tuple(file.relative_to(home) for file in files)), inside)
+        files += _write_report(replace(report, files=tuple(file.relative_to(home) for file in files)), inside)
     return replace(report, files=tuple(ends / file.relative_to(home) for file in files))
 
 
 def judged(subject: Subject, target: Target, version: str) -> Report:
-    """The report of an export, before anything is written."""
+    """Return the report of an export, before anything is written."""
     rows, naive = target.parameters(subject, version), target.naive(subject, version)
     errors = [deviation(subject.curve, target.shown(one, subject, version)) for one in (rows, naive)]
     return Report(
@@ -92,8 +92,8 @@ def judged(subject: Subject, target: Target, version: str) -> Report:
     )
 
 
-def _checked(target: Target, output: str | Path) -> Path:
-    """Where to write, if the target can."""
+def _checked_place(target: Target, output: str | Path) -> Path:
+    """Return where to write, if the target can."""
     place = Path(output)
     if place.suffix.lower() not in target.suffixes:
         words = [suffix or "no suffix, for a folder" for suffix in target.suffixes]
@@ -103,10 +103,10 @@ def _checked(target: Target, output: str | Path) -> Path:
 
 
 @contextmanager
-def _made(place: Path) -> Iterator[Path]:
-    """What `Target.write` is given, moved to its place when all went well."""
+def _staged(place: Path) -> Iterator[Path]:
+    """Provide the place that `Target.write` gets, and move what it wrote to its end if all went well."""
     if not place.suffix:
-        with replacing_folder(place, TOLD) as folder:
+        with replacing_folder(place, REPORT) as folder:
             yield folder
         return
     with folder_beside(place) as folder:
@@ -117,7 +117,7 @@ def _made(place: Path) -> Iterator[Path]:
 
 def _move(part: Path, end: Path) -> None:
     if part.is_dir():
-        with replacing_folder(end, TOLD) as folder:
+        with replacing_folder(end, REPORT) as folder:
             folder.rmdir()
             part.replace(folder)
         return
@@ -125,11 +125,11 @@ def _move(part: Path, end: Path) -> None:
         part.replace(trial)
 
 
-def _tell(report: Report, inside: Path) -> list[Path]:
+def _write_report(report: Report, inside: Path) -> list[Path]:
     """The page and the numbers, in the folder or beside the file."""
     single = bool(inside.suffix)
     page = inside.with_name(f"{inside.name}.md") if single else inside / _PAGE
-    told = inside.with_name(f"{inside.name}.json") if single else inside / TOLD
+    told = inside.with_name(f"{inside.name}.json") if single else inside / REPORT
     page.write_text(report.markdown(), encoding="utf-8")
     told.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
     return [page, told]

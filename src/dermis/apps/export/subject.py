@@ -1,18 +1,22 @@
-"""What is exported: a skin by itself, or a head with its skin."""
+"""Skins and heads to export, with the true profile of the skin."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
+
+import numpy as np
 
 from dermis.base.errors import refuse, shown_value
 from dermis.base.reading import named_path
 from dermis.formats.gltf.materials import skin_pictures
 from dermis.formats.samples import SAMPLES
 from dermis.human.head_file import relief_slopes
+from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
@@ -29,12 +33,14 @@ from dermis.scene.people import skin_of
 from dermis.scene.skin import Skin
 from dermis.scene.tissue import tissue_of
 
-if TYPE_CHECKING:
-    from dermis.human.person import Human
-
 BALL_MM = 100.0
 """Diameter of the ball that stands for a head where there is none."""
 
+ModelName = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
+MODELS: tuple[ModelName, ...] = get_args(ModelName)
+_PHOTONS = 1_000_000
+_ROLES = "colour", "normal", "roughness", "specular", "height"
+_DARKEST = 1e-9
 _MESHES = ".glb", ".gltf", ".obj", ".ply"
 _LONGEST_NAME = 40
 
@@ -43,8 +49,8 @@ _LONGEST_NAME = 40
 class Subject:
     """A skin to export.
 
-    name : as it was asked for: words of a user, to be escaped wherever they are written
-    curve : the true profile, and what all light together is of that which enters
+    name : as the user wrote it, to be escaped wherever it is written
+    curve : the true profile, and all the light that leaves, of that which enters
     albedo : (3,) diffuse reflectance that the target's base colour should have: the mean of the head's
         colour map, or the profile's own energy without one; linear Rec. 709 [-]
     model : where the curve comes from: "montecarlo", "layered", "table" ...
@@ -75,15 +81,59 @@ class Subject:
         words = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[:_LONGEST_NAME]
         return f"skin_{words}" if not words or words[0].isdigit() else words
 
-    def with_head(self, head: Head) -> Subject:
-        """The same with another head, one whose maps are painted, say."""
-        return self if self.scene is None else replace(self, scene=replace(self.scene, head=head))
+    @property
+    def skin(self) -> Skin:
+        """The scene's skin, or the default one."""
+        return Skin() if self.scene is None else self.scene.skin
+
+    def colour(self, least: float = 0.0, most: float = 1.0) -> Floats:
+        """Return the albedo (3,) within bounds."""
+        return np.clip(self.albedo, least, most)
+
+    def scaled(self, shown: Curve) -> Curve:
+        """Return a curve with the subject's energy, times the error of the curve's energy as an albedo."""
+        energy = self.curve.energy * shown.energy / np.maximum(self.albedo, _DARKEST)
+        return shown.with_energy(energy)
+
+    def eye_pictures(self) -> EyePictures | None:
+        """Return what the eyes of the shape look like, painted on a device; None for a shape without eyes."""
+        from dermis.frame.passes.painting.eye_pictures import eye_pictures
+        from dermis.gpu.failures import on_device
+
+        eyes = self.shape.eyes
+        return None if eyes is None else on_device("auto", lambda device: eye_pictures(device, eyes.look))
+
+    def painted(self, side: int, adapter: str) -> Subject:
+        """Return the subject with all maps of its head as arrays; itself where nothing has to be painted.
+
+        side : of the maps, a power of two from 256 to 4096 [texels]
+        adapter : on which they are painted
+        """
+        head = self.head
+        if self.scene is None or head is None or not head.maps.painted:
+            return self
+        from dermis.frame.painted import with_painted_maps
+        from dermis.gpu.failures import on_device
+
+        made = on_device(adapter, lambda device: with_painted_maps(device, head, side))
+        return replace(self, scene=replace(self.scene, head=made))
+
+    def map_pictures(self) -> dict[str, bytes]:
+        """Return the maps of the head as PNG files by role: colour (sRGB), normal (green up), and grey ones.
+
+        Roughness is Beckmann's m, specular the strength of the reflection, both plain; height is from its
+        lowest to its highest in 16 bits.
+        """
+        if self.head is None:
+            return {}
+        pictures, _ = skin_pictures(self.head.maps, relief_slopes(self.head))
+        return {role: pictures[role] for role in _ROLES if role in pictures}
 
 
 def subject_of(
     word: str | Path, *, profile: str | Path | None = None, model: ModelName | None = None, **head: Any
 ) -> Subject:
-    """What a word stands for.
+    """Return the subject of a name or file.
 
     word : a profile by name ("skin1", "dj3", "light", "gpu-gems-3"), its file (.toml, .csv), or a head:
         "human", "human:7", a person's .json, a sample, or a file (.glb, .gltf, .obj, .ply)
@@ -98,7 +148,10 @@ def subject_of(
     if not (is_person(name) or name in SAMPLES or path.suffix.lower() in _MESHES):
         return _skin(name, profile, model, head)
     made = load_head(word, **head)
-    skin = _skin_of(name, profile)
+    if profile is not None:
+        skin = Skin(profile=str(profile))
+    else:
+        skin = skin_of(person_of(name)) if is_person(name) else Skin()
     curve, used, tissue = true_curve(skin, model)
     mean = made.maps.mean_colour
     return Subject(
@@ -106,29 +159,15 @@ def subject_of(
     )
 
 
-def _skin(name: str, profile: str | Path | None, model: ModelName | None, head: dict[str, Any]) -> Subject:
-    from dermis.base.errors import refuse
-
+def _skin(name: str, profile: str | Path | None, model: ModelName | None, head: Iterable[str]) -> Subject:
     for option in ("profile",) if profile is not None else tuple(head):
         refuse(option, "a head that it is for", f"the skin {name} came", "Leave it out, or name a head")
     curve, used, tissue = true_curve(Skin(profile=name), model)
     return Subject(Path(name).name, curve, curve.energy, used, tissue)
 
 
-def _skin_of(name: str, profile: str | Path | None) -> Skin:
-    if profile is not None:
-        return Skin(profile=str(profile))
-    person: Human | None = person_of(name) if is_person(name) else None
-    return Skin() if person is None else skin_of(person)
-
-
-ModelName = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
-MODELS: tuple[ModelName, ...] = get_args(ModelName)
-_PHOTONS = 1_000_000
-
-
 def true_curve(skin: Skin, model: ModelName | None = None) -> tuple[Curve, str, Tissue | None]:
-    """The curve of a skin's profile, the model that it is by, and its tissue.
+    """Return the curve of a skin's profile, the model that it is by, and its tissue.
 
     model : by default Monte Carlo for homogeneous media by name, which the package has tables of, layered
         diffusion for other tissue, and for a table of Gaussians the table
@@ -143,15 +182,12 @@ def true_curve(skin: Skin, model: ModelName | None = None) -> tuple[Curve, str, 
             refuse("model", "a tissue", f"{skin.profile} is a table of Gaussians", "Leave it out")
         return Curve.of_profile(profile_of_table(table)), "table", None
     tissue = tissue_of(skin)
-    if model in (None, "montecarlo") and (counted := _counted(tissue)) is not None:
+    counted = counted_curve(tissue.medium) if tissue.rgb is None and model in (None, "montecarlo") else None
+    if counted is not None:
         return counted, "montecarlo", tissue
     used: ModelName = model or "layered"
     entering = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)
     return Curve.of_profile(_profile(tissue, used), entering), used, tissue
-
-
-def _counted(tissue: Tissue) -> Curve | None:
-    return counted_curve(tissue.medium) if tissue.rgb is None else None
 
 
 def _profile(tissue: Tissue, model: ModelName) -> RadialProfile:
@@ -160,39 +196,3 @@ def _profile(tissue: Tissue, model: ModelName) -> RadialProfile:
     from dermis.apps.truths.slab_mc import counted_profile
 
     return counted_profile(tissue.medium, tissue.rgb, _PHOTONS)
-
-
-ROLES = "colour", "normal", "roughness", "specular", "height"
-
-
-def painted(subject: Subject, side: int, adapter: str) -> Subject:
-    """The subject with all maps of its head as arrays; it is itself where nothing has to be painted.
-
-    side : of maps that are painted, a power of two from 256 to 4096 [texels]
-    adapter : that paints
-    """
-    if subject.head is None or not subject.head.maps.painted:
-        return subject
-    from dermis.frame.painted import with_painted_maps
-    from dermis.gpu.failures import on_device
-
-    head = subject.head
-    return subject.with_head(on_device(adapter, lambda device: with_painted_maps(device, head, side)))
-
-
-def write_maps(subject: Subject, folder: Path, stem: str = "") -> dict[str, Path]:
-    """The maps that a head has, as PNG, by role: colour (sRGB), normal (green up), and grey ones.
-
-    Roughness is Beckmann's m, specular the strength of the reflection, both plain; height is from its lowest
-    to its highest in 16 bits.
-
-    stem : what their names begin with, such as "skin_"
-    """
-    head = subject.head
-    if head is None:
-        return {}
-    pictures, _ = skin_pictures(head.maps, relief_slopes(head))
-    written = {role: folder / f"{stem}{role}.png" for role in ROLES if role in pictures}
-    for role, path in written.items():
-        path.write_bytes(pictures[role])
-    return written

@@ -1,12 +1,16 @@
-"""What a program that skin is exported to has to be able to do here."""
+"""Programs that skin is exported to, and the parameters that are typed into them."""
 
 from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from dermis.apps.export.subject import Subject
 from dermis.base.errors import refuse, shown_value
@@ -18,9 +22,9 @@ T = TypeVar("T", bound="Target")
 
 @dataclass(frozen=True)
 class Row:
-    """A parameter as it is typed into the target.
+    """A parameter as it is typed into a target.
 
-    name : there
+    name : in the target
     value : number, numbers of red, green and blue, switch or word
     unit : "mm", "m", "cm", "-" ...
     meaning : what the target takes it for, in a few words
@@ -36,14 +40,31 @@ Rows = tuple[Row, ...]
 
 
 def value_of(rows: Rows, name: str) -> Value:
-    """The value of the row of a name."""
+    """Return the value of the row of a name."""
     return next(row.value for row in rows if row.name == name)
 
 
 def numbers_of(rows: Rows, name: str) -> tuple[float, ...]:
-    """The value of the row of a name as numbers; one number is a tuple of one."""
+    """Return the value of the row of a name as numbers; one number is a tuple of one."""
     value = value_of(rows, name)
     return value if isinstance(value, tuple) else (float(value),)
+
+
+def with_values(rows: Rows, values: Mapping[str, Value]) -> Rows:
+    """Return the rows with other values by name."""
+    return tuple(replace(row, value=values.get(row.name, row.value)) for row in rows)
+
+
+def floats(values: ArrayLike) -> tuple[float, ...]:
+    """Return numbers as a tuple of plain floats."""
+    return tuple(np.ravel(np.asarray(values, np.float64)).tolist())
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> list[Path]:
+    """Write files into a folder, by their names; return their paths."""
+    for name, content in contents.items():
+        (folder / name).write_bytes(content)
+    return [folder / name for name in contents]
 
 
 @dataclass(frozen=True)
@@ -76,7 +97,7 @@ class Target(ABC):
     """Whether nobody has run the program with what is written."""
 
     def with_variant(self: T, variant: str | None) -> T:
-        """This target in one of its variants, the first where None.
+        """Return this target in one of its variants, the first where None.
 
         DermisError : it has no such variant
         """
@@ -88,14 +109,14 @@ class Target(ABC):
         return replace(self, variant=variant)
 
     def with_library(self, folder: str | Path) -> Target:
-        """This target with the library that it draws with inside what is written.
+        """Return this target with the library that it draws with, to be written into its page.
 
         DermisError : it draws with none
         """
         refuse("library", f"none for {self.name}", f"{shown_value(str(folder))} came", "Leave it out")
 
     def known_version(self, version: str | None) -> str:
-        """The version asked for, the newest where None.
+        """Return the requested version, the newest where None.
 
         DermisError : it is not known
         """
@@ -106,39 +127,50 @@ class Target(ABC):
             refuse("version", expected, f"{shown_value(version)} came", "Choose the nearest, and check it")
         return version
 
+    def file_in(self, place: Path, subject: Subject) -> Path:
+        """Return the main file: the place itself, or one of the usual suffix in it where it is a folder."""
+        suffix = next(filter(None, self.suffixes))
+        return place if place.suffix else place / f"{subject.identifier}{suffix}"
+
     @abstractmethod
     def parameters(self, subject: Subject, version: str) -> Rows:
-        """What shows the subject best."""
+        """Return the parameters that show the subject best."""
 
     @abstractmethod
     def naive(self, subject: Subject, version: str) -> Rows:
-        """What a user would type who does not know what the numbers mean there."""
+        """Return what a user would type who does not know what the numbers mean in this program."""
 
     @abstractmethod
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
-        """What the target makes of parameters, by its own formulas."""
+        """Return the curve that the target shows with parameters, by its own formulas."""
 
     @abstractmethod
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
-        """Write the files that the target reads; all that were written.
+        """Write the files that the target reads; return their paths.
 
         place : a folder that is empty, where the output's name has no suffix; else a file of that name in
             such a folder, beside which others may be put. It is moved to where it belongs afterwards
         """
 
 
-def write_values(target: Target, subject: Subject, rows: Rows, place: Path, version: str) -> Path:
-    """A JSON file of parameters with unit and meaning, marked as not run."""
-    file = place if place.suffix else place / f"{subject.identifier}.json"
-    told = {
-        "for": f"{target.title} {version}",
-        "status": "not run: by the published meanings",
-        "skin": subject.name,
-        "profile": subject.model,
-        "parameters": {
-            row.name: {"value": row.value, "unit": row.unit, "meaning": row.meaning} for row in rows
-        },
-        "remains_wrong": target.wrong,
-    }
-    file.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
-    return file
+class ParameterTable(Target):
+    """A program that nobody has run with the parameters: a JSON file of them with units and meanings."""
+
+    suffixes = (".json", "")
+    not_run = True
+
+    def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
+        """Write the parameters, marked as not run."""
+        file = self.file_in(place, subject)
+        told = {
+            "for": f"{self.title} {version}",
+            "status": "not run: by the published meanings",
+            "skin": subject.name,
+            "profile": subject.model,
+            "parameters": {
+                row.name: {"value": row.value, "unit": row.unit, "meaning": row.meaning} for row in rows
+            },
+            "remains_wrong": self.wrong,
+        }
+        file.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        return [file]

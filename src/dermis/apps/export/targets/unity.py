@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
 from dermis.apps.export.fitting import fit_d, lobe
-from dermis.apps.export.subject import Subject, write_maps
-from dermis.apps.export.target import Row, Rows, Target, Value, numbers_of
+from dermis.apps.export.subject import Subject
+from dermis.apps.export.target import Row, Rows, Target, floats, numbers_of, with_values, write_files
 from dermis.optics.curve import Curve
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
@@ -30,16 +29,16 @@ _FORMS = {_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version: 1 has no multiplier yet
 class Unity(Target):
     """A diffusion profile; the albedo stays in the material's base colour."""
 
-    name: ClassVar[str] = "unity"
-    title: ClassVar[str] = "Unity HDRP"
-    suffixes: ClassVar[tuple[str, ...]] = (".asset", "")
-    versions: ClassVar[tuple[str, ...]] = tuple(_FORMS)
-    needs_maps: ClassVar[bool] = True
-    wrong: ClassVar[str] = (
+    name = "unity"
+    title = "Unity HDRP"
+    suffixes = (".asset", "")
+    versions = tuple(_FORMS)
+    needs_maps = True
+    wrong = (
         "The filter is cut at 99.7 % of the widest channel, and worldScale has to tell the scale of a scene "
         "that is not in metres."
     )
-    not_run: ClassVar[bool] = True
+    not_run = True
 
     def parameters(self, subject: Subject, version: str) -> Rows:
         """Colour and multiplier of the fitted lobes."""
@@ -54,12 +53,8 @@ class Unity(Target):
 
     def naive(self, subject: Subject, version: str) -> Rows:
         """The skin's colour as the scattering colour, as the inspector advises, and a multiplier of 1."""
-        typed: dict[str, Value] = {
-            _COLOUR: tuple(map(float, np.clip(subject.albedo, 0.0, 1.0))),
-            _MULTIPLIER: _TYPED_MM,
-        }
-        rows = self.parameters(subject, version)
-        return tuple(Row(r.name, typed.get(r.name, r.value), r.unit, r.meaning) for r in rows)
+        typed = {_COLOUR: floats(subject.colour()), _MULTIPLIER: _TYPED_MM}
+        return with_values(self.parameters(subject, version), typed)
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
         """The lobe that the engine computes from its parameters."""
@@ -69,15 +64,16 @@ class Unity(Target):
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """The asset, and beside it the maps."""
-        asset = place if place.suffix else place / f"{subject.identifier}.asset"
+        asset = self.file_in(place, subject)
         asset.write_text(asset_text(asset.stem, rows, version), encoding="utf-8")
-        return [asset, *write_maps(subject, asset.parent, f"{asset.stem}_").values()]
+        maps = {f"{asset.stem}_{role}.png": data for role, data in subject.map_pictures().items()}
+        return [asset, *write_files(asset.parent, maps)]
 
 
 def _distances(d_mm: Floats, version: str) -> Rows:
     """The lobes' widths, in the one colour of before HDRP 14 or in colour and multiplier."""
     if version == _BEFORE_14:
-        return (Row(_COLOUR, tuple(d_mm.tolist()), "mm", "d, plain numbers in an HDR colour, no gamma"),)
+        return (Row(_COLOUR, floats(d_mm), "mm", "d, plain numbers in an HDR colour, no gamma"),)
     told = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
     return (
         Row(_COLOUR, told.scattering_colour, "-", "d by its largest channel, plain numbers, no gamma"),

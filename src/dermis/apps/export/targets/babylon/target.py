@@ -1,4 +1,4 @@
-"""What Babylon.js makes of a diffusion profile: its own few samples, as a curve.
+"""Babylon.js: a page with the head, lit and turned, whose skin scatters light on the screen.
 
 By the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A profile is a colour c. Samples are drawn
 from the lobe of width max(c), on a spiral, and weighted by Burley's lobe with S = c, so that a channel's
@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 
 from dermis.apps.export.fitting import fit_d
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, numbers_of
+from dermis.apps.export.target import Row, Rows, floats, numbers_of
 from dermis.apps.export.targets.pages.html import hash_of, inline
-from dermis.apps.export.targets.pages.library_page import Script, WebPage, linked, surface_rows
+from dermis.apps.export.targets.pages.library_page import LibraryPage, Script, surface_rows
 from dermis.optics.curve import Curve
 from dermis.optics.media import Floats
 
@@ -26,62 +26,27 @@ SAMPLES = 40
 TOO_WIDE = 2.0
 """Width on the screen over the one that metersPerUnit stands for."""
 _GOLDEN = 1.618033988749895
-
-
-def spiral(colour: ArrayLike, samples: int = SAMPLES) -> tuple[Floats, Floats, Floats]:
-    """Radii (n,) and angles (n,) [rad] of the samples, and weights (n, 3) that add up to 1.
-
-    Radii are in mm where the screen's scale is that of metersPerUnit and would be right.
-    """
-    s = np.asarray(colour, np.float64)
-    i = np.arange(samples)
-    radius, area = drawn((i + 0.5) / samples)
-    width = float(s.max())
-    r = width * radius[:, None]
-    weight = s * (np.exp(-r * s / 3.0) + np.exp(-r * s)) * (area * width)[:, None]
-    return r[:, 0], 2.0 * np.pi * ((i / _GOLDEN) % 1.0), weight / weight.sum(axis=0)
-
-
-def drawn(share: ArrayLike) -> tuple[Floats, Floats]:
-    """Radii within which shares of a lobe of width 1 lie, and 1 / (r pdf(r)) there, which weights go with."""
-    u = 1.0 - np.asarray(share, np.float64)
-    g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
-    n = g ** (-1.0 / 3.0)
-    c = 1.0 + g * n * n + n
-    return 3.0 * np.log(c / (4.0 * u)), c**3 / (4.0 * u * (c * c + 16.0 * u * u))
-
-
-def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> Curve:
-    """The curve of the samples over all directions of an edge, in a scene whose unit is a metre.
-
-    metres : metersPerUnit
-    """
-    r, _, weight = spiral(colour)
-    true_mm = TOO_WIDE * r / metres
-    return Curve.of(lambda at: (at[:, None, None] >= true_mm[:, None]).astype(float)[..., 0] @ weight, energy)
-
-
 _PROFILE = "subSurface.scatteringDiffusionProfile"
 _SCALE = "subSurfaceConfiguration.metersPerUnit"
 _CORE = "4Kbm3nj4VMzMufY0FYM9DactmO8CluLjEAe0W1BzVo7hlKEswOLkl46FLI6mxZmx"
 _LOADERS = "4FQhr/DrxLfjm5tCJq7Cs1uJIC29544DNb4rVCt4qVzXM7rw07KsDYgdH8/ayoss"
 
 
-class Babylon(WebPage):
-    """A page that runs."""
+class Babylon(LibraryPage):
+    """Page with Babylon.js."""
 
-    name: ClassVar[str] = "babylon"
-    title: ClassVar[str] = "Babylon.js"
-    versions: ClassVar[tuple[str, ...]] = ("9.28.0",)
-    licence: ClassVar[str] = "Apache-2.0"
-    draw: ClassVar[Path] = Path(__file__).with_name("babylon.js")
-    wrong: ClassVar[str] = (
+    name = "babylon"
+    title = "Babylon.js"
+    versions = ("9.28.0",)
+    licence = "Apache-2.0"
+    draw = Path(__file__).with_name("babylon.js")
+    wrong = (
         "Forty samples of one lobe a channel, the same in every pixel: shadows' edges show steps of a "
         "fortieth, and the narrower channels have fewer of them. Light spreads on the "
         "screen only, not through thin parts; slopes count twice in depth; diffuse light above 1 is "
         "cut off. Lights are parallel here."
     )
-    scripts: ClassVar[dict[str, tuple[Script, ...]]] = {
+    scripts: ClassVar = {
         "9.28.0": (
             Script("babylonjs", "9.28.0", "babylon.js", _CORE),
             Script("babylonjs-loaders", "9.28.0", "babylonjs.loaders.min.js", _LOADERS),
@@ -89,7 +54,7 @@ class Babylon(WebPage):
     }
 
     def parameters(self, subject: Subject, version: str) -> Rows:
-        """A profile of 1/d, and a scale that has the widest channel's lobe drawn from.
+        """Return a profile of 1/d, and a scale that has the widest channel's lobe drawn from.
 
         A channel c is 1/c wide and all are drawn from a lobe of width max(c), both times 2/metersPerUnit mm.
         So with k = sqrt(d_min d_max) the colour k/d and metersPerUnit 2/k, both are true.
@@ -99,29 +64,61 @@ class Babylon(WebPage):
         return _rows(subject, k / d, TOO_WIDE / k)
 
     def naive(self, subject: Subject, version: str) -> Rows:
-        """Widths in mm as the colour, as in the engine that the shader comes from; the file is in metres."""
+        """Return widths in mm as the colour, as in the engine of the shader; the file is in metres."""
         return _rows(subject, fit_d(subject.curve), 1.0)
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
-        """What its samples add up to."""
+        """Return the curve of its samples."""
         return spiral_curve(numbers_of(rows, _PROFILE), numbers_of(rows, _SCALE)[0], subject.curve.energy)
 
     def loaded(self, version: str) -> tuple[str, list[str]]:
-        """Two scripts."""
+        """Return two scripts."""
         scripts = self.scripts[version]
         if self.installed is None:
-            return "\n".join(map(linked, scripts)), [script.url for script in scripts]
+            return "\n".join(script.element for script in scripts), [script.url for script in scripts]
         texts = [inline(script.read(self.installed)) for script in scripts]
         return "\n".join(f"<script>{text}</script>" for text in texts), [hash_of(text) for text in texts]
 
 
-def _rows(subject: Subject, profile: np.ndarray, metres: float) -> Rows:
-    colour = tuple(float(x) for x in profile)
+def _rows(subject: Subject, profile: Floats, metres: float) -> Rows:
     return (
-        Row(_PROFILE, colour, "-", "1/width: a smaller number spreads farther"),
+        Row(_PROFILE, floats(profile), "-", "1/width: a smaller number spreads farther"),
         Row(_SCALE, metres, "m", "widths are 2 mm by this and by the colour; no length of the scene's"),
         *surface_rows(subject),
     )
+
+
+def spiral(colour: ArrayLike, samples: int = SAMPLES) -> tuple[Floats, Floats, Floats]:
+    """Return radii (n,) and angles (n,) [rad] of the samples, and weights (n, 3) that add up to 1.
+
+    Radii are in mm where the screen's scale is that of metersPerUnit and would be right.
+    """
+    s = np.asarray(colour, np.float64)
+    i = np.arange(samples)
+    radius, area = radii_of((i + 0.5) / samples)
+    width = float(s.max())
+    r = width * radius[:, None]
+    weight = s * (np.exp(-r * s / 3.0) + np.exp(-r * s)) * (area * width)[:, None]
+    return r[:, 0], 2.0 * np.pi * ((i / _GOLDEN) % 1.0), weight / weight.sum(axis=0)
+
+
+def radii_of(share: ArrayLike) -> tuple[Floats, Floats]:
+    """Return radii within which shares of a lobe of width 1 lie, and their weights 1 / (r pdf(r))."""
+    u = 1.0 - np.asarray(share, np.float64)
+    g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
+    n = g ** (-1.0 / 3.0)
+    c = 1.0 + g * n * n + n
+    return 3.0 * np.log(c / (4.0 * u)), c**3 / (4.0 * u * (c * c + 16.0 * u * u))
+
+
+def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> Curve:
+    """Return the curve of the samples over all directions of an edge, in a scene whose unit is a metre.
+
+    metres : metersPerUnit
+    """
+    r, _, weight = spiral(colour)
+    true_mm = TOO_WIDE * r / metres
+    return Curve.of(lambda at: (at[:, None, None] >= true_mm[:, None]).astype(float)[..., 0] @ weight, energy)
 
 
 TARGET = Babylon()

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from dermis.apps.export.fitting import fit_length
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Row, Rows, Target, numbers_of
-from dermis.apps.export.targets.blender.files import write_scene
+from dermis.apps.export.targets.blender.files import Versions, write_scene
 from dermis.apps.export.targets.blender.walks import (
     Entry,
     albedo,
@@ -31,7 +31,7 @@ _PI4 = 4.0 * np.pi
 JENSEN_MM = 3.67, 1.37, 0.68
 """Diffuse mean free paths of skin1 in [Jensen2001], which forums pass on as "the" radii of skin [mm]."""
 _FIRST = 4, 5
-_MET = 5, 2  # from which version on the radius of a random walk is a mean free path
+_MFP = 5, 2  # from which version on the radius of a random walk is a mean free path
 _FAR = 1e9
 
 
@@ -46,7 +46,7 @@ class Walk(NamedTuple):
     entry: Entry
 
     def within(self, radius: Floats) -> Floats:
-        """Share of what it returns that returns within radii [mean free paths]."""
+        """Return the share of what it returns that returns within radii [mean free paths]."""
         return walk_within(radius, self.albedo, self.entry) / self.total
 
     @property
@@ -71,7 +71,7 @@ class Blender(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Rows:
-        """The radius whose curve lies nearest to the true one, by the method's own map of it."""
+        """Return the radius whose curve is nearest to the true one, by the method's own use of it."""
         units = self._units(subject, version)
         fitted = np.array([fit_length(subject.curve, channel, unit) for channel, unit in enumerate(units)])
         return self._rows(
@@ -79,11 +79,11 @@ class Blender(Target):
         )
 
     def naive(self, subject: Subject, version: str) -> Rows:
-        """Published diffuse mean free paths of skin as the radius."""
+        """Return published diffuse mean free paths of skin as the radius."""
         return self._rows(JENSEN_MM, version)
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
-        """By the formulas of Cycles' kernel and of EEVEE's shader."""
+        """Return the curve by the formulas of Cycles' kernel and of EEVEE's shader."""
         radius = np.array(numbers_of(rows, _RADIUS)) * numbers_of(rows, _SCALE)[0] / _M
         length = np.maximum(radius * self._lengths(subject, version), 1e-9)
         units = self._units(subject, version)
@@ -94,18 +94,18 @@ class Blender(Target):
         return Curve.of(within, subject.curve.energy * self._returned(subject, version))
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
-        """A script with the files beside it, or the .blend that it saves.
+        """Write a script with the files beside it, or the .blend that it saves.
 
         Raises DermisError when a .blend is asked for and DERMIS_BLENDER_PYTHON names no Python with bpy.
         """
         method = self.variant.replace("-", "_").upper()
-        return write_scene(subject, rows, place, method, self._holds(version))
+        return write_scene(subject, rows, place, method, self._valid_versions(version))
 
-    def _holds(self, version: str) -> list[Any]:
-        """The first version that the numbers hold for, and the first that they do not hold for, or None."""
+    def _valid_versions(self, version: str) -> Versions:
+        """Return the versions that the numbers hold for."""
         if self.variant != "random-walk":
-            return [list(_FIRST), None]
-        return [list(_MET), None] if _met(version) else [list(_FIRST), list(_MET)]
+            return list(_FIRST), None
+        return (list(_MFP), None) if _is_mfp(version) else (list(_FIRST), list(_MFP))
 
     def _rows(self, radius: tuple[float, ...], version: str) -> Rows:
         rows = [
@@ -122,7 +122,7 @@ class Blender(Target):
         return tuple(rows)
 
     def _meaning(self, version: str) -> str:
-        walk = "the mean free path" if _met(version) else "4 pi mean free paths"
+        walk = "the mean free path" if _is_mfp(version) else "4 pi mean free paths"
         return {
             "random-walk": walk,
             "random-walk-skin": "the diffuse mean free path",
@@ -132,17 +132,15 @@ class Blender(Target):
 
     def _lengths(self, subject: Subject, version: str) -> Floats:
         """(3,) the curve's length, d or a mean free path, in a radius of 1."""
-        colour = np.clip(subject.albedo, 0.0, 1.0)
         if self.variant == "random-walk":
-            return np.full(3, 1.0 if _met(version) else 1.0 / _PI4)
+            return np.full(3, 1.0 if _is_mfp(version) else 1.0 / _PI4)
         if self.variant == "random-walk-skin":
-            return skin_stretch(colour, SKIN_ETA)
-        return np.full(3, 1.0 / _PI4) / (burley_stretch(colour) if self.variant == "eevee" else 1.0)
+            return skin_stretch(subject.colour(), SKIN_ETA)
+        return np.full(3, 1.0 / _PI4) / (burley_stretch(subject.colour()) if self.variant == "eevee" else 1.0)
 
     def _walks(self, subject: Subject, version: str) -> list[Walk]:
-        colour = np.clip(subject.albedo, 0.0, 1.0)
         plain = self.variant == "random-walk"
-        found = albedo(colour) if plain and _met(version) else legacy_albedo(colour)
+        found = (albedo if plain and _is_mfp(version) else legacy_albedo)(subject.colour())
         return [Walk(float(one), "straight" if plain else "skin") for one in found]
 
     def _units(self, subject: Subject, version: str) -> list[Within]:
@@ -159,9 +157,9 @@ class Blender(Target):
         return total / np.maximum(subject.albedo, 1e-6)
 
 
-def _met(version: str) -> bool:
+def _is_mfp(version: str) -> bool:
     """Whether the radius of a random walk is a mean free path there."""
-    return tuple(map(int, version.split("."))) >= _MET
+    return tuple(map(int, version.split("."))) >= _MFP
 
 
 TARGET = Blender()

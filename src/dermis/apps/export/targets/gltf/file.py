@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -11,42 +11,39 @@ from dermis.apps.export.subject import Subject
 from dermis.apps.export.targets.gltf.volume import colour_for
 from dermis.formats.gltf.materials import Added, colours_png
 from dermis.formats.gltf.write import encode_head
-from dermis.frame.passes.painting.eye_pictures import eye_pictures
-from dermis.gpu.failures import on_device
 from dermis.human.head_file import relief_slopes
 from dermis.human.person_file import numbers_of
-from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 from dermis.scene.heads import is_person, person_of
-from dermis.scene.skin import Skin
 
+Extensions = Mapping[str, Mapping[str, object]]
 _MULTISCATTER = "multiscatter"
 _STEPS = 1024
 
 
-def encoded(subject: Subject, extensions: dict[str, dict[str, Any]], draft: str) -> bytes:
+def encoded(subject: Subject, extensions: Extensions, draft: str) -> bytes:
     """The head, or the ball, with its eyes, hairs, targets and bones.
 
     extensions : of the skin's material, by name
     draft : what is no settled extension, "" for a file without
     """
-    head, skin = subject.shape, Skin() if subject.scene is None else subject.scene.skin
-    notes: dict[str, Any] = {"draft": draft} if draft else {}
+    head = subject.shape
+    notes: dict[str, object] = {"draft": draft} if draft else {}
     if is_person(subject.name):
         notes["person"] = numbers_of(person_of(subject.name))
     elif head.eyes is not None:
         notes["person"] = {"eyes": asdict(head.eyes.look)}
     return encode_head(
         head,
-        roughness=skin.roughness,
+        roughness=subject.skin.roughness,
         slopes=relief_slopes(head),
         notes=notes,
-        eyes=_eyes(head),
+        eyes=subject.eye_pictures(),
         added=_added(subject, head, extensions, draft),
     )
 
 
-def _added(subject: Subject, head: Head, extensions: dict[str, dict[str, Any]], draft: str) -> Added:
+def _added(subject: Subject, head: Head, extensions: Extensions, draft: str) -> Added:
     """Of a colour map the scattered colours become a map too; what is white lets all light in."""
     if not draft:
         plain = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
@@ -60,10 +57,3 @@ def _added(subject: Subject, head: Head, extensions: dict[str, dict[str, Any]], 
     scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER}
     made = {**extensions, "KHR_materials_scatter": scatter}
     return Added(white, made, extras, {_MULTISCATTER: colours_png(scattered)})
-
-
-def _eyes(head: Head) -> EyePictures | None:
-    if head.eyes is None:
-        return None
-    look = head.eyes.look
-    return on_device("auto", lambda device: eye_pictures(device, look))

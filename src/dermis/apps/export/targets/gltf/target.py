@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar
 
 import numpy as np
 
 from dermis.apps.export.fitting import fit_d
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, numbers_of
+from dermis.apps.export.target import Row, Rows, Target, Value, floats, numbers_of
 from dermis.apps.export.targets.gltf.file import encoded
 from dermis.apps.export.targets.gltf.volume import Volume, fitted, walked
 from dermis.optics.curve import Curve
-from dermis.optics.media import SKIN_ETA
+from dermis.optics.media import SKIN_ETA, Floats
 
 SCATTER, DIFFUSE = "scatter", "diffuse-transmission"
 DRAFT = "KHR_materials_scatter: draft of 2026-06-22 (KhronosGroup/glTF pull request 2579), not ratified"
@@ -23,22 +22,22 @@ _MULTISCATTER = "KHR_materials_scatter.multiscatterColorFactor"
 _FACTOR = "KHR_materials_diffuse_transmission.diffuseTransmissionFactor"
 _THROUGH = "KHR_materials_diffuse_transmission.diffuseTransmissionColorFactor"
 _BASE = "pbrMetallicRoughness.baseColorFactor"
+_IOR = Row("KHR_materials_ior.ior", SKIN_ETA, "-", "of the surface, which reflects 0.028 straight ahead")
 _THICK_M = 0.1  # a ball, and about a head: programs that trace no rays take it for the way through
 _EAR_MM = 4.0  # where light comes through a head
-_LEAST = 1e-9
 _TYPED = 0.5  # share of the light that a user lets through who sees the slider
 
 
 class Gltf(Target):
     """A .glb file."""
 
-    name: ClassVar[str] = "gltf"
-    title: ClassVar[str] = "glTF"
-    suffixes: ClassVar[tuple[str, ...]] = (".glb",)
-    versions: ClassVar[tuple[str, ...]] = ("2.0",)
-    variants: ClassVar[tuple[str, ...]] = (SCATTER, DIFFUSE)
-    needs_maps: ClassVar[bool] = True
-    wrong: ClassVar[str] = (
+    name = "gltf"
+    title = "glTF"
+    suffixes = (".glb",)
+    versions = ("2.0",)
+    variants = (SCATTER, DIFFUSE)
+    needs_maps = True
+    wrong = (
         f"{DRAFT}. Programs that trace rays and know it show this table's numbers; those that know"
         " transmission and volume alone show dark glass; those that rasterise take the multiscatter colour"
         f" for the one that is seen, and show skin too light. The variant {DIFFUSE} looks like skin"
@@ -64,12 +63,11 @@ class Gltf(Target):
         if self.variant == DIFFUSE:
             back = (1.0 - numbers_of(rows, _FACTOR)[0]) * subject.curve.energy
             return Curve.of(lambda r: np.repeat((r > 0.0)[:, None], 3, axis=1), back)
-        found = walked(_volume(rows))
-        return found.with_energy(found.energy / np.maximum(subject.albedo, _LEAST) * subject.curve.energy)
+        return subject.scaled(walked(_volume(rows)))
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """One .glb file; the skin's material has the extensions, none of which is required."""
-        extensions: dict[str, dict[str, Any]] = {"KHR_materials_ior": {"ior": SKIN_ETA}}
+        extensions: dict[str, dict[str, Value | list[float]]] = {"KHR_materials_ior": {"ior": SKIN_ETA}}
         for row in rows:
             extension, _, member = row.name.partition(".")
             if extension.startswith("KHR_"):
@@ -80,52 +78,30 @@ class Gltf(Target):
 
 
 def _scatter(volume: Volume) -> Rows:
-    colour = tuple(float(x) for x in volume.colour)
-    multiscatter = tuple(float(x) for x in volume.multiscatter)
+    strength, multiscatter = "KHR_materials_scatter.scatterStrengthFactor", floats(volume.multiscatter)
     return (
-        Row(
-            "KHR_materials_transmission.transmissionFactor",
-            1.0,
-            "-",
-            "all light goes into the volume",
-        ),
-        Row(
-            "KHR_materials_volume.thicknessFactor",
-            _THICK_M,
-            "m",
-            "above 0 for a volume",
-        ),
+        Row("KHR_materials_transmission.transmissionFactor", 1.0, "-", "all light goes into the volume"),
+        Row("KHR_materials_volume.thicknessFactor", _THICK_M, "m", "above 0 for a volume"),
         Row(_DISTANCE, volume.distance_m, "m", "the longest mean free path"),
-        Row(_COLOUR, colour, "-", "of light without an event on that way"),
-        Row(
-            "KHR_materials_scatter.scatterStrengthFactor",
-            1.0,
-            "-",
-            "all of the colour below",
-        ),
-        Row(
-            _MULTISCATTER,
-            multiscatter,
-            "-",
-            "by van de Hulst, of all light; a head has a map",
-        ),
+        Row(_COLOUR, floats(volume.colour), "-", "of light without an event on that way"),
+        Row(strength, 1.0, "-", "all of the colour below"),
+        Row(_MULTISCATTER, multiscatter, "-", "by van de Hulst, of all light; a head has a map"),
         Row("KHR_materials_scatter.scatterAnisotropy", 0.0, "-", "mean cosine: the paths are reduced ones"),
-        Row("KHR_materials_ior.ior", SKIN_ETA, "-", "of the surface, which reflects 0.028 straight ahead"),
+        _IOR,
     )
 
 
-def _diffuse(subject: Subject, factor: float, colour: Any) -> Rows:
-    base, through = (tuple(float(x) for x in each) for each in (subject.albedo, colour))
+def _diffuse(subject: Subject, factor: float, colour: Floats) -> Rows:
     return (
-        Row(_BASE, base, "-", "diffuse reflectance; the mean where it is a map"),
+        Row(_BASE, floats(subject.albedo), "-", "diffuse reflectance; the mean where it is a map"),
         Row(_FACTOR, float(factor), "-", f"share that comes through: of {_EAR_MM:g} mm, as of an ear"),
-        Row(_THROUGH, through, "-", "colour of what comes through"),
-        Row("KHR_materials_ior.ior", SKIN_ETA, "-", "of the surface, which reflects 0.028 straight ahead"),
+        Row(_THROUGH, floats(colour), "-", "colour of what comes through"),
+        _IOR,
     )
 
 
-def _through(subject: Subject) -> tuple[float, np.ndarray[Any, Any]]:
-    """Share of the light that comes through an ear, over that which comes back, and its colour.
+def _through(subject: Subject) -> tuple[float, Floats]:
+    """Return the share of the light that comes through an ear, over that which comes back, and its colour.
 
     Source: [ChristensenBurley2015], integrated over a plane at a depth.
     """

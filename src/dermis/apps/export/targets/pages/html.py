@@ -1,19 +1,53 @@
-"""Scripts and styles inside a page: how they may stand there, and what lets them run."""
+"""HTML files that hold all they need: inline scripts and styles, and a policy that lets only these run."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import html
 import re
+from collections.abc import Sequence
+from pathlib import Path
+from string import Template
 
+_NONE = "default-src 'none'; base-uri 'none'; form-action 'none'"
 _END = re.compile("</(?=script)", re.IGNORECASE)
 
 
+def page(
+    folder: Path,
+    *,
+    title: str,
+    note: str,
+    script: str,
+    policy: str,
+    sources: Sequence[str] = (),
+    **fields: str,
+) -> str:
+    """Return the text of page.html in a folder with its page.css, a script and other fields.
+
+    title, note : any text, which is escaped
+    script : as `inline` returns it
+    policy : directives of the Content-Security-Policy beside those for scripts and styles
+    sources : of other scripts, as in a Content-Security-Policy
+    """
+    style = (folder / "page.css").read_text("utf-8")
+    allowed = " ".join([hash_of(script), *sources])
+    return Template((folder / "page.html").read_text("utf-8")).substitute(
+        policy=html.escape(f"{_NONE}; {policy}; style-src {hash_of(style)}; script-src {allowed}"),
+        title=html.escape(title),
+        note=html.escape(note),
+        style=style,
+        script=script,
+        **fields,
+    )
+
+
 def inline(text: str) -> str:
-    """A script as it may stand between <script> and </script>: strings keep their meaning."""
+    """Return a script so that it may be between <script> and </script>: strings keep their meaning."""
     return _END.sub(r"<\\/", text).replace("<!--", r"<\!--")
 
 
 def hash_of(text: str) -> str:
-    """What a Content-Security-Policy knows an inline script or style by."""
+    """Return the hash by which a Content-Security-Policy allows an inline script or style."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -1,10 +1,9 @@
-"""JavaScript libraries of pages: from where they are loaded, or the files that are put into the page."""
+"""Pages that draw a head with a JavaScript library: the library's files, the page, its camera and lights."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
-import html
 import json
 import math
 import re
@@ -12,15 +11,14 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from string import Template
-from typing import Any, ClassVar
+from typing import ClassVar, TypedDict
 
 import numpy as np
 
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target
+from dermis.apps.export.target import Row, Rows, Target, Value, floats
 from dermis.apps.export.targets.gltf.file import encoded
-from dermis.apps.export.targets.pages.html import hash_of, inline
+from dermis.apps.export.targets.pages.html import inline, page
 from dermis.base.errors import refuse
 from dermis.base.reading import read_file
 from dermis.optics.media import SKIN_ETA
@@ -28,12 +26,18 @@ from dermis.scene.lights import DirectionalLight, Light
 from dermis.scene.model import Scene
 
 _CDN = "https://cdn.jsdelivr.net/npm"
-_MOST = 32 << 20
+_MOST = 32 << 20  # bytes of a script
+_M = 1e-3  # of a millimetre
+_SHADOW_SIDE = 2048
+_WARM_FRAMES = 4  # until all passes' programs are compiled
+_NO_LIBRARY = "{} could not be loaded from {}. Is there no network? Export again with --library."
+_MADE = "img-src blob: data:; connect-src blob: data:"  # textures of the head's file
+_HERE = Path(__file__).parent
 
 
 @dataclass(frozen=True)
 class Script:
-    """A file of a package, as npm has it.
+    """A file of an npm package.
 
     name : by which a page's modules import it, "" for one that is simply run
     sha384 : of its bytes, base64
@@ -47,16 +51,21 @@ class Script:
 
     @property
     def url(self) -> str:
-        """Where it is loaded from."""
+        """Address that it is loaded from."""
         return f"{_CDN}/{self.package}@{self.version}/{self.path}"
 
     @property
     def integrity(self) -> str:
-        """What the browser checks it by."""
+        """Hash by which the browser checks it."""
         return f"sha384-{self.sha384}"
 
+    @property
+    def element(self) -> str:
+        """Element of HTML that loads it, if its hash is right."""
+        return f'<script src="{self.url}" integrity="{self.integrity}" crossorigin="anonymous"></script>'
+
     def read(self, folder: Path) -> str:
-        """Its text, from the folder that npm installs packages into (node_modules).
+        """Return its text, from the folder that npm installs packages into (node_modules).
 
         DermisError : it is not there, or another version
         """
@@ -69,70 +78,39 @@ class Script:
         return data.decode("utf-8")
 
 
-def module_url(text: str, names: dict[str, str]) -> str:
-    """A module as an address that holds it.
+class CameraSettings(TypedDict):
+    """Camera in the head's file [m]; vertical angle of view [rad]."""
 
-    names : by which it imports others, and by which the page knows these
-    """
-    for old, new in names.items():
-        text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", text)
-    return f"data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}"
-
-
-Json = Mapping[str, Any]
-_NONE = "default-src 'none'; base-uri 'none'; form-action 'none'"
-_MADE = "img-src blob: data:; connect-src blob: data:"  # textures of the head's file
+    position: Sequence[float]
+    target: Sequence[float]
+    up: Sequence[float]
+    fov: float
 
 
-def page(
-    *, title: str, note: str, settings: Json, head: bytes, draw: Path, libraries: str, sources: Sequence[str]
-) -> str:
-    """The text of the page.
+class LightSettings(TypedDict):
+    """Parallel light."""
 
-    draw : script that draws
-    libraries : elements that load or hold the library
-    sources : what else scripts may come from, as in a Content-Security-Policy
-    """
-    script, style = inline(_text("panel.js") + draw.read_text("utf-8")), _text("page.css")
-    allowed = " ".join([hash_of(script), *sources])
-    return Template(_text("page.html")).substitute(
-        policy=html.escape(f"{_NONE}; {_MADE}; style-src {hash_of(style)}; script-src {allowed}"),
-        title=html.escape(title),
-        note=html.escape(note),
-        style=style,
-        script=script,
-        settings=json_text(settings),
-        head=base64.b64encode(head).decode(),
-        libraries=libraries,
-    )
+    direction: Sequence[float]
+    irradiance: Sequence[float]
 
 
-def json_text(value: Json) -> str:
-    """JSON that no element of HTML begins or ends in."""
-    told = json.dumps(value, ensure_ascii=True)
-    return told.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+class Settings(TypedDict):
+    """Settings that the page's script reads."""
 
-
-def linked(script: Script) -> str:
-    """An element that loads a script, if it is the one that it was."""
-    return f'<script src="{script.url}" integrity="{script.integrity}" crossorigin="anonymous"></script>'
-
-
-def _text(name: str) -> str:
-    return Path(__file__).with_name(name).read_text("utf-8")
-
-
-_M = 1e-3  # of a millimetre
-_SHADOW_SIDE = 2048
-_WARM_FRAMES = 4  # until all passes' programs are compiled
-_NO_LIBRARY = "{} could not be loaded from {}. Is there no network? Export again with --library."
+    camera: CameraSettings
+    lights: list[LightSettings]
+    skin: dict[str, Value]
+    shadow_side: int
+    warm_frames: int
+    smooth: bool
+    no_library: str
 
 
 @dataclass(frozen=True)
-class WebPage(Target):
-    """A page that draws a head.
+class LibraryPage(Target):
+    """A page that draws a head with a library.
 
-    installed : folder that npm has installed the library's packages into, whose files then stand in the page;
+    installed : folder that npm has installed the library's packages into, whose files the page then holds;
         None loads them from a public server
     """
 
@@ -147,30 +125,32 @@ class WebPage(Target):
     scripts: ClassVar[Mapping[str, tuple[Script, ...]]]
     """Files of the library, by version."""
 
-    def with_library(self, folder: str | Path) -> WebPage:
-        """The same with the library inside the page."""
+    def with_library(self, folder: str | Path) -> LibraryPage:
+        """Return the same with the library inside the page."""
         return replace(self, installed=Path(folder))
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
-        """The page."""
+        """Write the page."""
         libraries, sources = self.loaded(version)
         text = page(
+            _HERE,
             title=f"{subject.name} in {self.title}",
             note=f"{self.title} {version} ({self.licence}). {self.wrong}",
-            settings=self._settings(subject, rows, version),
-            head=encoded(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, ""),
-            draw=self.draw,
-            libraries=libraries,
+            script=inline((_HERE / "panel.js").read_text("utf-8") + self.draw.read_text("utf-8")),
+            policy=_MADE,
             sources=sources,
+            settings=json_text(self._settings(subject, rows, version)),
+            head=base64.b64encode(encoded(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
+            libraries=libraries,
         )
         place.write_text(text, encoding="utf-8")
         return [place]
 
     @abstractmethod
     def loaded(self, version: str) -> tuple[str, list[str]]:
-        """Elements that load or hold the library, and what scripts may come from."""
+        """Return elements that load or hold the library, and the allowed sources of scripts."""
 
-    def _settings(self, subject: Subject, rows: Rows, version: str) -> dict[str, Any]:
+    def _settings(self, subject: Subject, rows: Rows, version: str) -> Settings:
         scene = subject.scene or Scene(subject.shape)
         where = self.scripts[version][0].url
         middle = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # a ball's own
@@ -185,33 +165,45 @@ class WebPage(Target):
         }
 
 
+def json_text(value: Mapping[str, object]) -> str:
+    """Return JSON in which no element of HTML begins or ends."""
+    text = json.dumps(value, ensure_ascii=True)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def module_url(text: str, names: Mapping[str, str]) -> str:
+    """Return a module as an address that holds it.
+
+    names : by which it imports others, and by which the page knows these
+    """
+    for old, new in names.items():
+        text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", text)
+    return f"data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}"
+
+
 def surface_rows(subject: Subject) -> Rows:
-    """What both libraries take for the surface."""
+    """Return the parameters of the surface in both libraries."""
     return (
-        Row("albedo", tuple(float(x) for x in subject.albedo), "-", "diffuse; the mean where it is a map"),
+        Row("albedo", floats(subject.albedo), "-", "diffuse; the mean where it is a map"),
         Row("ior", SKIN_ETA, "-", "of the surface, which reflects 0.028 straight ahead"),
     )
 
 
-def camera_of(scene: Scene, middle_mm: Sequence[float]) -> dict[str, Any]:
-    """Where the scene is seen from in the head's file [m], and the vertical angle of view [rad].
+def camera_of(scene: Scene, middle_mm: Sequence[float]) -> CameraSettings:
+    """Return the scene's camera.
 
-    middle_mm : what cameras are placed around
+    middle_mm : about which cameras are placed
     """
     camera = scene.camera
     position, target = (_M * (np.array(middle_mm) + each) for each in (camera.position, camera.target))
-    up = [float(x) for x in camera.up]
     fov = 2.0 * math.atan(camera.half_tangent)
-    return {"position": position.tolist(), "target": target.tolist(), "up": up, "fov": fov}
+    return {"position": floats(position), "target": floats(target), "up": floats(camera.up), "fov": fov}
 
 
-def light_of(light: Light) -> dict[str, Any]:
-    """A light as parallel light with its irradiance at the head."""
+def light_of(light: Light) -> LightSettings:
+    """Return a light as parallel light with its irradiance at the head."""
     if isinstance(light, DirectionalLight):
         way = np.asarray(light.direction, np.float64)
     else:
         way = np.subtract(light.target, light.position)
-    return {
-        "direction": (way / np.linalg.norm(way)).tolist(),
-        "irradiance": [float(x) for x in light.irradiance],
-    }
+    return {"direction": floats(way / np.linalg.norm(way)), "irradiance": floats(light.irradiance)}

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows
+from dermis.apps.export.target import Row, Rows, with_values
 from dermis.apps.export.targets.pages.html import hash_of
-from dermis.apps.export.targets.pages.library_page import Script, WebPage, module_url, surface_rows
+from dermis.apps.export.targets.pages.library_page import LibraryPage, Script, module_url, surface_rows
 from dermis.optics.curve import Curve
 
 _HASHES = {
@@ -42,25 +42,25 @@ _IMPORTS = {
 _DEFAULT_IOR = 1.5
 
 
-class Three(WebPage):
-    """A page that runs."""
+class Three(LibraryPage):
+    """Page with three.js."""
 
-    name: ClassVar[str] = "three"
-    title: ClassVar[str] = "three.js"
-    versions: ClassVar[tuple[str, ...]] = ("0.187.0",)
-    licence: ClassVar[str] = "MIT"
-    draw: ClassVar[Path] = Path(__file__).with_name("three.js")
-    wrong: ClassVar[str] = (
+    name = "three"
+    title = "three.js"
+    versions = ("0.187.0",)
+    licence = "MIT"
+    draw = Path(__file__).with_name("three.js")
+    wrong = (
         "Nothing spreads: its materials send all light back from where it falls, so shadows' edges are sharp "
         "and have no red fringe, and nothing shines through an ear. Transmission would make glass of the "
         "skin and is left at 0. Lights are parallel here."
     )
-    scripts: ClassVar[dict[str, tuple[Script, ...]]] = {
-        "0.187.0": tuple(Script("three", "0.187.0", *told, name) for name, told in _HASHES.items())
+    scripts: ClassVar = {
+        "0.187.0": tuple(Script("three", "0.187.0", *file, name) for name, file in _HASHES.items())
     }
 
     def parameters(self, subject: Subject, version: str) -> Rows:
-        """The surface; there is nothing for what is below."""
+        """Return the surface; there is nothing for what is below."""
         return (
             *surface_rows(subject),
             Row("specularIntensity", 1.0, "-", "all that the index of refraction gives"),
@@ -68,17 +68,15 @@ class Three(WebPage):
         )
 
     def naive(self, subject: Subject, version: str) -> Rows:
-        """The index of refraction that the material begins with."""
-        usual = {"ior": _DEFAULT_IOR}
-        rows = self.parameters(subject, version)
-        return tuple(Row(r.name, usual.get(r.name, r.value), r.unit, r.meaning) for r in rows)
+        """Return the index of refraction that the material begins with."""
+        return with_values(self.parameters(subject, version), {"ior": _DEFAULT_IOR})
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
-        """All light leaves where it falls."""
+        """Return the curve of light that leaves where it falls."""
         return Curve.of(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
     def loaded(self, version: str) -> tuple[str, list[str]]:
-        """Six modules and the map of their names."""
+        """Return six modules and the map of their names."""
         scripts = self.scripts[version]
         if self.installed is None:
             places = {script.name: script.url for script in scripts}
@@ -90,8 +88,8 @@ class Three(WebPage):
         )
 
 
-def _import_map(told: dict[str, dict[str, str]], sources: list[str]) -> tuple[str, list[str]]:
-    text = json.dumps(told)
+def _import_map(entries: dict[str, dict[str, str]], sources: list[str]) -> tuple[str, list[str]]:
+    text = json.dumps(entries)
     return f'<script type="importmap">{text}</script>', [hash_of(text), *sources]
 
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
 from dermis.apps.export.fitting import fit_d, homogeneous, lobe
-from dermis.apps.export.subject import Subject, write_maps
-from dermis.apps.export.target import Row, Rows, Target, Value, numbers_of
+from dermis.apps.export.subject import Subject
+from dermis.apps.export.target import Row, Rows, Target, Value, floats, numbers_of, write_files
 from dermis.optics.curve import Curve
 from dermis.optics.fits.burley import UNREAL_FACTOR, BurleyProfile, shape_factor, unreal_parameters
 from dermis.optics.media import Floats
@@ -25,27 +24,28 @@ SCALE, DEPTH_SCALE = "world_unit_scale", "distance_scale"
 _LEAST_COLOUR, _MOST_CM, _LEAST_ALBEDO = 0.001, 50.0, 1e-3
 _UPLOADED_COLOUR = 0.009  # what the engine raises less to
 _MM_PER_CM = 10.0
+_IMPORTED = "colour", "normal", "roughness"
 _BEFORE_58 = ("5.3", "5.4", "5.5", "5.6", "5.7")
 
 
 class Unreal(Target):
     """A subsurface profile with Burley's kernel, for scenes in centimetres."""
 
-    name: ClassVar[str] = "unreal"
-    title: ClassVar[str] = "Unreal Engine"
-    suffixes: ClassVar[tuple[str, ...]] = ("", ".py")
-    versions: ClassVar[tuple[str, ...]] = (*_BEFORE_58, "5.8")
-    needs_maps: ClassVar[bool] = True
-    wrong: ClassVar[str] = (
+    name = "unreal"
+    title = "Unreal Engine"
+    suffixes = ("", ".py")
+    versions = (*_BEFORE_58, "5.8")
+    needs_maps = True
+    wrong = (
         "The base colour of the material colours the light, not the profile. Before 5.8 depths of thin parts "
         "are off by about 100 for light that comes through, and no field mends it; in 5.8 they are right "
         "while r.SSProfiles.Transmission.UseLegacy is 0."
     )
-    not_run: ClassVar[bool] = True
+    not_run = True
 
     def parameters(self, subject: Subject, version: str) -> Rows:
         """Mean free paths that the engine turns into the fitted lobes."""
-        albedo = _colour(subject)
+        albedo = subject.colour(_LEAST_ALBEDO)
         told = unreal_parameters(BurleyProfile(albedo, 1.0 / fit_d(subject.curve)))
         return _rows(albedo, np.array(told.mean_free_path_colour) * told.mean_free_path_distance_cm, version)
 
@@ -54,7 +54,7 @@ class Unreal(Target):
         path = homogeneous(subject.curve, subject.curve.energy).mfp_mm
         if subject.tissue is not None and subject.tissue.rgb is None:
             path = subject.tissue.medium.layers[-1].mean_free_path_mm
-        return _rows(_colour(subject), path / _MM_PER_CM, version)
+        return _rows(subject.colour(_LEAST_ALBEDO), path / _MM_PER_CM, version)
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
         """The lobe that the engine computes from its parameters, at the scale of its screen pass."""
@@ -65,15 +65,11 @@ class Unreal(Target):
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """The script, and beside it the maps."""
-        file = place if place.suffix else place / f"{subject.identifier}.py"
-        maps = write_maps(subject, file.parent, f"{file.stem}_")
-        names = {role: path.name for role, path in maps.items() if role in ("colour", "normal", "roughness")}
-        file.write_text(script(subject, rows, names, version), encoding="utf-8")
-        return [file, *maps.values()]
-
-
-def _colour(subject: Subject) -> Floats:
-    return np.clip(subject.albedo, _LEAST_ALBEDO, 1.0)
+        file, maps = self.file_in(place, subject), subject.map_pictures()
+        names = {role: f"{file.stem}_{role}.png" for role in maps}
+        imported = {role: name for role, name in names.items() if role in _IMPORTED}
+        file.write_text(_script(subject, rows, imported, version), encoding="utf-8")
+        return [file, *write_files(file.parent, {names[role]: data for role, data in maps.items()})]
 
 
 def _rows(albedo: Floats, path_cm: Floats, version: str) -> Rows:
@@ -83,8 +79,8 @@ def _rows(albedo: Floats, path_cm: Floats, version: str) -> Rows:
     return (
         Row("enable_burley", True, "-", "two exponentials; without it the old six Gaussians"),
         Row("enable_mean_free_path", True, "-", "without it the editor rewrites these numbers on loading"),
-        Row(ALBEDO, tuple(albedo.tolist()), "-", "A of s(A); it colours nothing"),
-        Row(COLOUR, tuple(colour.tolist()), "-", "mean free path by the distance, 0.6 s(A) d, no gamma"),
+        Row(ALBEDO, floats(albedo), "-", "A of s(A); it colours nothing"),
+        Row(COLOUR, floats(colour), "-", "mean free path by the distance, 0.6 s(A) d, no gamma"),
         Row(DISTANCE, distance, "cm", "mean free path where the colour is 1"),
         Row(SCALE, 1.0, "-", "1: a unit of the scene is a centimetre"),
         *(() if version in _BEFORE_58 else (depth,)),
@@ -92,8 +88,8 @@ def _rows(albedo: Floats, path_cm: Floats, version: str) -> Rows:
     )
 
 
-def script(subject: Subject, rows: Rows, maps: Mapping[str, str], version: str) -> str:
-    """A Python script that makes the profile and imports maps that lie beside it.
+def _script(subject: Subject, rows: Rows, maps: Mapping[str, str], version: str) -> str:
+    """Return a Python script that makes the profile and imports maps that lie beside it.
 
     maps : names of files by role
     """

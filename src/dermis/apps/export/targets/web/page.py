@@ -1,20 +1,18 @@
-"""One HTML file that holds a head, and what plays it."""
+"""HTML file that holds a recorded head and the player of its frames."""
 
 from __future__ import annotations
 
 import base64
 import gzip
-import html
 import io
 import json
 import re
 from pathlib import Path
-from string import Template
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.targets.pages.html import hash_of, inline
+from dermis.apps.export.targets.pages.html import inline, page
 from dermis.apps.export.targets.web.build import Built
 from dermis.apps.export.targets.web.dials import Dial
 from dermis.apps.export.targets.web.packing import seven_bits
@@ -33,53 +31,46 @@ MODULES = (
     "page",
 )
 """Of the player, each after those that it imports."""
-_NONE = "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:"
+_HERE = Path(__file__).parent
 _IMPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 
 
 def web_page(built: Built, dials: tuple[Dial, ...], title: str, note: str) -> str:
-    """The text of the page.
+    """Return the text of the page.
 
-    title, note : words of users among them are escaped
+    title, note : any text, which is escaped
     """
-    script, style = inline(player()), _text("page.css")
-    told = {
+    scene = {
         "forms": built.forms,
         "blobs": built.packer.runs,
         "images": [len(one) for one in built.pictures],
         "dials": [{"name": one.name, "values": one.values, "rest": one.rest} for one in dials],
     }
     assert built.poster is not None
-    return Template(_text("page.html")).substitute(
-        policy=html.escape(f"{_NONE}; style-src {hash_of(style)}; script-src {hash_of(script)}"),
-        title=html.escape(title),
-        note=html.escape(note),
-        style=style,
-        poster=f"data:image/webp;base64,{_base64(_poster(built.poster))}",
-        scene=seven_bits(gzip.compress(json.dumps(told).encode(), 9, mtime=0)),
+    return page(
+        _HERE,
+        title=title,
+        note=note,
+        script=inline(player()),
+        policy="img-src data:",
+        poster=f"data:image/webp;base64,{base64.b64encode(_webp(built.poster)).decode()}",
+        scene=seven_bits(gzip.compress(json.dumps(scene).encode(), 9, mtime=0)),
         data=seven_bits(built.packer.packed()),
         pictures=seven_bits(b"".join(built.pictures)),
-        script=script,
     )
 
 
 def player() -> str:
-    """The player's modules as one."""
-    return "".join(_EXPORT.sub("", _IMPORT.sub("", _text(f"{name}.js"))) for name in MODULES)
+    """Return the player's modules as one script."""
+    return "".join(
+        _EXPORT.sub("", _IMPORT.sub("", (_HERE / f"{name}.js").read_text("utf-8"))) for name in MODULES
+    )
 
 
-def _poster(picture: NDArray[np.uint8]) -> bytes:
+def _webp(picture: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
     into = io.BytesIO()
     Image.fromarray(picture).save(into, "WEBP", quality=80)
     return into.getvalue()
-
-
-def _base64(data: bytes) -> str:
-    return base64.b64encode(data).decode()
-
-
-def _text(name: str) -> str:
-    return Path(__file__).with_name(name).read_text("utf-8")
