@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, TypeVar
@@ -60,11 +60,14 @@ def floats(values: ArrayLike) -> tuple[float, ...]:
     return tuple(np.ravel(np.asarray(values, np.float64)).tolist())
 
 
-def write_files(folder: Path, contents: Mapping[str, bytes]) -> list[Path]:
-    """Write files into a folder, by their names; return their paths."""
-    for name, content in contents.items():
-        (folder / name).write_bytes(content)
-    return [folder / name for name in contents]
+def write_files(folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Path]:
+    """Write files into a folder, by their names in it; return their paths."""
+    written = []
+    for name, content in contents:
+        written.append(folder / name)
+        written[-1].parent.mkdir(exist_ok=True)
+        written[-1].write_bytes(content)
+    return written
 
 
 @dataclass(frozen=True)
@@ -127,9 +130,12 @@ class Target(ABC):
             refuse("version", expected, f"{shown_value(version)} came", "Choose the nearest, and check it")
         return version
 
-    def file_in(self, place: Path, subject: Subject) -> Path:
-        """Return the main file: the place itself, or one of the usual suffix in it where it is a folder."""
-        suffix = next(filter(None, self.suffixes))
+    def file_in(self, place: Path, subject: Subject, suffix: str = "") -> Path:
+        """Return the main file: the place itself, or one in it where it is a folder.
+
+        suffix : of the file in a folder, the usual one by default
+        """
+        suffix = suffix or next(filter(None, self.suffixes))
         return place if place.suffix else place / f"{subject.identifier}{suffix}"
 
     @abstractmethod

@@ -66,7 +66,7 @@ class Unity(Target):
         """The asset, and beside it the maps."""
         asset = self.file_in(place, subject)
         asset.write_text(asset_text(asset.stem, rows, version), encoding="utf-8")
-        maps = {f"{asset.stem}_{role}.png": data for role, data in subject.map_pictures().items()}
+        maps = ((f"{asset.stem}_{role}.png", data) for role, data in subject.map_pictures().items())
         return [asset, *write_files(asset.parent, maps)]
 
 

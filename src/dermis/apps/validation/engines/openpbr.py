@@ -14,7 +14,7 @@ from dermis.apps.export.run import export_skin, judged
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.openpbr import target as openpbr_target
-from dermis.apps.export.targets.openpbr.document import OPEN_PBR
+from dermis.apps.export.targets.openpbr.materials import OPEN_PBR
 from dermis.apps.export.targets.openpbr.target import fitted_mm, profile_of_specification
 from dermis.apps.export.targets.pbrt import target as pbrt_target
 from dermis.apps.validation.pages import RESULTS, read_figures, write_figures

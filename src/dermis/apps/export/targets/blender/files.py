@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps import truths
-from dermis.apps.export.lights import known_lights
+from dermis.apps.export.scene_parts import known_lights
 from dermis.apps.export.subject import BALL_MM, Subject
 from dermis.apps.export.target import Rows, floats
 from dermis.apps.truths.blender_process import Errand, blender_python, run_blender

@@ -1,4 +1,4 @@
-"""What each exported map holds, in which unit, and how a PNG shows it."""
+"""Maps of a head as OpenEXR and PNG, and a JSON of their meanings, units and ranges."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,13 @@ from dermis.images.io import encode_exr_parts
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
+Floats = NDArray[np.float32]
+Ranges = dict[str, str | float | list[float]]
+NormalY = Literal["up", "down"]
+SIDES = tuple(1 << k for k in range(8, 14))
+"""Sides that the maps may have [texel]."""
+_MOST, _BRIGHT = 65535, 99.9
+_LOGGER = logging.getLogger("dermis")
 Shown = Literal["colour", "light", "normal", "share", "range", "root", "none"]
 """How a PNG holds a map: sRGB of 8 bits; the same of light, divided by its 99.9th percentile; a normal n as
 (n + 1) / 2 in 16 bits; a share in 16 bits; 16 bits from the least to the largest value; the square root in
@@ -32,7 +39,7 @@ Shown = Literal["colour", "light", "normal", "share", "range", "root", "none"]
 
 @dataclass(frozen=True)
 class Meaning:
-    """Of a map.
+    """Meaning of a map.
 
     unit : of its numbers in OpenEXR, empty for none
     shown : how a PNG has it
@@ -67,23 +74,18 @@ MEANINGS: Mapping[str, Meaning] = MappingProxyType(
         ),
     }
 )
-"""By the maps' names, which are those of their files."""
-
-
-Floats = NDArray[np.float32]
-NormalY = Literal["up", "down"]
-_MOST, _BRIGHT = 65535, 99.9
+"""Meanings by the names of the maps and of their files."""
 
 
 def exr(name: str, values: Floats) -> bytes:
-    """A map as OpenEXR: channels R, G, B of colours and vectors, Y of one number."""
+    """Return a map as OpenEXR: channels R, G, B of colours and vectors, Y of one number."""
     letters = "Y" if values.ndim == 2 else "RGB"
     channels = [values] if values.ndim == 2 else list(np.moveaxis(values, -1, 0))
     return encode_exr_parts({name: dict(zip(letters, channels, strict=True))}, swift=True)
 
 
-def levels(values: Floats, meaning: Meaning) -> tuple[NDArray[np.uint8 | np.uint16], dict[str, Any]]:
-    """A map as a PNG has it, and how its levels become numbers."""
+def levels(values: Floats, meaning: Meaning) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:
+    """Return the levels of a map in a PNG, and how they become numbers."""
     if meaning.shown == "colour":
         return encode_srgb8(np.clip(values, 0.0, 1.0)), {"png": "sRGB"}
     if meaning.shown == "light":
@@ -102,7 +104,7 @@ def levels(values: Floats, meaning: Meaning) -> tuple[NDArray[np.uint8 | np.uint
 
 
 def with_green(normal: Floats, normal_y: NormalY) -> Floats:
-    """A map of normals whose green points to row 0 ("up", OpenGL) or away from it ("down", DirectX)."""
+    """Return normals whose green points to row 0 ("up", OpenGL) or away from it ("down", DirectX)."""
     if normal_y == "up":
         return normal
     return normal * np.array([1.0, -1.0, 1.0], np.float32)
@@ -112,13 +114,8 @@ def _sixteen(share: Floats) -> NDArray[np.uint16]:
     return np.rint(np.clip(share, 0.0, 1.0) * _MOST).astype(np.uint16)
 
 
-LOGGER = logging.getLogger("dermis")
-SIDES = tuple(1 << k for k in range(8, 14))
-"""Sides that the maps may have [texel]."""
-
-
 def check_side(side: object) -> int:
-    """The side of the maps.
+    """Return the side of the maps.
 
     Raises DermisError for one that is none of `SIDES`.
     """
@@ -130,7 +127,7 @@ def check_side(side: object) -> int:
 
 
 def baked_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> Baked:
-    """The maps of the skin in the scene's light, with its relief as heights where it has such."""
+    """Return the maps of the skin in the scene's light, with its relief as heights where it has such."""
     baked = bake(renderer, scene, settings, side)
     painted = renderer.kept_open.run(
         lambda: with_painted_maps(renderer.device, scene.head, min(max(side, LEAST), MOST))
@@ -144,26 +141,28 @@ def baked_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) 
 
 
 def map_files(baked: Baked, scene: Scene, normal_y: NormalY) -> Iterator[tuple[str, bytes]]:
-    """Names and contents of the files, the JSON last."""
-    described: dict[str, Any] = {}
+    """Return names and contents of the files, the JSON last."""
+    described: dict[str, Ranges] = {}
     for name, meaning in MEANINGS.items():
         if name not in baked.maps:
             continue
         values = with_green(baked.maps[name], normal_y) if name == "normal" else baked.maps[name]
-        LOGGER.info("writing %s", name)
+        _LOGGER.info("writing %s", name)
         yield f"{name}.exr", exr(name, values)
         inside = values[baked.covered]
         bounds = {"least": _plain(inside.min(axis=0)), "largest": _plain(inside.max(axis=0))}
         described[name] = {"unit": meaning.unit, "meaning": meaning.words, "exr": "linear", **bounds}
         if meaning.shown != "none":
-            picture, told = levels(values, meaning)
+            picture, scale = levels(values, meaning)
             yield f"{name}.png", encode_png(picture[..., None] if picture.ndim == 2 else picture, 6)
-            described[name] |= told
-    yield "maps.json", (json.dumps(_told(baked, scene, normal_y, described), indent=1) + "\n").encode()
+            described[name] |= scale
+    yield "maps.json", (json.dumps(_description(baked, scene, normal_y, described), indent=1) + "\n").encode()
 
 
-def _told(baked: Baked, scene: Scene, normal_y: NormalY, described: dict[str, Any]) -> dict[str, Any]:
-    """What a reader of the maps must know."""
+def _description(
+    baked: Baked, scene: Scene, normal_y: NormalY, described: dict[str, Ranges]
+) -> dict[str, object]:
+    """Return what a reader of the maps must know."""
     lights = [light.model_dump(mode="json") for light in scene.lights]
     around = scene.environment
     return {
@@ -187,7 +186,7 @@ def _told(baked: Baked, scene: Scene, normal_y: NormalY, described: dict[str, An
 
 
 def resampled(values: Floats, side: int) -> Floats:
-    """A map (h, w) at another side: means of texels where that is smaller, else what lies between them."""
+    """Return a map (h, w) at another side: means of texels where that is smaller, else interpolated."""
     height, width = values.shape
     while min(height, width) >= 2 * side and not (height | width) & 1:
         values = 0.25 * (values[0::2, 0::2] + values[1::2, 0::2] + values[0::2, 1::2] + values[1::2, 1::2])
@@ -203,5 +202,6 @@ def resampled(values: Floats, side: int) -> Floats:
     return np.ascontiguousarray(values, np.float32)
 
 
-def _plain(value: Any) -> Any:
-    return np.round(np.asarray(value, np.float64), 6).tolist()
+def _plain(value: Floats) -> float | list[float]:
+    found: float | list[float] = np.round(np.asarray(value, np.float64), 6).tolist()
+    return found

@@ -1,15 +1,14 @@
-"""Maps of a head in its own uv layout, with light before and after it spreads, for what reads pictures."""
+"""Maps of a head in its own uv layout, with light before and after it spreads, as pictures."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, value_of
-from dermis.apps.export.targets.maps.files import SIDES, baked_maps, check_side, map_files
+from dermis.apps.export.target import Row, Rows, Target, value_of, with_values, write_files
+from dermis.apps.export.targets.maps.files import SIDES, NormalY, baked_maps, check_side, map_files
 from dermis.base.errors import refuse
 from dermis.frame.skin_profiles import SkinProfiles
 from dermis.optics.curve import Curve
@@ -23,32 +22,31 @@ _ATLAS = 2048  # texels of the map in which light spreads, at most
 class MapFolder(Target):
     """OpenEXR in linear numbers and PNG to look at, with a JSON of units and ranges."""
 
-    name: ClassVar[str] = "maps"
-    title: ClassVar[str] = "maps"
-    suffixes: ClassVar[tuple[str, ...]] = ("",)
-    versions: ClassVar[tuple[str, ...]] = ("1",)
-    variants: ClassVar[tuple[str, ...]] = ("opengl", "directx")
-    wrong: ClassVar[str] = (
+    name = "maps"
+    title = "maps"
+    suffixes = ("",)
+    versions = ("1",)
+    variants = ("opengl", "directx")
+    wrong = (
         "Light is baked for one pose and the lights of one scene, as it leaves along the normal. The profile "
         "is the sum of Gaussians that the frame blurs by. Reflections off the surface depend on the eye: no "
         "map has them."
     )
 
     def parameters(self, subject: Subject, version: str) -> Rows:
-        """What is written, and which of the two maps of light is to be shown."""
+        """Return what is written, and which of the two maps of light is to be shown."""
         return (
             Row("size", self.side, "texel", "side of the maps"),
-            Row("normal_green", "up" if self._up else "down", "-", "towards row 0, or away from it"),
+            Row("normal_green", self._green, "-", "towards row 0, or away from it"),
             Row(_SPREAD, True, "-", "the light shown is that after it spread, scattered.exr"),
         )
 
     def naive(self, subject: Subject, version: str) -> Rows:
-        """Light that has not spread, times the albedo: an ordinary light map."""
-        rows = self.parameters(subject, version)
-        return tuple(Row(r.name, False, r.unit, r.meaning) if r.name == _SPREAD else r for r in rows)
+        """Return light that has not spread, times the albedo: an ordinary light map."""
+        return with_values(self.parameters(subject, version), {_SPREAD: False})
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
-        """The sum of Gaussians by which the frame spreads light, or none."""
+        """Return the sum of Gaussians by which the frame spreads light, or none."""
         energy = subject.curve.energy
         if not value_of(rows, _SPREAD) or subject.scene is None:
             return Curve.of(lambda r: np.repeat(np.where(r > 0.0, 1.0, 0.0)[:, None], 3, axis=1), energy)
@@ -63,7 +61,7 @@ class MapFolder(Target):
         return Curve.of(within, energy)
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
-        """All maps that the scene has."""
+        """Write all maps of the scene."""
         from dermis.frame.renderer import Renderer
 
         if subject.scene is None:
@@ -72,15 +70,11 @@ class MapFolder(Target):
         scene, side = subject.scene, check_side(self.side)
         settings = Settings(atlas=min(max(side, SIDES[0]), _ATLAS))
         baked = baked_maps(Renderer(self.adapter), scene, settings, side)
-        written = []
-        for name, content in map_files(baked, scene, "up" if self._up else "down"):
-            written.append(place / name)
-            written[-1].write_bytes(content)
-        return written
+        return write_files(place, map_files(baked, scene, self._green))
 
     @property
-    def _up(self) -> bool:
-        return self.variant != "directx"
+    def _green(self) -> NormalY:
+        return "down" if self.variant == "directx" else "up"
 
 
 TARGET = MapFolder()

@@ -1,47 +1,22 @@
-"""Triangles as binary PLY files, as Mitsuba reads them."""
+"""Meshes of a head for Mitsuba: closed surfaces about the skin's medium, and its other parts with colours."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.export.scene_parts import ply
+from dermis.apps.export.targets.mitsuba.xml import Words
 from dermis.apps.truths.mitsuba_scene import gap_of
 from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.frame.baking import baked_colours
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
-
-_FACE = np.dtype([("count", "u1"), ("corner", "<i4", (3,))])
-
-
-def ply(
-    triangles: NDArray[Any], positions: Any, normals: Any = None, uv: Any = None, colour: Any = None
-) -> bytes:
-    """A file of triangles.
-
-    positions, normals, uv, colour : (v, 3), (v, 3), (v, 2) with v = 0 at the pictures' top, (v, 3) linear
-    """
-    given = {"x y z": positions, "nx ny nz": normals, "u v": uv, "r g b": colour}
-    columns = {names: values for names, values in given.items() if values is not None}
-    vertices = np.concatenate([np.asarray(one, "<f4") for one in columns.values()], axis=1)
-    lines = [f"property float {name}" for names in columns for name in names.split()]
-    header = [
-        "ply",
-        "format binary_little_endian 1.0",
-        f"element vertex {len(vertices)}",
-        *lines,
-        f"element face {len(triangles)}",
-        "property list uchar int vertex_indices",
-        "end_header",
-    ]
-    faces = np.empty(len(triangles), _FACE)
-    faces["count"], faces["corner"] = 3, triangles
-    return "\n".join(header).encode() + b"\n" + vertices.tobytes() + faces.tobytes()
 
 
 class Surfaces(NamedTuple):
@@ -57,10 +32,8 @@ class Surfaces(NamedTuple):
     upper_caps: bytes | None
 
 
-def surfaces(words: Any, head: Head) -> Surfaces:
-    """The head about its centre [mm].
-
-    words : the module `mitsuba`, or what stands in for it
+def surfaces(words: Words, head: Head) -> Surfaces:
+    """Return the surfaces of the head about its centre [mm].
 
     Raises DermisError when the skin encloses no volume.
     """
@@ -79,14 +52,14 @@ def surfaces(words: Any, head: Head) -> Surfaces:
 
 
 def files_of(made: Surfaces) -> Iterator[tuple[str, bytes]]:
-    """Names and contents."""
+    """Return names and contents."""
     for name, content in made._asdict().items():
         if content is not None:
             yield f"meshes/{name}.ply", content
 
 
 def _caps(solid: Solid, first: int) -> bytes | None:
-    """The triangles from one on, None for none."""
+    """Return a file of the triangles from one on, None for none."""
     if len(solid.triangles) == first:
         return None
     used, corners = np.unique(solid.triangles[first:], return_inverse=True)
@@ -110,7 +83,7 @@ class Divided(NamedTuple):
 
 
 def divided(triangles: NDArray[np.integer], finer: int = _FINER) -> Divided:
-    """Each of some triangles as finer^2 smaller ones, which share no corners with those of others.
+    """Divide each of some triangles into finer^2 smaller ones, which share no corners with those of others.
 
     triangles : (t,) numbers
     """
@@ -128,7 +101,10 @@ def divided(triangles: NDArray[np.integer], finer: int = _FINER) -> Divided:
 
 
 def painted_meshes(renderer: Renderer, scene: Scene) -> dict[int, bytes]:
-    """Files of all materials but the skin, by their indices; the head about its centre [mm]."""
+    """Return files of all materials but the skin, by their indices; the head about its centre [mm].
+
+    They have no maps: fine triangles have a colour at each corner.
+    """
     mesh = scene.head.mesh
     opaque = [k for k, material in enumerate(mesh.materials) if material.kind != "skin"]
     parts = {k: divided(np.flatnonzero(mesh.material == k)) for k in opaque if (mesh.material == k).any()}

@@ -1,16 +1,16 @@
-"""A scene of Mitsuba as files: `mitsuba scene.xml` renders it, `-D boundary=rough` under another surface."""
+"""Scene of Mitsuba as files: `mitsuba scene.xml` renders it, `-D boundary=rough` under another surface."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.lights import known_lights
+from dermis.apps.export.scene_parts import known_lights
 from dermis.apps.export.targets.maps.files import exr
 from dermis.apps.export.targets.mitsuba.meshes import Surfaces, files_of, surfaces
 from dermis.apps.export.targets.mitsuba.xml import (
@@ -23,7 +23,7 @@ from dermis.apps.export.targets.mitsuba.xml import (
     include,
     picture_file,
 )
-from dermis.apps.truths.described import rgb, surroundings
+from dermis.apps.truths.described import Described, rgb, surroundings
 from dermis.apps.truths.lights import MITSUBA, emitter
 from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, sensor_of
 from dermis.scene.model import Scene
@@ -50,7 +50,7 @@ class Walked(NamedTuple):
 
 
 class Looks(NamedTuple):
-    """What is below and on the skin.
+    """Medium and surface of the skin.
 
     media : of each boundary
     roughness : Beckmann m, one number or (n, n)
@@ -70,7 +70,7 @@ class Looks(NamedTuple):
 def scene_files(
     scene: Scene, looks: Looks, boundary: Boundary, size: tuple[int, int], samples: int
 ) -> Iterator[tuple[str, bytes]]:
-    """Names and contents of the files, the scene first.
+    """Return names and contents of the files, the scene first.
 
     Raises DermisError for what Mitsuba has no words for: lights without shadows, cameras with shifted lenses,
     skin that encloses no volume.
@@ -92,8 +92,8 @@ def scene_files(
         yield picture_file(index), exr("light", np.asarray(values, np.float32))
 
 
-def medium_words(medium: Walked) -> dict[str, Any]:
-    """A homogeneous medium [mm]; colours hold at most 1, so the largest extinction goes into the scale."""
+def medium_words(medium: Walked) -> Described:
+    """Return a homogeneous medium [mm]; colours are at most 1, the largest extinction is the scale."""
     extinction = np.asarray(medium.sigma_t)
     return {
         "type": "homogeneous",
@@ -105,8 +105,10 @@ def medium_words(medium: Walked) -> dict[str, Any]:
     }
 
 
-def surface_words(boundary: Boundary, passing: Any = None, roughness: Any = 0.3) -> dict[str, Any]:
-    """The surface of the skin, as light meets it from outside.
+def surface_words(
+    boundary: Boundary, passing: Described | None = None, roughness: float | Described = 0.3
+) -> Described:
+    """Return the surface of the skin, as light meets it from outside.
 
     passing : share that a refracting surface lets pass each way, a texture; None for all
     roughness : Beckmann m, a number or a texture
@@ -115,7 +117,7 @@ def surface_words(boundary: Boundary, passing: Any = None, roughness: Any = 0.3)
     if boundary == "matched":
         mirror = {"type": "roughconductor", "material": "none", **rough}
         return {"type": "mask", "opacity": REFLECTED, "bsdf": mirror, "id": "skin_surface"}
-    index: dict[str, Any] = {"int_ior": SKIN_ETA, "ext_ior": 1.0}
+    index: Described = {"int_ior": SKIN_ETA, "ext_ior": 1.0}
     if passing is not None:
         index["specular_transmittance"] = passing
     if boundary == "smooth":
@@ -123,8 +125,8 @@ def surface_words(boundary: Boundary, passing: Any = None, roughness: Any = 0.3)
     return {"type": "roughdielectric", "id": "skin_surface", **rough, **index}
 
 
-def _below(dimmed: bool) -> dict[str, Any]:
-    """What a matched surface is for light from below: it dims what leaves, by the skin's lightness."""
+def _below(dimmed: bool) -> Described:
+    """Return a matched surface for light from below: it dims what leaves, by the skin's lightness."""
     if not dimmed:
         return {"type": "null", "id": "skin_below"}
     black = {"type": "diffuse", "reflectance": rgb((0.0, 0.0, 0.0))}
@@ -134,7 +136,7 @@ def _below(dimmed: bool) -> dict[str, Any]:
 def _frame(
     words: Words, scene: Scene, looks: Looks, boundary: Boundary, picture: tuple[int, int, int]
 ) -> list[ET.Element]:
-    """All but the skin.
+    """Return all parts but the skin.
 
     picture : width, height [pixel], samples of each
     """
@@ -148,7 +150,7 @@ def _frame(
     sensor["sampler"]["sample_count"] = Given("integer", "samples")
     # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
-    parts: list[dict[str, Any]] = [integrator, sensor]
+    parts: list[Described] = [integrator, sensor]
     lights = known_lights(scene.lights, MITSUBA, "Mitsuba")
     parts += [emitter(words, light, k) for k, light in enumerate(lights, start=1)]
     if scene.environment is not None:
@@ -163,10 +165,8 @@ def _frame(
 
 
 def _skin(words: Words, boundary: Boundary, looks: Looks, made: Surfaces) -> list[ET.Element]:
-    """The skin under a surface."""
-    roughness: Any = looks.roughness
-    if not isinstance(roughness, float):
-        roughness = _texture("roughness")
+    """Return the skin under a surface."""
+    roughness = looks.roughness if isinstance(looks.roughness, float) else _texture("roughness")
     passing = None if looks.passing is None else _texture("passing")
     parts = [medium_words(looks.media[boundary]), surface_words(boundary, passing, roughness)]
     shapes = dict.fromkeys(("skin", "caps"), "skin_surface")
@@ -190,5 +190,5 @@ def _opaque_file(index: int) -> str:
     return f"meshes/material_{index}.ply"
 
 
-def _texture(name: str) -> dict[str, Any]:
+def _texture(name: str) -> Described:
     return {"type": "bitmap", "filename": f"textures/{name}.exr", "raw": True}

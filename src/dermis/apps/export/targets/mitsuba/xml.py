@@ -1,15 +1,15 @@
-"""Mitsuba's scene descriptions as XML, without Mitsuba: it need not be there for a scene to be written."""
+"""Scene descriptions of Mitsuba as XML, written without Mitsuba."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import ClassVar, SupportsFloat
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 VERSION = "3.0.0"
 _POINTS, _VECTORS = ("position", "center"), ("direction",)
@@ -32,10 +32,10 @@ _KIND = {plugin: kind for kind, plugins in _KINDS.items() for plugin in plugins}
 class Transform:
     """A matrix as Mitsuba builds it: each call acts before those that came earlier."""
 
-    def __init__(self, matrix: Any = None) -> None:
+    def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
 
-    def look_at(self, origin: Any, target: Any, up: Any) -> Transform:
+    def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
         """From +Z towards the target, Y upwards."""
         ahead = _unit(np.subtract(target, origin))
         left = _unit(np.cross(up, ahead))
@@ -43,7 +43,7 @@ class Transform:
         matrix[:3] = np.column_stack([left, np.cross(ahead, left), ahead, origin])
         return Transform(self.matrix @ matrix)
 
-    def scale(self, factors: Any) -> Transform:
+    def scale(self, factors: ArrayLike) -> Transform:
         """Along the axes, or alike."""
         return Transform(self.matrix @ np.diag([*np.broadcast_to(factors, 3), 1.0]))
 
@@ -57,7 +57,7 @@ class Bitmap:
 
 @dataclass
 class Words:
-    """What stands in for the module `mitsuba` where scenes are described.
+    """Replacement of the module `mitsuba` where scenes are described.
 
     bitmaps : pictures, in the order in which they are written
     """
@@ -83,12 +83,12 @@ class Given:
     name: str
 
 
-def element(described: Mapping[str, Any], name: str, words: Words) -> ET.Element:
-    """What a description says, under a name.
+def element(described: Mapping[str, object], name: str, words: Words) -> ET.Element:
+    """Return the element of a description, under a name.
 
     words : takes the pictures
     """
-    plugin = described["type"]
+    plugin = str(described["type"])
     made = ET.Element(_KIND[plugin], {"type": plugin, **_named(name, described)})
     for key, value in described.items():
         if key not in ("type", "id"):
@@ -97,12 +97,12 @@ def element(described: Mapping[str, Any], name: str, words: Words) -> ET.Element
 
 
 def picture_file(index: int) -> str:
-    """Where a picture is beside the scene."""
+    """Return the file of a picture beside the scene."""
     return f"textures/light_{index}.exr"
 
 
 def document(parts: list[ET.Element]) -> bytes:
-    """A scene of these parts."""
+    """Return a scene of these parts."""
     root = ET.Element("scene", {"version": VERSION})
     root.extend(parts)
     ET.indent(root)
@@ -111,42 +111,42 @@ def document(parts: list[ET.Element]) -> bytes:
 
 
 def default(name: str, value: str) -> ET.Element:
-    """A value that the command line may replace."""
+    """Return a value that the command line may replace."""
     return ET.Element("default", {"name": name, "value": value})
 
 
 def include(filename: str) -> ET.Element:
-    """What another file describes."""
+    """Return a reference to another file."""
     return ET.Element("include", {"filename": filename})
 
 
-def _named(name: str, described: Mapping[str, Any]) -> dict[str, str]:
-    return {"id": described["id"]} if "id" in described else ({"name": name} if name else {})
+def _named(name: str, described: Mapping[str, object]) -> dict[str, str]:
+    return {"id": str(described["id"])} if "id" in described else ({"name": name} if name else {})
 
 
-def _property(key: str, value: Any, words: Words) -> ET.Element:
+def _property(key: str, value: object, words: Words) -> ET.Element:
     if isinstance(value, Ref):
         return ET.Element("ref", {"name": key, "id": value.name})
     if isinstance(value, Given):
         return ET.Element(value.kind, {"name": key, "value": f"${value.name}"})
     if isinstance(value, Transform):
         made = ET.Element("transform", {"name": key})
-        ET.SubElement(made, "matrix", {"value": _numbers(value.matrix.ravel())})
+        ET.SubElement(made, "matrix", {"value": _numbers(value.matrix)})
         return made
     if isinstance(value, Bitmap):
         words.bitmaps.append(value.values)
         return _plain("filename", picture_file(len(words.bitmaps) - 1))
     if isinstance(value, Mapping):
         if value["type"] == "rgb":
-            return ET.Element("rgb", {"name": key, "value": _numbers(np.ravel(value["value"]))})
+            return ET.Element("rgb", {"name": key, "value": _numbers(value["value"])})
         return element(value, key, words)
     return _plain(key, value)
 
 
-def _plain(key: str, value: Any) -> ET.Element:
+def _plain(key: str, value: object) -> ET.Element:
     if key in _POINTS or key in _VECTORS:
-        kind = "point" if key in _POINTS else "vector"
-        return ET.Element(kind, {"name": key, **dict(zip("xyz", map(_number, value), strict=True))})
+        kind, xyz = "point" if key in _POINTS else "vector", map(_number, np.asarray(value, np.float64))
+        return ET.Element(kind, {"name": key, **dict(zip("xyz", xyz, strict=True))})
     if isinstance(value, bool):
         return ET.Element("boolean", {"name": key, "value": str(value).lower()})
     if isinstance(value, int | np.integer):
@@ -156,13 +156,13 @@ def _plain(key: str, value: Any) -> ET.Element:
     return ET.Element("string", {"name": key, "value": str(value)})
 
 
-def _numbers(values: Any) -> str:
-    return " ".join(map(_number, values))
+def _numbers(values: ArrayLike) -> str:
+    return " ".join(map(_number, np.ravel(values)))
 
 
-def _number(value: Any) -> str:
+def _number(value: SupportsFloat) -> str:
     return f"{float(value):.9g}"
 
 
-def _unit(vector: Any) -> NDArray[np.float64]:
+def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(vector / np.linalg.norm(vector))

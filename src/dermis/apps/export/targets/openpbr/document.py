@@ -1,47 +1,26 @@
-"""Materials as a MaterialX document."""
+"""MaterialX documents of materials."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
-from typing import Any
 
-from dermis.apps.export.targets.openpbr.materials import DISTANCES, MAPS, Look, Value
+import MaterialX
+
+from dermis.apps.export.targets.openpbr.materials import DISTANCES, MAPS, Look, Value, input_name
 from dermis.base.errors import refuse
-from dermis.base.extras import needed
-
-TASK = "writing MaterialX"
-OPEN_PBR, STANDARD = "open_pbr_surface", "standard_surface"
-_IN_STANDARD: Mapping[str, str] = {
-    "base_color": "base_color",
-    "subsurface_weight": "subsurface",
-    "subsurface_color": "subsurface_color",
-    "subsurface_radius": "subsurface_scale",
-    "subsurface_radius_scale": "subsurface_radius",
-    "subsurface_scatter_anisotropy": "subsurface_anisotropy",
-    "specular_weight": "specular",
-    "specular_ior": "specular_IOR",
-    "specular_roughness": "specular_roughness",
-    "geometry_normal": "normal",
-}
 
 
-def input_name(shader: str, name: str) -> str:
-    """What an input of OpenPBR is called in a shader."""
-    return name if shader == OPEN_PBR else _IN_STANDARD[name]
-
-
-def document_of(looks: Sequence[Look], shader: str, prefix: str) -> Any:
-    """The document, checked by MaterialX's own library; lengths in metres, colours linear Rec. 709.
+def document_of(looks: Sequence[Look], shader: str, prefix: str) -> MaterialX.Document:
+    """Return the document, checked by MaterialX's own library; lengths in metres, colours linear Rec. 709.
 
     shader : `OPEN_PBR` or `STANDARD`
     prefix : of the maps' names, which lie beside the document
     """
-    mx = needed("MaterialX", TASK)
-    made = mx.createDocument()
+    made = MaterialX.createDocument()
     made.setColorSpace("lin_rec709")
     for look in looks:
-        _add_material(mx, made, look, shader, prefix)
+        _add_material(made, look, shader, prefix)
     made.setDataLibrary(library())
     valid, message = made.validate()
     if not valid:
@@ -50,19 +29,20 @@ def document_of(looks: Sequence[Look], shader: str, prefix: str) -> Any:
 
 
 @cache
-def library() -> Any:
-    """MaterialX's own definitions."""
-    mx = needed("MaterialX", TASK)
-    found = mx.createDocument()
-    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), found)
+def library() -> MaterialX.Document:
+    """Return MaterialX's own definitions."""
+    found = MaterialX.createDocument()
+    MaterialX.loadLibraries(
+        MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath(), found
+    )
     return found
 
 
-def _add_material(mx: Any, made: Any, look: Look, shader: str, prefix: str) -> None:
-    name = mx.createValidName(look.name) or "material"
+def _add_material(made: MaterialX.Document, look: Look, shader: str, prefix: str) -> None:
+    name = MaterialX.createValidName(look.name) or "material"
     node = made.addNode(shader, made.createValidChildName(f"{name}_surface"), "surfaceshader")
     for key, value in look.values.items():
-        one = node.setInputValue(input_name(shader, key), _value(mx, value))
+        one = node.setInputValue(input_name(shader, key), _value(value))
         if key in DISTANCES:
             one.setUnitType("distance")
             one.setUnit("meter")
@@ -78,8 +58,8 @@ def _add_material(mx: Any, made: Any, look: Look, shader: str, prefix: str) -> N
         material.setAttribute("uiname", look.name)
 
 
-def _add_map(graph: Any, role: str, file: str) -> Any:
-    """The output of a graph that reads a picture."""
+def _add_map(graph: MaterialX.NodeGraph, role: str, file: str) -> MaterialX.Output:
+    """Return the output of a graph that reads a picture."""
     kind = MAPS[role]
     image = graph.addNode("image", f"{role}_image", kind.type)
     picture = image.setInputValue("file", file, "filename")
@@ -94,5 +74,5 @@ def _add_map(graph: Any, role: str, file: str) -> Any:
     return output
 
 
-def _value(mx: Any, value: Value) -> Any:
-    return mx.Color3(*value) if isinstance(value, tuple) else float(value)
+def _value(value: Value) -> MaterialX.Color3 | float:
+    return MaterialX.Color3(*value) if isinstance(value, tuple) else float(value)

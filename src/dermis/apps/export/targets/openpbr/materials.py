@@ -1,4 +1,4 @@
-"""Materials as OpenPBR has them, before any file: values, and which map drives which input."""
+"""Materials of OpenPBR: values, the maps that drive inputs, and their files."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.subject import Subject
+from dermis.apps.export.target import floats, write_files
 from dermis.human.head_file import relief_slopes
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
@@ -25,13 +26,33 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Value = float | tuple[float, ...]
 
+OPEN_PBR, STANDARD = "open_pbr_surface", "standard_surface"
+_IN_STANDARD: Mapping[str, str] = {
+    "base_color": "base_color",
+    "subsurface_weight": "subsurface",
+    "subsurface_color": "subsurface_color",
+    "subsurface_radius": "subsurface_scale",
+    "subsurface_radius_scale": "subsurface_radius",
+    "subsurface_scatter_anisotropy": "subsurface_anisotropy",
+    "specular_weight": "specular",
+    "specular_ior": "specular_IOR",
+    "specular_roughness": "specular_roughness",
+    "geometry_normal": "normal",
+}
+_M = 1e-3
+_LONGEST = 40
 _EYE_IOR = 1.376
 _ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a word in the name
 _ROUGH_ELSE = 0.8
 
 
+def input_name(shader: str, name: str) -> str:
+    """Return the name of an input of OpenPBR in a shader."""
+    return name if shader == OPEN_PBR else _IN_STANDARD[name]
+
+
 class MapKind(NamedTuple):
-    """How a map is read: its type and colour space in MaterialX, and in what USD's preview takes."""
+    """Type and colour space of a map in MaterialX, and its colour space in USD's preview."""
 
     type: str
     space: str
@@ -51,7 +72,7 @@ INPUTS: Mapping[str, str] = {
     "specular": "specular_weight",
     "normal": "geometry_normal",
 }
-"""What each map drives."""
+"""Input that each map drives."""
 DISTANCES = ("subsurface_radius",)
 """Inputs with a length [m]."""
 
@@ -60,7 +81,7 @@ DISTANCES = ("subsurface_radius",)
 class Look:
     """A material.
 
-    name : as told
+    name : any text
     values : of inputs, lengths in metres
     maps : names of maps by the inputs that they drive
     """
@@ -77,7 +98,7 @@ def skin_look(
     colour: tuple[float, ...],
     roles: Iterable[str],
 ) -> Look:
-    """Of skin.
+    """Return the material of skin.
 
     radius_m : mean free paths
     colour : of skin without a map of it, linear Rec. 709 [-]
@@ -100,7 +121,7 @@ def skin_look(
 
 
 def plain_look(one: Material) -> Look:
-    """Of what is not skin."""
+    """Return the material of what is not skin."""
     rough = next((value for word, value in _ROUGH.items() if word in one.name.casefold()), _ROUGH_ELSE)
     ior = _EYE_IOR if "eye" in one.name.casefold() else SKIN_ETA
     red, green, blue = (float(part) for part in one.colour)
@@ -110,13 +131,13 @@ def plain_look(one: Material) -> Look:
 
 
 def eye_look(name: str) -> Look:
-    """Of an eyeball with a map of its colour."""
+    """Return the material of an eyeball with a map of its colour."""
     wet: dict[str, Value] = {"specular_roughness": _ROUGH["eye"], "specular_ior": _EYE_IOR}
     return Look(name, wet, {"base_color": "eye"})
 
 
 def hair_look(absorption: Floats, radius_mm: float) -> Look:
-    """Of hairs, a plain surface of their mean colour.
+    """Return the material of hairs, a plain surface of their mean colour.
 
     absorption : (n, 3) of their inside [1/mm]
 
@@ -130,7 +151,7 @@ def hair_look(absorption: Floats, radius_mm: float) -> Look:
 
 
 def drawn_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
-    """The maps that there are, by role, as numbers that go into files.
+    """Return the maps of a skin by role, as numbers that go into files.
 
     slopes : (n, n, 2) of the relief, where `maps` has no normals
     """
@@ -150,7 +171,7 @@ def drawn_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
 
 
 def encoded_maps(found: Mapping[str, Floats]) -> dict[str, bytes]:
-    """PNG files of 8 bits by role."""
+    """Return PNG files of 8 bits by role."""
     with ThreadPoolExecutor() as pool:  # zlib does not hold other threads up
         return dict(zip(found, pool.map(_png, found, found.values()), strict=True))
 
@@ -162,52 +183,35 @@ def _png(role: str, values: Floats) -> bytes:
     return encode_png(levels if levels.ndim == 3 else levels[..., None])
 
 
-_M = 1e-3
-_LONGEST = 40
-
-
-def place_of(place: Path, subject: Subject, suffix: str) -> tuple[Path, str]:
-    """The file that a target writes, and what the names of those beside it begin with.
-
-    place : as `Target.write` gets it
-    suffix : of the file in a folder
-    """
-    file = place if place.suffix else place / f"{subject.identifier}{suffix}"
+def prefix_of(file: Path, subject: Subject) -> str:
+    """Return the prefix of the names of the files beside a target's main file."""
     plain = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_LONGEST]
-    return file, f"{plain or subject.identifier}_"
-
-
-def skin_of(subject: Subject) -> Skin:
-    """The subject's own skin, or the default one."""
-    return Skin() if subject.scene is None else subject.scene.skin
+    return f"{plain or subject.identifier}_"
 
 
 def write_pictures(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
-    """The maps of the skin by role; none for a skin by itself."""
+    """Write the maps of the skin; return their paths by role, none for a skin by itself."""
     if subject.head is None:
         return {}
-    found = drawn_maps(subject.head.maps, skin_of(subject), relief_slopes(subject.head))
-    written = {}
-    for role, data in encoded_maps(found).items():
-        written[role] = folder / f"{prefix}{role}.png"
-        written[role].write_bytes(data)
-    return written
+    found = encoded_maps(drawn_maps(subject.head.maps, subject.skin, relief_slopes(subject.head)))
+    written = write_files(folder, ((f"{prefix}{role}.png", data) for role, data in found.items()))
+    return dict(zip(found, written, strict=True))
 
 
 def looks_of(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, Look]:
-    """Materials by their number in the subject's mesh.
+    """Return materials by their number in the subject's mesh.
 
     mfp_mm : (3,) mean free paths of the skin
     roles : of the maps that there are
     """
     red, green, blue = (_M * float(one) for one in mfp_mm)
-    colour = tuple(float(min(max(one, 0.0), 1.0)) for one in subject.albedo)
+    colour = floats(subject.colour())
     mesh, known = subject.shape.mesh, list(roles)
     looks = {}
     for kind in sorted(set(mesh.material.tolist())):
         one = mesh.materials[kind]
         if one.kind == "skin":
-            looks[kind] = skin_look(one.name, skin_of(subject), (red, green, blue), colour, known)
+            looks[kind] = skin_look(one.name, subject.skin, (red, green, blue), colour, known)
         else:
             looks[kind] = plain_look(one)
     return looks

@@ -1,62 +1,32 @@
-"""Mean free paths for the walks that OpenPBR means, and what other readings make of them."""
+"""OpenPBR and Standard Surface as a MaterialX document, with the maps of a head beside it.
+
+OpenPBR takes the radius for the mean free path of a random walk through a medium of the index of the air,
+whatever its phase function; the fit is of the curve of such a walk.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
 from dermis.apps.export.fitting import deviation, fit_d, homogeneous, lobe
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, numbers_of
-from dermis.apps.export.targets.openpbr.document import OPEN_PBR, STANDARD, TASK, document_of, input_name
-from dermis.apps.export.targets.openpbr.materials import looks_of, place_of, skin_of, write_pictures
+from dermis.apps.export.target import Row, Rows, Target, floats, numbers_of
+from dermis.apps.export.targets.openpbr.materials import (
+    OPEN_PBR,
+    STANDARD,
+    input_name,
+    looks_of,
+    prefix_of,
+    write_pictures,
+)
 from dermis.base.extras import needed
 from dermis.optics.curve import Curve
 from dermis.optics.half_space import half_space
 from dermis.optics.media import Floats, Layer
 from dermis.optics.van_de_hulst import albedo_of_colour
 from dermis.specular.fresnel import SKIN_ETA
-
-
-def fitted_mm(subject: Subject) -> Floats:
-    """(3,) mean free paths of the walk whose curve is nearest, at the colour that it is to have."""
-    return homogeneous(subject.curve, subject.albedo, "walk").mfp_mm
-
-
-def typed_mm(subject: Subject) -> Floats:
-    """(3,) what tables print for tissue, the diffuse mean free path on its surface; d of the lobe for none.
-
-    Source: 1 / sigma_tr of the lowest layer, [Jensen2001].
-    """
-    layer = lowest(subject)
-    if layer is None:
-        return fit_d(subject.curve)
-    return np.asarray(1.0 / np.sqrt(3.0 * np.maximum(layer.sigma_a, 1e-9) * layer.sigma_t_prime))
-
-
-def lowest(subject: Subject) -> Layer | None:
-    """The lowest layer of tissue in three channels, None without one."""
-    tissue = subject.tissue
-    if tissue is None or tissue.rgb is not None or tissue.medium.channels != 3:
-        return None
-    return tissue.medium.layers[-1]
-
-
-def walk(colour: Floats, mfp_mm: Floats, subject: Subject) -> Curve:
-    """What a walk shows that finds its albedo from a colour by van de Hulst's formula.
-
-    All light together is that of the subject, times what the formula is off by.
-    """
-    found = half_space("walk", albedo_of_colour(colour), mfp_mm)
-    return found.with_energy(subject.curve.energy * found.energy / np.maximum(subject.albedo, 1e-9))
-
-
-def profile_of_specification(mfp_mm: Floats, subject: Subject) -> Curve:
-    """What a renderer shows that takes the lobe of MaterialX's specification: its d is the radius."""
-    return lobe(mfp_mm, subject.curve.energy)
-
 
 TYPED = "diffuse mean free path, as published"
 _M = 1e-3
@@ -74,13 +44,13 @@ class OpenPbr(Target):
     Variants that end in "profile" are for renderers that take the radius for the d of a profile.
     """
 
-    name: ClassVar[str] = "openpbr"
-    title: ClassVar[str] = "OpenPBR (MaterialX 1.39)"
-    suffixes: ClassVar[tuple[str, ...]] = (".mtlx", "")
-    versions: ClassVar[tuple[str, ...]] = ("1.1.1",)
-    variants: ClassVar[tuple[str, ...]] = tuple(_SHADERS)
-    needs_maps: ClassVar[bool] = True
-    wrong: ClassVar[str] = (
+    name = "openpbr"
+    title = "OpenPBR (MaterialX 1.39)"
+    suffixes = (".mtlx", "")
+    versions = ("1.1.1",)
+    variants = tuple(_SHADERS)
+    needs_maps = True
+    wrong = (
         "Right in renderers that walk as OpenPBR says, or in the variants for a profile in those that take "
         "MaterialX's, whose d is the radius: it would spread a walk's radii up to 3.6 times as far, most in "
         "dark skin. MaterialX's GLSL only bends the shading by curvature. With a map of the colour the "
@@ -98,27 +68,30 @@ class OpenPbr(Target):
         return self.variant.endswith("profile")
 
     def parameters(self, subject: Subject, version: str) -> Rows:
-        """The walk, or the profile, whose curve is nearest."""
+        """Return the walk, or the profile, whose curve is nearest."""
         if self.is_profile:
             return surface_rows(subject, self.shader, fit_d(subject.curve), "d of the profile, the widest")
         path = fitted_mm(subject)
         return surface_rows(subject, self.shader, path, f"longest mean free path; {misread(path, subject)}")
 
     def naive(self, subject: Subject, version: str) -> Rows:
-        """The diffuse mean free paths of published tables, typed in."""
+        """Return the diffuse mean free paths of published tables, typed in."""
         return surface_rows(subject, self.shader, typed_mm(subject), TYPED)
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
-        """The walk of these rows, or the profile."""
+        """Return the curve of the walk of these rows, or of the profile."""
         radius = radii_mm(rows, self.shader)
         if self.is_profile:
             return profile_of_specification(radius, subject)
         return walk(np.array(numbers_of(rows, input_name(self.shader, "subsurface_color"))), radius, subject)
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
-        """The document, and the maps beside it."""
-        mx = needed("MaterialX", TASK)
-        file, prefix = place_of(place, subject, ".mtlx")
+        """Write the document, and the maps beside it."""
+        mx = needed("MaterialX", "writing MaterialX")
+        from dermis.apps.export.targets.openpbr.document import document_of
+
+        file = self.file_in(place, subject)
+        prefix = prefix_of(file, subject)
         pictures = write_pictures(subject, file.parent, prefix)
         looks = looks_of(subject, radii_mm(rows, self.shader), pictures)
         document = document_of([*looks.values()], self.shader, prefix)
@@ -127,33 +100,69 @@ class OpenPbr(Target):
 
 
 def surface_rows(subject: Subject, shader: str, radius_mm: Floats, meaning: str) -> Rows:
-    """What is typed into a shader for radii (3,), the longest of which has a meaning."""
-    longest, skin = float(radius_mm.max()), skin_of(subject)
-    colour = tuple(map(float, np.clip(subject.albedo, 0.0, 1.0)))
+    """Return the parameters of a shader with radii (3,); meaning is that of the longest."""
+    longest, skin, colour = float(radius_mm.max()), subject.skin, floats(subject.colour())
     rough = float(np.sqrt(skin.roughness * skin.smoothing))
-    told = (
+    inputs = (
         ("subsurface_weight", 1.0, "-", "all that is not reflected goes into the skin"),
         ("subsurface_color", colour, "-", "colour that is seen; the mean of the map where there is one"),
         ("subsurface_radius", _M * longest, "m", meaning),
-        ("subsurface_radius_scale", tuple((radius_mm / longest).tolist()), "-", "each channel's over that"),
+        ("subsurface_radius_scale", floats(radius_mm / longest), "-", "each channel's over that"),
         ("subsurface_scatter_anisotropy", 0.0, "-", "lengths are those of isotropic scattering"),
         ("specular_ior", SKIN_ETA, "-", "index of the surface, which reflects 0.028 straight ahead"),
         ("specular_weight", skin.strength, "-", "share of that; the map's mean"),
         ("specular_roughness", rough, "-", "root of Beckmann's m, or its map"),
     )
-    return tuple(Row(input_name(shader, name), value, unit, meaning) for name, value, unit, meaning in told)
+    return tuple(Row(input_name(shader, name), value, unit, meaning) for name, value, unit, meaning in inputs)
 
 
 def misread(mfp_mm: Floats, subject: Subject) -> str:
-    """How wrong renderers are that take the radius for the d of a profile."""
+    """Return how wrong renderers are that take the radius for the d of a profile."""
     off = deviation(subject.curve, profile_of_specification(mfp_mm, subject)).edge
     return f"taken for a profile's d, edges of shadows are off by {', '.join(f'{one:.3f}' for one in off)}"
 
 
 def radii_mm(rows: Rows, shader: str) -> Floats:
-    """(3,) radii of rows [mm]."""
+    """Return the radii (3,) of rows [mm]."""
     longest = numbers_of(rows, input_name(shader, "subsurface_radius"))[0] / _M
     return np.asarray(longest * np.array(numbers_of(rows, input_name(shader, "subsurface_radius_scale"))))
+
+
+def fitted_mm(subject: Subject) -> Floats:
+    """Return the mean free paths (3,) of the walk of the subject's colour whose curve is nearest [mm]."""
+    return homogeneous(subject.curve, subject.albedo, "walk").mfp_mm
+
+
+def typed_mm(subject: Subject) -> Floats:
+    """Return the diffuse mean free path (3,) that tables print for tissue, without tissue the lobe's d [mm].
+
+    Source: 1 / sigma_tr of the lowest layer, [Jensen2001].
+    """
+    layer = lowest(subject)
+    if layer is None:
+        return fit_d(subject.curve)
+    return np.asarray(1.0 / np.sqrt(3.0 * np.maximum(layer.sigma_a, 1e-9) * layer.sigma_t_prime))
+
+
+def lowest(subject: Subject) -> Layer | None:
+    """Return the lowest layer of tissue in three channels, None without one."""
+    tissue = subject.tissue
+    if tissue is None or tissue.rgb is not None or tissue.medium.channels != 3:
+        return None
+    return tissue.medium.layers[-1]
+
+
+def walk(colour: Floats, mfp_mm: Floats, subject: Subject) -> Curve:
+    """Return the curve of a walk whose albedo follows from a colour by van de Hulst's formula.
+
+    All light together is that of the subject, times what the formula is off by.
+    """
+    return subject.scaled(half_space("walk", albedo_of_colour(colour), mfp_mm))
+
+
+def profile_of_specification(mfp_mm: Floats, subject: Subject) -> Curve:
+    """Return the curve of a renderer with the lobe of MaterialX's specification: its d is the radius."""
+    return lobe(mfp_mm, subject.curve.energy)
 
 
 TARGET = OpenPbr()

@@ -1,4 +1,4 @@
-"""A scene in pbrt's own words (version 4): millimetres, relative to the head's centre."""
+"""Scene description of pbrt (version 4): millimetres, relative to the head's centre."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.export.lights import known_lights
+from dermis.apps.export.scene_parts import known_lights, ply
 from dermis.apps.truths.lights import facing_irradiance
 from dermis.base.errors import notify
 from dermis.base.registry import Registry
@@ -25,22 +26,22 @@ from dermis.scene.lights import (
     StripeLight,
 )
 
-Parameters = Mapping[str, Any]
+Parameters = Mapping[str, ArrayLike]
 Lines = list[str]
 SIDE, SAMPLES = 1024, 256
 _MOST_BOUNCES = 100
 
 
 def directive(word: str, kind: str, parameters: Parameters | None = None) -> str:
-    """A line such as `Material "subsurface" "float eta" [ 1.4 ]`.
+    """Return a line such as `Material "subsurface" "float eta" [ 1.4 ]`.
 
-    parameters : values by type and name; text, a truth, numbers, or arrays of them
+    parameters : values by type and name: text, true or false, numbers, or arrays of them
     """
-    told = [f'"{key}" [ {_told(value)} ]' for key, value in (parameters or {}).items()]
-    return " ".join([word, f'"{kind}"', *told])
+    texts = [f'"{key}" [ {_text(value)} ]' for key, value in (parameters or {}).items()]
+    return " ".join([word, f'"{kind}"', *texts])
 
 
-def _told(value: Any) -> str:
+def _text(value: ArrayLike) -> str:
     if isinstance(value, str):
         return '"' + value.replace("\\", "_").replace('"', "_") + '"'
     if isinstance(value, bool):
@@ -49,13 +50,13 @@ def _told(value: Any) -> str:
 
 
 def view_of(camera: Camera, file: str) -> Lines:
-    """Camera, film and integrator: all before the world begins."""
+    """Return camera, film and integrator: all before the world begins."""
     places = np.concatenate([camera.position, camera.target, camera.up])
     half, shift = camera.window(1.0)
     screen = [(end + shift[axis]) * half[axis] for axis in (0, 1) for end in (-1.0, 1.0)]
     return [
         "Scale -1 1 1  # pbrt's coordinates are left-handed",
-        f"LookAt {_told(places)}",
+        f"LookAt {_text(places)}",
         directive("Camera", "perspective", {"float fov": 90.0, "float screenwindow": screen}),
         directive("Sampler", "zsobol", {"integer pixelsamples": SAMPLES}),
         directive("Integrator", "volpath", {"integer maxdepth": _MOST_BOUNCES}),
@@ -66,7 +67,7 @@ def view_of(camera: Camera, file: str) -> Lines:
 
 
 def lights_of(lights: Iterable[Light], environment: Environment | None) -> Lines:
-    """What shines; what pbrt has not is told in a note and left out."""
+    """Return the lights; those that pbrt has not are left out with a note."""
     lines: Lines = []
     for number, light in enumerate(known_lights(lights, PBRT, "pbrt"), start=1):
         if PBRT[light.kind] is _no_light:
@@ -80,33 +81,24 @@ def lights_of(lights: Iterable[Light], environment: Environment | None) -> Lines
     return lines
 
 
-def part_of(mesh: Mesh, faces: Any, centre_mm: Sequence[float]) -> bytes:
-    """A binary PLY file of some triangles, with normals and uv whose v is upwards."""
+def part_of(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float]) -> bytes:
+    """Return a binary PLY file of some triangles, with normals and uv whose v is upwards."""
     vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
-    columns = [mesh.positions[vertex] - np.asarray(centre_mm), mesh.normals[vertex], mesh.uv[vertex]]
-    table = np.concatenate(columns, axis=1).astype("<f4")
-    table[:, 7] = 1.0 - table[:, 7]
-    rows = np.empty(len(corner) // 3 if corner.ndim == 1 else len(corner), [("n", "u1"), ("v", "<i4", 3)])
-    rows["n"], rows["v"] = 3, corner.reshape(-1, 3)
-    names = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz", "u", "v"))
-    header = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertex)}\n{names}"
-        f"element face {len(rows)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    return header.encode() + table.tobytes() + rows.tobytes()
+    uv = np.column_stack([mesh.uv[vertex, 0], 1.0 - mesh.uv[vertex, 1].astype("<f4")])
+    places = mesh.positions[vertex] - np.asarray(centre_mm)
+    return ply(corner.reshape(-1, 3), places, mesh.normals[vertex], uv)
 
 
 def _distance(light: PointLight) -> float:
     return float(np.linalg.norm(np.subtract(light.target, light.position)))
 
 
-def _intensity(light: PointLight) -> Any:
-    return np.multiply(light.irradiance, _distance(light) ** 2)
+def _intensity(light: PointLight) -> NDArray[np.float64]:
+    return np.asarray(np.multiply(light.irradiance, _distance(light) ** 2))
 
 
 def _point(light: PointLight) -> Lines:
-    told = {"point3 from": light.position, "rgb I": _intensity(light)}
-    return [directive("LightSource", "point", told)]
+    return [directive("LightSource", "point", {"point3 from": light.position, "rgb I": _intensity(light)})]
 
 
 def _spot(light: SpotLight) -> Lines:
@@ -136,15 +128,15 @@ def _rectangle(light: RectangleLight) -> Lines:
 def _sphere(light: SphereLight) -> Lines:
     given = np.pi * (light.radius_mm / _distance(light)) ** 2
     return [
-        f"Translate {_told(light.position)}",
+        f"Translate {_text(light.position)}",
         directive("AreaLightSource", "diffuse", {"rgb L": np.divide(light.irradiance, given)}),
         directive("Shape", "sphere", {"float radius": light.radius_mm}),
     ]
 
 
 def _directional(light: DirectionalLight) -> Lines:
-    told = {"point3 from": (0.0, 0.0, 0.0), "point3 to": light.direction, "rgb L": light.irradiance}
-    return [directive("LightSource", "distant", told)]
+    way = {"point3 from": (0.0, 0.0, 0.0), "point3 to": light.direction}
+    return [directive("LightSource", "distant", {**way, "rgb L": light.irradiance})]
 
 
 def _no_light(light: StripeLight) -> Lines:
@@ -162,4 +154,4 @@ PBRT: Registry[Callable[[Any], Lines]] = Registry(
         "stripe": _no_light,
     },
 )
-"""What writes a kind of light for pbrt."""
+"""Writers of a kind of light."""

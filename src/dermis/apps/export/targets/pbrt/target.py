@@ -1,16 +1,17 @@
-"""The maps of a head as pbrt's textures."""
+"""pbrt (version 4): a scene whose skin is the material "subsurface", photon beam diffusion of a table."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dermis.apps.export.fitting import nearest_size, resized
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, numbers_of
-from dermis.apps.export.targets.openpbr.materials import drawn_maps, encoded_maps, place_of, skin_of
+from dermis.apps.export.target import Row, Rows, Target, floats, numbers_of, write_files
+from dermis.apps.export.targets.openpbr.materials import drawn_maps, encoded_maps, prefix_of
 from dermis.apps.export.targets.openpbr.target import typed_mm
 from dermis.apps.export.targets.pbrt.diffusion import diffusion_table
 from dermis.apps.export.targets.pbrt.scene import Lines, directive, lights_of, part_of, view_of
@@ -21,47 +22,7 @@ from dermis.optics.media import SKIN_ETA, Floats
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 
-
-class Textures(NamedTuple):
-    """What a scene needs of maps.
-
-    lines : that make them
-    files : by name
-    driven : type of parameter, and texture or file, by the skin's parameters
-    """
-
-    lines: Lines
-    files: dict[str, bytes]
-    driven: dict[str, tuple[str, str]]
-
-
 _FROM = {"colour": ("spectrum", "sRGB", "reflectance"), "roughness": ("float", "linear", "roughness")}
-
-
-def textures_of(subject: Subject, prefix: str) -> Textures:
-    """Of a head; none of a skin by itself.
-
-    prefix : of the files' names
-    """
-    made = Textures([], {}, {})
-    if subject.head is None:
-        return made
-    found = drawn_maps(subject.head.maps, skin_of(subject), relief_slopes(subject.head))
-    if "roughness" in found:
-        found["roughness"] = found["roughness"] ** 2  # pbrt takes alpha itself, OpenPBR its root
-    for role, data in encoded_maps({role: found[role] for role in found if role != "specular"}).items():
-        file = f"{prefix}{role}.png"
-        made.files[file] = data
-        if role == "normal":
-            made.driven["normalmap"] = "string", file
-            continue
-        kind, encoding, parameter = _FROM[role]
-        told = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
-        made.lines.append(directive(f'Texture "{role}" "{kind}"', "imagemap", told))
-        made.driven[parameter] = "texture", role
-    return made
-
-
 _REFLECTANCE, _PATH = "reflectance", "mfp"
 _ROUGH_ELSE = 0.3  # of what is not skin
 _FAR, _ROOM = 10.0, 1.4  # of a ball's picture, by its size
@@ -70,13 +31,13 @@ _FAR, _ROOM = 10.0, 1.4  # of a ball's picture, by its size
 class Pbrt(Target):
     """A scene in text, with geometry and pictures beside it; millimetres."""
 
-    name: ClassVar[str] = "pbrt"
-    title: ClassVar[str] = "pbrt"
-    suffixes: ClassVar[tuple[str, ...]] = (".pbrt", "")
-    versions: ClassVar[tuple[str, ...]] = ("4",)
-    needs_maps: ClassVar[bool] = True
-    not_run: ClassVar[bool] = True
-    wrong: ClassVar[str] = (
+    name = "pbrt"
+    title = "pbrt"
+    suffixes = (".pbrt", "")
+    versions = ("4",)
+    needs_maps = True
+    not_run = True
+    wrong = (
         "Diffusion as on a plane, at every point: thin parts and folds are not like skin. The surface "
         "reflects all that Fresnel says, for the material has no strength of reflection; hairs and the eyes' "
         "colours are left out; colours become smooth spectra. The scene must stay in millimetres: scale "
@@ -84,33 +45,31 @@ class Pbrt(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Rows:
-        """Reflectance and mean free path whose table is nearest."""
+        """Return the reflectance and mean free path whose table is nearest."""
         path = nearest_size(subject.curve, _unit(subject.albedo))
         return _rows(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive(self, subject: Subject, version: str) -> Rows:
-        """The skin's colour, and the diffuse mean free paths of published tables as mean free paths."""
+        """Return the skin's colour, and published diffuse mean free paths as mean free paths."""
         return _rows(subject, typed_mm(subject), "as published, 1 / sigma_tr")
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
-        """pbrt's table at these numbers."""
+        """Return pbrt's table at these numbers."""
         reflectance = np.array(numbers_of(rows, _REFLECTANCE))
-        found = resized(_unit(reflectance), numbers_of(rows, _PATH))
-        return found.with_energy(subject.curve.energy * found.energy / np.maximum(subject.albedo, 1e-9))
+        return subject.scaled(resized(_unit(reflectance), numbers_of(rows, _PATH)))
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
-        """The scene, a mesh for each material, and the maps."""
-        file, prefix = place_of(place, subject, ".pbrt")
+        """Write the scene, a mesh for each material, and the maps."""
+        file = self.file_in(place, subject)
+        prefix = prefix_of(file, subject)
         scene = subject.scene or _ball(subject.shape)
         text, files = _text(subject, rows, scene, prefix)
-        for name, data in files.items():
-            (file.parent / name).write_bytes(data)
         file.write_text("\n".join([*text, ""]), encoding="ascii")
-        return [file, *(file.parent / name for name in files)]
+        return [file, *write_files(file.parent, files.items())]
 
 
 def _unit(reflectance: Floats) -> Curve:
-    """The curve of media of these reflectances, in mean free paths."""
+    """Return the curve of media of these reflectances, in mean free paths."""
     table = diffusion_table(SKIN_ETA)
     total = np.array([table.curve(table.radius[-1], float(one)) for one in reflectance], np.float64)
 
@@ -122,11 +81,10 @@ def _unit(reflectance: Floats) -> Curve:
 
 
 def _rows(subject: Subject, path_mm: Floats, meaning: str) -> Rows:
-    skin = skin_of(subject)
-    colour = tuple(map(float, np.clip(subject.albedo, 0.0, 1.0)))
+    skin, colour = subject.skin, floats(subject.colour())
     return (
         Row(_REFLECTANCE, colour, "-", "of light that enters; a texture where there is a map"),
-        Row(_PATH, tuple(map(float, path_mm)), "mm", meaning),
+        Row(_PATH, floats(path_mm), "mm", meaning),
         Row("scale", 1.0, "-", "of mfp; not to be changed"),
         Row("g", 0.0, "-", "the paths are those of isotropic scattering"),
         Row("eta", SKIN_ETA, "-", "index of the skin"),
@@ -136,7 +94,7 @@ def _rows(subject: Subject, path_mm: Floats, meaning: str) -> Rows:
 
 
 def _ball(ball: Head) -> Scene:
-    """A ball in the middle of the picture."""
+    """Return a ball in the middle of the picture."""
     x, y, z = (float(one) for one in -np.array(ball.centre_mm))
     size = float(ball.mesh.size_mm[1])
     camera = Camera(position=(x, y, z + _FAR * size), target=(x, y, z), frame_mm=_ROOM * size)
@@ -144,7 +102,7 @@ def _ball(ball: Head) -> Scene:
 
 
 def _text(subject: Subject, rows: Rows, scene: Scene, prefix: str) -> tuple[Lines, dict[str, bytes]]:
-    """The scene's lines, and the files beside it by name."""
+    """Return the scene's lines, and the files beside it by name."""
     head = scene.head
     textures = textures_of(subject, prefix)
     lines = [
@@ -164,23 +122,60 @@ def _text(subject: Subject, rows: Rows, scene: Scene, prefix: str) -> tuple[Line
 
 
 def _skin(rows: Rows, driven: dict[str, tuple[str, str]]) -> str:
-    """The skin's material; what a map drives is a texture's name in place of the row's numbers."""
+    """Return the skin's material; an input with a map has its texture's name."""
     kinds = {_REFLECTANCE: "rgb", _PATH: "rgb", "remaproughness": "bool"}
-    told: dict[str, Any] = {}
+    values: dict[str, ArrayLike] = {}
     for row in rows:
         if row.name in driven:
             kind, name = driven[row.name]
-            told[f"{kind} {row.name}"] = name
+            values[f"{kind} {row.name}"] = name
         else:
-            told[f"{kinds.get(row.name, 'float')} {row.name}"] = row.value
+            values[f"{kinds.get(row.name, 'float')} {row.name}"] = row.value
     if "normalmap" in driven:
-        told["string normalmap"] = driven["normalmap"][1]
-    return directive("Material", "subsurface", told)
+        values["string normalmap"] = driven["normalmap"][1]
+    return directive("Material", "subsurface", values)
 
 
 def _plain(colour: tuple[float, float, float]) -> str:
-    told = {"rgb reflectance": colour, "float roughness": _ROUGH_ELSE, "bool remaproughness": False}
-    return directive("Material", "coateddiffuse", told)
+    rough = {"float roughness": _ROUGH_ELSE, "bool remaproughness": False}
+    return directive("Material", "coateddiffuse", {"rgb reflectance": colour, **rough})
+
+
+class Textures(NamedTuple):
+    """Maps of a scene.
+
+    lines : that make them
+    files : by name
+    driven : type of parameter, and texture or file, by the skin's parameters
+    """
+
+    lines: Lines
+    files: dict[str, bytes]
+    driven: dict[str, tuple[str, str]]
+
+
+def textures_of(subject: Subject, prefix: str) -> Textures:
+    """Return the textures of a head; none for a skin by itself.
+
+    prefix : of the files' names
+    """
+    made = Textures([], {}, {})
+    if subject.head is None:
+        return made
+    found = drawn_maps(subject.head.maps, subject.skin, relief_slopes(subject.head))
+    if "roughness" in found:
+        found["roughness"] = found["roughness"] ** 2  # pbrt takes alpha itself, OpenPBR its root
+    for role, data in encoded_maps({role: found[role] for role in found if role != "specular"}).items():
+        file = f"{prefix}{role}.png"
+        made.files[file] = data
+        if role == "normal":
+            made.driven["normalmap"] = "string", file
+            continue
+        kind, encoding, parameter = _FROM[role]
+        given = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
+        made.lines.append(directive(f'Texture "{role}" "{kind}"', "imagemap", given))
+        made.driven[parameter] = "texture", role
+    return made
 
 
 TARGET = Pbrt()

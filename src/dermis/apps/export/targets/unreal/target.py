@@ -69,7 +69,7 @@ class Unreal(Target):
         names = {role: f"{file.stem}_{role}.png" for role in maps}
         imported = {role: name for role, name in names.items() if role in _IMPORTED}
         file.write_text(_script(subject, rows, imported, version), encoding="utf-8")
-        return [file, *write_files(file.parent, {names[role]: data for role, data in maps.items()})]
+        return [file, *write_files(file.parent, zip(names.values(), maps.values(), strict=True))]
 
 
 def _rows(albedo: Floats, path_cm: Floats, version: str) -> Rows:

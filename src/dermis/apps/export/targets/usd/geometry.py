@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdGeom, Vt
 
-from dermis.base.extras import needed
 from dermis.formats.moved_points import MovedPoints
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
@@ -16,7 +16,6 @@ from dermis.mesh.strands import Strands, points_of
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
-TASK = "writing USD"
 METRES = 1e-3
 """Of a millimetre."""
 
@@ -51,31 +50,30 @@ def corner_of_point(mesh: Mesh) -> NDArray[np.intp]:
     return np.unique(mesh.point, return_index=True)[1]
 
 
-def add_mesh(stage: Any, path: Any, head: Head, moved: MovedPoints) -> dict[int, Any]:
+def add_mesh(stage: Usd.Stage, path: Sdf.Path, head: Head, moved: MovedPoints) -> dict[int, UsdGeom.Subset]:
     """Write the mesh at rest; the subset's prim of each material that is used.
 
     moved : the head's vertices with all morph targets at 0
     """
-    geometry, vt = needed("pxr.UsdGeom", TASK), needed("pxr.Vt", TASK)
     mesh, faces = head.mesh, faces_of(head.mesh)
     one = corner_of_point(mesh)
-    made = geometry.Mesh.Define(stage, path)
-    points = vt.Vec3fArray.FromNumpy(metres(moved.positions_mm[one]))
+    made = UsdGeom.Mesh.Define(stage, path)
+    points = Vt.Vec3fArray.FromNumpy(metres(moved.positions_mm[one]))
     made.CreatePointsAttr(points)
-    made.CreateExtentAttr(geometry.PointBased.ComputeExtent(points))
-    made.CreateFaceVertexCountsAttr(vt.IntArray.FromNumpy(faces.sides))
-    made.CreateFaceVertexIndicesAttr(vt.IntArray.FromNumpy(mesh.point[faces.corner].astype(np.int32)))
-    made.CreateNormalsAttr(vt.Vec3fArray.FromNumpy(np.ascontiguousarray(moved.normals[one])))
-    made.SetNormalsInterpolation(geometry.Tokens.vertex)
-    made.CreateSubdivisionSchemeAttr(geometry.Tokens.none)
+    made.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    made.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(faces.sides))
+    made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.point[faces.corner].astype(np.int32)))
+    made.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(moved.normals[one])))
+    made.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     _add_uv(made, texture_coordinates(head), faces)
     subsets = {}
     for kind in np.unique(faces.material).tolist():
-        own = vt.IntArray.FromNumpy(np.flatnonzero(faces.material == kind).astype(np.int32))
-        subsets[kind] = geometry.Subset.CreateGeomSubset(
-            made, f"part_{kind}", geometry.Tokens.face, own, "materialBind"
+        own = Vt.IntArray.FromNumpy(np.flatnonzero(faces.material == kind).astype(np.int32))
+        subsets[kind] = UsdGeom.Subset.CreateGeomSubset(
+            made, f"part_{kind}", UsdGeom.Tokens.face, own, "materialBind"
         )
-    geometry.Subset.SetFamilyType(made, "materialBind", geometry.Tokens.partition)
+    UsdGeom.Subset.SetFamilyType(made, "materialBind", UsdGeom.Tokens.partition)
     return subsets
 
 
@@ -90,34 +88,32 @@ def texture_coordinates(head: Head) -> Floats:
     return found
 
 
-def _add_uv(made: Any, uv: Floats, faces: Faces) -> None:
+def _add_uv(made: UsdGeom.Mesh, uv: Floats, faces: Faces) -> None:
     """Texture coordinates (v, 2) with v upwards, one for each vertex of ours."""
-    geometry, sdf, vt = (needed(f"pxr.{name}", TASK) for name in ("UsdGeom", "Sdf", "Vt"))
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
-    primvar = geometry.PrimvarsAPI(made).CreatePrimvar(
-        "st", sdf.ValueTypeNames.TexCoord2fArray, geometry.Tokens.faceVarying
+    primvar = UsdGeom.PrimvarsAPI(made).CreatePrimvar(
+        "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
     )
-    primvar.Set(vt.Vec2fArray.FromNumpy(upwards))
-    primvar.SetIndices(vt.IntArray.FromNumpy(faces.corner))
+    primvar.Set(Vt.Vec2fArray.FromNumpy(upwards))
+    primvar.SetIndices(Vt.IntArray.FromNumpy(faces.corner))
 
 
-def add_hairs(stage: Any, path: Any, head: Head, strands: Strands) -> Any:
+def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) -> UsdGeom.BasisCurves:
     """Write hairs at rest as lines with a width at each knot."""
-    geometry, vt = needed("pxr.UsdGeom", TASK), needed("pxr.Vt", TASK)
     places = strands.places_mm(head.mesh, points_of(head.mesh))
-    made = geometry.BasisCurves.Define(stage, path)
+    made = UsdGeom.BasisCurves.Define(stage, path)
     count = np.full(len(places), places.shape[1], np.int32)
-    points = vt.Vec3fArray.FromNumpy(metres(places.reshape(-1, 3)))
-    widths = vt.FloatArray.FromNumpy((2.0 * METRES * strands.radius_mm.ravel()).astype(np.float32))
-    made.CreateTypeAttr(geometry.Tokens.linear)
-    made.CreateCurveVertexCountsAttr(vt.IntArray.FromNumpy(count))
+    points = Vt.Vec3fArray.FromNumpy(metres(places.reshape(-1, 3)))
+    widths = Vt.FloatArray.FromNumpy((2.0 * METRES * strands.radius_mm.ravel()).astype(np.float32))
+    made.CreateTypeAttr(UsdGeom.Tokens.linear)
+    made.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(count))
     made.CreatePointsAttr(points)
     made.CreateWidthsAttr(widths)
-    made.SetWidthsInterpolation(geometry.Tokens.vertex)
-    made.CreateExtentAttr(geometry.Curves.ComputeExtent(points, widths))
+    made.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+    made.CreateExtentAttr(UsdGeom.Curves.ComputeExtent(points, widths))
     return made
 
 
-def metres(places_mm: NDArray[Any]) -> Floats:
+def metres(places_mm: NDArray[np.floating]) -> Floats:
     """Of places in mm."""
     return np.ascontiguousarray(METRES * places_mm.astype(np.float64), np.float32)

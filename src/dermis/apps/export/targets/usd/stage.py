@@ -1,37 +1,47 @@
-"""A head as a USD stage, in metres, Y up."""
+"""USD stage of a head in metres, Y up.
+
+Materials are OpenPBR as nodes of MaterialX, and a preview for programs without it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdSkel
 
-from dermis.apps.export.targets.openpbr.materials import Look, hair_look
-from dermis.apps.export.targets.usd.geometry import TASK, add_hairs, add_mesh
-from dermis.apps.export.targets.usd.materials import add_material
+from dermis.apps.export.targets.openpbr.materials import MAPS, Look, Value, hair_look
+from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh
 from dermis.apps.export.targets.usd.motion import add_motion, valid_names
-from dermis.base.extras import needed
 from dermis.formats.moved_points import MovedPoints
 from dermis.mesh.head import Head
 
+_NODES = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
+_PREVIEWED = {
+    "base_color": "diffuseColor",
+    "subsurface_color": "diffuseColor",
+    "specular_roughness": "roughness",
+    "specular_ior": "ior",
+    "geometry_normal": "normal",
+}
+_UV = "st"
 
-def stage_of(head: Head, name: str, looks: Mapping[int, Look], prefix: str) -> Any:
-    """The stage.
+
+def stage_of(head: Head, name: str, looks: Mapping[int, Look], prefix: str) -> Usd.Stage:
+    """Return the stage.
 
     name : what the head is called
     looks : by the mesh's materials
     prefix : of the maps' names, which lie beside the stage
     """
-    usd, geometry, sdf = (needed(f"pxr.{one}", TASK) for one in ("Usd", "UsdGeom", "Sdf"))
-    stage = usd.Stage.CreateInMemory()
-    geometry.SetStageMetersPerUnit(stage, 1.0)
-    geometry.SetStageUpAxis(stage, geometry.Tokens.y)
-    root = sdf.Path("/" + valid_names([name])[0])
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    root = Sdf.Path("/" + valid_names([name])[0])
     moved = MovedPoints(head)
     top = _root(stage, root, moved)
     top.SetDisplayName(name)
-    usd.ModelAPI(top).SetKind("component")
+    Usd.ModelAPI(top).SetKind("component")
     stage.SetDefaultPrim(top)
     if head.attribution:
         stage.GetRootLayer().customLayerData = {"attribution": head.attribution}
@@ -45,31 +55,119 @@ def stage_of(head: Head, name: str, looks: Mapping[int, Look], prefix: str) -> A
 
 
 def moves(moved: MovedPoints) -> bool:
-    """Whether anything moves the head."""
+    """Return whether anything moves the head."""
     return bool(moved.rig.targets.names) or moved.rig.skeleton is not None
 
 
-def _root(stage: Any, path: Any, moved: MovedPoints) -> Any:
-    geometry, skel = needed("pxr.UsdGeom", TASK), needed("pxr.UsdSkel", TASK)
-    kind = skel.Root if moves(moved) else geometry.Xform
+def _root(stage: Usd.Stage, path: Sdf.Path, moved: MovedPoints) -> Usd.Prim:
+    kind = UsdSkel.Root if moves(moved) else UsdGeom.Xform
     return kind.Define(stage, path).GetPrim()
 
 
-def _add_materials(stage: Any, scope: Any, subsets: Mapping[int, Any], looks: Any, prefix: str) -> None:
-    geometry, shade = needed("pxr.UsdGeom", TASK), needed("pxr.UsdShade", TASK)
-    geometry.Scope.Define(stage, scope)
+def _add_materials(
+    stage: Usd.Stage,
+    scope: Sdf.Path,
+    subsets: Mapping[int, UsdGeom.Subset],
+    looks: Mapping[int, Look],
+    prefix: str,
+) -> None:
+    UsdGeom.Scope.Define(stage, scope)
     names = valid_names([looks[kind].name for kind in subsets])
     for (kind, subset), name in zip(subsets.items(), names, strict=True):
-        material = add_material(stage, scope.AppendChild(name), looks[kind], prefix)
-        shade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
+        material = _add_material(stage, scope.AppendChild(name), looks[kind], prefix)
+        UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
 
 
-def _add_hairs(stage: Any, root: Any, head: Head) -> None:
-    shade = needed("pxr.UsdShade", TASK)
+def _add_hairs(stage: Usd.Stage, root: Sdf.Path, head: Head) -> None:
     for name, strands in (("lashes_and_brows", head.strands), ("hair", head.hair)):
         if strands is None:
             continue
         made = add_hairs(stage, root.AppendChild(name), head, strands)
         look = hair_look(strands.absorption, float(np.median(strands.radius_mm)))
-        material = add_material(stage, root.AppendPath(f"materials/{name}"), look, "")
-        shade.MaterialBindingAPI.Apply(made.GetPrim()).Bind(material)
+        material = _add_material(stage, root.AppendPath(f"materials/{name}"), look, "")
+        UsdShade.MaterialBindingAPI.Apply(made.GetPrim()).Bind(material)
+
+
+def _add_material(stage: Usd.Stage, path: Sdf.Path, look: Look, prefix: str) -> UsdShade.Material:
+    """Write a material; return it.
+
+    prefix : of the maps' names, which lie beside the stage
+    """
+    material = UsdShade.Material.Define(stage, path)
+    material.GetPrim().SetDisplayName(look.name)
+    _add_open_pbr(stage, material, look, prefix)
+    _add_preview(stage, material, look, prefix)
+    return material
+
+
+def _add_open_pbr(stage: Usd.Stage, material: UsdShade.Material, look: Look, prefix: str) -> None:
+    prim = material.GetPrim()
+    prim.AddAppliedSchema("MaterialXConfigAPI")  # of a plug-in that usd-core comes without
+    prim.CreateAttribute("config:mtlx:version", Sdf.ValueTypeNames.String, False).Set("1.39")
+    surface = _shader(stage, material, "open_pbr", "ND_open_pbr_surface_surfaceshader")
+    for key, value in look.values.items():
+        _set(surface, key, value)
+    if look.maps:
+        place = _shader(stage, material, "place", "ND_geompropvalue_vector2")
+        place.CreateInput("geomprop", Sdf.ValueTypeNames.String).Set(_UV)
+        uv = place.CreateOutput("out", Sdf.ValueTypeNames.Float2)
+    for key, role in look.maps.items():
+        kind, types = MAPS[role], Sdf.ValueTypeNames
+        usd_type = {"color3": types.Color3f, "float": types.Float, "vector3": types.Float3}[kind.type]
+        image = _shader(stage, material, f"{role}_image", _NODES[kind.type])
+        file = image.CreateInput("file", types.Asset)
+        file.Set(Sdf.AssetPath(f"./{prefix}{role}.png"))
+        file.GetAttr().SetColorSpace(kind.space or "raw")
+        image.CreateInput("texcoord", types.Float2).ConnectToSource(uv)
+        last = image.CreateOutput("out", usd_type)
+        if role == "normal":
+            bump = _shader(stage, material, "normal_in_space", "ND_normalmap_float")
+            bump.CreateInput("in", usd_type).ConnectToSource(last)
+            last = bump.CreateOutput("out", usd_type)
+        surface.CreateInput(key, usd_type).ConnectToSource(last)
+    out = surface.CreateOutput("out", Sdf.ValueTypeNames.Token)
+    material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
+
+
+def _add_preview(stage: Usd.Stage, material: UsdShade.Material, look: Look, prefix: str) -> None:
+    """The preview has no scattering below the surface: its colour alone."""
+    types = Sdf.ValueTypeNames
+    surface = _shader(stage, material, "preview", "UsdPreviewSurface")
+    for key, value in look.values.items():
+        if key in _PREVIEWED and not (key == "base_color" and "subsurface_color" in look.maps):
+            _set(surface, _PREVIEWED[key], value)
+    reader = None
+    for key, role in look.maps.items():
+        if key not in _PREVIEWED:
+            continue
+        if reader is None:
+            place = _shader(stage, material, "preview_place", "UsdPrimvarReader_float2")
+            place.CreateInput("varname", types.String).Set(_UV)
+            reader = place.CreateOutput("result", types.Float2)
+        texture = _shader(stage, material, f"preview_{role}", "UsdUVTexture")
+        texture.CreateInput("file", types.Asset).Set(Sdf.AssetPath(f"./{prefix}{role}.png"))
+        texture.CreateInput("sourceColorSpace", types.Token).Set(MAPS[role].preview_space)
+        texture.CreateInput("st", types.Float2).ConnectToSource(reader)
+        for side in ("wrapS", "wrapT"):
+            texture.CreateInput(side, types.Token).Set("clamp")
+        if role == "normal":
+            texture.CreateInput("scale", types.Float4).Set((2.0, 2.0, 2.0, 1.0))
+            texture.CreateInput("bias", types.Float4).Set((-1.0, -1.0, -1.0, 0.0))
+        one = role == "roughness"
+        output = texture.CreateOutput("r" if one else "rgb", types.Float if one else types.Float3)
+        kinds = {"normal": types.Normal3f, "roughness": types.Float}
+        surface.CreateInput(_PREVIEWED[key], kinds.get(role, types.Color3f)).ConnectToSource(output)
+    out = surface.CreateOutput("surface", types.Token)
+    material.CreateSurfaceOutput().ConnectToSource(out)
+
+
+def _shader(stage: Usd.Stage, material: UsdShade.Material, name: str, kind: str) -> UsdShade.Shader:
+    made = UsdShade.Shader.Define(stage, material.GetPath().AppendChild(name))
+    made.CreateIdAttr(kind)
+    return made
+
+
+def _set(shader: UsdShade.Shader, name: str, value: Value) -> None:
+    types = Sdf.ValueTypeNames
+    kind = types.Color3f if isinstance(value, tuple) else types.Float
+    shader.CreateInput(name, kind).Set(value)

@@ -1,0 +1,58 @@
+"""Parts of scenes for other renderers: lights of the kinds that they have, and triangles as PLY files."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dermis.base.errors import notify
+from dermis.scene.lights import Light
+
+
+def known_lights(lights: Iterable[Light], known: Container[str], program: str) -> list[Light]:
+    """Return the lights, one of an unknown kind as the nearest known kind that it derives from, with a note.
+
+    known : kinds that the program has, points and parallel light among them
+    """
+    return [_known(light, known, f"light {k}: {program}") for k, light in enumerate(lights, start=1)]
+
+
+def _known(light: Light, known: Container[str], culprit: str) -> Light:
+    if light.kind in known:
+        return light
+    bases = (one for one in type(light).__mro__ if issubclass(one, Light))
+    base = next(one for one in bases if one.model_fields["kind"].default in known)
+    found = base(**{name: getattr(light, name) for name in base.model_fields if name != "kind"})
+    notify(f"{culprit} has no {light.kind} light and takes it for a {found.kind} light")
+    return found
+
+
+def ply(
+    triangles: NDArray[np.integer],
+    positions: ArrayLike,
+    normals: ArrayLike | None = None,
+    uv: ArrayLike | None = None,
+    colour: ArrayLike | None = None,
+) -> bytes:
+    """Return a binary PLY file of triangles.
+
+    triangles : (t, 3) vertices
+    positions, normals, uv, colour : (v, 3), (v, 3), (v, 2), (v, 3) linear, of each vertex
+    """
+    given = {"x y z": positions, "nx ny nz": normals, "u v": uv, "r g b": colour}
+    columns = {names: values for names, values in given.items() if values is not None}
+    vertices = np.concatenate([np.asarray(one, "<f4") for one in columns.values()], axis=1)
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(vertices)}",
+        *(f"property float {name}" for names in columns for name in names.split()),
+        f"element face {len(triangles)}",
+        "property list uchar int vertex_indices",
+        "end_header",
+    ]
+    faces = np.empty(len(triangles), [("count", "u1"), ("corner", "<i4", (3,))])
+    faces["count"], faces["corner"] = 3, triangles
+    return "\n".join(header).encode() + b"\n" + vertices.tobytes() + faces.tobytes()
