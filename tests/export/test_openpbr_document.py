@@ -10,15 +10,8 @@ pytest.importorskip("MaterialX")
 import MaterialX
 from MaterialX import PyMaterialXGenGlsl, PyMaterialXGenMdl, PyMaterialXGenOsl, PyMaterialXGenShader
 
-from dermis.apps.export.targets.openpbr.materials import (
-    OPEN_PBR,
-    STANDARD,
-    Look,
-    document_of,
-    library,
-    plain_look,
-    skin_look,
-)
+from dermis.apps.export.targets.openpbr.document import document_of, library
+from dermis.apps.export.targets.openpbr.materials import OPEN_PBR, STANDARD, Look, plain_look, skin_look
 from dermis.mesh.mesh import Material
 from dermis.scene.skin import Skin
 

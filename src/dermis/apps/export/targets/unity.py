@@ -13,7 +13,7 @@ import numpy as np
 
 from dermis.apps.export.fitting import fit_d, lobe
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, floats, numbers_of, with_values, write_files
+from dermis.apps.export.target import Row, Rows, Target, Value, floats, numbers_of, with_values, write_files
 from dermis.optics.curve import Curve
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
@@ -53,7 +53,7 @@ class Unity(Target):
 
     def naive(self, subject: Subject, version: str) -> Rows:
         """The skin's colour as the scattering colour, as the inspector advises, and a multiplier of 1."""
-        typed = {_COLOUR: floats(subject.colour()), _MULTIPLIER: _TYPED_MM}
+        typed: dict[str, Value] = {_COLOUR: floats(subject.colour()), _MULTIPLIER: _TYPED_MM}
         return with_values(self.parameters(subject, version), typed)
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from dermis.apps.export.fitting import deviation, fit_d
-from dermis.apps.export.subject import painted, subject_of
+from dermis.apps.export.subject import subject_of
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
 from dermis.apps.validation.engines.heads import TEXELS, Floats, compared, drawn, rendered
@@ -127,7 +127,7 @@ def binned(curve: Curve, d_mm: Floats) -> Floats:
 
 def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
     """Yield outlines and colours of the head without hair, which both draw differently, by each method."""
-    subject = painted(subject_of("human"), TEXELS, "auto")
+    subject = subject_of("human").painted(TEXELS, "auto")
     assert subject.head is not None
     bald = subject.with_head(replace(subject.head, hair=None, strands=None))
     ours = drawn(bald, SIDE)
@@ -146,7 +146,7 @@ def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
 
 def picture(pythons: dict[str, Path]) -> None:
     """Write a picture of ours beside Cycles of each version, with hair."""
-    subject = painted(subject_of("human"), TEXELS, "auto")
+    subject = subject_of("human").painted(TEXELS, "auto")
     seen = [drawn(subject, SHOWN)]
     for version, python in pythons.items():
         seen += rendered(subject, METHODS_OF[version][0], version, python, SHOWN, SHOWN_SAMPLES, 1)
