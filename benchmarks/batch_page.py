@@ -1,4 +1,4 @@
-"""Writes docs/scale.md from what `batch.py` has measured: python benchmarks/batch_page.py
+"""Writes docs/scale.md from what `batch.py` has measured.
 
 Each results/scale_*.json is a machine.
 """
@@ -6,12 +6,12 @@ Each results/scale_*.json is a machine.
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from dermis.base.atomic_write import replacing
+from dermis.base.command_line import run_script
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "scale.md"
@@ -24,12 +24,11 @@ _HEADS = "what", "workers", "adapters", "encoders of each", "images/s", "over th
 Told = dict[str, Any]
 
 
-def main() -> int:
+def main() -> None:
     """Write the page."""
     measured = [json.loads(path.read_text("utf-8")) for path in sorted(RESULTS.glob("scale_*.json"))]
     with replacing(PAGE) as trial:
         trial.write_text(page(measured), encoding="utf-8")
-    return 0
 
 
 def page(machines: Sequence[Told]) -> str:
@@ -140,4 +139,4 @@ only ratios mean something.
 """
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

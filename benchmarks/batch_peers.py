@@ -1,10 +1,9 @@
 """Data sets by Cycles and by us on one CPU, in one run: seconds for an image of a new person, and its noise.
 
-DERMIS_BLENDER_PYTHON=blender/bin/python python benchmarks/batch_peers.py
-
-Cycles renders people that `dermis head` wrote, with light below their skin, depth, normals and the number of
-the material, as those who make data sets with Blender do; ours come from `dermis batch`, with hair, brows and
-lashes, which the files for Cycles lack, and with labels and landmarks. Ten minutes on two idle cores.
+Needs DERMIS_BLENDER_PYTHON, a Python with bpy. Cycles renders people that `dermis head` wrote, with light
+below their skin, depth, normals and the number of the material, as those who make data sets with Blender do;
+ours come from `dermis batch`, with hair, brows and lashes, which the files for Cycles lack, and with labels
+and landmarks. Ten minutes on two idle cores.
 """
 
 from __future__ import annotations
@@ -23,13 +22,14 @@ from pathlib import Path
 from statistics import mean
 from typing import Annotated, Any
 
-from cyclopts import Parameter, run
+from cyclopts import Parameter
 
 from dermis.apps.truths.blender_process import blender_python
 from dermis.apps.validation.pages import write_figures
 from dermis.apps.validation.peers.report import cpu_model
+from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
-from dermis.base.errors import DermisError, refuse
+from dermis.base.errors import refuse
 
 ROOT = Path(__file__).resolve().parent
 RESULTS = ROOT / "results" / "batch_peers.json"
@@ -164,7 +164,4 @@ def _run(command: list[str]) -> str:
 
 
 if __name__ == "__main__":
-    try:
-        run(main)
-    except DermisError as error:
-        sys.exit(f"batch_peers: {error}")
+    run_script(main)

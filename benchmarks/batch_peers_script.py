@@ -7,8 +7,8 @@ normals and the number of the material. It leaves done.json with times, and the 
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -137,4 +137,9 @@ def add(name: str, data: Any) -> Any:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[-1]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    given = parser.parse_args()
+    if not (given.folder / "plan.json").is_file() or "bpy" not in globals():
+        parser.error(f"expected Blender's Python and a folder with plan.json, but {given.folder} came")
+    main(given.folder)

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from cyclopts import Parameter, run
+from cyclopts import Parameter
 
 from dermis.apps.validation.benchmarks.cases import Case, scenes_of, settings_of
 from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, stage_ms
 from dermis.base.atomic_write import check_output, replacing
+from dermis.base.command_line import run_script
 from dermis.base.console import print_json
 from dermis.frame.renderer import Renderer
 from dermis.frame.techniques.technique import AtlasTechnique
@@ -89,4 +90,4 @@ def measured(renderer: Renderer, head: Head, case: Case, effort: Effort) -> dict
 
 
 if __name__ == "__main__":
-    run(main)
+    run_script(main)

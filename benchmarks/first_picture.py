@@ -16,9 +16,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter, run
+from cyclopts import Parameter
 
 from dermis.base.atomic_write import check_output, replacing
+from dermis.base.command_line import run_script
 from dermis.base.console import print_json
 
 _WARM = 2  # runs after each cold one
@@ -81,4 +82,4 @@ def seconds(head: str, side: int, adapter: str, folder: Path, environment: Mappi
 
 
 if __name__ == "__main__":
-    run(main)
+    run_script(main)

@@ -11,9 +11,10 @@ import sys
 import time
 from typing import Annotated
 
-from cyclopts import Parameter, run
+from cyclopts import Parameter
 
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
+from dermis.base.command_line import run_script
 
 MEDIA = {
     "half-space, albedo 0.5": [ScatteringLayer(0.5, 0.5)],
@@ -58,4 +59,4 @@ def main(
 
 
 if __name__ == "__main__":
-    run(main)
+    run_script(main)

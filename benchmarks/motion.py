@@ -16,12 +16,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from cyclopts import Parameter, run
+from cyclopts import Parameter
 
 from dermis.apps.validation.benchmarks.cases import Case, scenes_of, settings_of
 from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, row_ms, stage_ms
 from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
 from dermis.base.atomic_write import check_output, replacing
+from dermis.base.command_line import run_script
 from dermis.base.console import print_json
 from dermis.frame.renderer import Renderer
 from dermis.gpu.memory import held_bytes
@@ -164,4 +165,4 @@ def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int
 
 
 if __name__ == "__main__":
-    run(main)
+    run_script(main)

@@ -1,4 +1,4 @@
-"""Median time from tissue to six shared Gaussians, on one core: python benchmarks/profiles.py."""
+"""Median time from tissue to six shared Gaussians, on one core."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import partial
 
 import dermis
+from dermis.base.command_line import run_script
 from dermis.optics.fits.gaussian import fit_gaussians
 
 REPEATS = 15
@@ -55,4 +56,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,4 +1,4 @@
-"""How well melanin and blood are found: python benchmarks/unmixing.py [-o results/unmixing.json]
+"""How well melanin and blood of skin are found.
 
 Colours of known skins go in, computed by layered diffusion without the table that unmixing reads, or counted
 by Monte Carlo; `unmixing_page.py` writes docs/fit.md from what comes out.
@@ -6,16 +6,15 @@ by Monte Carlo; `unmixing_page.py` writes docs/fit.md from what comes out.
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 import time
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
@@ -25,6 +24,8 @@ from dermis.apps.inverse.unmixing.solve import solve, weights_of
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.truths.slab_mc import counted_profile
 from dermis.apps.validation.pages import write_figures
+from dermis.base.command_line import run_script
+from dermis.base.console import print_lines
 from dermis.gpu import CommandList, Device, open_device
 from dermis.gpu.textures import texture_from
 from dermis.images.colour import delta_e_2000
@@ -47,31 +48,40 @@ _PHOTONS = 40_000
 _SIDE = 192
 
 
-def main(words: list[str]) -> int:
-    """Measure, and write the figures."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("-o", "--output", type=Path, default=RESULTS)
-    parser.add_argument("--adapter", default="auto")
-    parser.add_argument("--speed", action="store_true", help="print the times alone, and write nothing")
-    help_text = "folder with spectral_srgb_diffusion.csv, colours by another program; measure this alone"
-    parser.add_argument("--supplied", type=Path, help=help_text)
-    asked = parser.parse_args(words)
-    told = json.loads(asked.output.read_text("utf-8")) if asked.output.exists() else {}
-    if asked.supplied:
-        write_figures(asked.output, told | {"supplied": supplied(asked.supplied)}, 4)
+def main(
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = RESULTS,
+    adapter: str = "auto",
+    speed_only: Annotated[bool, Parameter(name="--speed", negative="")] = False,
+    supplied_folder: Annotated[Path | None, Parameter(name="--supplied")] = None,
+) -> int:
+    """Measure, and write the figures.
+
+    Parameters
+    ----------
+    output:
+        JSON with the figures.
+    speed_only:
+        Print the times alone, and write nothing.
+    supplied_folder:
+        Folder with spectral_srgb_diffusion.csv, colours by another program; measure this alone.
+    """
+    told = json.loads(output.read_text("utf-8")) if output.exists() else {}
+    if supplied_folder:
+        write_figures(output, told | {"supplied": supplied(supplied_folder)}, 4)
         return 0
-    device = open_device(asked.adapter)
+    device = open_device(adapter)
     speed = {"adapter": device.adapter.name} | {str(side): speed_ms(device, side) for side in SIDES}
-    if asked.speed:
-        sys.stdout.write(json.dumps(speed) + "\n")
+    if speed_only:
+        print_lines(json.dumps(speed))
         return 0
     told |= {"skins": SKINS, "noise": NOISE, "photons": _PHOTONS}
     told["known"] = {str(mm): known(replace(DEFAULT_SKIN, epidermis_mm=mm)) for mm in THICK_MM}
     told["mistaken"] = mistaken()
     told["counted"] = counted()
-    told["shading"] = shading(asked.adapter)
+    told["shading"] = shading(adapter)
     told["speed"] = speed
-    write_figures(asked.output, told, 4)
+    write_figures(output, told, 4)
     return 0
 
 
@@ -246,4 +256,4 @@ def speed_ms(device: Device, side: int) -> float:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_script(main)

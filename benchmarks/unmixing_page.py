@@ -1,19 +1,16 @@
-"""Writes docs/fit.md: python benchmarks/unmixing_page.py
-
-From what `unmixing.py`, `widths.py` and `fitting.py` measured.
-"""
+"""Writes docs/fit.md from what `unmixing.py`, `widths.py` and `fitting.py` measured."""
 
 from __future__ import annotations
 
 import json
 import math
 import statistics
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from dermis.base.atomic_write import replacing
+from dermis.base.command_line import run_script
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "fit.md"
@@ -22,16 +19,15 @@ RESULTS = ROOT / "benchmarks" / "results" / "unmixing.json"
 WIDTHS = RESULTS.with_name("widths.json")
 FITTED = ROOT / "benchmarks" / "results" / "fitting.json"
 
-_TRUE_STRENGTH = 1.0  # of the surface of all faces that are fitted, as fitting_scenes.py has them
+_TRUE_STRENGTH = 1.0  # of the surface of all faces that are fitted, as fitting.py has them
 
 Told = dict[str, Any]
 
 
-def main() -> int:
+def main() -> None:
     """Write the page."""
     with replacing(PAGE) as trial:
         trial.write_text(page(*figures()), encoding="utf-8")
-    return 0
 
 
 def figures() -> tuple[Told, Told]:
@@ -219,4 +215,4 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import resource
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from viewer_clock import Clock
 
 from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
 from dermis.apps.viewer.navigation import drag_light, orbit
@@ -20,6 +19,37 @@ from dermis.apps.viewer.viewer import Viewer
 from dermis.scene.heads import load_head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+
+
+class Clock:
+    """Time that is left, from now on.
+
+    seconds : in all; None for as long as it takes
+    """
+
+    def __init__(self, seconds: float | None = None) -> None:
+        self._began = time.perf_counter()
+        self._end = self._began + (math.inf if seconds is None else seconds)
+
+    @property
+    def gone_s(self) -> float:
+        """Since the beginning."""
+        return time.perf_counter() - self._began
+
+    @property
+    def left_s(self) -> float:
+        """Until the end, at least 0."""
+        return max(0.0, self._end - time.perf_counter())
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing is left."""
+        return self.left_s <= 0.0
+
+    def share(self, part: float) -> Clock:
+        """A part of what is left."""
+        return Clock(part * self.left_s)
+
 
 Change = Callable[[ViewerState, int], ViewerState]
 _SETTLING = 2  # frames before any is counted
@@ -213,3 +243,9 @@ def processor_s() -> float:
     """Of this process so far, user and system [s]."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     return used.ru_utime + used.ru_stime
+
+
+def spread(seconds: Sequence[float]) -> dict[str, float]:
+    """Median and 95th percentile [ms], and of how many."""
+    middle, late = np.percentile(seconds, (50, 95))
+    return {"median_ms": 1e3 * float(middle), "late_ms": 1e3 * float(late), "count": len(seconds)}

@@ -1,4 +1,4 @@
-"""How far a page's pictures are from `dermis render`: python benchmarks/web_difference.py HEAD [ADAPTER].
+"""How far a page's pictures are from `dermis render`.
 
 Headless Chromium on its software adapter draws the page in both forms; its linear pictures are held against
 those of a renderer whose maps are the ones that the page decodes, and these against the maps as they were.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import shutil
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +21,9 @@ import dermis
 from dermis.apps.export.targets.web.build import Asked, built
 from dermis.apps.export.targets.web.maps import smaller
 from dermis.apps.export.targets.web.page import web_page
+from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
+from dermis.base.extras import needed
 from dermis.frame.taping import renderer_for
 
 ATLAS, MAP = 512, 1024  # as exported
@@ -42,10 +43,9 @@ LINEAR = """async () => {
 }"""
 
 
-def main() -> None:
+def main(head: str, adapter: str = "auto") -> None:
     """Print a row for each form and size."""
-    name, adapter = sys.argv[1], (*sys.argv[2:], "auto")[0]
-    scene = dermis.Scene(dermis.load_head(name))
+    scene = dermis.Scene(dermis.load_head(head))
     scene = replace(scene, head=smaller(scene.head, MAP))
     settings = dermis.Settings(atlas=ATLAS)
     print_lines("| head | form | size | difference | what maps and hairs lose |", "|---|---|---|---|---|")
@@ -59,17 +59,16 @@ def main() -> None:
         )
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "head.html"
-            file.write_text(web_page(made, (), name, ""), encoding="utf-8")
+            file.write_text(web_page(made, (), head, ""), encoding="utf-8")
             found = drawn(file, side)
         off, lost = distance(found, wanted[0]), distance(wanted[0], given)
-        print_lines(f"| {name} | {form} | {side} x {side} | {off:.2%} | {lost:.2%} |")
+        print_lines(f"| {head} | {form} | {side} x {side} | {off:.2%} | {lost:.2%} |")
 
 
 def drawn(file: Path, side: int) -> NDArray[np.float32]:
     """(h, w, 3) linear, what a browser draws of a page."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as play:
+    playwright = needed("playwright.sync_api", "a page in Chromium")
+    with playwright.sync_playwright() as play:
         one: Any = play.chromium.launch(executable_path=shutil.which("chromium"), args=[*FLAGS, *SOFTWARE])
         page = one.new_page(viewport={"width": side, "height": side}, offline=True)
         page.goto(file.as_uri())
@@ -85,4 +84,4 @@ def distance(found: NDArray[np.float32], wanted: NDArray[np.float32]) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,8 +1,4 @@
-"""Time an exported page in headless Chromium: python benchmarks/web_page.py PAGE.html [SIDE [FORM]].
-
-FORM is gpu or software; without it the page chooses. Where Chromium can use a GPU, add --gpu. With
---minutes=10 the head is turned for so long instead, and the memory of page and browser is told each minute.
-"""
+"""Times of an exported page in headless Chromium, or its memory over minutes."""
 
 from __future__ import annotations
 
@@ -11,7 +7,12 @@ import shutil
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from dermis.base.command_line import run_script
+from dermis.base.extras import needed
 
 SOFTWARE = ["--use-webgpu-adapter=swiftshader"]
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--js-flags=--expose-gc", "--enable-precise-memory-info"]
@@ -73,15 +74,32 @@ def turned(page: Any, minutes: float) -> None:
             told += 1
 
 
-def main() -> None:
-    """Open the page and turn the head."""
-    from playwright.sync_api import sync_playwright
+def main(
+    file: Path,
+    side: int = 512,
+    form: Literal["gpu", "software", ""] = "",
+    *,
+    gpu: Annotated[bool, Parameter(negative="")] = False,
+    minutes: float = 0.0,
+) -> None:
+    """Open the page and turn the head.
 
-    words = [word for word in sys.argv[1:] if not word.startswith("--")]
-    minutes = next((float(word[10:]) for word in sys.argv if word.startswith("--minutes=")), 0.0)
-    file, side, form = Path(words[0]), int([*words, "512"][1]), (words[2:] or [""])[0]
-    flags = FLAGS + (HARDWARE if "--gpu" in sys.argv else SOFTWARE)
-    with sync_playwright() as play:
+    Parameters
+    ----------
+    file:
+        The exported page.
+    side:
+        Of the viewport [pixel].
+    form:
+        Of the frame [chosen by the page].
+    gpu:
+        Use the GPU of the machine, where Chromium can.
+    minutes:
+        Turn the head for so long instead, and print the memory of page and browser each minute.
+    """
+    playwright = needed("playwright.sync_api", "a page in Chromium")
+    flags = FLAGS + (HARDWARE if gpu else SOFTWARE)
+    with playwright.sync_playwright() as play:
         browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
         page = browser.new_page(viewport={"width": side, "height": side}, offline=True)
         began, used = time.perf_counter(), processor_s()
@@ -104,4 +122,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,4 +1,4 @@
-"""How well mixed profiles stand for light at the border of two media: python benchmarks/widths.py
+"""Errors of mixed profiles at the border of two media.
 
 Monte Carlo through two half-spaces side by side is the truth; `unmixing_page.py` puts the figures into
 docs/fit.md. With --cost it prints the milliseconds of frames with one, two and three profiles.
@@ -6,16 +6,15 @@ docs/fit.md. With --cost it prints the milliseconds of frames with one, two and 
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 from numpy.typing import NDArray
 
 import dermis
@@ -24,6 +23,8 @@ from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.inverse.unmixing.widths import widths_of
 from dermis.apps.truths.two_media import exchange
 from dermis.apps.validation.pages import write_figures
+from dermis.base.command_line import run_script
+from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer
 from dermis.images.io import write_png
 
@@ -42,19 +43,29 @@ _JUDGED, _CENTRAL = slice(40, 100), slice(20, 120)  # strips around the border; 
 _FRAMES = 12
 
 
-def main(words: list[str]) -> int:
-    """Measure, and write the figures."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("-o", "--output", type=Path, default=RESULTS)
-    parser.add_argument("--adapter", default="auto")
-    parser.add_argument("--cost", action="store_true", help="print milliseconds of frames, and write nothing")
-    parser.add_argument("--atlas", type=int, default=2048)
-    asked = parser.parse_args(words)
-    if asked.cost:
-        sys.stdout.write(json.dumps(cost(asked.adapter, asked.atlas)) + "\n")
+def main(
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = RESULTS,
+    adapter: str = "auto",
+    cost_only: Annotated[bool, Parameter(name="--cost", negative="")] = False,
+    atlas: int = 2048,
+) -> int:
+    """Measure, and write the figures.
+
+    Parameters
+    ----------
+    output:
+        JSON with the figures.
+    cost_only:
+        Print milliseconds of frames, and write nothing.
+    atlas:
+        Texels along the side of the atlas of those frames.
+    """
+    if cost_only:
+        print_lines(json.dumps(cost(adapter, atlas)))
         return 0
-    told = {"pairs": {name: border(*pair) for name, pair in PAIRS.items()}, "grid": grid(asked.adapter)}
-    write_figures(asked.output, told | {"photons": PHOTONS}, 3)
+    told = {"pairs": {name: border(*pair) for name, pair in PAIRS.items()}, "grid": grid(adapter)}
+    write_figures(output, told | {"photons": PHOTONS}, 3)
     return 0
 
 
@@ -151,4 +162,4 @@ def _frame_ms(renderer: Renderer, scene: dermis.Scene, settings: dermis.Settings
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_script(main)

@@ -7,12 +7,14 @@ import re
 import shlex
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 from cyclopts import App
 
 import dermis
+from dermis.base.command_line import make_app, run_app
 from dermis.cli import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -99,10 +101,42 @@ def test_files_are_there(page: Path) -> None:
     assert missing == []
 
 
-@pytest.mark.parametrize("folder", ["tools", "benchmarks"])
-def test_scripts_import(folder: str) -> None:
-    """All of a folder in one process; extras that a script needs, it asks for when it runs."""
-    names = [path.stem for path in SCRIPTS if path.parent.name == folder]
-    code = f"import sys; sys.path.insert(0, {str(ROOT / folder)!r})\nfor name in {names}: __import__(name)"
-    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert names and run.returncode == 0, run.stderr
+RUN_ALL = """
+import contextlib, io, runpy, sys
+for script in sys.argv[2:]:
+    sys.path.insert(0, script.rpartition("/")[0])
+    for option in ("--help", "--frobnicate"):
+        sys.argv, said = [script, option], io.StringIO()
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            try:
+                runpy.run_path(script, run_name="__main__")
+                code = None
+            except SystemExit as end:
+                code = end.code
+        shown = said.getvalue()
+        sound = shown.lower().startswith("usage:") or (option, shown.count("\\n")) == ("--frobnicate", 1)
+        if code != (2 if option == "--frobnicate" else 0) or not sound:
+            print(script, option, code, shown[-200:])
+    sys.path.pop(0)
+"""
+
+
+def test_scripts_explain_themselves_and_refuse_other_options() -> None:
+    """All in one process; extras that a script needs, it imports when it runs."""
+    scripts = [str(path) for path in SCRIPTS if '__name__ == "__main__"' in path.read_text("utf-8")]
+    command = [sys.executable, "-c", RUN_ALL, "", *scripts]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert scripts and (run.returncode, run.stdout) == (0, ""), run.stdout + run.stderr
+
+
+@pytest.mark.parametrize("name", ["accuracy", "engines", "peers"])
+def test_commands_of_the_validation_explain_themselves(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    module = f"dermis.apps.validation.{name}.__main__"
+    places = getattr(import_module(module), "COMMANDS", {f"dermis.apps.validation.{name}.report:{name}": ""})
+    for place in places:
+        folder, _, function = place.partition(":")
+        command = make_app(function, None)
+        command.default(getattr(import_module(folder), function))
+        assert run_app(command, ["--help"]) == 0 and run_app(command, ["--frobnicate"]) == 2
+    said = capsys.readouterr()
+    assert said.out.count("Usage:") == said.err.count("frobnicate: expected an option") == len(places)

@@ -1,16 +1,13 @@
-"""Every rig and environment on several heads, exposed as `dermis render` does, on one sheet to look at.
-
-python tools/contact_sheet.py sheet.png [--side 160] [--camera portrait]
-"""
+"""Every rig and environment on several heads, exposed as `dermis render` does, on one sheet to look at."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from dermis.base.command_line import run_script
 from dermis.formats.samples import SAMPLES, cached
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
@@ -47,21 +44,23 @@ def lit() -> Iterator[dict[str, object]]:
         yield {"lights": load_lights("rim"), "environment": Environment(name=room)}
 
 
-def main() -> None:
-    """Draw the sheet: a row for each light, a column for each head."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("output", type=Path)
-    parser.add_argument("--side", type=int, default=160)
-    parser.add_argument("--camera", default="portrait")
-    parser.add_argument("--adapter", default="auto")
-    asked = parser.parse_args()
-    settings = Settings(size=(asked.side, asked.side), atlas=512, shadow_size=1024, **PHOTOGRAPHED)
-    renderer, columns = Renderer(asked.adapter), []
+def main(output: Path, *, side: int = 160, camera: str = "portrait", adapter: str = "auto") -> None:
+    """Draw the sheet: a row for each light, a column for each head.
+
+    Parameters
+    ----------
+    output:
+        PNG file.
+    side:
+        Of each picture [pixel].
+    """
+    settings = Settings(size=(side, side), atlas=512, shadow_size=1024, **PHOTOGRAPHED)
+    renderer, columns = Renderer(adapter), []
     for head in heads().values():
-        scenes = [Scene(head, camera=preset(asked.camera, head), **light) for light in lit()]  # type: ignore[arg-type]
+        scenes = [Scene(head, camera=preset(camera, head), **light) for light in lit()]  # type: ignore[arg-type]
         columns.append(np.concatenate([renderer.draw(scene, settings).srgb8() for scene in scenes]))
-    write_png(asked.output, np.concatenate(columns, axis=1))
+    write_png(output, np.concatenate(columns, axis=1))
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,21 +1,19 @@
 """Walks as Cycles takes them through a half-space: writes `apps/export/targets/blender/cycles_walk.csv`.
 
-    python tools/cycles_walk.py [PHOTONS]   # a minute for 4 million
-
-No photon is absorbed: one that leaves after n scatterings stands for albedo^n at each albedo, so that all
-columns come from the same walks, smooth in the albedo.
+Takes a minute for 4 million photons. None is absorbed: one that leaves after n scatterings counts albedo^n at
+each albedo, so that all columns come from the same walks, smooth in the albedo.
 """
 
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.photon import Words, deflect, uniform
+from dermis.base.command_line import run_script
 from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
@@ -73,9 +71,8 @@ def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: Words, 
             ux, uy, uz = deflect(ux, uy, uz, 0.0, rng)
 
 
-def main() -> None:
+def main(photons: int = 4_000_000) -> None:
     """Walk for each way to enter and write the table."""
-    photons = int(sys.argv[1]) if len(sys.argv) > 1 else 4_000_000
     albedo = 1.0 - np.array(ROOTS) ** 2
     powers = albedo[:, None] ** np.arange(MOST)
     lines = []
@@ -93,4 +90,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

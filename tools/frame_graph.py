@@ -1,14 +1,14 @@
-"""Writes a frame's graph down, in docs/frame_graph.md: python tools/frame_graph.py [ADAPTER [PAGE]]."""
+"""Writes a frame's graph down, in docs/frame_graph.md."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import dermis
 from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
+from dermis.base.command_line import run_script
 from dermis.formats.samples import cached
 from dermis.gpu.listing import ListedPass, Listing
 
@@ -56,9 +56,8 @@ def pass_row(one: ListedPass) -> str:
     return f"| {'recorded' if one.recorded else ''} | {one.stage} | {one.shader} | {groups} | {bound} |"
 
 
-def main() -> None:
+def main(adapter: str = "auto", page: Path = PAGE) -> None:
     """Draw and write."""
-    adapter, page = (*sys.argv[1:], *("auto", str(PAGE))[len(sys.argv) - 1 :])[:2]
     renderer = dermis.Renderer(adapter)
     name = "lee_perry_smith" if cached("lee_perry_smith") else "human"
     scene = dermis.Scene(rigged(dermis.load_head(name, subdivide=0), TARGETS))
@@ -69,7 +68,7 @@ def main() -> None:
         renderer.draw(scene, SETTINGS)
         renderer.draw(*frame)
         marks[change] = set(renderer.graph.ran)
-    Path(page).write_text(
+    page.write_text(
         (PAGE.parent / "frame_graph.in.md")
         .read_text(encoding="utf-8")
         .format(
@@ -86,4 +85,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,6 +1,6 @@
 """Makes src/dermis/optics/data/half_space.csv: profiles of homogeneous half-spaces by Monte Carlo.
 
-python tools/half_space_table.py [PHOTONS], some minutes. Scattering is isotropic and lengths are in mean free
+Takes some minutes. Scattering is isotropic and lengths are in mean free
 paths, so that a profile depends on the albedo alone, the surface and how light enters. Photons are never
 absorbed: one that leaves after n scatterings counts albedo^n, for all albedos at once.
 """
@@ -8,7 +8,6 @@ absorbed: one that leaves after n scatterings counts albedo^n, for all albedos a
 from __future__ import annotations
 
 import math
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.photon import deflect, refract, uniform
 from dermis.base.atomic_write import replacing
+from dermis.base.command_line import run_script
 from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
@@ -41,9 +41,8 @@ HEAD = """\
 """
 
 
-def main() -> int:
+def main(photons: int = PHOTONS) -> None:
     """Trace all and write the table."""
-    photons = int(sys.argv[1]) if len(sys.argv) > 1 else PHOTONS
     lines = [HEAD + ",".join(["kind", "albedo", "total", *(f"{edge:.5g}" for edge in EDGES[1:])])]
     for kind, (eta, diffuse) in KINDS.items():
         dark = ABSORBED >= DARK
@@ -55,7 +54,6 @@ def main() -> int:
             lines.append(f"{kind},{1.0 - absorbed:.6g},{total[i]:.6g},{shares}")
     with replacing(OUT) as trial:
         trial.write_text("\n".join([*lines, ""]), encoding="utf-8")
-    return 0
 
 
 def traced(eta: float, diffuse: bool, absorbed: Floats, photons: int, events: int) -> Floats:
@@ -108,4 +106,4 @@ def _walk(
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

@@ -1,6 +1,6 @@
 """Makes src/dermis/human/data/human.npz: MakeHuman's parametric human as a bust with a layout of its own.
 
-python tools/human_data.py FOLDER, where FOLDER holds the published human.npz (CC0).
+FOLDER holds the published human.npz (CC0).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from human_layout import human_layout
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array, eye_array, vstack
 
+from dermis.base.command_line import run_script
 from dermis.human.published import DELTA_MM
 from dermis.mesh.rig import INFLUENCES
 
@@ -46,9 +47,8 @@ RELAXING = 40  # rounds of smoothing along the edge of the cut: it crosses the f
 ACROSS = 4  # quads of the cap from front to back
 
 
-def main() -> None:
+def main(folder: Path) -> None:
     """Make the file."""
-    folder = Path(sys.argv[1])
     with np.load(folder / "human.npz") as found:
         data = {name: found[name] for name in found}
     mean = MM * data["positions_dm"].astype(np.float64) + person(data, MEAN)
@@ -264,4 +264,4 @@ def stands_for(name: str) -> int:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

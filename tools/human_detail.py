@@ -1,7 +1,4 @@
-"""Makes src/dermis/human/data/detail.png: a tile of skin with pores, and one with its finest furrows.
-
-python tools/human_detail.py
-"""
+"""Makes src/dermis/human/data/detail.png: a tile of skin with pores, and one with its finest furrows."""
 
 from __future__ import annotations
 
@@ -15,6 +12,7 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
+from dermis.base.command_line import run_script
 from dermis.human.skin.detail import FULL_MM, SIDE, TILE_MM
 
 Doubles = NDArray[np.float64]
@@ -98,4 +96,4 @@ def wrapped(off: Doubles) -> Doubles:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

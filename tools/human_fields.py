@@ -1,6 +1,6 @@
 """Makes src/dermis/human/data/average.npz: the average person, and how far skin is from lips and lids.
 
-python tools/human_fields.py FOLDER, where FOLDER holds the published human.npz and its masks (CC0).
+FOLDER holds the published human.npz and its masks (CC0).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import lsqr
 from scipy.spatial import cKDTree
 
+from dermis.base.command_line import run_script
 from dermis.human.person import Human
 from dermis.human.published import DELTA_MM, count, places_mm
 from dermis.human.skin.surface import FIELDS
@@ -36,9 +37,8 @@ ROOT_MM = 1.5
 """How far the roots of the strips of lashes are from the skin at most."""
 
 
-def main() -> None:
+def main(folder: Path) -> None:
     """Make the file."""
-    folder = Path(sys.argv[1])
     head = AVERAGE.head(layout="hm08", subdivide=LEVEL)
     assert head.rig is not None and head.rig.stencils is not None
     stencils = head.rig.stencils
@@ -151,4 +151,4 @@ def fit(matrix: csr_array, point: Index, values: Doubles) -> Doubles:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,7 +1,4 @@
-"""Makes src/dermis/human/landmarks/*.csv: where landmarks lie on the quads of the parametric human.
-
-python tools/human_landmarks.py
-"""
+"""Makes src/dermis/human/landmarks/*.csv: where landmarks lie on the quads of the parametric human."""
 
 from __future__ import annotations
 
@@ -10,6 +7,8 @@ from pathlib import Path
 
 from human_landmark_places import Surface
 from human_landmark_sets import face_synthetics, ibug, mediapipe
+
+from dermis.base.command_line import run_script
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "landmarks"
 SOURCE = "tools/human_landmarks.py, by geometry and by eye on the average human"
@@ -52,4 +51,4 @@ def row(surface: Surface, landmark: str, place: tuple[int, float]) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,6 +1,6 @@
 """Makes src/dermis/human/regions/parts.csv: quads of lips, ears and mouth, by the published masks.
 
-python tools/human_parts.py FOLDER, where FOLDER holds the published masks (CC0).
+FOLDER holds the published masks (CC0).
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+
+from dermis.base.command_line import run_script
 
 HUMAN = Path(__file__).parent.parent / "src" / "dermis" / "human"
 OUT = HUMAN / "regions" / "parts.csv"
@@ -25,9 +27,9 @@ part,first,last
 """
 
 
-def main() -> None:
+def main(folder: Path) -> None:
     """Make the table."""
-    rows = [f"{part},{a},{b}\n" for part, quads in parts(Path(sys.argv[1])).items() for a, b in runs(quads)]
+    rows = [f"{part},{a},{b}\n" for part, quads in parts(folder).items() for a, b in runs(quads)]
     OUT.write_text(HEADER + "".join(rows), encoding="utf-8")
     sys.stdout.write(f"{OUT}  {len(rows)} runs\n")
 
@@ -54,4 +56,4 @@ def runs(numbers: NDArray[np.int64]) -> list[tuple[int, int]]:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,14 +1,14 @@
 """Makes src/dermis/environment/data/mirrors.csv: surface lobes as round ones about the plane of view.
 
-python tools/mirror_lobes.py, two or three minutes. `dermis.environment.mirror_fits` says how they are found.
+Takes two or three minutes. `dermis.environment.mirror_fits` says how they are found.
 """
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from dermis.base.atomic_write import replacing
+from dermis.base.command_line import run_script
 from dermis.environment.mirror_fits import LOBES, MIRROR_ROUGHNESSES, MIRROR_VIEWS, fitted_mirrors
 from dermis.specular.models import MODELS
 
@@ -23,7 +23,7 @@ HEAD = """\
 """
 
 
-def main() -> int:
+def main() -> None:
     """Fit all and write the table."""
     columns = [f"{name}_{k}" for k in range(LOBES) for name in ("angle", "beside", "roughness", "weight")]
     lines = [",".join(["model", "m", "cosine", *columns])]
@@ -36,8 +36,7 @@ def main() -> int:
     OUT.parent.mkdir(exist_ok=True)
     with replacing(OUT) as trial:
         trial.write_text(HEAD + "\n".join([*lines, ""]), encoding="utf-8")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

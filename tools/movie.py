@@ -1,7 +1,5 @@
 """A movie of the parametric human: it smiles, speaks a few visemes, blinks and turns under studio light.
 
-python tools/movie.py OUTPUT.mp4 [SIDE [FPS]]
-
 Writes the motion beside the movie, as a CSV like those of Live Link Face. Needs DERMIS_DATA with
 heads/makehuman.
 """
@@ -16,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import dermis
+from dermis.base.command_line import run_script
 from dermis.formats.maps import load_maps
 from dermis.images.movie import exact_rate
 from dermis.mesh.head import Head
@@ -58,11 +57,19 @@ PAIRED = ("MouthSmile", "CheekSquint", "MouthStretch", "MouthPress", "BrowOuterU
 """Columns that come once for each side."""
 
 
-def main() -> None:
-    """Write the CSV and the movie."""
-    output = Path(sys.argv[1])
-    side = int(sys.argv[2]) if len(sys.argv) > 2 else SIDE
-    rate = exact_rate(sys.argv[3] if len(sys.argv) > 3 else FPS)
+def main(output: Path, side: int = SIDE, fps: str = FPS) -> None:
+    """Write the CSV and the movie.
+
+    Parameters
+    ----------
+    output:
+        Movie, such as NAME.mp4.
+    side:
+        Of the pictures [pixel].
+    fps:
+        Pictures a second, as 30 or 30000/1001.
+    """
+    rate = exact_rate(fps)
     take = output.with_suffix(".csv")
     take.write_text(capture(), encoding="utf-8")
     head = MAN.head(load_maps(colour=SKIN), layout="hm08")
@@ -108,4 +115,4 @@ def value_at(keys: Keys, seconds: float) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,16 +1,19 @@
-"""Writes the table of outputs into docs/outputs.md from their registry.
-
-python tools/outputs_page.py
-"""
+"""Writes the table of outputs into docs/outputs.md from their registry."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from dermis.base.command_line import run_script
 from dermis.frame.outputs import OUTPUTS, Output
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "outputs.md"
 _BEGIN, _END = "<!-- outputs -->\n", "<!-- end -->\n"
+
+
+def main() -> None:
+    """Write the table."""
+    PAGE.write_text(page(PAGE.read_text("utf-8")), "utf-8")
 
 
 def page(text: str) -> str:
@@ -45,4 +48,4 @@ def _png(output: Output) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(PAGE.read_text("utf-8")), "utf-8")
+    run_script(main)

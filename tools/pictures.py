@@ -1,11 +1,7 @@
-"""Draws gallery pictures and puts them, as WebP, where the documentation shows them.
-
-python tools/pictures.py [NAME ...]
-"""
+"""Draws gallery pictures and puts them, as WebP, where the documentation shows them."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,19 +11,20 @@ from dermis.apps.gallery.picture import sheet
 from dermis.apps.gallery.run import encode_webp
 from dermis.apps.gallery.script import find_scripts
 from dermis.apps.gallery.studio import Studio
+from dermis.base.command_line import run_script
 
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
 WIDEST = 1600
 
 
-def main() -> None:
-    """Make every picture anew, or those that are named."""
+def main(*names: str) -> None:
+    """Draw every picture, or those that are named."""
     studio = Studio("lee_perry_smith")
-    for script in find_scripts(sys.argv[1:]):
+    for script in find_scripts(names):
         picture = Image.fromarray(sheet(script.draw(studio), script.columns))
         picture.thumbnail((WIDEST, 4 * WIDEST), Image.Resampling.LANCZOS)
         (FOLDER / f"{script.name}.webp").write_bytes(encode_webp(np.asarray(picture)))
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

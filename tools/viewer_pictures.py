@@ -1,7 +1,4 @@
-"""Pictures of the viewer for the documentation: its window on a screen in memory, and its page in Chromium.
-
-python tools/viewer_pictures.py [HEAD]
-"""
+"""Pictures of the viewer for the documentation: its window on a virtual screen and its page in Chromium."""
 
 from __future__ import annotations
 
@@ -18,6 +15,8 @@ from typing import Any
 
 from PIL import Image, ImageChops, ImageGrab
 
+from dermis.base.command_line import run_script
+
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
 SIZE = 1100, 760
 SCENE = ("--atlas", "1024", "--samples", "4")
@@ -29,9 +28,8 @@ COMPARE, FREEZE = (100, 243), (30, 268)
 CHROMIUM = "chromium", "chromium-browser", "google-chrome"
 
 
-def main() -> None:
+def main(head: str = "lee_perry_smith") -> None:
     """Make both."""
-    head = sys.argv[1] if len(sys.argv) > 1 else "lee_perry_smith"
     for name, take in (("viewer-window", window), ("viewer-browser", page)):
         take(head).save(FOLDER / f"{name}.webp", quality=88, method=6)
 
@@ -114,4 +112,4 @@ def still(take: Callable[[], Image.Image], quiet_s: float = REFINED_S) -> Image.
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

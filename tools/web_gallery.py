@@ -1,13 +1,13 @@
-"""Writes four heads as pages and a page that leads to them: python tools/web_gallery.py FOLDER."""
+"""Writes four heads as pages and a page that leads to them."""
 
 from __future__ import annotations
 
 import html
 import re
-import sys
 from pathlib import Path
 
 from dermis.apps.export.run import export_skin
+from dermis.base.command_line import run_script
 from dermis.formats.samples import cached
 
 HEADS = {"human": "the human", "human-7": "human:7", "human-12": "human:12", "scan": "lee_perry_smith"}
@@ -39,4 +39,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    run_script(main)

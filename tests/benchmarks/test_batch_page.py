@@ -52,8 +52,8 @@ def test_the_page_has_each_run_with_its_ratio() -> None:
 
 
 def test_memory_is_told_by_images() -> None:
+    from batch import Clock
     from batch_page import page
-    from batch_sections import Clock
 
     from dermis.apps.batch.run import Progress
 
@@ -67,7 +67,7 @@ def test_memory_is_told_by_images() -> None:
 
 
 def test_the_rate_is_that_of_the_middle() -> None:
-    from batch_sections import Clock
+    from batch import Clock
 
     clock = Clock([(10.0 if n == 1 else 20.0 + 0.5 * n, n) for n in range(1, 101)])
     assert clock.rate() == pytest.approx(2.0)

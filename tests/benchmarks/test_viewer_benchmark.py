@@ -31,7 +31,7 @@ def found_modules() -> Any:
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """At the sizes of the quick trial: a pointer in the middle must be beside what brings the panel back."""
-    from gpu_sections import quick_plan
+    from gpu_server import quick_plan
     from viewer_input import Plan
 
     head = write_head(tmp_path_factory.mktemp("benchmark") / "head.obj")
@@ -49,8 +49,7 @@ def driver(plan: Any) -> Any:
 
 
 def test_each_motion_moves_the_picture_and_nothing_else_is_computed(driver: Any, plan: Any) -> None:
-    from viewer_clock import Clock
-    from viewer_input import MOTIONS, speeds
+    from viewer_input import MOTIONS, Clock, speeds
 
     found = dict(speeds(driver, plan, Clock()))
     assert list(found) == list(MOTIONS)
@@ -64,8 +63,8 @@ def test_each_motion_moves_the_picture_and_nothing_else_is_computed(driver: Any,
 
 
 def test_delays_are_those_of_pictures_that_follow(driver: Any, plan: Any) -> None:
-    from viewer_clock import Clock
-    from viewer_delays import delays
+    from viewer_input import Clock
+    from viewer_memory import delays
 
     found = dict(delays(driver, plan, Clock()))
     assert [one["count"] for one in found.values()] == [plan.frames] * 2
@@ -73,9 +72,8 @@ def test_delays_are_those_of_pictures_that_follow(driver: Any, plan: Any) -> Non
 
 
 def test_no_time_leaves_a_few_frames_of_everything(driver: Any, plan: Any) -> None:
-    from viewer_clock import Clock
-    from viewer_delays import delays
-    from viewer_input import speeds
+    from viewer_input import Clock, speeds
+    from viewer_memory import delays
 
     many = replace(plan, frames=1000)
     assert {one["frames"] for _, one in speeds(driver, many, Clock(0.0))} == {3}
@@ -105,9 +103,8 @@ def test_a_picture_that_never_rests_ends_the_wait(driver: Any, monkeypatch: pyte
 
 
 def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: Path) -> None:
-    from viewer import Found
-    from viewer_clock import Clock
-    from viewer_tables import tables
+    from viewer import Found, tables
+    from viewer_input import Clock
 
     def broken(clock: Any) -> Any:
         assert clock.left_s <= 10.0
@@ -128,7 +125,7 @@ def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: P
 
 
 def test_a_server_that_has_nothing_to_show_is_told_with_its_reason(plan: Any) -> None:
-    from viewer_clock import Clock
+    from viewer_input import Clock
     from viewer_page import through_the_page
 
     with pytest.raises(RuntimeError, match="no such head"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +27,7 @@ def test_it_is_what_the_tool_makes(
     import human_data
 
     monkeypatch.setattr(human_data, "OUT", tmp_path / "human.npz")
-    monkeypatch.setattr(sys, "argv", ["human_data.py", str(sample_folder / "heads" / "human")])
-    human_data.main()
+    human_data.main(sample_folder / "heads" / "human")
     with np.load(tmp_path / "human.npz") as made, np.load(DATA / "human.npz") as kept:
         assert set(made) == set(kept)
         for name in kept:
@@ -47,8 +45,7 @@ def test_the_average_person_is_what_the_tool_measures(
     import human_fields
 
     monkeypatch.setattr(human_fields, "OUT", tmp_path / "average.npz")
-    monkeypatch.setattr(sys, "argv", ["human_fields.py", str(sample_folder / "heads" / "human")])
-    human_fields.main()
+    human_fields.main(sample_folder / "heads" / "human")
     with np.load(tmp_path / "average.npz") as made, np.load(DATA / "average.npz") as kept:
         assert set(made) == set(kept)
         assert np.abs(made["places"].astype(int) - kept["places"]).max() <= 1

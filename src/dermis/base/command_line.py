@@ -21,6 +21,7 @@ from cyclopts.exceptions import (
     UnusedCliTokensError,
 )
 
+from dermis.base.atomic_write import reason
 from dermis.base.errors import DermisError, DermisWarning, shortened, shown_value
 
 _LONGEST = 400  # letters
@@ -76,7 +77,11 @@ def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | N
     else:
         app = make_app(name, help_text)
         app.default(run)
-    sys.exit(run_app(app))
+    try:
+        code = run_app(app)
+    except OSError as error:
+        code = failed(name, f"{error.filename}: expected a usable file, but {reason(error)}. Name another.")
+    sys.exit(code)
 
 
 def add_command(app: App, name: str, place: str, summary: str) -> None:
