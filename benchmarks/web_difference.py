@@ -24,7 +24,7 @@ from dermis.apps.export.targets.web.page import web_page
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.base.extras import needed
-from dermis.frame.taping import renderer_for
+from dermis.frame.capture import renderer_for
 
 ATLAS, MAP = 512, 1024  # as exported
 SHOWN = ("software", 512), ("gpu", 256)

@@ -10,7 +10,7 @@ Columns: 7
 import dermis
 from dermis.apps.gallery.output_colours import coloured
 from dermis.apps.gallery.picture import main
-from dermis.frame.outputs import OUTPUTS
+from dermis.scene.outputs import OUTPUTS
 
 NAMES = [name for name in OUTPUTS if name not in ("normal_geometric", "label_face_synthetics")]
 BEFORE = dermis.Pose(bones={"head": (0, 12, 0)})

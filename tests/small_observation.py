@@ -11,8 +11,8 @@ from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.shards import Shard, ShardWriter, shards_of
 from dermis.apps.batch.spec import Spec, spec_of
 from dermis.frame.observation import Landmarks, Observation
-from dermis.frame.outputs import OUTPUTS
 from dermis.scene.opencv import OpenCvCamera
+from dermis.scene.outputs import OUTPUTS
 
 SIZE = 24, 16
 OUTPUT_NAMES = "depth", "normal", "uv", "triangle", "motion", "alpha"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dermis.frame.outputs import OUTPUTS
+from dermis.scene.outputs import OUTPUTS
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "outputs.md").read_text("utf-8")

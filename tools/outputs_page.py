@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dermis.base.command_line import run_script
-from dermis.frame.outputs import OUTPUTS, Output
+from dermis.scene.outputs import OUTPUTS, Output
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "outputs.md"
 _BEGIN, _END = "<!-- outputs -->\n", "<!-- end -->\n"

@@ -13,7 +13,7 @@ from dermis.apps.batch.output_encoding import Encoding, decode_output, encode_ou
 from dermis.apps.batch.reader import decode_image
 from dermis.apps.batch.records import encode_record
 from dermis.base.errors import DermisError
-from dermis.frame.outputs import OUTPUTS
+from dermis.scene.outputs import OUTPUTS
 
 ALL = tuple(OUTPUTS.names)
 

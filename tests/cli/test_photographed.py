@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import Run
 
-from dermis.frame.metering import KEY
+from dermis.frame.features.post.meter import KEY
 from dermis.images.io import read_image
 
 pytestmark = pytest.mark.photographed

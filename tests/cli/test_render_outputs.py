@@ -14,8 +14,8 @@ import OpenEXR
 import pytest
 
 from dermis.frame.output_files import encoded, png_levels
-from dermis.frame.outputs import OUTPUTS
 from dermis.images.io import read_image
+from dermis.scene.outputs import OUTPUTS
 
 Run = Callable[..., Any]
 

@@ -32,7 +32,8 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.optics.media import media
-from dermis.scene import Camera, PointLight, Scene
+from dermis.scene import Camera, Scene
+from dermis.scene.lights import PointLight
 
 RADIUS = "Subsurface Radius"
 HOSTILE = "x'; import os; os.system('true') #\n\"\"\"'''"

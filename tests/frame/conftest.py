@@ -8,8 +8,8 @@ import pytest
 from observed import observed
 from tolerances import HALVES, TWIN
 
-from dermis.frame.levels import FLOATS, usual_texel
 from dermis.frame.observation import Observation
+from dermis.frame.programs import FLOATS, usual_texel
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 

@@ -1,5 +1,5 @@
 // What a half-space does by directions, for pairs of cosines.
-//#include "direction.wgsl"
+//#include "irradiance/direction.wgsl"
 
 @group(0) @binding(30) var cosines: texture_2d<f32>; // of coming in, of leaving
 @group(0) @binding(31) var back: texture_storage_2d<rgba32float, write>;

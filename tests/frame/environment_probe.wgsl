@@ -1,7 +1,7 @@
 // Light from the environment for given normals and views: what enters a partly open surface, and its mirror image.
-//#include "geometry.wgsl"
+//#include "shape/geometry.wgsl"
 //#include "bilinear.wgsl"
-//#include "skin.wgsl"
+//#include "surface/skin.wgsl"
 //#include "environment.wgsl"
 
 @group(0) @binding(30) var normals: texture_2d<f32>; // and the open share of the sky

@@ -1,6 +1,6 @@
 // Where rays that meet the cornea see the plane of the iris, in an eye's own space, and what share of its colour shows.
-//#include "lighting.wgsl"
-//#include "eye.wgsl"
+//#include "irradiance/lighting.wgsl"
+//#include "shading/eye.wgsl"
 
 @group(0) @binding(30) var places: texture_2d<f32>; // on the cornea [mm]
 @group(0) @binding(31) var ways: texture_2d<f32>; // of sight, unit

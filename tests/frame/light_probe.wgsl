@@ -1,6 +1,6 @@
 // What one part of the first light gives at given points, and how much of the light they see.
-//#include "geometry.wgsl"
-//#include "skin.wgsl"
+//#include "shape/geometry.wgsl"
+//#include "surface/skin.wgsl"
 //#include "lights.wgsl"
 
 struct Part {

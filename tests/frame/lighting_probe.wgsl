@@ -1,5 +1,5 @@
 // What the surface reflects of the scene's lights, for given normals, views and roughness.
-//#include "lighting.wgsl"
+//#include "irradiance/lighting.wgsl"
 
 @group(0) @binding(30) var normals: texture_2d<f32>;
 @group(0) @binding(31) var views: texture_2d<f32>; // and the roughness

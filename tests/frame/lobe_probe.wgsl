@@ -1,8 +1,8 @@
 // The lobe's functions one by one, for given directions and roughness about the normal +Z.
-//#include "geometry.wgsl"
+//#include "shape/geometry.wgsl"
 //#include "bilinear.wgsl"
-//#include "skin.wgsl"
-//#include "lobe.wgsl"
+//#include "surface/skin.wgsl"
+//#include "surface/lobe.wgsl"
 
 @group(0) @binding(30) var to_light: texture_2d<f32>; // and the roughness
 @group(0) @binding(31) var to_eye: texture_2d<f32>; // and rho_s

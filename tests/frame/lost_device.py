@@ -22,8 +22,8 @@ from setups import settings_of
 from dermis.cli import main
 from dermis.frame import renderer as renderer_module
 from dermis.frame import resources as resources_module
-from dermis.frame.passes import pack
-from dermis.frame.passes.painting import paint
+from dermis.frame.features.outputs import readback
+from dermis.frame.features.surface.painting import paint
 from dermis.frame.renderer import Renderer
 from dermis.frame.surface_points import surface_points
 from dermis.gpu import CommandList, Device
@@ -110,7 +110,7 @@ def begun_to_read(renderer: Renderer) -> Any:
     """The copy is mapped or about to be."""
     rendered = renderer.draw(scene(), DRAWN)
     known = rendered.srgb8()
-    with losing(pack.Leaving, "image"):
+    with losing(readback.Leaving, "image"):
         assert np.array_equal(rendered.srgb8(), known)
     return rendered.linear()
 
@@ -129,7 +129,7 @@ def many(renderer: Renderer) -> Any:
     """Some frames are in flight when the device goes, wherever that is."""
     mixes, drawn = np.linspace(0.0, 1.0, MANY), DRAWN.model_dump()
     known = list(renderer.render_many(map(scene, mixes), **drawn))
-    for target, name, calls in ((CommandList, "submit", 4), (pack.Leaving, "image", 2)):
+    for target, name, calls in ((CommandList, "submit", 4), (readback.Leaving, "image", 2)):
         with losing(target, name, calls):
             found = list(renderer.render_many(map(scene, mixes), **drawn))
         assert len(found) == MANY and all(map(np.array_equal, found, known))
@@ -153,7 +153,7 @@ def observing(renderer: Renderer) -> Any:
     opened[-1].handle.destroy()
     assert depth.any() and np.array_equal(rendered.output("depth"), depth)
     known = list(renderer.observe(scenes, DRAWN, outputs=names))
-    for target, name, calls in ((CommandList, "submit", 3), (pack.Leaving, "all", 2)):
+    for target, name, calls in ((CommandList, "submit", 3), (readback.Leaving, "all", 2)):
         with losing(target, name, calls):
             found = list(renderer.observe(scenes, DRAWN, outputs=names))
         assert len(found) == len(scenes)

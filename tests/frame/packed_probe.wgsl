@@ -1,6 +1,6 @@
 // A point and its surface packed and taken apart again.
-//#include "lighting.wgsl"
-//#include "packed_surface.wgsl"
+//#include "irradiance/lighting.wgsl"
+//#include "surface/packed_surface.wgsl"
 
 @group(0) @binding(30) var directions: texture_2d<f32>; // normals
 @group(0) @binding(31) var colours: texture_2d<f32>; // and the height over the facet

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
+from dermis.frame.features.atlas.stretch import draw_coarser
+from dermis.frame.features.atlas.textures import AtlasTextures, upload_atlas
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes import SHARED_SHADERS, SPECULAR
-from dermis.frame.passes.stretch import draw_coarser
+from dermis.frame.programs import shader_folders
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, ComputeProgram, Constants, Device, download, make_texture, upload
 from dermis.mesh.head import Head
@@ -38,7 +38,7 @@ AnyLight = PointLight | SpotLight | DirectionalLight
 
 def entered_light(renderer: Renderer, inputs: Inputs) -> NDArray[np.float64]:
     """(n, n, 4) light that has entered the skin, and 1 where there is any; as halves on GPUs."""
-    made = download(renderer.device, inputs.resources.levels.stacks[0]).astype(float)
+    made = download(renderer.device, inputs.resources.diffusion.levels.stacks[0]).astype(float)
     return made / [*(3 * [inputs.blurs[0].scale]), 1.0]
 
 
@@ -113,7 +113,7 @@ def probe(
     A keyword whose value is a dict is taken as the members of the shader's struct of that name.
     """
     path = Path(__file__).parent / f"{name}.wgsl"
-    program = ComputeProgram(device, path, (SHARED_SHADERS, SPECULAR), dict(constants))
+    program = ComputeProgram(device, path, shader_folders(), dict(constants))
     made = {output: make_texture(device, size, "rgba32float") for output in outputs}
     records = {
         key: program.record(key.title(), **v) if isinstance(v, dict) else v for key, v in bound.items()

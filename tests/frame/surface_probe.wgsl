@@ -1,8 +1,8 @@
 // The relief's normal and roughness, and how much of the first light arrives, at each texel of the atlas.
-//#include "geometry.wgsl"
+//#include "shape/geometry.wgsl"
 //#include "bilinear.wgsl"
-//#include "skin.wgsl"
-//#include "lobe.wgsl"
+//#include "surface/skin.wgsl"
+//#include "surface/lobe.wgsl"
 //#include "lights.wgsl"
 
 struct Footprint {

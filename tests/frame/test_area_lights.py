@@ -14,11 +14,11 @@ from twins import surface
 
 from dermis.atlas.cached import cached_atlas
 from dermis.base.errors import DermisError
-from dermis.frame.fine_light import TEXEL_AREA
+from dermis.frame.features.irradiance.irradiance import TEXEL_AREA
+from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.lights import light_records, light_views
 from dermis.frame.lights.rectangle import KIND, facing_irradiance
-from dermis.frame.passes import device_constants, strip_for
-from dermis.frame.passes.shade import shade_program
+from dermis.frame.programs import device_constants, strip_for
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from

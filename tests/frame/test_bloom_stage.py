@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from setups import frontal, head_of, scene_of, settings_of
 from tolerances import TWIN
 
-from dermis.frame.passes import bloom
+from dermis.frame.features.post import bloom
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane

@@ -9,11 +9,12 @@ from test_diffuse_stage import point_of_light
 from tolerances import SPREAD_ENERGY, SPREAD_PEAK
 
 from dermis.atlas.build import build_atlas
-from dermis.frame.atlas_textures import _coarser
-from dermis.frame.blur_chain import chain_cost, lead_up
-from dermis.frame.coarser import Sheet
-from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
-from dermis.frame.passes import combine, diffuse
+from dermis.frame.features.atlas.textures import Sheet, _coarser
+from dermis.frame.features.diffusion import blur as diffuse
+from dermis.frame.features.diffusion import combine
+from dermis.frame.features.diffusion.kernels import chain_cost, lead_up
+from dermis.frame.features.diffusion.levels import Blur, halvings_of, make_levels
+from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
 from dermis.optics.profiles import load_profile

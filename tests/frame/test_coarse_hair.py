@@ -12,10 +12,10 @@ from setups import front_camera, frontal, run_frame, scene_of
 from strand_setups import hairy
 from tolerances import FURNACE_OF_HAIR
 
-from dermis.frame import strands as hairs
-from dermis.frame.passes import strands as drawing
+from dermis.frame.features.hair import passes as drawing
+from dermis.frame.features.hair import resources as hairs
+from dermis.frame.features.hair.resources import make_space, room_of
 from dermis.frame.renderer import Renderer
-from dermis.frame.strand_space import make_space, room_of
 from dermis.gpu import download
 from dermis.mesh.head import Head
 from dermis.scene.environment import Environment
@@ -28,7 +28,7 @@ BLACK = 1e5  # absorption [1/mm]
 def picture(renderer: Renderer, scene: Scene, **settings: Any) -> NDArray[np.float64]:
     """(h, w, 4) picture and coverage."""
     given = {"size": (SIZE, SIZE), "technique": "none"} | settings
-    made = run_frame(renderer, scene, **given).resources.picture
+    made = run_frame(renderer, scene, **given).resources.post.picture
     return download(renderer.device, made.exposed).astype(float)
 
 
@@ -95,7 +95,7 @@ def test_hair_shades_hair(renderer: Renderer, absorption: float, low: float, hig
         begins = np.concatenate([[[-12.0, 0.0, 0.6]], above])
         head = hairy(begins, begins * [-1, 1, 1], 0.1, absorption)
         scene = replace(lit(head), lights=(frontal(shadows=True),))
-        made = run_frame(renderer, scene, technique="none", size=(SIZE, SIZE)).resources.strands
+        made = run_frame(renderer, scene, technique="none", size=(SIZE, SIZE)).resources.hair
         assert made is not None
         raw = renderer.device.handle.queue.read_buffer(made.tables.drawn)
         seen.append(np.frombuffer(raw, np.float32, 5 * 8).reshape(5, 8)[2, 4:7].mean())

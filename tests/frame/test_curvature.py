@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from setups import head_of
 
 from dermis.atlas.build import build_atlas
-from dermis.frame.curvature import make_curvature
-from dermis.frame.geometry import upload_geometry
-from dermis.frame.passes import curvature
-from dermis.frame.passes.shape import rest_shape
-from dermis.frame.shape import shape_tables
+from dermis.frame.features.shape import curvature
+from dermis.frame.features.shape.curvature import make_curvature
+from dermis.frame.features.shape.mesh import upload_geometry
+from dermis.frame.features.shape.shape import rest_shape, shape_tables
 from dermis.gpu import CommandList, Device
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere

@@ -14,9 +14,11 @@ from tolerances import FLAT, SHEARED_PEAK, SHEARED_VARIANCE, SPREAD_ENERGY, SPRE
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
-from dermis.frame.passes import combine, diffuse
+from dermis.frame.features.atlas.textures import AtlasTextures
+from dermis.frame.features.diffusion import blur as diffuse
+from dermis.frame.features.diffusion import combine
+from dermis.frame.features.diffusion.levels import Blur, halvings_of, make_levels
+from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.profiles import load_profile

@@ -50,7 +50,7 @@ def seen_from(degrees: float) -> Camera:
 
 def middle(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
     inputs = run_frame(renderer, scene, **({"size": (9, 9), "atlas": 64} | settings))
-    return download(renderer.device, inputs.resources.picture.exposed)[4, 4, :3].astype(float)
+    return download(renderer.device, inputs.resources.post.picture.exposed)[4, 4, :3].astype(float)
 
 
 def law(cosine_in: float, cosine_out: float, eta: float, colour: Floats = COLOUR) -> Floats:
@@ -173,7 +173,7 @@ def test_light_from_around_is_not_multiplied_by_what_scattered_once(
                 size=(192, 192),
                 technique=technique,
                 atlas=256,
-            ).resources.picture.exposed,
+            ).resources.post.picture.exposed,
         )[..., :3]
         for direction in ("lambertian", "half-space")
     )
@@ -196,7 +196,9 @@ def test_light_that_came_from_beside_leaves_all_ways_alike(renderer: Renderer, p
     )
     plain = replace(ball, skin=ball.skin.model_copy(update={"direction": "lambertian"}))
     images = [
-        download(renderer.device, run_frame(renderer, scene, atlas=256).resources.picture.exposed)[..., :3]
+        download(renderer.device, run_frame(renderer, scene, atlas=256).resources.post.picture.exposed)[
+            ..., :3
+        ]
         for scene in (ball, plain)
     ]
     made, usual = images

@@ -52,7 +52,7 @@ def around(head: Any, environment: Environment, **skin: Any) -> Scene:
 
 def exposed(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
     """(h, w, 4) picture and coverage."""
-    picture = run_frame(renderer, scene, **settings).resources.picture
+    picture = run_frame(renderer, scene, **settings).resources.post.picture
     return download(renderer.device, picture.exposed).astype(float)
 
 
@@ -137,7 +137,7 @@ def test_a_white_ball_in_a_furnace(renderer: Renderer, rho_s: float, energy: str
     """As much leaves as arrives; without an energy term the surface's own share comes on top."""
     scene = around(WHITE, Environment(name="uniform"), rho_s=rho_s, roughness=0.3, energy=energy)
     inputs = run_frame(renderer, scene, occlusion="none", size=(64, 64), atlas=128)
-    seen = middle(download(renderer.device, inputs.resources.picture.exposed).astype(float))
+    seen = middle(download(renderer.device, inputs.resources.post.picture.exposed).astype(float))
     albedo, mean = surface_albedo(np.linspace(0.0, 1, 200), 0.3)
     expected = ENERGY[energy].furnace(albedo, mean, rho_s)
     assert seen.min() > expected.min() - FURNACE and seen.max() < expected.max() + FURNACE
@@ -152,7 +152,7 @@ def test_a_plain_sky_fills_everything_evenly(renderer: Renderer) -> None:
     environment = Environment(name="uniform", exposure=3.0, rotation_degrees=33.0)
     scene = around(head, environment, rho_s=0.0)
     inputs = run_frame(renderer, scene, occlusion="none", atlas=128)
-    image = download(renderer.device, inputs.resources.picture.exposed).astype(float)
+    image = download(renderer.device, inputs.resources.post.picture.exposed).astype(float)
     assert np.allclose(middle(image), 3.0 * DEFAULT_COLOUR, rtol=PREFILTERED)
 
 
@@ -161,9 +161,9 @@ def test_an_environment_adds_to_lights(renderer: Renderer, close: float) -> None
     head = head_of(plane(100.0))
     both = replace(scene_of(head, frontal()), environment=Environment(name="uniform"))
     one, other, sum_ = (
-        download(renderer.device, run_frame(renderer, scene, occlusion="none").resources.picture.exposed)[
-            ..., :3
-        ]
+        download(
+            renderer.device, run_frame(renderer, scene, occlusion="none").resources.post.picture.exposed
+        )[..., :3]
         for scene in (scene_of(head, frontal()), around(head, Environment(name="uniform")), both)
     )
     assert np.abs(one + other - sum_).max() < close * sum_.max()
@@ -186,7 +186,9 @@ def test_exposure_is_a_factor_of_suns_too(renderer: Renderer, room: str, close: 
     plain, bright = (
         download(
             renderer.device,
-            run_frame(renderer, around(WHITE, Environment(name=room, exposure=e))).resources.picture.exposed,
+            run_frame(
+                renderer, around(WHITE, Environment(name=room, exposure=e))
+            ).resources.post.picture.exposed,
         )[..., :3]
         for e in (1.0, 1e6)
     )
@@ -209,7 +211,7 @@ def test_it_is_seen_behind_the_head(renderer: Renderer, room: str, rotation: flo
     camera = front_camera(WHITE, frame_mm=600.0)
     scene = replace(scene_of(WHITE, camera=camera), environment=environment)
     inputs = run_frame(renderer, scene, occlusion="none", exposure=2.0, **SEEN)
-    image = download(renderer.device, inputs.resources.picture.exposed).astype(float)
+    image = download(renderer.device, inputs.resources.post.picture.exposed).astype(float)
     y, x = np.mgrid[:48, :48]
     ray = twins.unit(np.dstack([x - 23.5, 23.5 - y, np.full(x.shape, -24.0)]))  # 45 degrees to each side
     exact = 2 * twins.panorama_at(prefilter(room).layers[1].astype(float), inputs.lit["environment"], ray)
@@ -223,7 +225,7 @@ def test_it_is_seen_behind_the_head(renderer: Renderer, room: str, rotation: flo
 def test_a_colour_is_behind_the_head_unless_asked(renderer: Renderer, room: str) -> None:
     scene = around(WHITE, Environment(name=room))
     image = download(
-        renderer.device, run_frame(renderer, scene, background=(0, 1, 0)).resources.picture.exposed
+        renderer.device, run_frame(renderer, scene, background=(0, 1, 0)).resources.post.picture.exposed
     )
     assert np.allclose(image[0, 0], [0, 1, 0, 0])
 
@@ -256,7 +258,7 @@ def test_light_follows_the_rotation(renderer: Renderer, room: str) -> None:
     for degrees in (0.0, 180.0):
         scene = around(WHITE, Environment(name=room, rotation_degrees=degrees), rho_s=0.0)
         image = download(
-            renderer.device, run_frame(renderer, scene, occlusion="none").resources.picture.exposed
+            renderer.device, run_frame(renderer, scene, occlusion="none").resources.post.picture.exposed
         )
         left_right.append((image[24, 14, 2], image[24, 33, 2]))
     assert left_right[0][1] > 1.2 * left_right[0][0]

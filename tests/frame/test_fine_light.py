@@ -37,7 +37,7 @@ def lit(renderer: Renderer, light: StripeLight, atlas: int, **settings: Any) -> 
 
 def across(renderer: Renderer, light: StripeLight, atlas: int, **settings: Any) -> Floats:
     """(w, 3) radiance along a row of the picture, away from where triangles meet."""
-    picture = lit(renderer, light, atlas, **settings).resources.picture
+    picture = lit(renderer, light, atlas, **settings).resources.post.picture
     return download(renderer.device, picture.radiance)[PIXELS // 2 + 12, :, :3].astype(float)
 
 

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from tolerances import KERNEL_VARIANCE
 
-from dermis.frame.gaussian_kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel, kernel_table, taps
+from dermis.frame.features.diffusion.kernels import (
+    ROWS_PER_UNIT,
+    TRUNCATION,
+    WIDEST,
+    kernel,
+    kernel_table,
+    taps,
+)
 
 VARIANCES = [0.001, 0.02, 0.3, 0.5, 0.999, 1.0, 1.7, 2.3, 4.0, 6.5, 8.99, 9.0]
 

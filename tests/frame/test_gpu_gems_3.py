@@ -9,7 +9,7 @@ import pytest
 from setups import resting
 
 from dermis.atlas.build import build_atlas
-from dermis.frame.levels import Blur
+from dermis.frame.features.diffusion.levels import Blur
 from dermis.frame.techniques.gpu_gems_3 import TECHNIQUE
 from dermis.gpu import CommandList, Device, download, upload
 from dermis.mesh.primitives import plane

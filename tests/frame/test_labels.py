@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from observed import EDGE, SIDES, SIZE, around, from_edge, labelled, marks
 
-from dermis.frame import strand_space
+from dermis.frame.features.hair import resources as strand_space
 from dermis.frame.observation import Observation
 from dermis.frame.renderer import Renderer
 from dermis.human.labels.classes import class_number, label_classes

@@ -15,10 +15,11 @@ from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.atlas_textures import AtlasTextures, _coarser, upload_atlas
-from dermis.frame.coarser import Sheet, halved
-from dermis.frame.levels import FLOATS, Blur, halvings_of, layers_of, make_levels, scale_of
-from dermis.frame.passes import combine, diffuse
+from dermis.frame.features.atlas.textures import AtlasTextures, Sheet, _coarser, halved, upload_atlas
+from dermis.frame.features.diffusion import blur as diffuse
+from dermis.frame.features.diffusion import combine
+from dermis.frame.features.diffusion.levels import Blur, halvings_of, layers_of, make_levels, scale_of
+from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
 from dermis.optics.profiles import load_profile

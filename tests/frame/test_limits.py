@@ -15,7 +15,7 @@ from setups import settings_of
 
 import dermis
 from dermis.frame import renderer as renderer_module
-from dermis.frame.passes import shader_folders
+from dermis.frame.programs import shader_folders
 from dermis.frame.renderer import Renderer
 from dermis.gpu import open_device
 from dermis.gpu.adapters import DEFAULT_LIMITS

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from setups import frontal, head_of, probe, run_frame, scene_of
 from tolerances import LOBE_TWIN, TABLE_LOBE
 
-from dermis.frame import surface
+from dermis.frame.features.surface import record as surface
 from dermis.frame.renderer import Renderer
 from dermis.gpu.textures import texture_from
 from dermis.mesh.primitives import plane
@@ -48,7 +48,7 @@ def shader(renderer: Renderer, light: Floats, view: Floats, m: float, rho_s: flo
         "to_light": texture_from(renderer.device, np.dstack([light, m * flat]), "rgba32float"),
         "to_eye": texture_from(renderer.device, np.dstack([view, rho_s * flat]), "rgba32float"),
     }
-    outputs, chosen = ["reflected", "passed"], surface.constants(Skin(**skin))
+    outputs, chosen = ["reflected", "passed"], surface.surface_constants(Skin(**skin))
     made = probe(renderer.device, "lobe_probe", (SIZE, SIZE), outputs, chosen, **lit, **textures)
     return [texture[..., k] for texture in made for k in range(3)]
 
@@ -137,7 +137,7 @@ def test_relief_that_turns_away_from_the_eye_reflects_as_seen_at_its_horizon(ren
         "normals": texture_from(renderer.device, np.dstack([normal, 0 * normal[..., :1]]), "rgba32float"),
         "views": texture_from(renderer.device, np.dstack([view, 0 * normal[..., :1] + 0.3]), "rgba32float"),
     }
-    chosen = surface.constants(Skin(specular="kelemen-direct"))
+    chosen = surface.surface_constants(Skin(specular="kelemen-direct"))
     (made,) = probe(renderer.device, "lighting_probe", (SIZE, SIZE), ["mirror"], chosen, **lit, **textures)
     n_v = (normal * view).sum(-1, keepdims=True)
     seen = normal - np.minimum(n_v, 0) * view

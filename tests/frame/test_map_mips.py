@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from tolerances import HALVES
 
-from dermis.frame.passes import map_mips
+from dermis.frame.features.surface import mips as map_mips
 from dermis.gpu import Device, download
 from dermis.images.filters import mip_chain
 

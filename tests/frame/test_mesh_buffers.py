@@ -9,10 +9,9 @@ import pytest
 from setups import frontal, head_of, probe, run_frame, scene_of
 
 from dermis.atlas.cached import cached_atlas
-from dermis.frame.geometry import upload_geometry
-from dermis.frame.passes.shape import rest_shape
+from dermis.frame.features.shape.mesh import upload_geometry
+from dermis.frame.features.shape.shape import rest_shape, shape_tables
 from dermis.frame.renderer import Renderer
-from dermis.frame.shape import shape_tables
 from dermis.mesh.primitives import uv_sphere
 
 BALL = head_of(uv_sphere(30.0, 24, 12))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, scene_of, settings_of
 from tolerances import HALVES
 
-from dermis.frame.metering import CLIPPING, KEY, SIDE, STOPPED_DOWN
+from dermis.frame.features.post.meter import CLIPPING, KEY, SIDE, STOPPED_DOWN
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.environment import Environment
@@ -28,7 +28,7 @@ def metered(renderer: Renderer, scene: Scene, **settings: Any) -> float:
 
 def points(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
     """(n, 2) light and brightness at the points that were metered last."""
-    meter = renderer.prepare(scene, settings_of(exposure="auto")).resources.meter
+    meter = renderer.prepare(scene, settings_of(exposure="auto")).resources.post.meter
     assert meter is not None
     raw = np.frombuffer(renderer.device.handle.queue.read_buffer(meter.points), np.float32)
     found = raw.reshape(SIDE * SIDE, 2).astype(float)

@@ -17,13 +17,15 @@ from dermis import Pose
 from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.atlas_textures import upload_atlas
-from dermis.frame.geometry import upload_geometry
-from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
-from dermis.frame.passes import diffuse, shape, stretch
-from dermis.frame.passes.shape import MotionBytes
+from dermis.frame.features.atlas import stretch
+from dermis.frame.features.atlas.textures import upload_atlas
+from dermis.frame.features.diffusion import blur as diffuse
+from dermis.frame.features.diffusion.levels import Blur, halvings_of, make_levels
+from dermis.frame.features.shape import shape
+from dermis.frame.features.shape.mesh import upload_geometry
+from dermis.frame.features.shape.shape import MotionBytes, make_shape, shape_tables
+from dermis.frame.programs import FLOATS
 from dermis.frame.renderer import Renderer
-from dermis.frame.shape import make_shape, shape_tables
 from dermis.gpu import CommandList, Device, download, upload
 from dermis.mesh.head import Head
 from dermis.optics.profiles import load_profile

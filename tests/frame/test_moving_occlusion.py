@@ -15,12 +15,12 @@ from tolerances import FOLLOWED, OCCLUSION, STILL
 from twins import surface
 
 from dermis.atlas.cached import cached_atlas
-from dermis.frame.passes import moving_occlusion
-from dermis.frame.passes.occlusion import bake_occlusion
-from dermis.frame.passes.visibility_buffer import make_layers
+from dermis.frame.features.occlusion import moving as moving_occlusion
+from dermis.frame.features.occlusion.baked import bake_occlusion
+from dermis.frame.features.occlusion.moving import SIDE as MAP_SIDE
+from dermis.frame.features.occlusion.moving import anchors_of, look_around, turn_of
+from dermis.frame.features.visibility.layers import make_layers
 from dermis.frame.renderer import Renderer
-from dermis.frame.sky import SIDE as MAP_SIDE
-from dermis.frame.sky import anchors_of, look_around, turn_of
 from dermis.gpu import download
 from dermis.human.person import Human
 from dermis.mesh.head import Head

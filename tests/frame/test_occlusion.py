@@ -15,8 +15,8 @@ from twins import surface
 
 from dermis.atlas.build import build_atlas
 from dermis.atlas.cached import cached_atlas
-from dermis.frame import surroundings
-from dermis.frame.passes.occlusion import bake_occlusion, whole_map
+from dermis.frame.features.occlusion.baked import bake_occlusion, whole_map
+from dermis.frame.lights import environment as surroundings
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.mesh.geometry import fibonacci_sphere
@@ -89,7 +89,7 @@ def test_the_map_has_no_gaps() -> None:
 
 def seen(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
     inputs = run_frame(renderer, scene, **({"size": (64, 64), "atlas": SIDE} | settings))
-    return download(renderer.device, inputs.resources.picture.exposed)[..., :3].astype(float)
+    return download(renderer.device, inputs.resources.post.picture.exposed)[..., :3].astype(float)
 
 
 def test_corners_are_darker_and_can_be_left_bright(renderer: Renderer) -> None:

@@ -11,18 +11,18 @@ from setups import front_camera, frontal, head_of, place, scene_of, settings_of
 from strand_setups import hairy
 
 from dermis.base.errors import DermisError
-from dermis.frame import resources
-from dermis.frame.asked import Asked
+from dermis.frame import allocation
 from dermis.frame.limits import frame_bytes
-from dermis.frame.outputs import OUTPUTS
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
+from dermis.frame.request import FrameRequest
 from dermis.gpu.listing import Listing
 from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
+from dermis.scene.outputs import OUTPUTS
 
 Floats = NDArray[np.float64]
 STAGES = "geometry", "surface", "motion", "alpha"
@@ -273,8 +273,8 @@ def test_what_is_known_is_not_made_again(renderer: Renderer) -> None:
 
 def test_outputs_count_where_sizes_are_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """As memory that the frame takes: 24 bytes a pixel for a normal and its copy."""
-    asked: list[Asked] = []
-    monkeypatch.setattr(resources, "check_limits", lambda _, one: asked.append(one))
+    asked: list[FrameRequest] = []
+    monkeypatch.setattr(allocation, "check_limits", lambda _, one: asked.append(one))
     for names in ([], ["normal"]):
         renderer.draw(SCENE, settings_of(size=(10, 11)), outputs=names)
     bare, more = (frame_bytes(one)["size"] for one in asked)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-FRAME = ("dermis.frame.renderer", "dermis.frame.outputs", "dermis.frame.passes")
+FRAME = ("dermis.frame.renderer", "dermis.scene.outputs", "dermis.frame.programs")
 EXPORT = ("dermis.apps.export.run", "dermis.apps.export.targets.pbrt.target")
 REFERENCE = ("dermis.apps.truths.lights", "dermis.apps.truths.cycles_scene")
 CLI = (

@@ -12,8 +12,9 @@ from setups import settings_of
 from dermis import Human
 from dermis.atlas.raster import rasterise
 from dermis.base.errors import DermisError
-from dermis.frame.painted import with_painted_maps
-from dermis.frame.passes.painting import given, paint
+from dermis.frame.features.surface.painting import paint
+from dermis.frame.features.surface.painting import paint as given
+from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
 from dermis.human.skin.colours import colours, mean_colour

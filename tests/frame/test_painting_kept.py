@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.frame.passes.painting import resting as stage
-from dermis.frame.passes.painting.given import Given, given_for
-from dermis.frame.passes.painting.resting import Resting, resting
+from dermis.frame.features.surface.painting import paint as stage
+from dermis.frame.features.surface.painting.paint import Given, Resting, given_for, resting
 from dermis.gpu import Device, download, open_device
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.frame.passes import post
+from dermis.frame.features.post import picture as post
 from dermis.gpu import CommandList, Device, download, upload
 from dermis.images.colour import encode_srgb, encode_srgb8
 from dermis.scene.settings import Settings

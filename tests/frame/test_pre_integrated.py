@@ -26,7 +26,8 @@ from dermis.mesh.mesh import build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
-from dermis.scene import Camera, DirectionalLight, Scene
+from dermis.scene import Camera, Scene
+from dermis.scene.lights import DirectionalLight
 
 Floats = NDArray[np.float64]
 PROFILE = load_profile("gpu-gems-3")
@@ -110,7 +111,7 @@ def test_relief_is_smoothed_by_the_radius_of_half_the_light() -> None:
 
 def image(renderer: Renderer, scene: Scene, technique: str = "pre-integrated", **settings: Any) -> Floats:
     inputs = run_frame(renderer, scene, **({"size": (64, 64)} | settings), technique=technique)
-    return download(renderer.device, inputs.resources.picture.exposed).astype(float)
+    return download(renderer.device, inputs.resources.post.picture.exposed).astype(float)
 
 
 RADIUS = 10.0

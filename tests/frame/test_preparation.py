@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
-from dermis.frame import blurred_levels, preparation, resources
+from dermis.frame import preparation, resources
+from dermis.frame.features.diffusion import resources as blurred_levels
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.environment import Environment
@@ -52,7 +53,7 @@ def test_cameras_and_lights_leave_the_rest(renderer: Renderer, monkeypatch: pyte
     assert len({one.view.tobytes() for one in found}) == 3
     assert len({one.camera.clips.tobytes() for one in found}) == 3
     assert len({one.lit["lights"].tobytes() for one in found}) == 3
-    assert len({id(one.resources.levels) for one in found}) == 1
+    assert len({id(one.resources.diffusion.levels) for one in found}) == 1
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from setups import entered_light, frontal, head_of, run_frame, scene_of, settings_of
 
 from dermis.base.errors import DermisError
+from dermis.frame.features.diffusion.mixture import load_shares
 from dermis.frame.inputs import Inputs
-from dermis.frame.profile_mixture import load_shares
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.images.io import write_png

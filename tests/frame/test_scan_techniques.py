@@ -24,7 +24,9 @@ def test_scan(renderer: Renderer) -> None:
     made = {}
     for technique in ("none", "texture-space", "screen-space", "pre-integrated"):
         inputs = run_frame(renderer, scene, technique=technique, **SIZES)
-        made[technique] = download(renderer.device, inputs.resources.picture.exposed)[..., :3].astype(float)
+        made[technique] = download(renderer.device, inputs.resources.post.picture.exposed)[..., :3].astype(
+            float
+        )
     atlas = made.pop("texture-space")
     off = {name: np.sqrt(((image - atlas) ** 2).mean()) for name, image in made.items()}
     assert off["screen-space"] < 0.4 * off["none"]

@@ -14,7 +14,8 @@ from tolerances import TWIN
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.scene import DirectionalLight, Scene, StripeLight
+from dermis.scene import Scene
+from dermis.scene.lights import DirectionalLight, StripeLight
 
 Floats = NDArray[np.float64]
 BALL = head_of(uv_sphere(30.0, 48, 24))
@@ -23,7 +24,7 @@ SIDE_LIGHT = DirectionalLight(direction=(-2, -1, -1), irradiance=(3.0, 2.0, 1.0)
 
 def image(renderer: Renderer, scene: Scene, technique: str, **settings: Any) -> Floats:
     inputs = run_frame(renderer, scene, **({"size": (64, 64)} | settings), technique=technique)
-    return download(renderer.device, inputs.resources.picture.exposed).astype(float)
+    return download(renderer.device, inputs.resources.post.picture.exposed).astype(float)
 
 
 def narrow(folder: Path) -> str:

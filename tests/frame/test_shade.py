@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,8 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, place, run_frame, scene_of
 from tolerances import TWIN
 
-from dermis.frame import passes
-from dermis.frame.passes import shade
+from dermis.frame import programs
+from dermis.frame.features.shading import shade
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download, upload
 from dermis.mesh.head import Head
@@ -35,7 +34,7 @@ WEIGHTS = load_profile("gpu-gems-3").weight
 
 def image(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
     inputs = run_frame(renderer, scene, **({"size": SIZE} | settings))
-    return download(renderer.device, inputs.resources.picture.exposed).astype(float)
+    return download(renderer.device, inputs.resources.post.picture.exposed).astype(float)
 
 
 def seen_points(scene: Scene) -> tuple[Floats, Floats]:
@@ -220,10 +219,10 @@ def test_software_adapters_get_the_picture_of_gpus(
     """Strips of pixels, the last one cut off, past what shows nothing; lights from behind passed over."""
     sun = DirectionalLight(direction=(2, -1, 1), shadows=False)
     scene = scene_of(head_of(uv_sphere(30.0, 24, 12)), sun, LIGHTS["spot"], frontal(), sun)
-    own = [one for one in passes.device_constants(renderer.device) if one[0] == "MESH_IN_BUFFERS"]
+    own = [one for one in programs.device_constants(renderer.device) if one[0] == "MESH_IN_BUFFERS"]
     made = []
     for constants in ((), (("PASSES_DARK", 1), ("STRIP", 16))):
-        monkeypatch.setattr(passes, "device_constants", lambda _, more=constants: (*own, *more))
+        monkeypatch.setattr(programs, "device_constants", lambda _, more=constants: (*own, *more))
         monkeypatch.setattr(renderer.device, "programs", {})
         made.append(image(renderer, scene, size=(45, 37), samples=samples, technique=technique))
     assert made[0].max() > 0.1 and np.array_equal(*made)
@@ -236,10 +235,10 @@ def test_a_strip_is_left_at_its_end(renderer: Renderer) -> None:
     scene, size = scene_of(head, frontal(), camera=camera), (16, 256)
     inputs = run_frame(renderer, scene, size=size, technique="none")
     resources = inputs.resources
-    radiance, half = resources.picture.radiance, replace(resources.picture, size=(16, 128))
+    radiance = resources.post.picture.radiance
     upload(renderer.device, radiance, np.full((256, 16, 4), 7.0, np.float32))
     frame, look = CommandList(renderer.device), (inputs.lit, inputs.view, inputs.constants)
-    shade.draw(frame, *look, resources.visibility, resources.scattered, half)
+    shade.draw(frame, *look, resources.visibility, resources.scattered, radiance, (16, 128))
     frame.submit()
     renderer.graph.forget()  # it knows nothing of this
     made = download(renderer.device, radiance)

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from setups import head_of, joined, place, run_frame, scene_of
 
-from dermis.frame.passes import irradiance
+from dermis.frame.features.irradiance import irradiance
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download, upload
 from dermis.mesh.primitives import plane, uv_sphere

@@ -13,13 +13,12 @@ from tolerances import SHAPE, SHAPE_NORMAL, STRETCHED, WALKED
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.atlas_textures import upload_atlas
-from dermis.frame.coarser import Sheet, halved
-from dermis.frame.geometry import upload_geometry
-from dermis.frame.gutters import make_walks, with_lists
-from dermis.frame.passes import gutters, shape, stretch
-from dermis.frame.passes.shape import MotionBytes
-from dermis.frame.shape import Shape, make_shape, shape_tables
+from dermis.frame.features.atlas import gutters, stretch
+from dermis.frame.features.atlas.gutters import make_walks, with_lists
+from dermis.frame.features.atlas.textures import Sheet, halved, upload_atlas
+from dermis.frame.features.shape import shape
+from dermis.frame.features.shape.mesh import upload_geometry
+from dermis.frame.features.shape.shape import MotionBytes, Shape, make_shape, shape_tables
 from dermis.gpu import CommandList, Device, download
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh, build_mesh

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
-from dermis.frame.levels import HALVES
+from dermis.frame.programs import HALVES
 from dermis.frame.renderer import Renderer
 from dermis.frame.techniques import technique
 from dermis.mesh.primitives import uv_sphere

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from dermis.base.errors import DermisError
-from dermis.frame.skin_profiles import SkinProfiles
-from dermis.frame.translucency import shared_width
+from dermis.frame.features.diffusion.profiles import SkinProfiles
+from dermis.frame.features.translucency.make import shared_width
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import fit_profile, load_profile
 from dermis.optics.tissue import Tissue
@@ -35,7 +35,7 @@ def test_the_first_move_of_a_slider_starts_from_the_profile_as_it_is(monkeypatch
         starts.append(near)
         return fit_profile(tissue, name, near)
 
-    monkeypatch.setattr("dermis.frame.skin_profiles.fit_profile", fit)
+    monkeypatch.setattr("dermis.frame.features.diffusion.profiles.fit_profile", fit)
     plain = profiles.of(Skin(profile="light"))
     first, fresh = profiles.of(skin(melanin=0.03)), load_profile("light", {"melanin": 0.03})
     assert starts == [plain]

@@ -10,11 +10,10 @@ from setups import settings_of
 from tolerances import SHAPE
 
 from dermis import Human
-from dermis.frame.painted import with_painted_maps
-from dermis.frame.passes import shape
-from dermis.frame.passes.shape import MotionBytes
+from dermis.frame.features.shape import shape
+from dermis.frame.features.shape.shape import MotionBytes, make_shape, shape_tables
+from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.renderer import Renderer
-from dermis.frame.shape import make_shape, shape_tables
 from dermis.gpu import CommandList, Device
 from dermis.human.model import human_head
 from dermis.human.skin.surface import lid_rings

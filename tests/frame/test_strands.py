@@ -13,7 +13,7 @@ from strand_setups import hairy, shuffled
 from tolerances import FURNACE, LOBE_TWIN, TWIN
 
 from dermis.base.errors import DermisError
-from dermis.frame import strand_space
+from dermis.frame.features.hair import resources as strand_space
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from
@@ -34,7 +34,7 @@ BLACK = 1e5  # absorption [1/mm]
 def picture(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
     """(h, w, 4) picture and coverage."""
     given = {"size": (SIZE, SIZE), "technique": "none"} | settings
-    made = run_frame(renderer, scene, **given).resources.picture
+    made = run_frame(renderer, scene, **given).resources.post.picture
     return download(renderer.device, made.exposed).astype(float)
 
 
@@ -189,7 +189,7 @@ def test_hairs_follow_the_skin(renderer: Renderer) -> None:
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     moved = (head.positions_mm @ turn.T + [2.0, -3.0, 0.0]).astype(np.float32)
     inputs = run_frame(renderer, replace(lit(head), pose=Pose(positions_mm=moved)), technique="none")
-    made = inputs.resources.strands
+    made = inputs.resources.hair
     assert made is not None and head.strands is not None
     raw = renderer.device.handle.queue.read_buffer(made.tables.posed)
     rows = np.frombuffer(raw, np.float32, 7 * 4).reshape(1, 7, 4)

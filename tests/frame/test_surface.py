@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from setups import front_camera, head_of, run_frame, scene_of
 from tolerances import TWIN
 
-from dermis.frame import surface
-from dermis.frame.passes import SHARED_SHADERS
+from dermis.frame.features.surface import record as surface
+from dermis.frame.programs import FEATURES, shader_folders
 from dermis.frame.renderer import Renderer
 from dermis.gpu import ComputeProgram, download
 from dermis.mesh.primitives import plane
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 Z = np.array([0.0, 0.0, 1.0])
 COLOUR = np.array([0.5, 0.25, 0.75])
 PATCH = head_of(plane(100.0), colour=np.broadcast_to(COLOUR, (8, 8, 3)))
-SURFACE = Path(SHARED_SHADERS) / "surface.wgsl"
+SURFACE = FEATURES / "surface/surface.wgsl"
 PROFILE = GaussianSum("white", np.array([1.0]), np.ones((1, 3)))
 LIGHT = DirectionalLight(direction=(0.6, 0, -1), irradiance=(2.0, 2.0, 2.0), shadows=False)
 
@@ -38,7 +38,7 @@ def pixel(renderer: Renderer, head: Any = PATCH, **skin: Any) -> Floats:
     """(3,) radiance at the foot of the camera."""
     scene = scene_of(head, LIGHT, camera=front_camera(head), **skin)
     inputs = run_frame(renderer, scene, size=(1, 1), technique="none")
-    return download(renderer.device, inputs.resources.picture.exposed).astype(float)[0, 0, :3]
+    return download(renderer.device, inputs.resources.post.picture.exposed).astype(float)[0, 0, :3]
 
 
 def parts(m: float, rho_s: float, model: str, fresnel: str, energy: str) -> tuple[Floats, float]:
@@ -102,7 +102,7 @@ def skin_struct(tmp_path: Path, renderer: Renderer, *members: str) -> ComputePro
     declared = SURFACE.read_text("utf-8").replace("struct Skin {", "\n".join(["struct Skin {", *members]))
     path = tmp_path / "waxed.wgsl"
     path.write_text(f"{declared}\n@compute @workgroup_size(1) fn main() {{}}", "utf-8")
-    return ComputeProgram(renderer.device, path, (SHARED_SHADERS,))
+    return ComputeProgram(renderer.device, path, shader_folders())
 
 
 def test_a_new_dial_reaches_the_struct_by_its_name(tmp_path: Path, renderer: Renderer) -> None:
@@ -118,6 +118,6 @@ def test_every_member_of_the_struct_is_filled_in(tmp_path: Path, renderer: Rende
 
 
 def test_only_other_models_than_the_default_ask_for_another_pipeline() -> None:
-    assert surface.constants(Skin()) == surface.constants(Skin(specular="none")) == ()
-    assert surface.constants(Skin(specular="phong")) == (("MODEL", 6),)
-    assert surface.constants(Skin(fresnel="exact")) == (("EXACT_FRESNEL", 1),)
+    assert surface.surface_constants(Skin()) == surface.surface_constants(Skin(specular="none")) == ()
+    assert surface.surface_constants(Skin(specular="phong")) == (("MODEL", 6),)
+    assert surface.surface_constants(Skin(fresnel="exact")) == (("EXACT_FRESNEL", 1),)

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from setups import entered_light, frontal, head_of, probe, run_frame, scene_of
 
-from dermis.frame.passes.surface_texels import SURFACE_BYTES
+from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.renderer import Renderer
 from dermis.gpu.textures import texture_from
 from dermis.mesh.primitives import uv_sphere

@@ -29,12 +29,11 @@ from translucency_twins import (
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.cells import Cells, divide
-from dermis.frame.atlas_layout import PairBuffers, Translucency
-from dermis.frame.passes import translucency_weights
-from dermis.frame.passes.pair_search.passes import cell_tables
-from dermis.frame.passes.pair_search.search import search
+from dermis.frame.features.translucency import passes as translucency_weights
+from dermis.frame.features.translucency.make import pairs_from, translucency_from
+from dermis.frame.features.translucency.pair_search.search import cell_tables, search
+from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.renderer import Renderer
-from dermis.frame.translucency import pairs_from, translucency_from
 from dermis.gpu import CommandList, Device, download
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
@@ -113,7 +112,7 @@ def weighed(device: Device, pairs: PairBuffers, surface: dict[str, Any]) -> Tran
     """What the blurred levels let pass between pairs, on a surface."""
     made = translucency_from(device, surface, pairs, BLURRED.variance_mm2, BLURRED.weight)
     frame = CommandList(device)
-    translucency_weights.draw(frame, made)
+    translucency_weights.draw_weights(frame, made)
     frame.submit()
     return made
 

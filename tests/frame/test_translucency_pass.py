@@ -14,11 +14,13 @@ from translucency_twins import decoded, pairs_on, share_of, surface_of
 from dermis.apps.viewer.views import draw_thickness
 from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.cells import divide
-from dermis.frame import passes
-from dermis.frame.atlas_layout import Translucency
-from dermis.frame.levels import FLOATS, Blur, make_levels
-from dermis.frame.passes import translucency, translucency_weights
-from dermis.frame.translucency import translucency_from
+from dermis.frame import programs
+from dermis.frame.features.diffusion.levels import Blur, make_levels
+from dermis.frame.features.translucency import passes as translucency
+from dermis.frame.features.translucency import passes as translucency_weights
+from dermis.frame.features.translucency.make import translucency_from
+from dermis.frame.features.translucency.resources import Translucency
+from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Constants, Device, download, make_texture, upload
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
@@ -60,7 +62,7 @@ def weighed_of(device: Device, mesh: Mesh) -> Weighed:
     pairs = pairs_on(device, surface, atlas, divide(atlas, float(np.sqrt(VARIANCE[-1]))))
     thin = translucency_from(device, surface, pairs, VARIANCE, WEIGHT)
     frame = CommandList(device)
-    translucency_weights.draw(frame, thin)
+    translucency_weights.draw_weights(frame, thin)
     frame.submit()
     words = read(device, thin.weights).reshape(-1, 2)[: pairs.count]
     texel = read(device, thin.source_points).reshape(-1, 8)[:, 7]
@@ -110,7 +112,7 @@ def test_twin_of_what_comes_through(
     row: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(passes, "_ROW", row)
+    monkeypatch.setattr(programs, "_ROW", row)
     levels = np.random.default_rng(8).random((2, 64, 64, 3)).astype(np.float32)
     twin, made = summed(device, weighed, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
     assert twin.max() > 0.1

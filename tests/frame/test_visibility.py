@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, place, run_frame, scene_of
 
-from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
+from dermis.frame.features.visibility.layers import draw_layers, make_layers
+from dermis.frame.projection import pixel_samples
 from dermis.frame.renderer import Renderer
-from dermis.frame.samples import pixel_samples
 from dermis.gpu import CommandList, download
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import build_mesh

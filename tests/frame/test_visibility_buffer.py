@@ -11,8 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
-from dermis.frame.passes import shape, visibility_buffer
-from dermis.frame.passes.visibility_buffer import Layers, draw_layers, make_layers
+from dermis.frame.features.shape import shape
+from dermis.frame.features.visibility import layers as visibility_buffer
+from dermis.frame.features.visibility.layers import Layers, draw_layers, make_layers
 from dermis.frame.projection import parallel_view
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download
@@ -75,7 +76,7 @@ def shown(layers: Layers, renderer: Renderer, head: Head, camera: Camera, sample
     settings = settings_of(size=SIZE, samples=samples)
     inputs = renderer.prepare(scene_of(head, frontal(), camera=camera), settings)
     frame = CommandList(renderer.device)
-    shape.draw(frame, inputs.resources.shape, inputs.motion)
+    shape.draw(frame, inputs.resources.shape.shape, inputs.motion)
     draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
     frame.submit()
     made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]

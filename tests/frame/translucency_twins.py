@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.translucency.cells import Cells
-from dermis.frame.atlas_layout import PairBuffers
-from dermis.frame.atlas_textures import upload_atlas
-from dermis.frame.geometry import upload_geometry
-from dermis.frame.passes import stretch
-from dermis.frame.passes.pair_search.passes import cell_tables
-from dermis.frame.passes.shape import rest_shape
-from dermis.frame.shape import shape_tables
-from dermis.frame.translucency import find_pairs
+from dermis.frame.features.atlas import stretch
+from dermis.frame.features.atlas.textures import upload_atlas
+from dermis.frame.features.shape.mesh import upload_geometry
+from dermis.frame.features.shape.shape import rest_shape, shape_tables
+from dermis.frame.features.translucency.make import find_pairs
+from dermis.frame.features.translucency.pair_search.search import cell_tables
+from dermis.frame.features.translucency.resources import PairBuffers
 from dermis.gpu import CommandList, Device
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
 from dermis.atlas.atlas import Atlas
-from dermis.frame.gaussian_kernels import ROWS_PER_UNIT, SUMMED_TRUNCATION, WIDEST, kernel_table
+from dermis.frame.features.diffusion.kernels import ROWS_PER_UNIT, SUMMED_TRUNCATION, WIDEST, kernel_table
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight

@@ -15,7 +15,7 @@ from gltf_rules import check_rules, khronos_issues
 from dermis import DermisError, Human, Pose, load_head
 from dermis.formats.gltf.document import Document
 from dermis.formats.gltf.primitives import Fibres
-from dermis.frame.passes.painting.eye_pictures import eye_pictures
+from dermis.frame.features.surface.painting.painted_head import eye_pictures
 from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
 from dermis.human.head_file import write_person

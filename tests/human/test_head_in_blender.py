@@ -13,7 +13,7 @@ import pytest
 
 from dermis import Human, Pose, load_head
 from dermis.apps.truths.cycles import PYTHON_VARIABLE
-from dermis.frame.painted import painted_head
+from dermis.frame.features.surface.painting.painted_head import painted_head
 from dermis.gpu import open_device
 from dermis.human.head_file import write_person
 from dermis.images.io import read_image

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_head import SIZE, write_head
 
-from dermis.frame.inputs import camera_views, pinhole
+from dermis.frame.features.shading.view import camera_views, pinhole
 from dermis.mesh.head import Head
 from dermis.scene import Camera, Settings
 from dermis.scene.camera import PRESETS

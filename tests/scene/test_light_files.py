@@ -9,18 +9,8 @@ import pytest
 from small_head import write_head
 
 from dermis.base.errors import DermisError
-from dermis.scene import (
-    Environment,
-    RectangleLight,
-    Scene,
-    SphereLight,
-    SpotLight,
-    StripeLight,
-    load_lights,
-    load_scene,
-    studio,
-)
-from dermis.scene.lights import light_presets
+from dermis.scene import Environment, Scene, load_lights, load_scene
+from dermis.scene.lights import RectangleLight, SphereLight, SpotLight, StripeLight, light_presets, studio
 
 KINDS = """
 [[lights]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis import Human
-from dermis.frame.skin_profiles import SkinProfiles
+from dermis.frame.features.diffusion.profiles import SkinProfiles
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.people import skin_of
 from dermis.scene.skin import Skin

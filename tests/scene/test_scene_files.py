@@ -13,20 +13,17 @@ from dermis.human.regions.zones import REGIONS
 from dermis.images.io import write_png
 from dermis.scene import (
     Camera,
-    DirectionalLight,
-    PointLight,
     Scene,
     Settings,
     Skin,
-    SpotLight,
     load_camera,
     load_lights,
     load_scene,
     portrait,
-    studio,
     three_quarter,
 )
 from dermis.scene.heads import load_head
+from dermis.scene.lights import DirectionalLight, PointLight, SpotLight, studio
 
 WHOLE = """
 [head]

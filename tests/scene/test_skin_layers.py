@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dermis.base.errors import DermisError
-from dermis.frame.skin_profiles import SkinProfiles
+from dermis.frame.features.diffusion.profiles import SkinProfiles
 from dermis.optics.profiles import load_profile
 from dermis.scene.field_errors import ImpossibleError
 from dermis.scene.skin import Pigments, Skin, TissueLayer

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from dermis.base.errors import DermisError
-from dermis.scene import Camera, DirectionalLight, Environment, PointLight, Settings, Skin, SpotLight
+from dermis.scene import Camera, Environment, Settings, Skin
 from dermis.scene.field_errors import ImpossibleError
+from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 
 FORM = re.compile(r"\w+: (\S+: )?expected .+, but .+\. Correct it\.")
 BAD = [

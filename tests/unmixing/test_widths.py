@@ -11,7 +11,7 @@ from dermis.apps.inverse.unmixing.model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.inverse.unmixing.widths import CORNERS, save_widths, widths_of
 from dermis.base.errors import DermisError
-from dermis.frame.profile_mixture import load_shares
+from dermis.frame.features.diffusion.mixture import load_shares
 from dermis.optics.profiles import load_profile
 
 

@@ -30,7 +30,7 @@ from dermis.apps.validation.benchmarks.report import (
 )
 from dermis.apps.validation.benchmarks.run import Benchmark, LeftOut, run
 from dermis.base.errors import DermisError
-from dermis.frame.passes.surface_texels import SURFACE_BYTES
+from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
 from dermis.gpu.textures import texel_bytes
@@ -104,7 +104,7 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
     assert found["visibility"] == moved.seen * 2 * 4 + geometry
     assert found["post"] == 48 * 32 * (16 + 16 + 4)
     # the narrower of the two is lit again, not blurred; the other one's blur knows stretch and reach by texel
-    light = texel_bytes(moved.inputs.resources.levels.stacks[0])
+    light = texel_bytes(moved.inputs.resources.diffusion.levels.stacks[0])
     gutter = moved.inputs.layouts[0].atlas.gutter.size // 16
     assert gutter > 0
     assert found["irradiance"] == moved.texels * (32 + 4 + light)
@@ -123,7 +123,7 @@ def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: 
     (scene,), settings = scenes_of(case, head, tmp_path, 1), settings_of(case)
     renderer.draw(scene, settings)
     moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
-    thin, levels = moved.inputs.layouts[0].translucency, moved.inputs.resources.levels
+    thin, levels = moved.inputs.layouts[0].translucency, moved.inputs.resources.diffusion.levels
     assert thin is not None
     receivers, sources = thin.pairs.receivers[1], thin.pairs.sources[1]
     assert thin.pairs.count > receivers > 10

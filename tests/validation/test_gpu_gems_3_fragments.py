@@ -68,12 +68,12 @@ def drawn(renderer: Renderer, scene: Scene, technique: str, seams: str) -> Drawn
         patch.setattr(CommandList, "fill", counted)
         renderer.draw(scene, settings, anew=True)
     inputs = renderer.prepare(scene, settings)
-    device, levels, layout = renderer.device, inputs.resources.levels, inputs.layouts[0]
+    device, levels, layout = renderer.device, inputs.resources.diffusion.levels, inputs.layouts[0]
     assert layout.translucency is not None
     stack = [
         download(device, levels.stacks[0], layer=k) for k in range(1 + len(inputs.blurs[0].variance_mm2))
     ]
-    results = layout.scattered, layout.translucency.light, inputs.resources.picture.radiance
+    results = layout.scattered, layout.translucency.light, inputs.resources.post.picture.radiance
     return Drawn(
         [level.astype(float) for level in stack],
         [download(device, one).astype(float) for one in results],

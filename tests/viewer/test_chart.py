@@ -38,7 +38,7 @@ def test_each_texel_is_a_square_with_the_layer_s_own_light(state: ViewerState) -
     assert np.array_equal(found[::2, ::2], found[1::2, 1::2])
     levels = studio.renderer.prepare(
         state.scene, state.settings.model_copy(update={"size": (2 * SIDE, 2 * SIDE)})
-    ).resources.levels
+    ).resources.diffusion.levels
     light = download(studio.renderer.device, levels.stacks[0])
     light = (light if light.ndim == 3 else light[0])[..., :3] / np.pi
     assert light.max() > 0.1

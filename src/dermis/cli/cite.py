@@ -72,7 +72,8 @@ def _of_comparison(against: str, technique: str | None) -> tuple[str, ...]:
 
 
 def _of_picture(file: Path | None, settings: Mapping[str, Any], skin: Mapping[str, Any]) -> tuple[str, ...]:
-    from dermis.scene import load_scene, studio
+    from dermis.scene import load_scene
+    from dermis.scene.lights import studio
     from dermis.scene.sources import sources_of
 
     if file is None:

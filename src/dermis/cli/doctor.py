@@ -88,7 +88,8 @@ def _self_test(renderer: Any) -> dict[str, Any]:
     from dermis.mesh.head import Head
     from dermis.mesh.maps import Maps
     from dermis.mesh.primitives import uv_sphere
-    from dermis.scene import Camera, DirectionalLight, Scene, Settings, Skin
+    from dermis.scene import Camera, Scene, Settings, Skin
+    from dermis.scene.lights import DirectionalLight
 
     lamp = DirectionalLight(direction=(0.0, 0.0, -1.0), irradiance=(3.14159, 3.14159, 3.14159))
     scene = Scene(

@@ -28,9 +28,9 @@ class FrameLandmarks:
         self.path = image.with_name(f"{image.stem}.landmarks.json")
         if typed is not None:
             from dermis.base.atomic_write import check_output
-            from dermis.frame.landmark_space import asked_landmarks
+            from dermis.frame.features.outputs.landmarks import checked_landmarks
 
-            self.names = asked_landmarks([name.strip() for name in typed.split(",")])
+            self.names = checked_landmarks([name.strip() for name in typed.split(",")])
             check_output(self.path, (self.path.suffix,))
 
     def check(self, head: Any) -> None:

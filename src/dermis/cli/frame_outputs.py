@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from dermis.base.console import note
 from dermis.base.errors import refuse
-from dermis.frame.outputs import OUTPUTS, asked_outputs
+from dermis.scene.outputs import OUTPUTS, checked_outputs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,7 +35,7 @@ class FrameOutputs:
         if kind and typed is None:
             refuse("--outputs-format", "--outputs with it", "there is none", "Name what is to be written")
         self.image = image
-        self.names = asked_outputs(_names(typed)) if typed is not None else ()
+        self.names = checked_outputs(_names(typed)) if typed is not None else ()
         self.together = image.suffix.lower() == ".exr" and kind in (None, "exr")
         if not self.names:
             self.paths: dict[str, Path] = {}

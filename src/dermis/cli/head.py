@@ -127,7 +127,7 @@ def head(
         Print the names of the published targets, and write nothing.
     """
     from dermis.base.atomic_write import check_output
-    from dermis.frame.painted import painted_head
+    from dermis.frame.features.surface.painting.painted_head import painted_head
     from dermis.gpu.failures import on_device
     from dermis.human.person_file import write_numbers
 

@@ -32,7 +32,8 @@ from dermis.scene.techniques import TECHNIQUES
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head
-    from dermis.scene import Light, Scene
+    from dermis.scene import Scene
+    from dermis.scene.lights import Light
 
     SkinOptions = dict[str, Any]
     SettingsOptions = dict[str, Any]

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from dermis.atlas.raster import cross, rasterise, texel_corners
 from dermis.base.errors import DermisError
-from dermis.frame.baked_numbers import CHANNELS, COUNT
-from dermis.frame.curvature import make_curvature
+from dermis.frame.features.shading import bake as baking_pass
+from dermis.frame.features.shading.bake import CHANNELS, COUNT
+from dermis.frame.features.shape import curvature
+from dermis.frame.features.shape.curvature import make_curvature
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes import bake as baking_pass
-from dermis.frame.passes import curvature
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList
 from dermis.mesh.geometry import uv_cross
@@ -133,12 +133,8 @@ def _baked(
     """(n, COUNT) numbers of the places, in the light of a frame that is drawn for it."""
     renderer.draw(scene, settings, timed=False, outputs=outputs)
     inputs = renderer.prepare(scene, settings, "", outputs)
-    bound, pigments = _bound(renderer, inputs, scene), None
-    made = inputs.resources.outputs
-    if made is not None and made.light.pigmented is not None:
-        pigments = made.light.pigmented.everywhere
-    elif "melanin" not in outputs:
-        pigments = (0.0, 0.0)
+    bound, made = _bound(renderer, inputs, scene), inputs.resources.outputs
+    pigments = made.light.pigments if made is not None and "melanin" in outputs else (0.0, 0.0)
     found = np.empty((len(places), COUNT), np.float32)
     for start in range(0, len(places), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)

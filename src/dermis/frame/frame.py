@@ -2,59 +2,80 @@
 
 from __future__ import annotations
 
-from dermis.frame.inputs import Inputs
-from dermis.frame.output_stages import draw_outputs, labels_of_hairs
-from dermis.frame.passes import (
-    background,
-    bloom,
+from functools import partial
+
+from dermis.frame.features import (
+    hair,
     interreflection,
-    meter,
-    moving_occlusion,
+    occlusion,
+    outputs,
     post,
-    shade,
+    shading,
     shadows,
     shape,
-    strands,
-    visibility_buffer,
+    visibility,
 )
-from dermis.frame.passes.painting import expression
+from dermis.frame.features.outputs.seen import SeenFrame, SpreadLight
+from dermis.frame.features.surface.painting.paint import draw_expression
+from dermis.frame.inputs import Inputs
 from dermis.frame.techniques.technique import Technique
-from dermis.gpu import Graph
+from dermis.gpu import Graph, Texture
 
 
 def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     """Light the skin, scatter the light below it, shade the image; only stale passes run."""
-    made = inputs.resources
-    shape.draw(graph, made.shape, inputs.motion)
-    if made.person:
-        shape.draw(graph, made.person, inputs.motion.at_rest)
+    made, lit, view = inputs.resources, inputs.lit, inputs.view
+    shape.draw(graph, made.shape.shape, inputs.motion)
+    if made.shape.person:
+        shape.draw(graph, made.shape.person, inputs.motion.at_rest)
     if made.face and inputs.movements is not None:
-        expression.draw(graph, made.face, inputs.movements)
-    bounded = ("SHAPES", 1) in inputs.light_constants
-    shadows.draw(graph, made.shadow_maps, inputs.shadow_views, made.head, bounded)
-    if made.strands:
-        graph.repeat(strands.pose, made.strands.tables, made.shape)
-        if len(inputs.shadow_views.clips):
-            strands.shadow(graph, made.strands, inputs.lit)
+        draw_expression(graph, made.face, inputs.movements)
+    area_lights = ("SHAPES", 1) in inputs.light_constants
+    shadows.draw(graph, made.shadow_maps, inputs.shadow_views, made.head, area_lights)
+    if made.hair:
+        hair.draw_shadows(graph, made.hair, made.shape.shape, inputs.shadow_views, lit)
     if made.sky and inputs.around:
-        moving_occlusion.draw(graph, made.sky, *inputs.around, inputs.layouts)
+        maps = [(layout, layout.occlusion) for layout in inputs.layouts]
+        occlusion.draw(graph, made.sky, *inputs.around, maps)
     for layout in inputs.layouts:
         if layout.interreflection:
             interreflection.draw(graph, layout.lit, layout.interreflection, inputs.light_constants)
     below = technique.scatter(graph, inputs)
-    visibility_buffer.draw(graph, made.visibility, inputs.camera, made.head)
-    look, apart = (inputs.lit, inputs.view, inputs.constants), technique.apart(made.own)
-    radiance = shade.draw(graph, *look, made.visibility, below, made.picture, apart)
+    visibility.draw(graph, made.visibility, inputs.camera, made.head)
+    image, apart = made.post.picture.radiance, technique.apart(made.technique)
+    radiance = shading.draw(
+        graph, lit, view, inputs.constants, made.visibility, below, image, inputs.settings.size, apart
+    )
     radiance = technique.finish(graph, inputs, radiance)
-    seen = inputs.lit, inputs.view, inputs.light_constants
-    if made.strands:
-        over, labels = (made.visibility.texture, radiance), labels_of_hairs(graph, inputs)
-        radiance = strands.draw(graph, made.strands, seen, made.head, *over, labels)
-    if made.meter:
-        meter.draw(graph, made.meter, seen, made.visibility.texture, radiance)
-    if made.backdrop:
-        radiance = background.draw(graph, made.backdrop, seen[:2], radiance, made.meter, inputs.settings)
-    if made.glow:
-        radiance = bloom.draw(graph, made.glow, radiance, inputs.settings.bloom)
-    post.draw(graph, radiance, made.picture, inputs.settings, made.meter)
-    draw_outputs(graph, inputs, below)
+    seen = _seen(graph, inputs, technique, below)
+    look = lit, view, inputs.light_constants
+    if made.hair:
+        over, labels = (made.visibility.texture, radiance), outputs.hair_labels(graph, made.outputs, seen)
+        radiance = hair.draw(graph, made.hair, look, made.head, *over, labels)
+    post.draw(graph, made.post, inputs.settings, radiance, *look, made.visibility.texture)
+    outputs.draw(graph, made.outputs, seen)
+
+
+def _seen(graph: Graph, inputs: Inputs, technique: Technique, below: Texture) -> SeenFrame:
+    """Return what the outputs read of the frame."""
+    made, spread = inputs.resources, None
+    layers = technique.apart(made.spread)
+    if layers is not None:
+        spread = SpreadLight(layers, partial(technique.spread, graph, inputs))
+    return SeenFrame(
+        lit=inputs.lit,
+        view=inputs.view,
+        centre_mm=inputs.centre_mm,
+        constants=inputs.constants,
+        scattered=below,
+        camera=inputs.camera,
+        head=made.head,
+        visibility=made.visibility,
+        shape=made.shape.shape,
+        picture=made.post.picture,
+        hair=made.hair is not None,
+        previous=inputs.previous,
+        thin=inputs.layouts[0].translucency,
+        spread=spread,
+        through=partial(technique.leave_through, graph, inputs),
+    )

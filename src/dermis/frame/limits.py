@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from dermis.base.errors import refuse
-from dermis.frame.asked import Asked
-from dermis.frame.passes.shadows import SHADOW_BYTES
-from dermis.frame.passes.surface_texels import SURFACE_BYTES
-from dermis.frame.profile_mixture import sums_of
-from dermis.frame.techniques.technique import Technique
+from dermis.frame.features.diffusion.mixture import sums_of
+from dermis.frame.features.shadows.shadows import SHADOW_BYTES
+from dermis.frame.features.surface.texels import SURFACE_BYTES
+from dermis.frame.request import FrameRequest
+from dermis.frame.technique import TechniqueTraits
 from dermis.gpu import Device
 from dermis.gpu.memory import OutOfMemoryError, check_memory, format_bytes, held_bytes, probed_memory
 from dermis.scene.settings import Settings
@@ -30,37 +30,37 @@ _SHARE = 0.75  # of the room that was found: the head, its maps and programs tak
 _LEAST = 64  # of a side, below which nothing is won
 
 
-def check_limits(device: Device, asked: Asked) -> None:
+def check_limits(device: Device, request: FrameRequest) -> None:
     """Raises DermisError for sizes over the device's limits."""
-    limit, name, settings = device.max_texture_size, device.adapter.name, asked.settings
-    sides = {"size": max(settings.size), "atlas": asked.atlases.side, "shadow_size": settings.shadow_size}
+    limit, name, settings = device.max_texture_size, device.adapter.name, request.settings
+    sides = {"size": max(settings.size), "atlas": request.atlases.side, "shadow_size": settings.shadow_size}
     for option, side in sides.items():
         if side > limit:
             name_limit = f"at most {limit} (the limit of {name})"
             refuse(option, name_limit, f"it is {side}", "Choose a smaller one")
-    needed = frame_bytes(asked)
+    needed = frame_bytes(request)
     width, height = settings.size
-    sizes = f"{asked.atlases.side} texels and {width}x{height} pixels"
+    sizes = f"{request.atlases.side} texels and {width}x{height} pixels"
     of_both = needed["atlas"] + needed["size"]
-    check_memory(device, of_both, "atlas and size", sizes, partial(fitting, asked))
+    check_memory(device, of_both, "atlas and size", sizes, partial(fitting, request))
 
 
-def no_room(error: OutOfMemoryError, device: Device, asked: Asked) -> OutOfMemoryError:
+def no_room(error: OutOfMemoryError, device: Device, request: FrameRequest) -> OutOfMemoryError:
     """The same error, with what would fit in place of what did not; what was made of that is released."""
     for one in filter(None, (error, error.__cause__)):
         traceback.clear_frames(one.__traceback__)
-    needed = sum(frame_bytes(asked).values())
+    needed = sum(frame_bytes(request).values())
     found = probed_memory(device, needed)
     most = _SHARE * (held_bytes() + found)
     if needed <= most:  # and yet it did not fit: others of this process hold the rest
         most = _SHARE * found
-    return OutOfMemoryError(error.expected, error.came, error.size, fitting(asked, most))
+    return OutOfMemoryError(error.expected, error.came, error.size, fitting(request, most))
 
 
-def fitting(asked: Asked, most: float) -> str:
+def fitting(request: FrameRequest, most: float) -> str:
     """What to write for a frame to take no more than a number of bytes: halves of what takes most of it."""
-    smaller, changed = asked, dict[str, str]()
-    needed = frame_bytes(asked)
+    smaller, changed = request, dict[str, str]()
+    needed = frame_bytes(request)
     while sum(needed.values()) > most:
         option = max(needed, key=lambda name: needed[name])
         halved = _halved(smaller.settings, option)
@@ -73,29 +73,29 @@ def fitting(asked: Asked, most: float) -> str:
     return f"With {' '.join(changed.values())} it takes about {format_bytes(sum(needed.values()))}"
 
 
-def frame_bytes(asked: Asked) -> dict[str, float]:
+def frame_bytes(request: FrameRequest) -> dict[str, float]:
     """Bytes that a frame takes, by the option that they follow from; the head and its maps aside."""
-    technique, settings, atlases = asked.technique, asked.settings, asked.atlases
+    technique, settings, atlases = request.technique, request.settings, request.atlases
     width, height = settings.size
     pixel = _PICTURE + _SAMPLE * settings.samples + technique.pixel_bytes
-    pixel += _NUMBER * sum(asked.output_channels.values())
-    pixel += technique.apart_bytes * ("diffuse" in asked.outputs)
-    texel = atlas_texel_bytes(technique, asked.count, len(atlases.layouts))
-    texel += _mixing_bytes(asked) if asked.count else 0.0
-    if "translucent" in asked.outputs:
+    pixel += _NUMBER * sum(request.output_channels.values())
+    pixel += technique.apart_bytes * ("diffuse" in request.outputs)
+    texel = atlas_texel_bytes(technique, request.count, len(atlases.layouts))
+    texel += _mixing_bytes(request) if request.count else 0.0
+    if "translucent" in request.outputs:
         texel += _FLOATS * (2 * len(atlases.layouts) - 1)
     return {
         "atlas": texel * atlases.side**2,
         "size": float(pixel * width * height),
-        "shadow_size": float(SHADOW_BYTES * asked.shadow_layers * settings.shadow_size**2),
+        "shadow_size": float(SHADOW_BYTES * request.shadow_layers * settings.shadow_size**2),
     }
 
 
-def _mixing_bytes(asked: Asked) -> float:
+def _mixing_bytes(request: FrameRequest) -> float:
     """Of a texel of the atlas, where a map mixes profiles: levels of each other, shares and sums."""
-    others = len(asked.others)
-    shares = len(asked.atlases.layouts) + sums_of(others)
-    return others * asked.technique.texel_bytes(asked.count) + _FLOATS * shares if others else 0.0
+    others = len(request.others)
+    shares = len(request.atlases.layouts) + sums_of(others)
+    return others * request.technique.texel_bytes(request.count) + _FLOATS * shares if others else 0.0
 
 
 def _halved(settings: Settings, option: str) -> Settings | None:
@@ -115,7 +115,7 @@ def _written(settings: Settings, option: str) -> dict[str, str]:
     return {"size": f"--size {width}x{height} --samples {settings.samples}"}
 
 
-def atlas_texel_bytes(technique: Technique, levels: int, layouts: int) -> float:
+def atlas_texel_bytes(technique: TechniqueTraits, levels: int, layouts: int) -> float:
     """Bytes of an atlas texel on a software adapter: geometry, levels, light between passes, their sum.
 
     levels : number of Gaussians that blur light

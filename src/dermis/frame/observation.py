@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.base.summary import Summarised
-from dermis.frame.passes.pack import Leaving
+from dermis.frame.features.outputs.readback import Leaving
 from dermis.gpu.memo import same
 from dermis.scene.head_pose import gaze, head_pose
 from dermis.scene.model import Scene
@@ -43,7 +43,7 @@ class Observation(Summarised):
     """A picture with what is known of what it shows.
 
     picture : (h, w, 3), or with alpha (h, w, 4): sRGB bytes, or linear floats where these are asked
-    outputs : by name, (h, w) or (h, w, c) with row 0 at the top; see `dermis.frame.outputs`
+    outputs : by name, (h, w) or (h, w, c) with row 0 at the top; see `dermis.scene.outputs`
     camera : K, R and t; places of the scene are in mm from the head's centre
     landmarks : by the name of their set
     head_pose : (3, 4) rotation and shift [mm] from the head at rest to the camera, see `scene.head_pose`

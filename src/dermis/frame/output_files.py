@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from dermis.base import atomic_write as files
 from dermis.base.errors import refuse
-from dermis.frame.outputs import OUTPUTS, Output
 from dermis.images.codecs import encode_png
 from dermis.images.io import encode_exr_parts
+from dermis.scene.outputs import OUTPUTS, Output
 
 Format = Literal["exr", "png", "npy"]
 _MOST_LEVEL = 65535

@@ -9,22 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.frame.asked import Asked
-from dermis.frame.atlas_layout import AtlasLayout
-from dermis.frame.inputs import EyesSeen, Inputs, Resources, camera_views, pinhole, seen_by
-from dermis.frame.levels import Blur, scale_of
+from dermis.frame.allocation import make_resources
+from dermis.frame.features.diffusion.levels import Blur, scale_of
+from dermis.frame.features.diffusion.profiles import Mixed, SkinProfiles
+from dermis.frame.features.hair.resources import strand_constants
+from dermis.frame.features.occlusion.moving import Anchors, Look, anchors_of, look_around, sky_record, turn_of
+from dermis.frame.features.outputs.seen import PreviousScene
+from dermis.frame.features.shading.shade import shade_program
+from dermis.frame.features.shading.view import EyesSeen, camera_views, pinhole, seen_by
+from dermis.frame.features.shape.shape import MotionBytes, motion_at_rest
+from dermis.frame.inputs import Inputs
+from dermis.frame.layout import AtlasLayout
 from dermis.frame.lights import light_constants, light_parts, light_records, light_views
+from dermis.frame.lights.environment import brightest, load_surroundings, with_suns
 from dermis.frame.limits import no_room
-from dermis.frame.passes.moving_occlusion import sky_record
-from dermis.frame.passes.outputs.motion import Before
-from dermis.frame.passes.shade import shade_program
-from dermis.frame.passes.shape import MotionBytes, resting
 from dermis.frame.projection import Views, shadow_layers
-from dermis.frame.resources import make_resources
-from dermis.frame.skin_profiles import Mixed, SkinProfiles
-from dermis.frame.sky import Anchors, Look, anchors_of, look_around, turn_of
-from dermis.frame.strands import strand_constants
-from dermis.frame.surroundings import brightest, load_surroundings, with_suns
+from dermis.frame.request import FrameRequest
+from dermis.frame.resources import Resources
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Constants, Device, Memo
 from dermis.gpu.memo import same
@@ -83,7 +84,7 @@ class Preparation:
         """
         inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks))
         if "motion" in outputs:
-            inputs = replace(inputs, before=self._before(scene, previous or scene, inputs))
+            inputs = replace(inputs, previous=self._before(scene, previous or scene, inputs))
         self.memo.end()
         return inputs
 
@@ -105,26 +106,26 @@ class Preparation:
         who = scene.head, scene.skin, profile, _person(scene)
         counts = parts, len(layers.clips), scene.motion is not None
         mixed = tuple(others), shares
-        asked = Asked(*who, settings, around, surroundings, technique, *counts, view, *mixed, *more)
+        request = FrameRequest(*who, settings, around, surroundings, technique, *counts, view, *mixed, *more)
         try:
-            resources = keep(make_resources, self.memo, device, asked)
+            resources = keep(make_resources, self.memo, device, request, technique)
         except OutOfMemoryError as error:
             self.memo.forget()
-            raise no_room(error, device, asked) from error
+            raise no_room(error, device, request) from error
         seen_from = pinhole(scene.camera, head, settings)
         shone_on = light_constants(scene) + strand_constants(head, settings) + linked(resources)
-        scale = scale_of(resources.levels.texel, brightest(scene, surroundings))
+        scale = scale_of(resources.diffusion.levels.texel, brightest(scene, surroundings))
         return Inputs(
             resources=resources,
             settings=settings,
             motion=moved.motion,
             movements=keep(_movements, head, scene.motion) if resources.face else None,
             layouts=tuple(under(layout, record) for layout in resources.layouts),
-            blurs=keep(_scaled, resources.blurs, scale),
+            blurs=keep(_scaled, resources.diffusion.blurs, scale),
             shadow_views=layers,
             light_constants=shone_on,
             camera=camera_views(seen_from, moved.outline, settings.samples),
-            seen=seen_from.window,
+            window=seen_from.window,
             around=self._around(head, scene.motion, moved.outline) if resources.sky else None,
             view=seen_by(resources.view, seen_from, moved.eyes),
             constants=resources.constants + shone_on,
@@ -140,7 +141,7 @@ class Preparation:
         anchors, motion = self.memo.keep(anchors_of, head.topology), motion or head.control.rest
         return self.memo.keep(_looked, outline, using=(motion, self.device, head, anchors))
 
-    def _before(self, scene: Scene, previous: Scene, inputs: Inputs) -> Before:
+    def _before(self, scene: Scene, previous: Scene, inputs: Inputs) -> PreviousScene:
         """What motion is counted from.
 
         Raises DermisError for a scene of another head.
@@ -154,7 +155,7 @@ class Preparation:
             moved = self.memo.keep(_bytes_of, head, previous.motion, moved, of="before")
         seen_from = pinhole(previous.camera, head, inputs.settings)
         view = seen_by(inputs.resources.view, seen_from, None)
-        return Before(None if moved == inputs.motion else moved, view)
+        return PreviousScene(None if moved == inputs.motion else moved, view)
 
     def _moved(self, head: Head, motion: Motion | None) -> Moved:
         """The head as it is posed, or at rest where no motion came."""
@@ -193,7 +194,7 @@ def _movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
 
 
 def _resting(head: Head) -> MotionBytes:
-    return resting(head.control)
+    return motion_at_rest(head.control)
 
 
 def _eyes(head: Head, motion: Motion) -> EyesSeen | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -210,3 +211,17 @@ def parallel_view(direction: Vec, outline: Outline, size: int) -> ShadowView:
     middle = 0.5 * (low[0] + high[0]) * axes[0] + 0.5 * (low[1] + high[1]) * axes[1]
     origin, right, up = ((float(x), float(y), float(z)) for x, y, z in (middle, axes[0], axes[1]))
     return ShadowView(clip, 2.0 * half / size, origin, right, up, float(low[2]), float(high[2]))
+
+
+@cache
+def pixel_samples(count: int) -> NDArray[np.float64]:
+    """(count, 2) places in the unit square: Hammersley's set, even in both axes for any count."""
+    index = np.arange(count)
+    y, digit, rest = np.zeros(count), 0.5, index.copy()
+    while rest.any():
+        y += digit * (rest & 1)
+        rest >>= 1
+        digit /= 2
+    places = np.stack([(index + 0.5) / count, y + 0.5 / count], axis=-1) % 1.0
+    places.flags.writeable = False
+    return places

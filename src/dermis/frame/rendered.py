@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.base.summary import Summarised
-from dermis.frame.outputs import OUTPUTS
-from dermis.frame.passes.meter import Meter, read_meter
-from dermis.frame.passes.outputs.planes import OutputResources
-from dermis.frame.passes.pack import Leaving
-from dermis.frame.passes.post import Picture
+from dermis.frame.features import outputs as output_features
+from dermis.frame.features.outputs.readback import Leaving
+from dermis.frame.features.post.meter import Meter, read_meter
+from dermis.frame.features.post.picture import Picture
 from dermis.gpu import Device, download
+from dermis.scene.outputs import OUTPUTS
 from dermis.scene.settings import Settings
 
 T = TypeVar("T")
@@ -34,7 +34,7 @@ class Shown:
     device: Device
     picture: Picture
     meter: Meter | None
-    outputs: OutputResources | None = None
+    outputs: output_features.Resources | None = None
 
 
 @dataclass(frozen=True, repr=False)

@@ -13,20 +13,19 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse, shown_value
 from dermis.base.quantities import whole_number
-from dermis.frame.in_flight import arriving
-from dermis.frame.landmark_space import asked_landmarks
+from dermis.frame.features.outputs.landmarks import checked_landmarks
+from dermis.frame.features.outputs.readback import Leaving
 from dermis.frame.observation import Observation, observed_frames
-from dermis.frame.outputs import asked_outputs
-from dermis.frame.passes import warm_up
-from dermis.frame.passes.pack import Leaving
+from dermis.frame.programs import warm_up
 from dermis.frame.rendered import Rendered, Shown
-from dermis.frame.submitter import Submitter
+from dermis.frame.submission import Submitter, arriving
 from dermis.gpu import Device, open_device
 from dermis.gpu.command_list import Timed
 from dermis.gpu.failures import ReopeningDevice
 from dermis.mesh.head import Head
 from dermis.scene.given import given_plain
 from dermis.scene.model import Scene
+from dermis.scene.outputs import checked_outputs
 from dermis.scene.settings import Settings
 
 T = TypeVar("T")
@@ -95,7 +94,7 @@ class Renderer(Submitter):
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
         settings = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        what = Scene.of(scene), settings, view, asked_outputs(outputs), previous and Scene.of(previous)
+        what = Scene.of(scene), settings, view, checked_outputs(outputs), previous and Scene.of(previous)
         return self.kept_open.run(partial(self._draw, anew, timed, *what))
 
     def _draw(self, anew: bool, timed: Timed, *what: Any) -> Rendered:
@@ -112,7 +111,7 @@ class Renderer(Submitter):
         times = frame.stage_ms() if timed else None
         setup_ms, made = 1e3 * (ready - started) + self._opening_ms, inputs.resources
         self._opening_ms = 0.0
-        shown = self._last = Shown(self.device, made.picture, made.meter, made.outputs)
+        shown = self._last = Shown(self.device, made.post.picture, made.post.meter, made.outputs)
 
         def again() -> None:
             vars(shown).update(vars(self._draw(anew, timed, *what).shown))
@@ -205,7 +204,7 @@ class Renderer(Submitter):
         """
         if settings is None or isinstance(settings, Settings | Mapping):
             settings = repeat(given_plain(Settings, settings or {}, "settings", "size=(512, 512)"))
-        asked = partial(self._send, outputs=asked_outputs(outputs), landmarks=asked_landmarks(landmarks))
+        asked = partial(self._send, outputs=checked_outputs(outputs), landmarks=checked_landmarks(landmarks))
         send = partial(asked, linear=linear, alpha=alpha)
         frames = observed_frames(send, scenes, previous, settings)
         return arriving(self.kept_open, lambda: self.device, frames)

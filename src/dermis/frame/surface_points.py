@@ -8,10 +8,14 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.atlas_layout import AtlasLayout
-from dermis.frame.atlas_textures import AtlasTextures, packed_texels
-from dermis.frame.passes import irradiance, shadows, shape, surface_texels, visibility_buffer
-from dermis.frame.passes.surface_texels import make_surfaces
+from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.textures import AtlasTextures, packed_texels
+from dermis.frame.features.irradiance import irradiance
+from dermis.frame.features.shadows import shadows
+from dermis.frame.features.shape import shape
+from dermis.frame.features.surface import texels as surface_texels
+from dermis.frame.features.surface.texels import make_surfaces
+from dermis.frame.features.visibility import layers as visibility_buffer
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download, make_texture
 from dermis.gpu.textures import texture_from
@@ -48,7 +52,7 @@ def _surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Sur
     inputs = renderer.prepare(scene, single)
     frame = CommandList(renderer.device)
     made = inputs.resources
-    shape.draw(frame, made.shape, inputs.motion)
+    shape.draw(frame, made.shape.shape, inputs.motion)
     visibility_buffer.draw(frame, made.visibility, inputs.camera, made.head)
     frame.submit()
     renderer.graph.forget()  # it does not know of this frame
@@ -104,9 +108,9 @@ def _lit(renderer: Renderer, scene: Scene, settings: Settings, records: NDArray[
     lit = make_texture(device, (side, side), "rgba32float")
     frame = CommandList(device)
     made = inputs.resources
-    shape.draw(frame, made.shape, inputs.motion)
+    shape.draw(frame, made.shape.shape, inputs.motion)
     shadows.draw(frame, made.shadow_maps, inputs.shadow_views, made.head)
-    layout = AtlasLayout(listed, first.head, first.lit, make_surfaces(device, side), lit)
+    layout = LitAtlas(listed, first.head, first.lit, make_surfaces(device, side), lit)
     surface_texels.draw(frame, layout)
     irradiance.draw(frame, layout, inputs.light_constants, lit, side)
     frame.submit()

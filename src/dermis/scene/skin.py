@@ -150,3 +150,10 @@ class Skin(Plain):
     def smoothing(self) -> float:
         """Factor of the roughness that the skin's oil makes [-]."""
         return 1.0 - (1.0 - _OILY_SMOOTHING) * self.oiliness
+
+
+def lobe_name(skin: Skin) -> str:
+    """Return the name of the skin's lobe; skin without one keeps the default, for wet materials beside it."""
+    from dermis.specular.models import MODELS
+
+    return next(iter(MODELS)) if skin.specular == "none" else skin.specular

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.levels import Blur, Levels, Split
-from dermis.frame.passes import TILE, program
+from dermis.frame.features.atlas.textures import AtlasTextures
+from dermis.frame.features.diffusion.levels import Blur, Levels
+from dermis.frame.programs import TILE, program
+from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.gpu import Recorder
 from dermis.optics.fits.gaussian import single_gaussian
@@ -28,7 +29,7 @@ class Dim(AtlasTechnique):
         """No."""
         return False
 
-    def halvings(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """None."""
         return (0, 0)
 

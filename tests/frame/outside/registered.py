@@ -26,7 +26,7 @@ from outside.glow import GLOW
 from outside.uv_sum import UV_SUM
 
 from dermis.frame.lights.kind import KINDS
-from dermis.frame.outputs import OUTPUTS
+from dermis.scene.outputs import OUTPUTS
 from dermis.scene.techniques import TECHNIQUES
 from dermis.specular.models import MODELS
 

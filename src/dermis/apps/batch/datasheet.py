@@ -17,11 +17,11 @@ from dermis.apps.batch.shards import is_there, shard_path, shards_of, stamp_of
 from dermis.apps.batch.spec import Spec
 from dermis.base.tables import read_rows
 from dermis.formats.samples import SAMPLES
-from dermis.frame.outputs import OUTPUTS
 from dermis.human.labels.classes import label_classes
 from dermis.human.landmarks.points import table_points
 from dermis.human.landmarks.sets import SETS
 from dermis.human.model import THANKS
+from dermis.scene.outputs import OUTPUTS
 
 README, DESCRIPTION = "README.md", "dataset.json"
 _MOST_LISTED = 50

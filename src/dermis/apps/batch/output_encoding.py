@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.frame.output_files import png_levels
-from dermis.frame.outputs import OUTPUTS, Output
 from dermis.images.codecs import decode_rows, decode_with_pillow, encode_png
 from dermis.images.hdr import decode_exr, encode_exr
 from dermis.images.sizes import check_size
+from dermis.scene.outputs import OUTPUTS, Output
 
 Array = NDArray[Any]
 Encoding = Literal["png", "exr", "npy"]

@@ -13,7 +13,6 @@ from dermis.base.errors import DermisError, about, refuse, shortened
 from dermis.base.reading import is_file
 from dermis.environment.panorama import UNIFORM
 from dermis.formats.samples import SAMPLES
-from dermis.frame.outputs import asked_outputs
 from dermis.human.hair.look import HairLook
 from dermis.human.landmarks.points import table_points
 from dermis.human.landmarks.sets import SETS
@@ -23,6 +22,7 @@ from dermis.mesh.eyes import EyeLook
 from dermis.mesh.pose import MOST_WEIGHT
 from dermis.scene.heads import HUMAN
 from dermis.scene.lights import NO_LIGHTS
+from dermis.scene.outputs import checked_outputs
 from dermis.scene.skin import Skin
 
 _ANCESTRY = "person.african", "person.asian", "person.caucasian"
@@ -33,7 +33,7 @@ _LONGEST = 100  # letters of a name
 def check_spec(spec: Any, drawn: Mapping[str, Distribution], expressions: Mapping[str, Any]) -> None:
     """Refuse a spec that cannot be drawn, by table and key."""
     with about("outputs"):
-        asked_outputs(spec.outputs)
+        checked_outputs(spec.outputs)
     _check_landmarks(spec.landmarks, spec.folder)
     check_looks(spec.person)
     check_skin(spec.skin)

@@ -97,7 +97,7 @@ class Subject:
 
     def eye_pictures(self) -> EyePictures | None:
         """Return what the eyes of the shape look like, painted on a device; None for a shape without eyes."""
-        from dermis.frame.passes.painting.eye_pictures import eye_pictures
+        from dermis.frame.features.surface.painting.painted_head import eye_pictures
         from dermis.gpu.failures import on_device
 
         eyes = self.shape.eyes
@@ -112,7 +112,7 @@ class Subject:
         head = self.head
         if self.scene is None or head is None or not head.maps.painted:
             return self
-        from dermis.frame.painted import with_painted_maps
+        from dermis.frame.features.surface.painting.painted_head import with_painted_maps
         from dermis.gpu.failures import on_device
 
         made = on_device(adapter, lambda device: with_painted_maps(device, head, side))

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.outputs import OUTPUTS
 from dermis.images.colour import encode_srgb8
+from dermis.scene.outputs import OUTPUTS
 
 _LIGHT = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
 _COLOURS = 8192

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.formats.samples import cached
-from dermis.frame.painted import with_painted_maps
+from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
@@ -92,7 +92,7 @@ class Studio:
         def light() -> NDArray[np.float32]:
             self._draw(scene, 1.0, settings)
             inputs = self.renderer.prepare(scene, self.settings(**settings))
-            levels, blur = inputs.resources.levels, inputs.blurs[0]
+            levels, blur = inputs.resources.diffusion.levels, inputs.blurs[0]
             layer = blur.own[level]
             halved = blur.halvings[layer]
             found = download(self.renderer.device, levels.stacks[halved], layer=layer - levels.first[halved])

@@ -1,8 +1,8 @@
 // What lies on the way to the picture, over the pixels that see it: levels of light, stretch, thickness, shadow, normals.
-//#include "geometry.wgsl"
+//#include "shape/geometry.wgsl"
 //#include "bilinear.wgsl"
 //#include "layer_colours.wgsl"
-//#include "skin.wgsl"
+//#include "surface/skin.wgsl"
 //#include "lights.wgsl"
 
 const SHADOW_VIEW: u32 = 3u; // before it the layers of the atlas, after it normals

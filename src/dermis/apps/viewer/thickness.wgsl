@@ -1,5 +1,5 @@
 // Least depth of the flesh between each cell that takes light through it and those that give light.
-//#include "translucent_pair.wgsl"
+//#include "translucency/translucent_pair.wgsl"
 //#include "each.wgsl"
 
 struct Sum {

@@ -11,10 +11,10 @@ import numpy as np
 from dermis.apps.viewer.chart import ATLAS, Chart
 from dermis.apps.viewer.state import PARTS
 from dermis.base.errors import refuse
-from dermis.frame.atlas_layout import PairBuffers, Translucency
+from dermis.frame.features.post.meter import read_meter
+from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes import each, program
-from dermis.frame.passes.meter import read_meter
+from dermis.frame.programs import each, program
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture, upload
 from dermis.gpu.failures import gpu_failures
@@ -91,13 +91,15 @@ class Views:
     def _layer(self, inputs: Inputs, view: str, settings: Settings) -> tuple[Any, float]:
         """The map of the atlas that a view reads, and how its numbers are scaled."""
         if view in LEVELS:
-            layer, blurs = LEVELS[view], inputs.blurs[:1] if inputs.resources.scatters else ()
+            layer, blurs = LEVELS[view], inputs.blurs[:1]
             own = blurs[0].own if blurs else ()
             count = len(own)
             if layer >= count:
                 refuse(f"view {view}", "a level of light on the atlas", f"there are {count}", _ATLAS_NEEDED)
             halvings, scale = blurs[0].halvings[own[layer]], blurs[0].scale
-            return inputs.resources.levels.layer(own[layer], halvings), self._exposure(inputs) / scale
+            return inputs.resources.diffusion.levels.layer(own[layer], halvings), self._exposure(
+                inputs
+            ) / scale
         if view == "stretch":
             stretch = inputs.layouts[0].atlas.resources["stretch_map"]
             return stretch, self._mean_density(stretch)
@@ -105,7 +107,7 @@ class Views:
 
     def _exposure(self, inputs: Inputs) -> float:
         """Of the frame drawn last."""
-        meter, given = inputs.resources.meter, inputs.settings.exposure
+        meter, given = inputs.resources.post.meter, inputs.settings.exposure
         return read_meter(self._renderer.device, meter) if meter else float(given)
 
     def _thickness(self, inputs: Inputs) -> Any:

@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
-from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.levels import HALVES, Blur, Halvings, Levels, Split, make_levels
-from dermis.frame.passes import TECHNIQUES, program
+from dermis.frame.features.atlas.textures import AtlasTextures
+from dermis.frame.features.diffusion.levels import Blur, Halvings, Levels, make_levels
+from dermis.frame.programs import HALVES, program
+from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique
-from dermis.gpu import Device, make_texture
+from dermis.gpu import (
+    ComputeProgram,
+    Constants,
+    Device,
+    FragmentProgram,
+    MutableBindings,
+    Recorder,
+    TextureOrView,
+    make_texture,
+)
 from dermis.gpu.textures import FORMAT_BYTES
 
-Pair = tuple[Any, Any]
+Pair = tuple[TextureOrView, TextureOrView]
 
 
 @dataclass(frozen=True, eq=False)
 class StretchedLevels(Levels):
     """Levels with space for a stretch map that is blurred along with the light."""
 
-    stretch: Pair = (None, None)
+    stretch: Pair | None = None
 
 
 class GpuGems3(AtlasTechnique):
@@ -41,13 +51,13 @@ class GpuGems3(AtlasTechnique):
         """Memory for each texel of the atlas."""
         return float(FORMAT_BYTES[HALVES] * (levels + 4))
 
-    def halvings(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """All levels have the whole resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
-    def fill(self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
+    def fill(self, graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
         """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""
-        assert isinstance(levels, StretchedLevels)
+        assert isinstance(levels, StretchedLevels) and levels.stretch is not None
         shaders = [
             self.shader(graph.device, (("AXIS", axis), ("SKIPPED", blur.edge == "skipped")))
             for axis in (0, 1)
@@ -67,12 +77,20 @@ class GpuGems3(AtlasTechnique):
                 self.run(graph, shader, bound, (blurred, wider), levels.size)
             source, before = stretch, float(variance)
 
-    def shader(self, device: Device, constants: Any) -> Any:
+    def shader(self, device: Device, constants: Constants) -> ComputeProgram | FragmentProgram:
         """The pass along one axis."""
-        return program(device, TECHNIQUES / "gpu_gems_3.wgsl", constants)
+        return program(device, Path(__file__).with_name("gpu_gems_3.wgsl"), constants)
 
-    def run(self, graph: Any, shader: Any, bound: dict[str, Any], into: Pair, side: int) -> None:
+    def run(
+        self,
+        graph: Recorder,
+        shader: ComputeProgram | FragmentProgram,
+        bound: MutableBindings,
+        into: Pair,
+        side: int,
+    ) -> None:
         """Declare one pass into a texture of light and one of stretch."""
+        assert isinstance(shader, ComputeProgram)
         bound = bound | {"blurred": into[0], "stretch_blurred": into[1]}
         graph.compute("diffuse", shader, bound, (side, side))
 

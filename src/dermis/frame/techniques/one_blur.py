@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dermis.frame.levels import Split
+from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.frame.techniques.texture_space import TextureSpace
 from dermis.optics.fits.gaussian import single_gaussian
@@ -21,7 +21,7 @@ class OneBlur(TextureSpace):
         """The one Gaussian."""
         return single_gaussian(profile)
 
-    def split(self, profile: GaussianSum, white: bool) -> Split:
+    def split(self, profile: GaussianSum, white: bool) -> ProfileSplit:
         """The blur alone: texels are shown as they are."""
         return AtlasTechnique.split(self, profile, white)
 

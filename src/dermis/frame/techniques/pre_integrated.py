@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dermis.frame.features.shape import curvature
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes import curvature
+from dermis.frame.technique import TechniqueResources
 from dermis.frame.techniques.technique import Technique
-from dermis.gpu import ComputeProgram, Device, Graph, Memo
+from dermis.gpu import ComputeProgram, Device, Graph, Memo, Record, Texture
 from dermis.gpu.textures import texture_from
 from dermis.optics.fits.separable import preintegrate
 from dermis.optics.gaussians import Floats, GaussianSum
@@ -29,7 +29,7 @@ _MOST_PENUMBRA_MM = 8.0
 
 
 @dataclass(frozen=True, eq=False)
-class PreIntegrated:
+class PreIntegrated(TechniqueResources):
     """What the shading pass reads in place of light on an atlas.
 
     table : texture of `tables`
@@ -37,7 +37,7 @@ class PreIntegrated:
     relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue
     """
 
-    table: Any
+    table: Texture
     penumbra_mm: float
     relief_mm: Floats
 
@@ -53,17 +53,18 @@ class PreIntegratedSkin(Technique):
         """The profile's tables."""
         return memo.keep(pre_integrate, device, profile)
 
-    def describe(self, view: Any, shade: ComputeProgram, own: PreIntegrated) -> None:
+    def describe(self, view: Record, shade: ComputeProgram, own: TechniqueResources | None) -> None:
         """Write the tables' scales."""
+        assert isinstance(own, PreIntegrated)
         scales = {"most_curved": MOST_CURVED, "penumbra": own.penumbra_mm, "relief": own.relief_mm}
         view["pre"] = shade.record("PreIntegrated", **scales)
 
-    def scatter(self, graph: Graph, inputs: Inputs) -> Any:
-        """The tables in place of light on the atlas."""
-        resources = inputs.resources
-        assert resources.curvature is not None
-        graph.repeat(curvature.draw, resources.head, resources.curvature)
-        return resources.own.table
+    def scatter(self, graph: Graph, inputs: Inputs) -> Texture:
+        """Return the tables in place of light on the atlas."""
+        made, own = inputs.resources, inputs.resources.technique
+        assert made.shape.curvature is not None and isinstance(own, PreIntegrated)
+        graph.repeat(curvature.draw, made.head, made.shape.curvature)
+        return own.table
 
 
 TECHNIQUE = PreIntegratedSkin()

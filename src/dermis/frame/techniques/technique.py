@@ -3,38 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.fine_light import TEXEL_AREA
+from dermis.frame.features.atlas import blend, gutters, stretch
+from dermis.frame.features.atlas.textures import MOST_HALVINGS, AtlasTextures
+from dermis.frame.features.diffusion import combine
+from dermis.frame.features.diffusion import mixture as mix
+from dermis.frame.features.diffusion.levels import Blur, Halvings, Levels, halvings_of, make_levels
+from dermis.frame.features.diffusion.mixture import Mixture
+from dermis.frame.features.irradiance import irradiance
+from dermis.frame.features.irradiance.irradiance import TEXEL_AREA
+from dermis.frame.features.surface import texels
+from dermis.frame.features.translucency import passes as translucency
+from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.inputs import Inputs
-from dermis.frame.levels import (
-    FLOATS,
-    MOST_HALVINGS,
-    Blur,
-    Halvings,
-    Levels,
-    Split,
-    halvings_of,
-    make_levels,
-    usual_texel,
+from dermis.frame.programs import FLOATS, usual_texel
+from dermis.frame.technique import ProfileSplit, TechniqueResources, TechniqueTraits, channel_weights
+from dermis.gpu import (
+    ComputeProgram,
+    Device,
+    Graph,
+    Memo,
+    Record,
+    Recorder,
+    Texture,
+    TextureOrView,
 )
-from dermis.frame.passes import (
-    blend,
-    combine,
-    gutters,
-    irradiance,
-    profile_mixture,
-    stretch,
-    surface_texels,
-    translucency,
-    translucency_weights,
-)
-from dermis.frame.profile_mixture import Mixture
-from dermis.gpu import Constants, Device, Graph, Memo
 from dermis.gpu.textures import FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
@@ -43,84 +38,67 @@ from dermis.scene.settings import Settings
 _RELIT_MM2 = 0.1**2
 
 
-class Technique:
+class Technique(TechniqueTraits):
     """How light spreads below the skin; in this base class it leaves where it entered.
 
     Its name is that of its line in `scene.techniques.TECHNIQUES`.
-
-    sources : keys of the bibliography
-    on_atlas : whether light spreads over the atlas
-    mixes : whether it can mix profiles by a map
-    stitches : whether it can carry light across the map's seams
-    transmits : whether light comes through thin parts
-    curved : whether the shading reads the surface's curvature
-    shade_constants : pipeline constants of the shading pass
-    pixel_bytes : of memory for each pixel, besides the picture
-    apart_bytes : of memory for each pixel for `make_apart`
     """
 
-    sources: ClassVar[tuple[str, ...]] = ()
-    on_atlas: ClassVar[bool] = False
-    mixes: ClassVar[bool] = False
-    stitches: ClassVar[bool] = True
-    transmits: ClassVar[bool] = False
-    curved: ClassVar[bool] = False
-    shade_constants: ClassVar[Constants] = ()
-    pixel_bytes: ClassVar[int] = 0
-    apart_bytes: ClassVar[int] = 0
-
-    def split(self, profile: GaussianSum, white: bool) -> Split:
-        """The profile as the technique uses it.
-
-        white : renormalise each channel's weights to 1, so that the colour map alone gives the colour
-        """
-        total = _weights(profile, white).sum(axis=0)
-        return Split(total, total, np.empty(0), np.empty((0, 3)))
-
-    def stretch(self, settings: Settings) -> str:
-        """How blurs follow the map's stretch, one of `Settings.stretch`."""
-        return settings.stretch
-
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
-        """Textures for light and its blurred levels; of the least size where no light is on the atlas."""
+        """Return textures for light and its blurred levels; the least size where no light is on the atlas."""
         return make_levels(device, side, halvings, FLOATS)
 
-    def make_sum(self, device: Device, side: int) -> Any:
-        """Space for the light that leaves below the surface."""
+    def make_sum(self, device: Device, side: int) -> Texture:
+        """Return space for the light that leaves below the surface."""
         return combine.make_sum(device, side)
 
-    def texel_bytes(self, levels: int) -> float:
-        """Memory for each texel of the atlas on a software adapter, with the space between passes."""
-        return 0.0
+    def chain(
+        self, split: ProfileSplit, atlas: AtlasTextures, edge: str
+    ) -> tuple[ProfileSplit, tuple[int, ...]]:
+        """Return the split with weightless levels that lead to others, and which those are; here none."""
+        return split, ()
 
-    def make(self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum) -> Any:
-        """The technique's own tables and textures, kept by the memo."""
+    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+        """Return how often the resolution of each level is halved, that of the unblurred one first."""
+        return (0,) * (1 + len(split.blurred_mm2))
+
+    def make(
+        self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
+    ) -> TechniqueResources | None:
+        """Return the technique's own tables and textures, kept by the memo."""
         return None
 
-    def describe(self, view: Any, shade: Any, own: Any) -> None:
+    def make_apart(self, memo: Memo, device: Device, settings: Settings) -> TechniqueResources | None:
+        """Return space for light that the shading of outputs keeps apart; None for none."""
+        return None
+
+    def describe(self, view: Record, shade: ComputeProgram, own: TechniqueResources | None) -> None:
         """Write what the shading pass needs to its record.
 
         shade : the pass' program
         """
 
-    def scatter(self, graph: Graph, inputs: Inputs) -> Any:
-        """Declare the passes before the shading; returns the texture that it reads as `scattered`."""
+    def apart(self, own: TechniqueResources | None) -> Texture | None:
+        """Return the texture for light that the shading keeps apart, None when it keeps none."""
+        return None
+
+    def scatter(self, graph: Graph, inputs: Inputs) -> Texture:
+        """Declare the passes before the shading; return the texture that it reads as `scattered`."""
         return inputs.resources.scattered
 
-    def apart(self, own: Any) -> Any:
-        """Texture for light that the shading keeps apart, None when it keeps none."""
-        return None
-
-    def finish(self, graph: Graph, inputs: Inputs, radiance: Any) -> Any:
-        """Declare the passes after the shading; returns the texture that holds the picture."""
+    def finish(self, graph: Graph, inputs: Inputs, radiance: Texture) -> Texture:
+        """Declare the passes after the shading; return the texture that holds the picture."""
         return radiance
 
-    def make_apart(self, memo: Memo, device: Device, settings: Settings) -> Any:
-        """Space for what the shading of outputs keeps apart, in its texture `layers`; None for nothing."""
-        return None
+    def spread(self, graph: Graph, inputs: Inputs) -> tuple[TextureOrView, TextureOrView]:
+        """Spread the light of `make_apart`; return textures of it and of the share of it that leaves."""
+        raise NotImplementedError
 
-    def spread(self, graph: Graph, inputs: Inputs, apart: Any) -> tuple[Any, Any]:
-        """Spread that over the picture; returns textures of the light and of the share of it that leaves."""
+    def leave_through(self, graph: Graph, inputs: Inputs, into: tuple[Texture, ...]) -> Texture:
+        """Add up only the light through thin parts; return the texture of all layouts.
+
+        into : textures of the atlas, of each layout and, of several, all together
+        """
         raise NotImplementedError
 
 
@@ -137,14 +115,14 @@ class AtlasTechnique(Technique):
         """Whether the narrowest Gaussian is lit again in the picture instead of blurred."""
         return bool(profile.variance_mm2[0] <= _RELIT_MM2)
 
-    def split(self, profile: GaussianSum, white: bool) -> Split:
+    def split(self, profile: GaussianSum, white: bool) -> ProfileSplit:
         """What is lit again, and the Gaussians that blur."""
         profile = self.gaussians(profile)
-        weight = _weights(profile, white)
+        weight = channel_weights(profile, white)
         total = weight.sum(axis=0)
         if self.relights(profile):
-            return Split(weight[0], total, profile.variance_mm2[1:], weight[1:])
-        return Split(np.zeros(3), total, profile.variance_mm2, weight)
+            return ProfileSplit(weight[0], total, profile.variance_mm2[1:], weight[1:])
+        return ProfileSplit(np.zeros(3), total, profile.variance_mm2, weight)
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
         """Space for light and its blurred levels."""
@@ -155,60 +133,63 @@ class AtlasTechnique(Technique):
         mips = sum(0.25**halving for halving in range(MOST_HALVINGS + 1))
         return FORMAT_BYTES[FLOATS] * (levels + 2 * mips)  # where none is halved that could be
 
-    def chain(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[Split, tuple[int, ...]]:
-        """The split with weightless levels that lead to others, and which those are; here there are none."""
-        return split, ()
-
-    def halvings(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """How often the resolution of each level is halved, that of the unblurred one first."""
         most = len(atlas.sheets(edge)) - 1
         return halvings_of(split.blurred_mm2, atlas.usual_per_mm, most)
 
-    def scatter(self, graph: Graph, inputs: Inputs) -> Any:
+    def scatter(self, graph: Graph, inputs: Inputs) -> Texture:
         """Light each layout, let the light spread, blend two layouts."""
-        resources = inputs.resources
-        if not resources.scatters:
-            return resources.scattered
-        levels, layouts, mixture = resources.levels, inputs.layouts, resources.mixture
+        made = inputs.resources
+        levels, layouts, mixture = made.diffusion.levels, inputs.layouts, made.diffusion.mixture
+        if not inputs.blurs:
+            return made.scattered
         for number, (layout, blur) in enumerate(zip(layouts, inputs.blurs, strict=True)):
             into = levels.layer(0), levels.size, levels.texel, blur.scale, TEXEL_AREA
             graph.repeat(stretch.draw, layout.head, layout.atlas)
             if layout.walked:
                 graph.repeat(gutters.draw, layout.atlas, layout.walked.walks, layout.walked.head)
-            surface_texels.draw(graph, layout)
+            texels.draw(graph, layout)
             irradiance.draw(graph, layout, inputs.light_constants, *into)
             if layout.translucency:
-                graph.repeat(translucency_weights.draw, layout.translucency)
+                graph.repeat(translucency.draw_weights, layout.translucency)
                 if layout.translucency.slabs:
-                    translucency.draw_slants(graph, layout, inputs.light_constants)
+                    translucency.draw_slants(graph, layout, layout.translucency, inputs.light_constants)
             graph.repeat(self.fill, levels, layout.atlas, blur)
             leaves = mixture.sum(0) if mixture else layout.scattered
             graph.repeat(self.leave, levels, blur, layout.translucency, leaves)
             if mixture:
-                profile_mixture.share(graph, layout, mixture, number)
+                mix.share(graph, layout, mixture, number)
                 graph.repeat(self.mix, levels, blur, layout.atlas, mixture, number, layout.scattered)
         if len(layouts) > 1:
-            blend.draw(graph, layouts[0], layouts[1], resources.scattered)
-        return resources.scattered
+            blend.draw(graph, layouts[0], layouts[1], made.scattered)
+        return made.scattered
 
-    def fill(self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
+    def fill(self, graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
         """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""
         raise NotImplementedError
 
-    def leave(self, graph: Any, levels: Levels, blur: Blur, thin: Any, into: Any) -> None:
+    def leave(
+        self,
+        graph: Recorder,
+        levels: Levels,
+        blur: Blur,
+        thin: Translucency | None,
+        into: TextureOrView,
+    ) -> None:
         """Let the blurred light through thin parts, and add up what leaves."""
         through = translucency.draw(graph, levels, blur, thin) if thin else None
         combine.draw(graph, levels, blur, into, through, thin.lost if thin else None)
 
     def mix(
         self,
-        graph: Any,
+        graph: Recorder,
         levels: Levels,
         blur: Blur,
         atlas: AtlasTextures,
         mixture: Mixture,
         layout: int,
-        into: Any,
+        into: Texture,
     ) -> None:
         """Add to what leaves by the first profile what others make of it: half as receivers, half as givers.
 
@@ -217,16 +198,19 @@ class AtlasTechnique(Technique):
         for other, (given, weight) in enumerate(zip(mixture.given, blur.changes, strict=True)):
             change = replace(blur, weight=weight)
             combine.draw(graph, levels, change, mixture.sum(1 + 2 * other))
-            profile_mixture.give(graph, levels, mixture, layout, other)
+            mix.give(graph, levels, mixture, layout, other)
             self.fill(graph, given, atlas, blur)
             combine.draw(graph, given, change, mixture.sum(2 + 2 * other))
-        profile_mixture.draw(graph, mixture, layout, into)
+        mix.draw(graph, mixture, layout, into)
 
-    def leave_through(self, graph: Any, levels: Levels, blur: Blur, thin: Any, into: Any) -> None:
-        """Add up only what `leave` let through thin parts, by the same steps."""
-        alone = replace(blur, weight=np.zeros_like(blur.weight))
-        combine.draw(graph, levels, alone, into, thin.light, thin.lost)
-
-
-def _weights(profile: GaussianSum, white: bool) -> NDArray[np.float64]:
-    return profile.weight / profile.albedo if white else profile.weight
+    def leave_through(self, graph: Graph, inputs: Inputs, into: tuple[Texture, ...]) -> Texture:
+        """Add up only the light through thin parts, by the passes that add up the blurred light."""
+        layouts, levels = inputs.layouts, inputs.resources.diffusion.levels
+        for layout, blur, texture in zip(layouts, inputs.blurs, into, strict=False):
+            alone, thin = replace(blur, weight=np.zeros_like(blur.weight)), layout.translucency
+            assert thin is not None
+            combine.draw(graph, levels, alone, texture, thin.light, thin.lost)
+        if len(layouts) > 1:
+            first, second = (replace(one, scattered=into[k]) for k, one in enumerate(layouts))
+            blend.draw(graph, first, second, into[-1])
+        return into[-1]

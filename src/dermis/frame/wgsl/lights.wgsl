@@ -1,7 +1,7 @@
 // Lights of every kind: what arrives from each at a point.
 //#include "axes.wgsl"
-//#include "shadows.wgsl"
-//#include "soft_shadows.wgsl"
+//#include "shadows/shadows.wgsl"
+//#include "shadows/soft_shadows.wgsl"
 //#include <lights>
 
 override SHAPES: bool = false; // whether there are area lights

@@ -1,3 +1,4 @@
+// Light read from a level, filtered by the sampler or in the shader.
 //#if FILTERED_SOURCE
 // A level whose texels every GPU can filter.
 

@@ -1,3 +1,4 @@
+// Light stored to a level, in the format of its texture.
 //#if STORED_HALVES
 // Light stored as halves.
 //#include "halves.wgsl"

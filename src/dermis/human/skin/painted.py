@@ -13,6 +13,9 @@ from dermis.human.skin.colours import mean_colour
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.maps import Maps
 
+LEAST_SIDE, MOST_SIDE = 256, 4096
+"""Sides of painted maps [texels]."""
+
 
 @dataclass(frozen=True, repr=False)
 class PaintedMaps(Maps):

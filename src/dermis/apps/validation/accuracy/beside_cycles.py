@@ -19,13 +19,14 @@ from dermis.apps.validation.accuracy.person import sheet_bytes
 from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_figures, write_figures
 from dermis.atlas.build import build_atlas
 from dermis.base.console import print_lines
-from dermis.frame.painted import with_painted_maps
+from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.optics.profiles import load_profile
-from dermis.scene import PointLight, Scene, Settings, Skin, load_camera
+from dermis.scene import Scene, Settings, Skin, load_camera
 from dermis.scene.camera import PRESETS
+from dermis.scene.lights import PointLight
 from dermis.specular.two_lobe import NARROW, SHARE_OF_NARROW, WIDE
 
 HIGHLIGHTS, LOOKS = RESULTS / "highlights.json", RESULTS / "look.json"

@@ -16,15 +16,15 @@ from dermis.apps.validation.pages import data_file, print_tables, use_tests_fold
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.atlas.cached import cached_atlas
-from dermis.frame.atlas_textures import upload_atlas
-from dermis.frame.geometry import upload_geometry
-from dermis.frame.levels import Blur, Levels, halvings_of, make_levels, usual_texel
-from dermis.frame.passes import diffuse
-from dermis.frame.passes import stretch as stretched
-from dermis.frame.passes.shape import rest_shape
+from dermis.frame.features.atlas import stretch as stretched
+from dermis.frame.features.atlas.textures import upload_atlas
+from dermis.frame.features.diffusion import blur as diffuse
+from dermis.frame.features.diffusion.levels import Blur, Levels, halvings_of, make_levels
+from dermis.frame.features.shape.mesh import upload_geometry
+from dermis.frame.features.shape.shape import rest_shape, shape_tables
+from dermis.frame.programs import usual_texel
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import REMEDIES
-from dermis.frame.shape import shape_tables
 from dermis.gpu import CommandList, Device, download, open_device, upload
 from dermis.gpu.textures import half_store_rounding
 from dermis.mesh.head import Head
@@ -33,7 +33,8 @@ from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
-from dermis.scene import DirectionalLight, Light, Scene, Settings, Skin, StripeLight
+from dermis.scene import Scene, Settings, Skin
+from dermis.scene.lights import DirectionalLight, Light, StripeLight
 
 if TYPE_CHECKING:
     from atlas_reading import Points  # of the folder tests, as other names are that functions import

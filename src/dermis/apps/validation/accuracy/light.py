@@ -21,12 +21,13 @@ from dermis.environment.prefilter import (
     Prefiltered,
     prefilter,
 )
+from dermis.frame.features.occlusion.baked import DIRECTIONS, bake_occlusion
 from dermis.frame.lights.rectangle import facing_irradiance
-from dermis.frame.passes.occlusion import DIRECTIONS, bake_occlusion
 from dermis.frame.projection import frame_of
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import uv_sphere
-from dermis.scene import Environment, PointLight, RectangleLight, Scene, Settings, Skin, load_lights
+from dermis.scene import Environment, Scene, Settings, Skin, load_lights
+from dermis.scene.lights import PointLight, RectangleLight
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import Cosines
 from dermis.specular.kelemen import kelemen

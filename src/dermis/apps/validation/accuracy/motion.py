@@ -13,7 +13,7 @@ from dermis.apps.validation.accuracy import blur
 from dermis.apps.validation.pages import DOCS, data_file, fill_page, in_checkout, use_tests_folder
 from dermis.atlas.cached import cached_atlas
 from dermis.formats.maps import load_maps
-from dermis.frame.passes.occlusion import bake_occlusion
+from dermis.frame.features.occlusion.baked import bake_occlusion
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.human.expressions import expression

@@ -20,7 +20,8 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.optics.media import media
-from dermis.scene import DirectionalLight, Settings
+from dermis.scene import Settings
+from dermis.scene.lights import DirectionalLight
 from dermis.scene.techniques import TECHNIQUES
 
 PAGE = DOCS / "techniques.md"

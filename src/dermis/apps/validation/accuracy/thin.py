@@ -20,7 +20,8 @@ from dermis.mesh.primitives import wedge
 from dermis.optics.diffusion.models import through_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
-from dermis.scene import DirectionalLight, Scene, Settings, Skin
+from dermis.scene import Scene, Settings, Skin
+from dermis.scene.lights import DirectionalLight
 
 Array = NDArray[np.float64]
 Choice = Callable[[Array, Array], NDArray[np.bool_]]  # of places by their positions and normals

@@ -6,17 +6,17 @@ import statistics
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from dermis.base.errors import DermisError
-from dermis.frame.atlas_layout import Translucency
+from dermis.frame.features.diffusion.levels import Blur, Levels
+from dermis.frame.features.surface.texels import SURFACE_BYTES
+from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.inputs import Inputs
-from dermis.frame.levels import Blur, Levels
-from dermis.frame.passes.surface_texels import SURFACE_BYTES
 from dermis.frame.techniques.gpu_gems_3 import StretchedLevels
-from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture
+from dermis.gpu import CommandList, ComputeProgram, Device, Texture, download, make_texture
 from dermis.gpu.textures import FORMAT_BYTES, texel_bytes
 
 _MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
@@ -48,7 +48,7 @@ class Moved:
 def moved_by(device: Device, inputs: Inputs, vertices: int) -> Moved:
     """Counts after a frame was drawn."""
     texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
-    seen = np.count_nonzero(download(device, inputs.resources.picture.bytes)[..., 3])
+    seen = np.count_nonzero(download(device, inputs.resources.post.picture.bytes)[..., 3])
     maps, layers = inputs.resources.shadow_maps.texture, range(len(inputs.shadow_views.clips))
     shadowing = sum(int(np.count_nonzero(download(device, maps, layer=layer))) for layer in layers)
     return Moved(inputs, int(texels), int(seen), shadowing, vertices)
@@ -60,7 +60,7 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
     Where others are not needed, only texels with surface and pixels that show the head count. Repeated reads
     within a stage or a blur, scratch space between two passes, and tables that fit in caches do not count.
     """
-    inputs, picture = moved.inputs, moved.inputs.resources.picture
+    inputs, picture = moved.inputs, moved.inputs.resources.post.picture
     pixels, shadow = picture.size[0] * picture.size[1], inputs.resources.shadow_maps.texture
     samples = inputs.settings.samples * texel_bytes(inputs.resources.visibility.texture)
     geometry = _CORNERS * inputs.resources.head.triangles + _PLACE * moved.vertices
@@ -75,12 +75,12 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
     }
     if between := inputs.layouts[0].interreflection:
         found["interreflection"] = float(between.space.nbytes)
-    return (found | _scattering_bytes(moved, looked_up)) if inputs.resources.scatters else found
+    return (found | _scattering_bytes(moved, looked_up)) if inputs.blurs else found
 
 
 def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
     """Bytes of the stages that light the atlas and spread the light."""
-    inputs, texels, levels = moved.inputs, moved.texels, moved.inputs.resources.levels
+    inputs, texels, levels = moved.inputs, moved.texels, moved.inputs.resources.diffusion.levels
     blur = inputs.blurs[0]
     entered = texels * FORMAT_BYTES[levels.texel]
     blurred = [texels * FORMAT_BYTES[levels.texel] / 4**halved for halved in blur.halvings[1:]]
@@ -100,7 +100,7 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
 
     The passes of 2007 blur the stretch map along with the light instead.
     """
-    levels, finest, blur = inputs.resources.levels, inputs.layouts[0].atlas, inputs.blurs[0]
+    levels, finest, blur = inputs.resources.diffusion.levels, inputs.layouts[0].atlas, inputs.blurs[0]
     if isinstance(levels, StretchedLevels):
         stretch = texel_bytes(finest.resources["stretch_map"])
         return 2.0 * stretch * texels * len(blur.halvings[1:])
@@ -129,7 +129,7 @@ def _through(thin: Translucency, levels: Levels, blur: Blur) -> float:
 
 def _maps(inputs: Inputs, most: int) -> int:
     """Bytes of the head's maps that `most` points read, a texel each."""
-    textures = [inputs.lit[name] for name in _MAPS]
+    textures = [cast(Texture, inputs.lit[name]) for name in _MAPS]
     return sum(texel_bytes(one) * min(most, one.size[0] * one.size[1]) for one in textures)
 
 

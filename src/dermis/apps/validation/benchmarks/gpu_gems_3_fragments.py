@@ -7,21 +7,27 @@ from typing import Any
 
 import numpy as np
 
-from dermis.frame.atlas_layout import AtlasLayout
+from dermis.frame.features.atlas import stretch
+from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.diffusion.combine import nothing
+from dermis.frame.features.diffusion.levels import Blur, Halvings, Levels
+from dermis.frame.features.surface import texels as surface_texels
+from dermis.frame.features.translucency import passes as translucency
+from dermis.frame.features.translucency import passes as translucency_weights
 from dermis.frame.inputs import Inputs
-from dermis.frame.levels import FLOATS, HALVES, Blur, Halvings, Levels
-from dermis.frame.passes import (
-    registered,
-    shader_folders,
-    stretch,
-    suited,
-    surface_texels,
-    translucency,
-    translucency_weights,
-)
-from dermis.frame.passes.combine import nothing
+from dermis.frame.programs import FLOATS, HALVES, registered, shader_folders, suited
 from dermis.frame.techniques.gpu_gems_3 import GpuGems3, Pair, StretchedLevels
-from dermis.gpu import Constants, Device, FragmentProgram, Graph, compiled, make_texture
+from dermis.gpu import (
+    ComputeProgram,
+    Constants,
+    Device,
+    FragmentProgram,
+    Graph,
+    MutableBindings,
+    Recorder,
+    compiled,
+    make_texture,
+)
 from dermis.optics.gaussians import MOST_GAUSSIANS
 
 _FOLDER = Path(__file__).parent
@@ -48,28 +54,36 @@ class Fragments(GpuGems3):
         for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
             graph.repeat(stretch.draw, layout.head, layout.atlas)
             surface_texels.draw(graph, layout)
-            self._light(graph, layout, inputs.light_constants, made.levels.layer(0), blur.scale)
-            self.fill(graph, made.levels, layout.atlas, blur)
+            self._light(graph, layout, inputs.light_constants, made.diffusion.levels.layer(0), blur.scale)
+            self.fill(graph, made.diffusion.levels, layout.atlas, blur)
             thin = layout.translucency
             if thin:
-                translucency_weights.draw(graph, thin)
+                translucency_weights.draw_weights(graph, thin)
                 if thin.slabs:
-                    translucency.draw_slants(graph, layout, inputs.light_constants)
-            through = translucency.draw(graph, made.levels, blur, thin) if thin else None
-            self._add_up(graph, made.levels, blur, layout.scattered, through, thin.lost if thin else None)
+                    translucency.draw_slants(graph, layout, thin, inputs.light_constants)
+            through = translucency.draw(graph, made.diffusion.levels, blur, thin) if thin else None
+            self._add_up(
+                graph, made.diffusion.levels, blur, layout.scattered, through, thin.lost if thin else None
+            )
         return made.scattered
 
     def shader(self, device: Device, constants: Constants) -> FragmentProgram:
         """The pass along one axis."""
         return _program(device, "gpu_gems_3_fragment.wgsl", constants, [HALVES, HALVES])
 
-    def run(self, graph: Graph, shader: Any, bound: dict[str, Any], into: Pair, side: int) -> None:
-        """One pass that fills a texture of light and one of stretch."""
+    def run(
+        self,
+        graph: Recorder,
+        shader: ComputeProgram | FragmentProgram,
+        bound: MutableBindings,
+        into: Pair,
+        side: int,
+    ) -> None:
+        """Fill a texture of light and one of stretch."""
+        assert isinstance(graph, Graph) and isinstance(shader, FragmentProgram)
         graph.fill("diffuse", shader, bound, into)
 
-    def _light(
-        self, graph: Graph, layout: AtlasLayout, constants: Constants, into: Any, scale: float
-    ) -> None:
+    def _light(self, graph: Graph, layout: LitAtlas, constants: Constants, into: Any, scale: float) -> None:
         shader = _program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALVES])
         bound = {
             **layout.lit,

@@ -1,7 +1,7 @@
 // Light that enters the skin at each texel of the atlas, as irradiance.wgsl has it, as fragments of a render pass.
 //#include "covering.wgsl"
-//#include "lighting.wgsl"
-//#include "packed_surface.wgsl"
+//#include "irradiance/lighting.wgsl"
+//#include "surface/packed_surface.wgsl"
 
 struct Entering {
     scale: f32, // of what is stored over the light

@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from dermis.frame.passes import shader_folders
-from dermis.frame.surface import constants
+from dermis.frame.features.surface.record import surface_constants
+from dermis.frame.programs import shader_folders
 from dermis.gpu import CommandList, ComputeProgram, Device, make_texture
 from dermis.gpu.textures import texture_from
 from dermis.scene.skin import Skin
@@ -34,7 +34,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     on_cpu = device.adapter.kind == "CPU"
     side, lights = (_SIDE_ON_CPU, _LIGHTS_ON_CPU) if on_cpu else (_SIDE, _LIGHTS)
     skins = [Skin.model_validate({"specular": m, "fresnel": f}) for m in MODELS for f in FRESNEL]
-    overrides = [{"IDLE": 1}, *(dict(constants(skin)) for skin in skins)]
+    overrides = [{"IDLE": 1}, *(dict(surface_constants(skin)) for skin in skins)]
     programs = [
         ComputeProgram(device, _SHADER, shader_folders(), {"LIGHTS": lights, **one}) for one in overrides
     ]

@@ -1,5 +1,5 @@
 // What evaluating a lobe costs: each invocation is a point of a ball under many lights, seen from the front.
-//#include "lobe.wgsl"
+//#include "surface/lobe.wgsl"
 
 override LIGHTS: u32 = 16u; // for each point
 override IDLE: bool = false; // leave the lobe out: what remains is not its cost

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.person.traced import Paint
 from dermis.base.errors import refuse
-from dermis.frame.passes import program
-from dermis.frame.passes.painting import paint
+from dermis.frame.features.surface.painting import paint
+from dermis.frame.programs import program
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download, make_texture
 from dermis.human.skin.detail import TILE_MM, detail_heights_mm

@@ -1,5 +1,5 @@
 // Colours of an eye and of teeth as pictures, as the frame shades them.
-//#include "mouth.wgsl"
+//#include "shading/mouth.wgsl"
 
 const IRIS: u32 = 0u;
 const WHITE_OF_EYE: u32 = 1u; // 2 for upper teeth, 3 for lower ones

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from dermis.base.errors import refuse
 from dermis.base.version import version
 from dermis.frame.baking import Baked, bake
-from dermis.frame.painted import with_painted_maps
-from dermis.frame.passes.painting.paint import LEAST, MOST
+from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.renderer import Renderer
+from dermis.human.skin.painted import LEAST_SIDE, MOST_SIDE
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
 from dermis.images.io import encode_exr_parts
@@ -130,7 +130,7 @@ def baked_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) 
     """Return the maps of the skin in the scene's light, with its relief as heights where it has such."""
     baked = bake(renderer, scene, settings, side)
     painted = renderer.kept_open.run(
-        lambda: with_painted_maps(renderer.device, scene.head, min(max(side, LEAST), MOST))
+        lambda: with_painted_maps(renderer.device, scene.head, min(max(side, LEAST_SIDE), MOST_SIDE))
     )
     height = painted.maps.height
     if height is None:

@@ -10,7 +10,7 @@ from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Row, Rows, Target, value_of, with_values, write_files
 from dermis.apps.export.targets.maps.files import SIDES, NormalY, baked_maps, check_side, map_files
 from dermis.base.errors import refuse
-from dermis.frame.skin_profiles import SkinProfiles
+from dermis.frame.features.diffusion.profiles import SkinProfiles
 from dermis.optics.curve import Curve
 from dermis.optics.media import Floats
 from dermis.scene.settings import Settings

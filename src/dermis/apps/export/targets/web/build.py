@@ -13,9 +13,10 @@ from dermis.apps.export.targets.web.described import Named, described
 from dermis.apps.export.targets.web.dials import Dial, changes, node_inputs
 from dermis.apps.export.targets.web.maps import Pictured, picture_of, shorten, texels_of
 from dermis.apps.export.targets.web.packing import Packer
-from dermis.frame.inputs import Inputs, pinhole
+from dermis.frame.capture import FORMS, renderer_for, sparser, taken
+from dermis.frame.features.shading.view import pinhole
+from dermis.frame.inputs import Inputs
 from dermis.frame.renderer import Renderer
-from dermis.frame.taping import FORMS, renderer_for, sparser, taken
 from dermis.gpu.capture import FrameCapture
 from dermis.mesh.outline import Outline
 from dermis.scene.lights import SpotLight
@@ -138,7 +139,7 @@ def _form(made: Built, renderer: Renderer, asked: Asked, form: str) -> Json:
     base: Inputs | None = None
     for settings, fewer in asked.frames(form):
         inputs = renderer.prepare(asked.scene, settings)
-        base, picture = base or inputs, inputs.resources.picture
+        base, picture = base or inputs, inputs.resources.post.picture
         take = sparser(taken(tape, inputs), fewer)
         frames.append(Named(settings.technique, take, picture, settings.size, fewer))
         turned.append(_turned(made.packer, renderer, asked, settings, inputs, frames[-1]))

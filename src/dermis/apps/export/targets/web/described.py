@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dermis.apps.export.targets.web.packing import Packer
-from dermis.frame.passes.post import Picture
+from dermis.frame.features.post.picture import Picture
 from dermis.gpu.capture import CapturedFrame, CapturedPass, FrameCapture
 
 

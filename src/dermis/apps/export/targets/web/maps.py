@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.targets.web.described import bound
 from dermis.apps.export.targets.web.packing import stepped
+from dermis.frame.capture import halving, refill
 from dermis.frame.renderer import Renderer
-from dermis.frame.taping import halving, refill
 from dermis.gpu.capture import CapturedFrame, FrameCapture
 from dermis.images.filters import mip_chain
 from dermis.mesh.head import Head

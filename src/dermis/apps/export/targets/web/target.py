@@ -78,7 +78,7 @@ class Web(Target):
 
     @staticmethod
     def _profile(subject: Subject):  # type: ignore[no-untyped-def]
-        from dermis.frame.skin_profiles import SkinProfiles
+        from dermis.frame.features.diffusion.profiles import SkinProfiles
         from dermis.optics.profiles import load_profile
 
         scene = subject.scene

@@ -1,0 +1,23 @@
+// Empties what hairs hold back of each light, and where they are on its shadow map.
+//#include "shape/geometry.wgsl"
+//#include "surface/surface.wgsl"
+//#include "strand_window.wgsl"
+
+@group(0) @binding(31) var<storage, read_write> windows: array<u32>; // see strand_window.wgsl
+
+const LANES: u32 = 256u;
+
+// Of a word of a light.
+fn empty_word(word: u32) -> u32 {
+    if (word >= WINDOW_HEAD) {
+        return select(0u, NO_HAIR, (word - WINDOW_HEAD) % TEXEL_WORDS == 0u);
+    }
+    return select(0u, ~0u, word < 3u); // the high end below the low one
+}
+
+@compute @workgroup_size(LANES)
+fn main(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    for (var word = id.x; word < arrayLength(&windows); word += groups.x * LANES) {
+        windows[word] = empty_word(word % window_begin(1));
+    }
+}

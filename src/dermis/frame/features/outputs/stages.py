@@ -1,0 +1,113 @@
+"""The stages that make outputs, by the names of their shaders, and the passes that they declare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dermis.base.registry import Registry
+from dermis.frame.features.outputs import light
+from dermis.frame.features.outputs.labels import draw_labels
+from dermis.frame.features.outputs.landmarks import draw_landmarks
+from dermis.frame.features.outputs.planes import Planes, fill, stage_program
+from dermis.frame.features.outputs.resources import Resources
+from dermis.frame.features.outputs.seen import SeenFrame
+from dermis.frame.features.shading.view import rays_of
+from dermis.frame.features.shape import shape
+from dermis.frame.features.visibility.layers import draw_layers
+from dermis.frame.projection import MIDDLE, Views
+from dermis.gpu import Bindings, Graph, Texture
+
+Stage = Callable[[Graph, Planes, Resources, SeenFrame, Texture], None]
+_OF_THE_SURFACE = ("DETAIL",)  # pipeline constants of surface.wgsl
+
+
+def hair_labels(graph: Graph, made: Resources | None, seen: SeenFrame) -> Bindings | None:
+    """Return what the pass that draws hairs binds to label them too; None where no labels are requested."""
+    if not _labels_hairs(made, seen):
+        return None
+    assert made is not None and made.labels is not None
+    return made.labels.for_hairs(_draw_centres(graph, made, seen))
+
+
+def draw(graph: Graph, made: Resources | None, seen: SeenFrame) -> None:
+    """Declare the passes that fill the planes of all requested outputs."""
+    if made is None:
+        return
+    drawn = _labels_hairs(made, seen)
+    centres = (made.centres or seen.visibility).texture if drawn else _draw_centres(graph, made, seen)
+    for planes in made.planes:
+        STAGES[planes.stage](graph, planes, made, seen, centres)
+    if made.landmarks:
+        draw_landmarks(graph, made.landmarks, seen, centres)
+
+
+def _labels_hairs(made: Resources | None, seen: SeenFrame) -> bool:
+    return seen.hair and made is not None and made.labels is not None and made.labels.hair_classes is not None
+
+
+def _draw_centres(graph: Graph, made: Resources, seen: SeenFrame) -> Texture:
+    """Find the triangles at the pixels' centres, unless the picture's only sample lies there."""
+    if made.centres is None:
+        return seen.visibility.texture
+    draw_layers(graph, "outputs", made.centres, Views(seen.camera.clips, MIDDLE), seen.head)
+    return made.centres.texture
+
+
+def _geometry(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+    shader = stage_program(graph.device, planes)
+    fill(graph, planes, shader, seen.bound(shader, centres))
+
+
+def _surface(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+    constants = tuple(one for one in seen.constants if one[0] in _OF_THE_SURFACE)
+    shader = stage_program(graph.device, planes, constants)
+    fill(graph, planes, shader, seen.bound(shader, centres))
+
+
+def _motion(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+    previous, vertices = seen.previous, seen.shape.vertices
+    assert previous is not None
+    if previous.motion is not None:
+        assert made.previous is not None
+        shape.draw(graph, made.previous, previous.motion)
+        vertices = made.previous.vertices
+    shader = stage_program(graph.device, planes)
+    bound = seen.bound(shader, centres) | {
+        "before": shader.record("Before", rays=rays_of(shader, previous.view)),
+        "before_table": vertices["vertex_table"],
+        "before_buffer": vertices["vertex_buffer"],
+    }
+    fill(graph, planes, shader, bound)
+
+
+def _alpha(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+    fill(graph, planes, stage_program(graph.device, planes), {"exposed": seen.picture.exposed})
+
+
+def _label(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+    assert made.labels is not None
+    draw_labels(graph, planes, made.labels, seen, centres)
+
+
+def _of_light(draw: Callable[[Graph, Planes, light.LightSpace, SeenFrame, Texture], None]) -> Stage:
+    def stage(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+        draw(graph, planes, made.light, seen, centres)
+
+    return stage
+
+
+STAGES: Registry[Stage] = Registry(
+    "stage of outputs",
+    {
+        "geometry": _geometry,
+        "surface": _surface,
+        "motion": _motion,
+        "alpha": _alpha,
+        "light": _of_light(light.draw_light),
+        "visibility": _of_light(light.draw_visibility),
+        "pigments": _of_light(light.draw_pigments),
+        "thickness": _of_light(light.draw_thickness),
+        "label": _label,
+    },
+)
+"""By the names of their shaders, features/outputs/STAGE.wgsl."""

@@ -1,0 +1,6 @@
+"""The shape of a head on the device: control points, the surface that they span, its curvature."""
+
+from dermis.frame.features.shape.resources import Resources, make
+from dermis.frame.features.shape.shape import draw
+
+__all__ = ["Resources", "draw", "make"]

@@ -1,0 +1,112 @@
+// Colours of an eye: the white, and the iris as it is seen through the cornea.
+//#include "shape/eyeball.wgsl"
+
+//#fill const IRIS_AT: f32 = {iris_at}; // plane of the iris on the axis [mm]
+
+const EYE_ETA: f32 = 1.336; // of the cornea's front and what is behind, as one surface
+const IRIS_MM: f32 = 6.0; // radius
+const CONCAVE: f32 = 0.30; // light is gathered on the side of the iris opposite to it: slope at its rim
+// What a diffuse disc under the cornea shows of its colour: light that leaves water spreads over a wider cone, by the index
+// squared, and a lens of that curvature draws what arrives together on its way to the iris.
+const FOCUS_MM: f32 = EYE_ETA * CORNEA_MM / (EYE_ETA - 1.0); // behind the apex
+const DRAWN_TO: f32 = 1.0 - (CORNEA_AT + CORNEA_MM - IRIS_AT) / FOCUS_MM; // part of a beam's width
+const UNDER_WATER: f32 = 1.0 / (EYE_ETA * EYE_ETA * DRAWN_TO * DRAWN_TO);
+const LIMBUS_SOFT_MM: f32 = 0.55; // half of the width over which the white turns clear
+const AROUND: f32 = 1.0; // how far normals of the white, which scatters light over some mm, turn to its front
+// Artist's values, linear.
+const STROMA: vec3f = vec3f(0.20, 0.27, 0.33); // without pigment, which scatters blue
+const PIGMENT: vec3f = vec3f(0.085, 0.040, 0.018); // of eumelanin
+const WHITE: vec3f = vec3f(0.52, 0.465, 0.435);
+const VESSEL: vec3f = vec3f(0.62, 0.20, 0.17);
+
+struct Eye {
+    to_own: mat4x4f, // from the head's space to mm of a usual eye, z along its axis
+    material: u32,
+    eumelanin: f32,
+    pupil_mm: f32,
+    redness: f32,
+    seed: f32,
+    middle_mm: f32, // where on the axis the middle of the ball lies: 0 for one of usual size
+}
+
+// Random numbers at whole places of the plane, and smooth noise between them.
+fn eye_random(cell: vec2f, seed: f32) -> f32 {
+    return fract(sin(dot(cell, vec2f(127.1, 311.7)) + 17.3 * seed) * 43758.5453);
+}
+
+fn eye_noise(place: vec2f, seed: f32) -> f32 {
+    let cell = floor(place);
+    let t = (place - cell) * (place - cell) * (3.0 - 2.0 * (place - cell));
+    let near = mix(eye_random(cell, seed), eye_random(cell + vec2f(1.0, 0.0), seed), t.x);
+    let far = mix(eye_random(cell + vec2f(0.0, 1.0), seed), eye_random(cell + vec2f(1.0, 1.0), seed), t.x);
+    return mix(near, far, t.y);
+}
+
+// Noise around the axis, the same after a whole turn.
+fn around_axis(turn: f32, fibres: f32, radius: f32, along: f32, seed: f32) -> f32 {
+    let place = turn / 6.2831853 * fibres;
+    let back = place - fibres;
+    let share = smoothstep(0.75, 1.0, turn / 6.2831853);
+    return mix(eye_noise(vec2f(place, radius * along), seed), eye_noise(vec2f(back, radius * along), seed), share);
+}
+
+// Where the plane of the iris is seen through the cornea, from its axis [mm]: p, d of a point and the way of sight, own space.
+fn seen_on_iris(p: vec3f, d: vec3f) -> vec2f {
+    let n = normalize(p - vec3f(0.0, 0.0, CORNEA_AT));
+    let inside = refract(d, n, 1.0 / EYE_ETA);
+    let far = (IRIS_AT - p.z) / min(inside.z, -0.05);
+    return p.xy + max(far, 0.0) * inside.xy;
+}
+
+// Colour of the iris at a place of its plane: fibres of the stroma over a dark back, pigment among them.
+fn iris_colour(eye: Eye, q: vec2f) -> vec3f {
+    let r = length(q);
+    let turn = atan2(q.y, q.x) + 3.14159265;
+    let share = clamp((r - eye.pupil_mm) / (IRIS_MM - eye.pupil_mm), 0.0, 1.0);
+    let wave = 0.35 * (around_axis(turn, 9.0, r, 0.4, eye.seed + 3.0) - 0.5);
+    let fine = around_axis(turn, 110.0, share, 2.2, eye.seed);
+    let coarse = around_axis(turn, 38.0, share, 3.0, eye.seed + 1.0);
+    let crypts = smoothstep(0.62, 0.85, around_axis(turn, 17.0, share, 5.0, eye.seed + 2.0));
+    let fibres = 0.30 + 0.75 * fine * fine + 0.55 * coarse * coarse;
+    let collarette = exp(-pow((share - 0.30 - 0.25 * wave) / 0.10, 2.0));
+    let ruff = smoothstep(0.0, 0.06, share);
+    let rim = 1.0 - 0.85 * smoothstep(0.80, 1.0, r / IRIS_MM + 0.06 * wave);
+    let patches = around_axis(turn, 7.0, share, 1.6, eye.seed + 4.0);
+    // pigment lies around the pupil first
+    let inner = 1.2 * exp(-pow(share / 0.42, 2.0));
+    let pigment = eye.eumelanin * (0.55 + 0.9 * patches + inner) + 0.10 * inner;
+    let hidden = 1.0 - exp(-2.6 * pigment * max(eye.eumelanin, 0.15));
+    var colour = mix(STROMA * mix(1.0, 0.75, eye.eumelanin), PIGMENT * (1.0 + 2.2 * (1.0 - eye.eumelanin)), hidden);
+    colour *= fibres * (1.0 + 0.5 * collarette) * (1.0 - 0.45 * crypts * (1.0 - 0.5 * eye.eumelanin)) * rim;
+    let open = smoothstep(eye.pupil_mm - 0.06, eye.pupil_mm + 0.10, r + 0.12 * wave);
+    return mix(vec3f(0.0015), colour * mix(0.35, 1.0, ruff), open);
+}
+
+// Colour of the white at a place of the ball, with vessels towards its sides.
+fn white_colour(eye: Eye, p: vec3f) -> vec3f {
+    let off = length(p.xy);
+    let aside = smoothstep(6.5, 11.5, off);
+    let turn = atan2(p.y, p.x);
+    let bent = off + 1.3 * eye_noise(p.xy * 0.9, eye.seed + 7.0);
+    let line = abs(eye_noise(vec2f(turn * 7.0 + 0.35 * bent, bent * 0.5), eye.seed + 5.0) - 0.5);
+    let fine = abs(eye_noise(vec2f(turn * 16.0 - 0.3 * bent, bent * 0.9), eye.seed + 6.0) - 0.5);
+    let vessels = (1.0 - smoothstep(0.0, 0.035, line)) + 0.6 * (1.0 - smoothstep(0.0, 0.03, fine));
+    let red = eye.redness * (0.18 * aside + 0.55 * vessels * smoothstep(6.2, 9.0, off));
+    let yellow = mix(vec3f(1.0), vec3f(0.97, 0.90, 0.80), aside);
+    return mix(WHITE * yellow, VESSEL, clamp(red, 0.0, 0.8));
+}
+
+// Share of the surface at a place that is clear.
+fn clear_at(p: vec3f) -> f32 {
+    return (1.0 - smoothstep(LIMBUS_MM - LIMBUS_SOFT_MM, LIMBUS_MM + LIMBUS_SOFT_MM, length(p.xy))) * step(0.0, p.z);
+}
+
+// The same place of the iris or, beside it, of its edge.
+fn on_iris_at(q: vec2f) -> vec2f {
+    return q * min(1.0, IRIS_MM / max(length(q), 1e-3));
+}
+
+// The iris' normal at such a place as if it gathered light, which the cornea does.
+fn gathered_at(on_iris: vec2f) -> vec3f {
+    return normalize(vec3f(-CONCAVE * on_iris / IRIS_MM, 1.0));
+}

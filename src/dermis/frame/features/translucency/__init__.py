@@ -1,0 +1,1 @@
+"""Light through thin parts: ears, nostrils, lips, eyelids."""

@@ -1,0 +1,1 @@
+"""The search for translucent pairs of places, on the device."""

@@ -1,0 +1,41 @@
+// How much of the light that enters where sources lie passes deep slabs: over that of uniform light of which as much comes back.
+//#include "irradiance/lighting.wgsl"
+//#include "irradiance/texels_beside.wgsl"
+//#include "light_words.wgsl"
+//#include "translucent_source.wgsl"
+
+struct Slanted {
+    sources: u32,
+}
+
+@group(0) @binding(31) var<uniform> slanted: Slanted;
+@group(0) @binding(32) var<storage, read> source_points: array<Source>;
+@group(0) @binding(33) var<storage, read_write> slants: array<vec2u>; // as in light_words.wgsl
+
+const SIZE: u32 = 64u; // of a workgroup
+
+@compute @workgroup_size(SIZE)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) number: u32,
+) {
+    let index = (group.y * groups.x + group.x) * SIZE + number;
+    if (index >= slanted.sources) {
+        return;
+    }
+    let texel = vec2u(source_points[index].texel & 0xffffu, source_points[index].texel >> 16u);
+    let packed = packed_at(vec2i(texel));
+    var slant = vec3f(1.0); // where it is dark, light comes from around
+    if (packed.look.w != 0u) {
+        let surface = unpack_surface(packed);
+        var point = unpack_point(packed);
+        point.place = (vec2f(texel) + 0.5) / vec2f(textureDimensions(surfaces));
+        if (OBLIQUE) {
+            bend_here = bend_at(vec2i(texel), packed.place);
+        }
+        let lit = light_up(point, surface, surface.normal, open_at(point.place));
+        slant = select(slant, lit.across / max(lit.entered, vec3f(1e-20)), lit.entered > vec3f(0.0));
+    }
+    slants[index] = light_words(slant);
+}

@@ -1,1 +1,0 @@
-"""The search for translucent pairs, pass by pass."""
