@@ -7,7 +7,7 @@ from dermis.gpu.device import Device, open_device
 from dermis.gpu.graph import Graph
 from dermis.gpu.memo import Memo
 from dermis.gpu.program import ComputeProgram, Constants, FragmentProgram, RasterProgram, compiled
-from dermis.gpu.recorder import Recorder
+from dermis.gpu.recorder import DrawTarget, Recorder
 from dermis.gpu.textures import download, make_texture, texture_from, upload, view_of
 from dermis.gpu.types import (
     Bindable,
@@ -31,6 +31,7 @@ __all__ = [
     "ComputeProgram",
     "Constants",
     "Device",
+    "DrawTarget",
     "FragmentProgram",
     "Graph",
     "Memo",

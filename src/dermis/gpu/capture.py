@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from dermis.gpu.device import Device
 from dermis.gpu.graph import Graph
 from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram
-from dermis.gpu.recorder import Recorder
+from dermis.gpu.recorder import DrawTarget, Groups, Recorder
 from dermis.gpu.shader_types import Binding, record_type
 from dermis.gpu.textures import download
-from dermis.gpu.types import Bindings, Buffer, Record, TextureOrView, TextureView
+from dermis.gpu.types import Bindings, Buffer, Record, TextureOrView
 
 T = TypeVar("T")
 
@@ -130,7 +130,7 @@ class FrameCapture(Graph):
         stage: str,
         program: ComputeProgram,
         resources: Bindings,
-        groups: tuple[int, int, int],
+        groups: Groups,
         completes: str = "",
     ) -> None:
         """Take a pass down."""
@@ -148,18 +148,16 @@ class FrameCapture(Graph):
         program: RasterProgram,
         resources: Bindings,
         vertices: int,
+        target: DrawTarget,
         *,
         indices: Buffer | None = None,
         layer: int = 0,
-        depth: TextureView,
-        far: float,
-        target: TextureOrView | None = None,
     ) -> None:
-        """Take down a pass that rasterises."""
-        attached = {"indices": indices, "depth": depth, "target": target}
+        """Write down a pass that rasterises."""
+        attached = {"indices": indices, "depth": target.depth, "target": target.colour}
         numbers = {name: -1 if one is None else self.resource(one) for name, one in attached.items()}
         taken = self._pass(stage, program, resources, (vertices,))
-        taken.raster = {"layer": layer, "far": far, **numbers}
+        taken.raster = {"layer": layer, "far": target.far, **numbers}
 
     def fill(
         self, stage: str, program: FragmentProgram, resources: Bindings, targets: Sequence[TextureOrView]

@@ -12,8 +12,8 @@ from dermis.gpu.dependencies import Access
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
-from dermis.gpu.recorder import Recorder
-from dermis.gpu.types import Bindings, Buffer, Texture, TextureOrView, TextureView
+from dermis.gpu.recorder import DrawTarget, Groups, Recorder
+from dermis.gpu.types import Bindings, Buffer, Texture, TextureOrView
 from dermis.gpu.uniforms import Uniforms
 
 Timed = bool | Literal["whole"]
@@ -53,14 +53,14 @@ class CommandList(Recorder):
         stage: str,
         program: ComputeProgram,
         resources: Bindings,
-        groups: tuple[int, int, int],
+        groups: Groups,
         completes: str = "",
         access: Access | None = None,
     ) -> None:
-        """Run `program` for a number of workgroups along each axis.
+        """Add a pass, see `Recorder.dispatch`.
 
-        completes : of account where passes are declared, see `Recorder.dispatch`
-        access : of these resources, for who has it
+        completes : ignored, as all passes run
+        access : access of these resources, where it is known
         """
         key = stage, groups, program.places(resources, self._uniforms)
         known = access.steps if access else {}
@@ -114,26 +114,19 @@ class CommandList(Recorder):
         program: RasterProgram,
         resources: Bindings,
         vertices: int,
+        target: DrawTarget,
         *,
         indices: Buffer | None = None,
         layer: int = 0,
-        depth: TextureView,
-        far: float,
-        target: TextureOrView | None = None,
     ) -> None:
-        """Rasterise `vertices` / 3 triangles into cleared targets.
-
-        indices : buffer of the numbers of the vertices for the shader; None counts them
-        layer : the instance index that the shader sees
-        far : the depth that the attachment starts at
-        """
+        """Add a pass that rasterises, see `Recorder.draw`."""
         attached = {
-            "view": depth,
+            "view": target.depth,
             "depth_load_op": "clear",
             "depth_store_op": "store",
-            "depth_clear_value": far,
+            "depth_clear_value": target.far,
         }
-        targets = [target] if target is not None else []
+        targets = [] if target.colour is None else [target.colour]
         one = self._render_pass(stage, program, resources, targets, attached)
         if indices is None:
             one.draw(vertices, 1, 0, layer)
@@ -249,12 +242,10 @@ class Step(NamedTuple):
     bound: Any
     uniforms: int
     offsets: Any
-    groups: tuple[int, int, int]
+    groups: Groups
 
 
-def step_of(
-    stage: str, program: ComputeProgram, group: Any, offsets: Sequence[int], groups: tuple[int, int, int]
-) -> Step:
+def step_of(stage: str, program: ComputeProgram, group: Any, offsets: Sequence[int], groups: Groups) -> Step:
     """A dispatch of a bind group with the offsets of its uniforms."""
     # as the native library takes them, so that no frame needs to convert them
     kept = program.device.ffi.new("uint32_t[]", offsets)

@@ -12,14 +12,13 @@ from dermis.gpu.device import Device
 from dermis.gpu.listing import Listing, ListingRecorder
 from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram
 from dermis.gpu.readback import Fetched
-from dermis.gpu.recorder import Recorder
+from dermis.gpu.recorder import DrawTarget, Groups, Recorder
 from dermis.gpu.replay import Recordings
-from dermis.gpu.types import Bindings, Buffer, TextureOrView, TextureView
+from dermis.gpu.types import Bindings, Buffer, TextureOrView
 from dermis.gpu.uniforms import Uniforms
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-Groups = tuple[int, int, int]
 _MOST_KNOWN = 8  # kinds of frames in turn: pictures, their readback, and those of several views
 
 
@@ -38,7 +37,7 @@ class DeclaredPass:
 
 
 class Graph(Recorder):
-    """Declares the passes of each frame with the methods of `Frame`, and runs those that are stale.
+    """Declares the passes of each frame with the methods of `CommandList`, and runs those that are stale.
 
     A pass' reads and writes come from its shader's bindings. The version that it writes follows from its
     program, its resources and their versions, the workgroups, and the constants that the shader reads. A pass
@@ -72,7 +71,7 @@ class Graph(Recorder):
     def dispatch(
         self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
     ) -> None:
-        """Declare a pass of a number of workgroups along each axis; see `Recorder.dispatch`."""
+        """Declare a compute pass, see `Recorder.dispatch`."""
         access = program.access(resources)
         writes = access.writes
         if completes:
@@ -85,10 +84,7 @@ class Graph(Recorder):
         self._add(stage, program, resources, groups, access, writes, run)
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
-        """Declare that the host puts bytes into the start of a buffer, before all passes.
-
-        data : the same object in each frame costs nothing, as Python keeps the hash of bytes
-        """
+        """Declare what the host writes, see `Recorder.write`."""
         slot = slot_of(self.device, buffer)
 
         def run(frame: CommandList) -> None:
@@ -104,37 +100,26 @@ class Graph(Recorder):
         program: RasterProgram,
         resources: Bindings,
         vertices: int,
+        target: DrawTarget,
         *,
         indices: Buffer | None = None,
         layer: int = 0,
-        depth: TextureView,
-        far: float,
-        target: TextureOrView | None = None,
     ) -> None:
-        """Declare a pass that rasterises triangles into cleared targets, as `Frame.draw` does."""
-        writes = tuple(slot_of(self.device, one) for one in (depth, target) if one is not None)
+        """Declare a pass that rasterises, see `Recorder.draw`."""
+        attached = (target.depth, target.colour)
+        writes = tuple(slot_of(self.device, one) for one in attached if one is not None)
 
-        def run(frame: CommandList) -> None:
-            frame.draw(
-                stage,
-                program,
-                resources,
-                vertices,
-                indices=indices,
-                layer=layer,
-                depth=depth,
-                far=far,
-                target=target,
-            )
+        def run(commands: CommandList) -> None:
+            commands.draw(stage, program, resources, vertices, target, indices=indices, layer=layer)
 
         access = program.access(resources)
         taken = None if indices is None else slot_of(self.device, indices)
-        self._add(stage, program, resources, (vertices,), access, writes, run, (layer, far, taken))
+        self._add(stage, program, resources, (vertices,), access, writes, run, (layer, target.far, taken))
 
     def fill(
         self, stage: str, program: FragmentProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Declare a pass for each texel of its targets, as `Frame.fill` does."""
+        """Declare a pass that fills targets, see `Recorder.fill`."""
         writes = tuple(slot_of(self.device, one) for one in targets)
 
         def run(frame: CommandList) -> None:

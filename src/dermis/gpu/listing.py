@@ -8,7 +8,7 @@ from typing import Any
 
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, Program
-from dermis.gpu.recorder import Recorder
+from dermis.gpu.recorder import Groups, Recorder
 from dermis.gpu.types import Bindings
 
 
@@ -110,7 +110,7 @@ class ListingRecorder(Recorder):
         stage: str,
         program: ComputeProgram,
         resources: Bindings,
-        groups: tuple[int, int, int],
+        groups: Groups,
         completes: str = "",
     ) -> None:
         """Add a pass with its number of workgroups along each axis."""

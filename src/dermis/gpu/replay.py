@@ -15,7 +15,7 @@ from dermis.gpu.dependencies import Access, Slot, new_number, slot_of
 from dermis.gpu.device import Device
 from dermis.gpu.memo import is_value, same
 from dermis.gpu.program import ComputeProgram
-from dermis.gpu.recorder import Recorder
+from dermis.gpu.recorder import Groups, Recorder
 from dermis.gpu.types import Bindings
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
@@ -62,7 +62,7 @@ class Recording(Recorder):
         stage: str,
         program: ComputeProgram,
         resources: Bindings,
-        groups: tuple[int, int, int],
+        groups: Groups,
         completes: str = "",
     ) -> None:
         """Keep a pass, as `Graph.dispatch` declares one."""

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.features.shape.mesh import HeadResources, upload_bare
-from dermis.frame.features.visibility.layers import Drawer, Layers, draw_layers, make_layers
+from dermis.frame.features.visibility.layers import Layers, draw_layers, make_layers
 from dermis.frame.programs import TILE, each, program
 from dermis.frame.projection import MIDDLE, Views, frame_of
-from dermis.gpu import CommandList, Device, make_texture
+from dermis.gpu import CommandList, Device, Recorder, make_texture
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 from dermis.mesh.morph_targets import no_targets
@@ -172,7 +172,7 @@ def make_map(device: Device, resting: Any) -> tuple[Any, MovingOcclusion]:
 
 
 def draw(
-    graph: Drawer,
+    graph: Recorder,
     sky: Sky,
     look: Look,
     record: Any,
@@ -188,7 +188,7 @@ def draw(
             _draw_map(graph, sky, layout, follows)
 
 
-def _draw_map(graph: Drawer, sky: Sky, layout: LitAtlas, follows: MovingOcclusion) -> None:
+def _draw_map(graph: Recorder, sky: Sky, layout: LitAtlas, follows: MovingOcclusion) -> None:
     """Fill a layout's map; where its texels lie is found once."""
     moved = layout.lit["occlusion_map"]
     bound = {**layout.head.resources, "atlas": layout.atlas.resources["atlas"], "corners": follows.corners}
@@ -210,7 +210,7 @@ def sky_record(device: Device, look: Look, vertices: int) -> Any:
 
 
 def _draw_vertices(
-    graph: Drawer, sky: Sky, look: Look, record: Any, head: HeadResources, resting: bool = False
+    graph: Recorder, sky: Sky, look: Look, record: Any, head: HeadResources, resting: bool = False
 ) -> None:
     """Find the shares of a head as it is drawn now."""
     draw_layers(graph, "occlusion", sky.layers, look.views, sky.occluders.placed(head))

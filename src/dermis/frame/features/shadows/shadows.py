@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from dermis.frame.features.shape.mesh import HeadResources
-from dermis.frame.features.visibility.layers import Drawer, Layers, draw_layers, make_layers
+from dermis.frame.features.visibility.layers import Layers, draw_layers, make_layers
 from dermis.frame.programs import program
 from dermis.frame.projection import Views
-from dermis.gpu import Device, make_texture
+from dermis.gpu import Device, Recorder, make_texture
 from dermis.gpu.memory import check_memory
 
 SHADOW_BYTES = 4
@@ -43,7 +43,7 @@ def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
     return ShadowMaps(make_layers(device, (size, size), layers, triangles=False), bounds)
 
 
-def draw(graph: Drawer, maps: ShadowMaps, views: Views, head: HeadResources, bounded: bool = True) -> None:
+def draw(graph: Recorder, maps: ShadowMaps, views: Views, head: HeadResources, bounded: bool = True) -> None:
     """Draw the depth that each light sees.
 
     bounded : whether there are area lights, which read the bounds

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.programs import each, program
-from dermis.gpu import Bindings, CommandList, Device, Graph, Recorder, make_texture
+from dermis.gpu import Bindings, CommandList, Device, Recorder, make_texture
 from dermis.mesh.eyeball import Contact
 from dermis.mesh.geometry import MIN_UV_CROSS, vertex_normals
 from dermis.mesh.head import Head
@@ -246,7 +246,7 @@ class MotionBytes(NamedTuple):
         return MotionBytes(self.positions)
 
 
-def draw(graph: CommandList | Graph, shape: Shape, motion: MotionBytes) -> None:
+def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
     """Put the shape where the motion has it."""
     graph.write("shape", shape.rest, motion.positions)
     if motion.weights:

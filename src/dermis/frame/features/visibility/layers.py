@@ -19,10 +19,9 @@ from dermis.frame.programs import FEATURES, program, shader_folders, suited
 from dermis.frame.projection import Matrix, Views
 from dermis.gpu import (
     Buffer,
-    CommandList,
     Constants,
     Device,
-    Graph,
+    DrawTarget,
     RasterProgram,
     Recorder,
     Texture,
@@ -33,7 +32,6 @@ from dermis.gpu import (
 from dermis.gpu.program import Program
 from dermis.gpu.textures import view_of
 
-Drawer = CommandList | Graph
 _GROUPS = 2048  # workgroups that keep a GPU busy; where there are more triangles, each takes more of them
 _TAKEN = (8, 128)  # triangles of a workgroup of visibility_buffer.wgsl: fewest and most
 _RUN = 16  # of them in a row in the mesh, where they are many and small
@@ -80,7 +78,7 @@ def make_layers(
     return make(device, size, max(1, count), triangles)
 
 
-def draw_layers(graph: Drawer, stage: str, layers: Layers, views: Views, head: HeadResources) -> None:
+def draw_layers(graph: Recorder, stage: str, layers: Layers, views: Views, head: HeadResources) -> None:
     """Fill a layer for each sample of each view; depth 1 is near and 0 far."""
     if layers.nearness is not None:
         _draw_compute(graph, stage, layers, views, head)
@@ -88,7 +86,7 @@ def draw_layers(graph: Drawer, stage: str, layers: Layers, views: Views, head: H
         _draw_raster(graph, stage, layers, views.matrices(layers.size), head)
 
 
-def draw(graph: Drawer, visibility: Layers, views: Views, head: HeadResources) -> None:
+def draw(graph: Recorder, visibility: Layers, views: Views, head: HeadResources) -> None:
     """Find the triangle that each sample of the image sees [Burns2013]; shading happens later, in compute."""
     draw_layers(graph, "visibility", visibility, views, head)
 
@@ -161,12 +159,12 @@ def _recorded(layers: Layers, triangles: int, clips: Matrix) -> tuple[int, ...]:
     return (_BOTH,) if fine else (_DEPTH, _FOUND)
 
 
-def _draw_raster(graph: Drawer, stage: str, layers: Layers, clips: Matrix, head: HeadResources) -> None:
+def _draw_raster(graph: Recorder, stage: str, layers: Layers, clips: Matrix, head: HeadResources) -> None:
     shader = _raster_program(graph.device, layers.triangles)
     resources = {**head.resources, "views": _views(shader, layers, clips, head)}
     for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
-        indices, mesh = None if layers.triangles else head.indices, (shader, resources, 3 * head.triangles)
-        graph.draw(stage, *mesh, indices=indices, layer=layer, depth=depth, far=0.0, target=target)
+        indices, into = None if layers.triangles else head.indices, DrawTarget(depth, 0.0, target)
+        graph.draw(stage, shader, resources, 3 * head.triangles, into, indices=indices, layer=layer)
 
 
 def _raster_program(device: Device, triangles: bool) -> RasterProgram:
