@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 SIZE = {"width": 400, "height": 480}
-PATIENCE_S = 25.0
+PATIENCE_S = 120.0
 _QUIET = (
     "--no-sandbox",
     "--disable-gpu",
@@ -44,6 +44,7 @@ def visited(browser: Any, url: str, expected: str = "no error", **given: Any) ->
     """The page, showing something; an error in its console fails the test unless it was expected."""
     one = browser.new_page(**{"viewport": SIZE} | given)
     errors: list[str] = []
+    one.set_default_timeout(1000 * PATIENCE_S)
     one.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     one.on("pageerror", lambda error: errors.append(str(error)))
     listen(one)

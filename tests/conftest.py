@@ -14,40 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from rerun_modules import RERUN
 
 if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
 _UNSET = "DERMIS_DATA is not set"
-_BY_THE_CLOCK = [
-    "test_browser",
-    "test_browser_drags",
-    "test_browser_files",
-    "test_campaign",
-    "test_children",
-    "test_command_view",
-    "test_console",
-    "test_distributed",
-    "test_drawer",
-    "test_drivers",
-    "test_gpu_server",
-    "test_hostile_clients",
-    "test_hostile_pictures",
-    "test_interruption",
-    "test_lost_twice",
-    "test_opening",
-    "test_page",
-    "test_process_memory",
-    "test_served",
-    "test_streams",
-    "test_viewer_heads",
-    "test_web_pages",
-    "test_web_player",
-    "test_window",
-]
-"""Modules that watch other programs by the clock, and a busy machine may hold those up: what fails there is
-tried a second time, and the summary tells of it.
-"""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -59,7 +31,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        if item.path.stem in _BY_THE_CLOCK:
+        if item.path.stem in RERUN:
             item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=1))
 
 

@@ -13,7 +13,7 @@ from dermis.scene.settings import Settings
 
 ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
 _EDGE, _MOST_TURNS = 10.0, 20  # logical pixels; of the wheel
-_LONGEST_S = 60.0
+_LONGEST_S = 120.0
 SETTINGS = Settings(atlas=128, samples=2, shadow_size=256)
 
 

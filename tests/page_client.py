@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SIZE = 400, 300
-PATIENCE_S, _QUIET_S = 25.0, 0.7
+PATIENCE_S, _QUIET_S = 120.0, 0.7
 
 
 class Page:

@@ -102,7 +102,6 @@ def _placed(folder: Path, name: str, place: str) -> Path:
 
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("name", KINDS)
-@pytest.mark.timeout(10)
 def test_a_name_without_a_file_to_read_is_refused(tmp_path: Path, head: Head, name: str, place: str) -> None:
     path = _placed(tmp_path, name, place)
     with pytest.raises(DermisError, match=r"expected .*, but .*\."):
@@ -111,7 +110,6 @@ def test_a_name_without_a_file_to_read_is_refused(tmp_path: Path, head: Head, na
 
 @pytest.mark.parametrize("place", [place for place in PLACES if place != "name with NUL"])
 @pytest.mark.parametrize("part", NAMED)
-@pytest.mark.timeout(10)
 def test_likewise_where_a_scene_names_it(tmp_path: Path, part: str, place: str) -> None:
     write_head(tmp_path / "head.obj")
     named = _placed(tmp_path, "other.toml", place).name
@@ -128,7 +126,6 @@ def test_likewise_where_a_scene_names_it(tmp_path: Path, part: str, place: str) 
 
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 @pytest.mark.parametrize("name", KINDS)
-@pytest.mark.timeout(10)
 def test_a_text_that_cannot_be_taken_is_refused(tmp_path: Path, head: Head, name: str, text: bytes) -> None:
     (tmp_path / name).write_bytes(text)
     with pytest.raises(DermisError, match=rf"{re.escape(name)}.*expected ") as caught:

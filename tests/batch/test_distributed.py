@@ -26,7 +26,13 @@ pytestmark = pytest.mark.filterwarnings("ignore")  # dask's own
 def cluster() -> Iterator[Any]:
     """Two processes with a thread each, which is how a worker of ours wants them."""
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=None) as made:
+    import dask
+
+    slow = {"connect": "300s", "tcp": "300s"}  # of a busy machine
+    with (
+        dask.config.set({"distributed.comm.timeouts": slow, "distributed.scheduler.worker-ttl": None}),
+        distributed.LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=None) as made,
+    ):
         yield made
 
 

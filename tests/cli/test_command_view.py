@@ -96,10 +96,10 @@ def test_one_signal_ends_the_page(folder: Path, number: int, code: int) -> None:
     with child_process.start(command, stdout=pipe, stderr=pipe, text=True, env=environment) as served:
         try:
             assert served.stdout is not None
-            urllib.request.urlopen(served.stdout.readline().split()[0], timeout=60).close()
+            urllib.request.urlopen(served.stdout.readline().split()[0], timeout=120).close()
             assert list((folder / "temporary").iterdir())
             served.send_signal(number)
-            assert served.wait(timeout=60) == code
+            assert served.wait(timeout=120) == code
             assert not list((folder / "temporary").iterdir())
         finally:
             served.kill()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pty
 import subprocess
@@ -12,57 +13,65 @@ import pytest
 
 import dermis
 
-SLOW = """
-import sys, time
-from dermis.cli import console
+PREPARES = """
+import sys
+from types import SimpleNamespace
 from dermis.base.progress import preparing
+from dermis.cli import console
 
-console.TOLD_AFTER_S = 0.2
+now = 0.0
+console.time = SimpleNamespace(monotonic=lambda: now)
 with console.working_on("loading"):
-    with preparing("fitting the eyes"):
-        time.sleep(float(sys.argv[1]))
-    with preparing("reading the mesh"):
-        pass
-    time.sleep(0.3)
+    for step, seconds in (("fitting the eyes", float(sys.argv[1])), ("reading the mesh", 0.0)):
+        with preparing(step):
+            now += seconds
+            sys.stdin.readline()
 """
+TIMES = 5
 
 
-def told_on_a_terminal(seconds: float) -> str:
-    """What a program with a slow step writes to stderr, where that is a terminal."""
+def shown_on_a_terminal(seconds: float) -> list[str]:
+    """Return what a spinner shows TIMES during each of two steps.
+
+    seconds : that the first step has taken by the spinner's clock; the second has just begun
+    """
     master, slave = pty.openpty()
     environment = os.environ | {"TERM": "xterm", "COLUMNS": "100"}
-    process = subprocess.Popen(
-        [sys.executable, "-c", SLOW, str(seconds)], stdin=slave, stderr=slave, env=environment
-    )
-    os.close(slave)
-    found = b""
-    while True:
-        try:
-            part = os.read(master, 1 << 16)
-        except OSError:  # as Linux tells that the other end is closed
-            break
-        if not part:
-            break
-        found += part
+    command = [sys.executable, "-c", PREPARES, str(seconds)]
+    shown = []
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stderr=slave, env=environment, text=True
+    ) as process:
+        os.close(slave)
+        assert process.stdin is not None
+        for _ in range(2):
+            text = ""
+            while text.count("loading") < TIMES:
+                text += os.read(master, 1 << 16).decode(errors="replace")
+            shown.append(text)
+            process.stdin.write("\n")
+            process.stdin.flush()
+        with contextlib.suppress(OSError):  # as Linux tells that the other end is closed
+            while os.read(master, 1 << 16):
+                pass
     os.close(master)
-    assert process.wait(timeout=60) == 0
-    return found.decode()
+    assert process.returncode == 0
+    return shown
 
 
 def test_a_terminal_shows_what_takes_long() -> None:
-    text = told_on_a_terminal(1.0)
-    assert "loading: fitting the eyes (1 s)" in text
-    assert "reading the mesh" not in text
+    first, second = shown_on_a_terminal(3.0)
+    assert "loading: fitting the eyes (3 s)" in first
+    assert "reading the mesh" not in second
 
 
 def test_a_terminal_does_not_show_what_is_soon_done() -> None:
-    text = told_on_a_terminal(0.0)
-    assert "loading" in text
-    assert "fitting" not in text
+    assert not any("fitting" in text or "reading" in text for text in shown_on_a_terminal(1.0))
 
 
 def test_nothing_is_told_elsewhere() -> None:
-    made = subprocess.run([sys.executable, "-c", SLOW, "0.5"], capture_output=True, check=True, text=True)
+    command = [sys.executable, "-c", PREPARES, "3"]
+    made = subprocess.run(command, input="\n\n", capture_output=True, check=True, text=True)
     assert (made.stdout, made.stderr) == ("", "")
 
 

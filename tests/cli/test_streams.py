@@ -97,7 +97,7 @@ sys.stdout.write("done")
         os.close(slave)
         os.read(master, 1)  # the bar is there
         os.close(master)
-        assert ran.communicate("gone\n", timeout=60) == ("done", None)
+        assert ran.communicate("gone\n", timeout=120) == ("done", None)
     assert ran.returncode == 0
 
 
@@ -131,4 +131,4 @@ dermis.cli.main()
         assert ran.stdout is not None and ran.stderr is not None
         assert ran.stdout.read(1) == b"x"
         ran.terminate()
-        assert ran.wait(timeout=30) == 143 and ran.stderr.read() == b""
+        assert ran.wait(timeout=120) == 143 and ran.stderr.read() == b""

@@ -8,7 +8,7 @@ import json
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -101,8 +101,8 @@ def test_who_is_refused_is_told_the_same_and_hung_up_on(shown: Any) -> None:
         assert response.headers["Content-Security-Policy"] and b"token" not in response.read()
 
 
-def closes_within(one: socket.socket, seconds: float) -> bool:
-    one.settimeout(seconds)
+def closes(one: socket.socket) -> bool:
+    one.settimeout(PATIENCE_S)
     try:
         while one.recv(4096):
             pass
@@ -137,32 +137,60 @@ def test_headers_that_do_not_come_are_not_waited_for(
         slow = threading.Thread(target=dribble)
         slow.start()
         try:
-            assert closes_within(one, 3.0)
+            assert closes(one)
         finally:
             stop.set()
             slow.join()
 
 
-def test_a_page_may_be_silent(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "HEADERS_S", 0.2)
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The server's connections, as they are made."""
+    found, usual = list[Any](), connections.LimitedConnection.connection_made
+
+    def connection_made(one: Any, transport: Any) -> None:
+        usual(one, transport)
+        found.append(one)
+
+    monkeypatch.setattr(connections.LimitedConnection, "connection_made", connection_made)
+    return found
+
+
+def comes(reached: Callable[[], bool]) -> bool:
+    """Return whether something comes to be."""
+    end = time.monotonic() + PATIENCE_S
+    while not reached() and time.monotonic() < end:
+        time.sleep(0.01)
+    return reached()
+
+
+def test_a_page_may_be_silent(shown: Any, made: list[Any]) -> None:
+    with socket.create_connection(address(shown)):
+        assert comes(lambda: len(made) == 1 and made[0]._deadline is not None)
     with visit(shown) as one:
-        time.sleep(0.8)
+        assert len(made) == 2 and made[1]._deadline is None
         page = Page(one)
         page.show()
         page.still()
 
 
-def test_only_so_many_connections_are_open(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_so_many_connections_are_open(
+    shown: Any, made: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(connections, "MOST_CONNECTIONS", 3)
     with contextlib.ExitStack() as crowd:
         for _ in range(3):
             crowd.enter_context(socket.create_connection(address(shown)))
-        time.sleep(0.2)
+        assert comes(lambda: len(made) == 3)
         late = crowd.enter_context(socket.create_connection(address(shown)))
-        assert closes_within(late, 3.0)
-    time.sleep(0.2)
-    with answered(shown, "GET", "/") as response:
-        assert response.status == 200
+        assert closes(late)
+    assert comes(lambda: is_answered(shown))
+
+
+def is_answered(shown: Any) -> bool:
+    with contextlib.suppress(ConnectionError), answered(shown, "GET", "/") as response:
+        return response.status == 200
+    return False
 
 
 def test_only_so_many_pages_are_shown(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -174,9 +202,12 @@ def test_only_so_many_pages_are_shown(shown: Any, monkeypatch: pytest.MonkeyPatc
             crowd.enter_context(visit(shown))
         with pytest.raises(InvalidStatus):
             crowd.enter_context(visit(shown))
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
-        with contextlib.suppress(InvalidStatus), visit(shown) as one:
-            assert json.loads(one.recv(timeout=PATIENCE_S))["type"] in ("active", "ticket")
-            return
-    raise AssertionError("pages that leave are not forgotten")
+    assert comes(lambda: is_shown(shown))
+
+
+def is_shown(shown: Any) -> bool:
+    from websockets.exceptions import InvalidStatus
+
+    with contextlib.suppress(InvalidStatus), visit(shown) as one:
+        return json.loads(one.recv(timeout=PATIENCE_S))["type"] in ("active", "ticket")
+    return False

@@ -121,7 +121,7 @@ def test_the_command_ends_with_its_one_line(tmp_path: Path) -> None:
     broken = tmp_path / "broken.obj"
     broken.write_text("v 1 2\nf 1 2 3\n")
     with command(str(broken)) as ended:
-        out, errors = ended.communicate(timeout=60)
+        out, errors = ended.communicate(timeout=PATIENCE_S)
     assert ended.returncode == 2 and out.startswith("http://127.0.0.1:")
     assert errors.startswith("dermis: ") and "broken.obj" in errors and errors.count("\n") == 1
 
@@ -139,9 +139,9 @@ def test_a_signal_ends_it_while_it_prepares_and_leaves_nothing(
             url = served.stdout.readline().split()[0]
             (folder,) = tmp_path.iterdir()
             assert folder.stat().st_mode & 0o777 == 0o700
-            urllib.request.urlopen(url, timeout=60).close()
+            urllib.request.urlopen(url, timeout=PATIENCE_S).close()
             served.send_signal(number)
-            _, errors = served.communicate(timeout=60)
+            _, errors = served.communicate(timeout=PATIENCE_S)
             assert served.returncode == code and "Traceback" not in errors and list(tmp_path.iterdir()) == []
         finally:
             served.kill()

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from offscreen_input import InputDriver
+from page_client import PATIENCE_S
 from small_head import write_head
 
 from dermis.apps.viewer import heads
@@ -26,7 +27,7 @@ def gate(head: Head, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
     def slowly(name: str) -> Head:
         one.asked.append(name)
-        assert one.wait(20.0)
+        assert one.wait(PATIENCE_S)
         return Head(name, head.mesh, head.maps)
 
     monkeypatch.setattr(heads, "load_head", slowly)
@@ -35,7 +36,7 @@ def gate(head: Head, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
 
 def wait(driver: InputDriver) -> None:
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + PATIENCE_S
     while driver.viewer.session.heads.note and time.monotonic() < end:
         time.sleep(0.02)
         driver.frame()
@@ -98,7 +99,7 @@ def test_a_pose_stays_where_the_names_are_the_same(rigged: ViewerState, rigged_f
             write_head(rigged_file.with_name("bare.obj"))
         opening = Heads()
         opening.open(name)
-        end, found = time.monotonic() + 20.0, None
+        end, found = time.monotonic() + PATIENCE_S, None
         while found is None and time.monotonic() < end:
             found = opening.take(posed)
         assert found is not None and (found.scene.pose is not None) is kept

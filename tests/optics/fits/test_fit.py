@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import itertools
-import time
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
 from dermis.optics.fits import gaussian as fit_module
+from dermis.optics.fits import variable_projection
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 from dermis.optics.fits.targets import Points, Rings, ring_error
 from dermis.optics.gaussians import GaussianSum
@@ -220,20 +221,20 @@ def test_a_near_fit_of_another_size_is_left_aside(sample_folder: Path) -> None:
     assert np.allclose(fit_gaussians(target, 5, near=four.profile).error, fit_gaussians(target, 5).error)
 
 
-def test_fits_are_fast_enough_for_a_slider(sample_folder: Path) -> None:
-    target = stored_rgb(sample_folder, "dj3")
+def test_fits_take_few_steps(sample_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slider needs it; benchmarks/profiles.py measures the time."""
+    target, steps, project = stored_rgb(sample_folder, "dj3"), [0], variable_projection._project
+
+    def counted(*given: Any) -> variable_projection.Fit:
+        steps[0] += 1
+        return project(*given)
+
+    monkeypatch.setattr(variable_projection, "_project", counted)
     profile = fit_gaussians(target, 6).profile
-
-    def seconds(run: Callable[[], GaussianFit]) -> float:
-        took = []
-        for _ in range(3):
-            start = time.process_time()
-            run()
-            took.append(time.process_time() - start)
-        return min(took)
-
-    assert seconds(lambda: fit_gaussians(target, 6)) < 0.25
-    assert seconds(lambda: fit_gaussians(target, 6, near=profile)) < 0.02
+    assert 0 < steps[0] < 200
+    steps[0] = 0
+    fit_gaussians(target, 6, near=profile)
+    assert 0 < steps[0] < 10
 
 
 def test_size_and_strength_scale_out() -> None:

@@ -1,0 +1,36 @@
+"""A worker that begins no other shard while there is a whole one, until a file says that it may."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from dermis.apps.batch import worker_pool
+from dermis.apps.batch.worker import Worker
+
+GATE = "HELD_UNTIL"
+"""Variable: the file."""
+
+
+def serve(pipe: Any, slot: Any, work: Any) -> None:
+    """Serve as a worker does, but hold."""
+    gate, usual = Path(os.environ[GATE]), Worker.draw
+
+    def draw(worker: Worker, *given: Any) -> Any:
+        while any(work.out.glob("shard-*.tar")) and not gate.exists():
+            time.sleep(0.01)
+        return usual(worker, *given)
+
+    with patch.object(Worker, "draw", draw):
+        worker_pool.serve(pipe, slot, work)
+
+
+def main() -> None:
+    """Run the command with such workers."""
+    from dermis.cli import main as command
+
+    with patch.object(worker_pool, "serve", serve):
+        command()
