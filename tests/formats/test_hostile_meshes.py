@@ -204,7 +204,7 @@ def test_scenes_of_more_than_a_head_are_refused(
 
 def test_nodes_of_one_name_take_no_time(tmp_path: Path) -> None:
     file, node = square()
-    file.tree["nodes"] += [{"name": "a"} for _ in range(100_000)]
+    file.tree["nodes"] += [{"name": "a"} for _ in range(60_000)]
     load_mesh(file.write(tmp_path / "a.glb", node))
 
 
