@@ -18,7 +18,7 @@ from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import export_skin, judged
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.unity import asset_text
+from dermis.apps.export.targets.unity import Unity, asset_text
 from dermis.base.errors import DermisError
 
 LOBES = ["unity", "unreal", "renderman"]
@@ -168,3 +168,15 @@ def test_what_is_written_names_the_file_and_not_its_folder(tmp_path: Path) -> No
     files = export_skin(subject_of(file), "unity", tmp_path / "out").files
     assert subject_of(file).name == "mine.toml"
     assert all(str(tmp_path).encode() not in path.read_bytes() for path in files)
+
+
+def test_a_target_of_another_package(tmp_path: Path) -> None:
+    class Toy(Unity):
+        name = "toy"
+        title = "Toy"
+
+    with TARGETS.including("toy", Toy()):
+        report = export_skin("skin1", "toy", tmp_path / "skin.asset")
+    assert report.files[0].name == "skin.asset" and report.files[0].exists()
+    with pytest.raises(DermisError, match=r"target: expected one of arnold, .*'toy' came"):
+        export_skin("skin1", "toy", tmp_path / "again.asset")

@@ -1,0 +1,30 @@
+"""What CONTRIBUTING.md says of packages and files is so."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("head", "container"), [("floor", "dermis"), ("floor of `apps`", "dermis.apps")])
+def test_floors_are_those_of_the_import_linter(head: str, container: str) -> None:
+    rows = TEXT.partition(f"| {head} | what it holds |\n|---|---|\n")[2].partition("\n\n")[0].splitlines()
+    told = [set(re.findall(r"`(\w+)`", row.split("|")[1])) for row in rows]
+    document = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = document["tool"]["importlinter"]["contracts"]
+    (layers,) = (one["layers"] for one in contracts if one.get("containers") == [container])
+    assert told == [{name.strip() for name in layer.split("|")} for layer in layers]
+
+
+def test_files_of_the_recipes_exist() -> None:
+    named = {path for path in re.findall(r"`([\w./]+/[\w.]+\.\w+)`", TEXT) if not re.search("[A-Z]{4}", path)}
+    assert len(named) > 30
+    places = ROOT, ROOT / "src" / "dermis"
+    missing = sorted(path for path in named if not any((place / path).exists() for place in places))
+    assert missing == []
