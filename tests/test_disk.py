@@ -367,7 +367,7 @@ def test_two_processes_at_once_leave_whole_files(tmp_path: Path) -> None:
     code = """
 import sys
 import numpy as np
-from dermis import disk
+from dermis.base import disk
 from dermis.base.private import cache_folder
 for k in range(60):
     for name in "ab":

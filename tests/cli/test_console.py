@@ -17,7 +17,7 @@ PREPARES = """
 import sys
 from types import SimpleNamespace
 from dermis.base.progress import preparing
-from dermis.cli import console
+from dermis.base import console
 
 now = 0.0
 console.time = SimpleNamespace(monotonic=lambda: now)

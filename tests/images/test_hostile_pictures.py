@@ -93,9 +93,9 @@ def peak_of(path: Path, call: str) -> float:
     """By how many times the result's bytes the memory grew at its highest while a child made it."""
     code = f"""
 import resource, sys
-from dermis.images import codecs, colour, exr, radiance
+from dermis.images import codecs, colour, hdr
 from dermis.images.io import read_image
-from dermis.mesh.maps import load_maps
+from dermis.formats.maps import load_maps
 import OpenEXR, PIL.Image, PIL.PngImagePlugin
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 kept = {call}
