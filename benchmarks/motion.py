@@ -18,9 +18,8 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from dermis.apps.validation.benchmarks.cases import Case, scenes_of, settings_of
+from dermis.apps.validation.benchmarks.cases import Case, pose_at, rigged, scenes_of, settings_of
 from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, row_ms, stage_ms
-from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
 from dermis.base.atomic_write import check_output, replacing
 from dermis.base.command_line import run_script
 from dermis.base.console import print_json

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
+from dermis.apps.validation.benchmarks.cases import pose_at, rigged
 from dermis.apps.viewer.navigation import drag_light, orbit
 from dermis.apps.viewer.pace import Pace
 from dermis.apps.viewer.state import ViewerState, changed

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import dermis
-from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
+from dermis.apps.validation.benchmarks.cases import pose_at, rigged
 from dermis.base.command_line import run_script
 from dermis.formats.samples import cached
 from dermis.gpu.listing import ListedPass, Listing

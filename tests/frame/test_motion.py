@@ -14,7 +14,7 @@ from test_shape import anew, bent, words
 from tolerances import FLAT, HARMONIC, POSED
 
 from dermis import Pose
-from dermis.apps.validation.benchmarks.rigged import pose_at, rigged
+from dermis.apps.validation.benchmarks.cases import pose_at, rigged
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.features.atlas import stretch

@@ -12,7 +12,7 @@ import pytest
 HERE = Path(__file__).parent
 FRAME = ("dermis.frame.renderer", "dermis.scene.outputs", "dermis.frame.programs")
 EXPORT = ("dermis.apps.export.run", "dermis.apps.export.targets.pbrt.target")
-REFERENCE = ("dermis.apps.truths.lights", "dermis.apps.truths.cycles_scene")
+REFERENCE = ("dermis.apps.truths.lights", "dermis.apps.truths.cycles")
 CLI = (
     "dermis.cli",
     "dermis.cli.cite",

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.truths.slab import ScatteringLayer
-from dermis.apps.truths.slab_mc import trace_slab
+from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.optics.directions import directional_albedo, refracted
 from dermis.optics.slabs import doubled_slabs, slabs
 

@@ -7,8 +7,7 @@ import pytest
 from tolerances import FORWARD_AMOUNT, FORWARD_CONTINUOUS
 from walk import fresnel, returned
 
-from dermis.apps.truths.slab import ScatteringLayer
-from dermis.apps.truths.slab_mc import trace_slab
+from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.optics.directions import ROWS, Directions, directional_albedo, directions, mean_of_once
 from dermis.optics.forward import forward_directions
 from dermis.optics.media import media

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from lit_balls import BALL, LIGHTS, ball_scene
 
-from dermis.apps.truths.cycles import PYTHON_VARIABLE, Method, cycles_passes, cycles_render
-from dermis.apps.truths.cycles_scene import Coated, describe
+from dermis.apps.truths.cycles import PYTHON_VARIABLE, Coated, Method, cycles_passes, cycles_render, describe
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.path_traced import Lambertian, path_trace
 from dermis.base.errors import DermisError

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from painted_ball import ball, paint
 
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mesh_shape, sensor_of, variant_of
-from dermis.apps.truths.person import eyes
+from dermis.apps.truths.person import shapes as eyes
 from dermis.apps.truths.person.subject import Person
 from dermis.mesh.eye_look import LIMITS
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
@@ -70,8 +70,8 @@ def by_snell(places: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[
     """(n, n, 2) where refracted rays meet the plane of the iris [mm]."""
     n = (places - [0.0, 0.0, cornea_centre_mm()]) / CORNEA_MM
     cosine = -(ways * n).sum(axis=-1, keepdims=True)
-    inner = np.sqrt(1.0 - (1.0 - cosine**2) / eyes.INDEX**2)
-    bent = ways / eyes.INDEX + (cosine / eyes.INDEX - inner) * n
+    inner = np.sqrt(1.0 - (1.0 - cosine**2) / eyes.CORNEA_INDEX**2)
+    bent = ways / eyes.CORNEA_INDEX + (cosine / eyes.CORNEA_INDEX - inner) * n
     far = (iris_mm() - places[..., 2:]) / bent[..., 2:]
     return np.asarray((places + far * bent)[..., :2])
 

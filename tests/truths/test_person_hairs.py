@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
-from dermis.apps.truths.person.hairs import COLOURS, control_points, groups, hair_shapes, write_curves
+from dermis.apps.truths.person.shapes import COLOURS, control_points, groups, hair_shapes, write_curves
 from dermis.apps.truths.person.subject import Hairs
 from dermis.specular.hair import fibre, scattered
 

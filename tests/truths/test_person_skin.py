@@ -12,11 +12,11 @@ from painted_ball import ball, scene
 
 from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
 from dermis.apps.truths.mitsuba_scene import lit_scene, load_mitsuba, mesh_shape, variant_of
-from dermis.apps.truths.person import medium, skin
+from dermis.apps.truths.person import medium
+from dermis.apps.truths.person import shapes as skin
 from dermis.apps.truths.person.medium import PASSED, colours_in, mean_free_paths, single_albedo
 from dermis.apps.truths.person.traced import person_scene
-from dermis.apps.truths.slab import ScatteringLayer
-from dermis.apps.truths.slab_mc import trace_slab
+from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.scene.lights import RectangleLight
 
 pytest.importorskip("mitsuba")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.apps.truths.surface_diffusion import vertex_areas, welded
-from dermis.apps.truths.surface_diffusion_operators import delaunay, intrinsic, mass_and_stiffness
+from dermis.apps.truths.surface_diffusion import delaunay, intrinsic, mass_and_stiffness, vertex_areas, welded
 from dermis.mesh.primitives import plane
 
 Floats = NDArray[np.float64]

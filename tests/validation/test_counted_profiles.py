@@ -7,9 +7,8 @@ import pytest
 from tolerances import COUNTED_TOTAL
 
 from dermis.apps.truths.half_space import directional_albedo
-from dermis.apps.validation.comparisons import profile_models
-from dermis.apps.validation.comparisons.profile_models import ModelName
-from dermis.apps.validation.comparisons.scenes import medium_scene
+from dermis.apps.validation.comparisons import scenes as profile_models
+from dermis.apps.validation.comparisons.scenes import ModelName, medium_scene
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

@@ -11,10 +11,18 @@ import pytest
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.truths.person import medium
 from dermis.apps.truths.person.traced import Paint
-from dermis.apps.validation.comparisons.person import Pair, compare_person, drawn, pair_of
-from dermis.apps.validation.comparisons.person_iris import iris_of
+from dermis.apps.validation.comparisons.person import (
+    EYE_MM,
+    VIEWS,
+    Pair,
+    compare_person,
+    drawn,
+    iris_of,
+    pair_of,
+    scene_of,
+    softbox,
+)
 from dermis.apps.validation.comparisons.person_paint import paint_of
-from dermis.apps.validation.comparisons.person_views import EYE_MM, VIEWS, scene_of, softbox
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human

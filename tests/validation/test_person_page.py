@@ -11,8 +11,7 @@ from PIL import Image
 
 from dermis.apps.truths.metrics import Estimate
 from dermis.apps.validation.accuracy import person as page
-from dermis.apps.validation.comparisons.person import Pair
-from dermis.apps.validation.comparisons.person_views import VIEWS
+from dermis.apps.validation.comparisons.person import VIEWS, Pair
 
 ROOT = Path(__file__).parents[2]
 ONE = Estimate(1.0, 0.01)

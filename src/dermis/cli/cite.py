@@ -65,7 +65,7 @@ def cite(
 
 
 def _of_comparison(against: str, technique: str | None) -> tuple[str, ...]:
-    from dermis.apps.validation.comparisons.sources import comparison_sources
+    from dermis.apps.validation.comparisons.compare import comparison_sources
     from dermis.scene.techniques import TECHNIQUES
 
     return comparison_sources(against, [technique] if technique else TECHNIQUES)

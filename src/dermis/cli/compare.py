@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dermis.apps.validation.comparisons.profile_models import ModelName
+from dermis.apps.validation.comparisons.scenes import ModelName
 from dermis.base.console import print_json, print_lines, working_on
 from dermis.base.errors import refuse
 from dermis.cli.eye_options import note_eyes

@@ -1,10 +1,67 @@
-"""Monte Carlo: light across the border of two half-spaces side by side, with no diffusion approximation."""
+"""Monte Carlo: light across the border of two half-spaces side by side, compiled by numba.
+
+The left medium fills x < 0, the right one x > 0, both z > 0; all scatter isotropically.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from dermis.optics.media import Floats
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.truths.photon import MAX_EVENTS, Words, deflect, refract, uniform
+from dermis.base.compiled import compiled
+
+Floats = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+
+@compiled
+def _walk(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: Words) -> float:
+    """Where a photon leaves that entered straight down at x [mm]; NaN for one that is absorbed."""
+    z = ux = uy = 0.0
+    uz = 1.0
+    medium = 0 if x < 0.0 else 1
+    depth = -math.log(uniform(rng))  # optical, to the next scattering
+    for _ in range(MAX_EVENTS):
+        path = depth / sigma_t[medium]
+        to_face = -z / uz if uz < 0.0 else math.inf
+        to_side = -x / ux if (ux > 0.0 if medium == 0 else ux < 0.0) else math.inf
+        if to_side < min(path, to_face):
+            x, z = 0.0, z + to_side * uz
+            depth -= to_side * sigma_t[medium]
+            medium = 1 - medium
+        elif to_face < path:
+            x, z = x + to_face * ux, 0.0
+            depth -= to_face * sigma_t[medium]
+            if uniform(rng) >= refract(-uz, eta)[0]:
+                return x
+            uz = -uz
+        else:
+            x, z = x + path * ux, z + path * uz
+            if uniform(rng) > albedo[medium]:
+                return math.nan
+            ux, uy, uz = deflect(ux, uy, uz, 0.0, rng)
+            depth = -math.log(uniform(rng))
+    return math.nan
+
+
+@compiled
+def count_crossings(
+    photons: int, sigma_t: Floats, albedo: Floats, eta: float, edges_mm: Floats, rng: Words, tally: Counts
+) -> None:
+    """Add to tally (n, n) where photons leave, by bins of where they enter and leave; as many into each.
+
+    edges_mm : (n + 1,) evenly spaced
+    """
+    bins = len(edges_mm) - 1
+    width = (edges_mm[-1] - edges_mm[0]) / bins
+    for start in range(bins):
+        for _ in range(photons):
+            end = _walk(edges_mm[0] + (start + uniform(rng)) * width, sigma_t, albedo, eta, rng)
+            if edges_mm[0] <= end < edges_mm[-1]:
+                tally[start, int((end - edges_mm[0]) / width)] += 1
 
 
 def exchange(
@@ -20,8 +77,6 @@ def exchange(
 
     Source: [Wang1995], with a second medium.
     """
-    from dermis.apps.truths.half_planes import count_crossings
-
     sigma_t = np.asarray(sigma_a, np.float64) + sigma_s_prime
     tally = np.zeros((len(edges_mm) - 1,) * 2, np.int64)
     rng = np.random.SeedSequence(seed).generate_state(4, np.uint64).astype(np.uint64)

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.apps.truths.described import rgb
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.person.subject import Person
-from dermis.apps.truths.slab import ScatteringLayer
-from dermis.apps.truths.slab_mc import trace_slab
+from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.mesh.geometry import triangle_areas
 from dermis.optics.media import SKIN_ETA
 from dermis.scene.camera import Camera

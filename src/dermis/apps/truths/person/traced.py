@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.described import rgb
-from dermis.apps.truths.mitsuba_passes import Passes, digest_surroundings, kept_passes
 from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     lit_scene,
@@ -20,17 +19,18 @@ from dermis.apps.truths.mitsuba_scene import (
 )
 from dermis.apps.truths.path_traced import (
     SAMPLES_PER_PASS,
+    Passes,
     PathTraced,
     Report,
     Variant,
     add_passes,
+    digest_surroundings,
+    kept_passes,
     passes_for,
     traced,
 )
-from dermis.apps.truths.person.eyes import eye_shapes
-from dermis.apps.truths.person.hairs import hair_shapes
 from dermis.apps.truths.person.medium import PASSED, VOXELS, mean_free_paths, medium_of
-from dermis.apps.truths.person.skin import picture, skin_shapes
+from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, picture, skin_shapes
 from dermis.apps.truths.person.subject import Paint as Paint
 from dermis.apps.truths.person.subject import Person, person_of
 from dermis.scene.model import Scene

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 import dermis
-from dermis.apps.truths.cycles import cycles_passes
-from dermis.apps.truths.cycles_scene import Coated, Facets
+from dermis.apps.truths.cycles import Coated, Facets, cycles_passes
 from dermis.apps.validation.accuracy.person import sheet_bytes
 from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_figures, write_figures
 from dermis.atlas.build import build_atlas

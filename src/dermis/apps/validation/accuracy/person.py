@@ -13,10 +13,8 @@ from dermis.apps.gallery.picture import sheet
 from dermis.apps.gallery.run import encode_webp
 from dermis.apps.gallery.script import Panels
 from dermis.apps.truths.metrics import Estimate
-from dermis.apps.validation.comparisons.person import Pair, compare_person
-from dermis.apps.validation.comparisons.person_iris import iris_of
+from dermis.apps.validation.comparisons.person import EYE_MM, VIEWS, Pair, compare_person, iris_of, scene_of
 from dermis.apps.validation.comparisons.person_paint import paint_of
-from dermis.apps.validation.comparisons.person_views import EYE_MM, VIEWS, scene_of
 from dermis.apps.validation.pages import DOCS, fill_page, in_checkout
 from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import dermis
-from dermis.apps.truths.slab import ScatteringLayer
-from dermis.apps.truths.slab_mc import trace_slab
+from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.apps.validation.accuracy.thin import scattered
 from dermis.apps.validation.pages import print_tables
 from dermis.mesh.primitives import wedge

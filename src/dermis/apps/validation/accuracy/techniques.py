@@ -10,9 +10,8 @@ from dermis.apps.truths.half_space import directional_albedo
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.validation.accuracy import blur, half_space, texture_space
 from dermis.apps.validation.comparisons.compare import Comparison, Row, compare
-from dermis.apps.validation.comparisons.profile_models import ModelName
 from dermis.apps.validation.comparisons.report import cells
-from dermis.apps.validation.comparisons.scenes import comparison_scene, usual_region
+from dermis.apps.validation.comparisons.scenes import ModelName, comparison_scene, usual_region
 from dermis.apps.validation.comparisons.truths import Truth
 from dermis.apps.validation.pages import DOCS, fill_page, in_checkout, use_tests_folder
 from dermis.frame.surface_points import irradiance_at, surface_points

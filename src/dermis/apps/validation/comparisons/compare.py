@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.comparisons.profile_models import ModelName
-from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, medium_scene
+from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, ModelName, medium_scene
 from dermis.apps.validation.comparisons.truths import TRUTHS, Subject, Truth, check_seen
 from dermis.base.errors import refuse
 from dermis.frame.renderer import Renderer
@@ -20,6 +19,7 @@ from dermis.mesh.head import Head
 from dermis.optics.media import media
 from dermis.scene.settings import Settings
 from dermis.scene.skin import DirectionName, Skin
+from dermis.scene.sources import scattering_sources
 
 Floats = NDArray[np.float64]
 _SHOWN_PERCENTILE = 99.0
@@ -173,3 +173,23 @@ def _flip(image: Floats, truth: Floats, mask: NDArray[np.bool_]) -> float | None
     from dermis.apps.truths.metrics import flip
 
     return flip(image, truth, mask).mean if find_spec("flip_evaluator") else None
+
+
+_TRUTHS = {
+    "surface-integral": ("JensenBuhler2002", "Turk1992"),
+    "heat": ("PinkallPolthier1993", "BobenkoSpringborn2007", "Fisher2007", "SharpCrane2020", "Bank1985"),
+    "path-traced": ("Jakob2022", "Miller2019", "Welford1962"),
+    "cycles": ("ChristensenBurley2015",),
+}
+_DIFFERENCE = "Andersson2020"
+
+
+def comparison_sources(against: str, techniques: Iterable[str]) -> tuple[str, ...]:
+    """Keys of the bibliography, without duplicates.
+
+    against : of `truths.TRUTHS`
+    """
+    keys = [*_TRUTHS[against], _DIFFERENCE]
+    for technique in techniques:
+        keys += scattering_sources(Settings.model_validate({"technique": technique}))
+    return tuple(dict.fromkeys(keys))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +12,19 @@ from numpy.typing import NDArray
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import PathTraced, Variant
 from dermis.apps.truths.person.traced import Paint, trace_person
-from dermis.apps.validation.comparisons.person_views import VIEWS, scene_of
 from dermis.apps.validation.comparisons.truths import check_seen
 from dermis.base.errors import refuse
+from dermis.environment.panorama import UNIFORM
 from dermis.frame.renderer import Renderer
+from dermis.human.expressions import expression
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
+from dermis.mesh.pose import Pose
+from dermis.scene.camera import PRESETS, Camera, side, three_quarter
+from dermis.scene.camera import cheek as at_cheek
+from dermis.scene.camera import portrait as from_front
+from dermis.scene.environment import Environment
+from dermis.scene.lights import Light, PointLight, RectangleLight, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -142,3 +150,170 @@ def pair_of(name: str, ours: Floats, truth: PathTraced, mask: NDArray[np.bool_])
         truth.samples,
         truth.seconds,
     )
+
+
+_SOFTBOX_MM = 500.0
+EYE_MM = 30.0
+"""Height of the pictures of an eye."""
+_LIPS_MM, _EAR_MM = 72.0, 120.0
+
+
+@dataclass(frozen=True)
+class View:
+    """What is looked at.
+
+    camera : before a head
+    light : a preset's name, or a panorama's
+    pose : name of an expression
+    times : by how much more paths it takes than others
+    """
+
+    camera: Callable[[Head], Camera]
+    light: str
+    pose: str | None = None
+    times: float = 1.0
+
+
+def at_eye(head: Head) -> Camera:
+    """The left eye from the front, 30 mm of it."""
+    x, y, z = _eye_mm(head)
+    return Camera(position=(x, y, z + 500.0), target=(x, y, z), frame_mm=EYE_MM)
+
+
+def at_eye_beside(head: Head) -> Camera:
+    """The left eye from its outer side."""
+    x, y, z = _eye_mm(head)
+    return Camera(position=(x + 380.0, y, z + 330.0), target=(x, y, z), frame_mm=EYE_MM)
+
+
+def at_lips(head: Head) -> Camera:
+    """The mouth from a little to the left."""
+    x, y, z = head.frontmost(0.0, _mouth_mm(head))
+    return Camera(position=(x + 120.0, y, z + 500.0), target=(x, y - 4.0, z), frame_mm=_LIPS_MM)
+
+
+def behind_ear(head: Head) -> Camera:
+    """The left ear from behind."""
+    usual = PRESETS["ear"](head)
+    x, y, z = usual.target
+    return Camera(position=(x + 430.0, y + 10.0, z - 430.0), target=(x - 8.0, y, z), frame_mm=_EAR_MM)
+
+
+def _eye_mm(head: Head) -> tuple[float, float, float]:
+    """The left eye's apex, from the head's centre."""
+    if head.eyes is None:
+        return head.frontmost(30.0, 0.0)
+    x, y, z = head.control.positions_mm[head.eyes.apex[0]] - np.array(head.centre_mm)
+    return float(x), float(y), float(z)
+
+
+def _mouth_mm(head: Head) -> float:
+    """Height of the mouth: where upper and lower teeth meet, in the mean."""
+    names = [material.part for material in head.mesh.materials]
+    teeth = [names.index(part) for part in ("upper teeth", "lower teeth") if part in names]
+    chosen = np.unique(head.mesh.triangles[np.isin(head.mesh.material, teeth)])
+    if not len(chosen):
+        return -60.0
+    return float(head.mesh.positions[chosen, 1].mean() - head.centre_mm[1])
+
+
+VIEWS: dict[str, View] = {
+    "portrait": View(from_front, "studio"),
+    "three-quarter": View(three_quarter, "studio"),
+    "profile": View(side, "studio"),
+    "eye": View(at_eye, "window", times=2.0),
+    "eye from its side": View(at_eye_beside, "window", times=2.0),
+    "lips and teeth": View(at_lips, "studio", "smile-with-teeth"),
+    "cheek": View(at_cheek, "studio"),
+    "ear from behind": View(behind_ear, "studio"),
+    "portrait, window": View(from_front, "window"),
+    "portrait, esplanade": View(from_front, "royal_esplanade"),
+    "three-quarter, lebombo": View(three_quarter, "lebombo"),
+}
+PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
+
+
+def scene_of(head: Head, view: View) -> Scene:
+    """A head in a view, in lights that have a size: through a refracting cornea no path finds a point."""
+    given = {"camera": view.camera(head), "pose": None if view.pose is None else Pose(expression(view.pose))}
+    if view.light in PANORAMAS:
+        return Scene(head, environment=Environment(name=view.light), **given)  # type: ignore[arg-type]
+    lights = tuple(softbox(light) for light in preset_lights(view.light))
+    return Scene(head, lights=lights, **given)  # type: ignore[arg-type]
+
+
+def softbox(light: Light) -> Light:
+    """A light from a point as a softbox in its place; any other as it is."""
+    if type(light) is RectangleLight or not isinstance(light, PointLight) or hasattr(light, "radius_mm"):
+        return light
+    return RectangleLight(
+        position=light.position,
+        target=light.target,
+        irradiance=light.irradiance,
+        width_mm=_SOFTBOX_MM,
+        height_mm=_SOFTBOX_MM,
+    )
+
+
+Mask = NDArray[np.bool_]
+_PUPIL_MM = 4.0  # around the middle: what tells where the pupil is
+_INNER_MM, _OUTER_MM = 2.6, 5.0  # ring of the iris, as seen from the front
+_BRIGHT = 1.6  # over the median of the ring: highlights
+
+
+class IrisFound(NamedTuple):
+    """Of ours against the truth.
+
+    right, down : how far the truth's pupil lies from ours [pixel]
+    brightness : mean of ours over that of the truth on the ring of the iris, highlights aside [-]
+    left, beside : the same on the ring's left and right halves
+    """
+
+    right: Estimate
+    down: Estimate
+    brightness: Estimate
+    left: Estimate
+    beside: Estimate
+
+
+def iris_of(pair: Pair, frame_mm: float) -> IrisFound:
+    """What is found in a picture with an eye in its middle, seen from the front.
+
+    frame_mm : height of the picture
+    """
+    ours, truth = pair.ours.mean(axis=2), pair.truth.mean(axis=2)
+    noise = pair.variance.mean(axis=2)  # channels may share paths: at most so much
+    side = len(ours)
+    along = (np.arange(side) + 0.5 - 0.5 * side) * frame_mm / side
+    x, y = np.meshgrid(along, along)
+    off = np.hypot(x, y)
+    ring = (off > _INNER_MM) & (off < _OUTER_MM)
+    dull = _dull(ours, ring) & _dull(truth, ring)
+    right, down = _shift(ours, truth, noise, dull & (off < _PUPIL_MM))
+    ring &= dull
+    whole, left, beside = (_ratio(ours, truth, noise, ring & part) for part in (off > 0, x < 0, x >= 0))
+    return IrisFound(right, down, whole, left, beside)
+
+
+def _dull(image: Floats, ring: Mask) -> Mask:
+    """(h, w) pixels off highlights; a mean over neighbours tells them in a noisy picture."""
+    from scipy.ndimage import gaussian_filter
+
+    smooth = gaussian_filter(image, 2.0)
+    return np.asarray(smooth < _BRIGHT * np.median(smooth[ring]))
+
+
+def _shift(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> tuple[Estimate, Estimate]:
+    """By how much the truth lies to the right of and below ours, where it is so many times as bright."""
+    down, right = (np.asarray(slope) for slope in np.gradient(ours))
+    columns = np.stack([ours[part], -right[part], -down[part], np.ones(int(part.sum()))], axis=-1)
+    inverse = np.linalg.inv(columns.T @ columns) @ columns.T
+    gain, x, y, _ = (float(one) for one in inverse @ truth[part])
+    error: Floats = np.sqrt((inverse**2 * noise[part]).sum(axis=1)) / abs(gain)
+    return Estimate(x / gain, float(error[1])), Estimate(y / gain, float(error[2]))
+
+
+def _ratio(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> Estimate:
+    total = float(truth[part].sum())
+    ratio = float(ours[part].sum()) / total
+    return Estimate(ratio, ratio * float(np.sqrt(noise[part].sum())) / total)

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.metrics import MID_GREY, signed_difference
-from dermis.apps.validation.comparisons.compare import Comparison, Row
-from dermis.apps.validation.comparisons.sources import comparison_sources
+from dermis.apps.validation.comparisons.compare import Comparison, Row, comparison_sources
 from dermis.base.atomic_write import replacing
 from dermis.images.codecs import encode_png
 

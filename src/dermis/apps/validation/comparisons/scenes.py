@@ -6,16 +6,18 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
-from dermis.apps.validation.comparisons.profile_models import ModelName, gaussians_of
+from dermis.apps.truths.slab_mc import counted_profile
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.optics.counted import COUNTED
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Medium
-from dermis.optics.profiles import write_profile
+from dermis.optics.profiles import fit_radial, write_profile
+from dermis.optics.tissue import Tissue
 from dermis.scene.camera import Camera, portrait, three_quarter
 from dermis.scene.lights import Light, SpotLight, StripeLight
 from dermis.scene.model import Scene
@@ -105,3 +107,20 @@ def medium_scene(
 def usual_region(light: str) -> str:
     """Where a light's effect shows most."""
     return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")
+
+
+ModelName = Literal["counted", "layered", "montecarlo"]
+"""By tables of photons, by layered diffusion, or by photons one by one."""
+_PHOTONS = 2_000_000  # a channel
+
+
+def gaussians_of(body: Medium, model: ModelName | None = None) -> GaussianSum:
+    """Six Gaussians for a medium.
+
+    model : by default tables of photons where there are some, else layered diffusion
+
+    Raises DermisError for a medium that has no tables.
+    """
+    if model == "montecarlo":
+        return fit_radial(counted_profile(body, photons=_PHOTONS), body.name)
+    return fit_radial(Tissue(body).profile(model), body.name)

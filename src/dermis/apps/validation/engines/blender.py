@@ -128,8 +128,9 @@ def binned(curve: Curve, d_mm: Floats) -> Floats:
 def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
     """Yield outlines and colours of the head without hair, which both draw differently, by each method."""
     subject = subject_of("human").painted(TEXELS, "auto")
-    assert subject.head is not None
-    bald = subject.with_head(replace(subject.head, hair=None, strands=None))
+    assert subject.scene is not None
+    head = replace(subject.scene.head, hair=None, strands=None)
+    bald = replace(subject, scene=replace(subject.scene, head=head))
     ours = drawn(bald, SIDE)
     for version, python in pythons.items():
         for method in METHODS_OF[version]:

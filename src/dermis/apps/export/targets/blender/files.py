@@ -19,7 +19,7 @@ from dermis.apps.export.scene_parts import known_lights
 from dermis.apps.export.subject import BALL_MM, Subject
 from dermis.apps.export.target import Rows, floats
 from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
-from dermis.apps.truths.cycles_scene import camera_of
+from dermis.apps.truths.cycles import camera_of
 from dermis.apps.truths.described import UNIT_MM, Described, world
 from dermis.apps.truths.lights import CYCLES, lamp
 from dermis.formats.gltf.write import encode_head
