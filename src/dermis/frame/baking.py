@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from dermis.frame.features.shape import curvature
 from dermis.frame.features.shape.curvature import make_curvature
 from dermis.frame.inputs import Inputs
 from dermis.frame.renderer import Renderer
-from dermis.gpu import CommandList
+from dermis.gpu import CommandList, MutableBindings
 from dermis.mesh.geometry import uv_cross
 from dermis.mesh.mesh import Mesh
 from dermis.scene.model import Scene
@@ -144,7 +143,7 @@ def _baked(
     return found
 
 
-def _bound(renderer: Renderer, inputs: Inputs, scene: Scene) -> dict[str, Any]:
+def _bound(renderer: Renderer, inputs: Inputs, scene: Scene) -> MutableBindings:
     """What the shader reads of the frame."""
     made, device = inputs.resources, renderer.device
     space = make_curvature(device, scene.head.topology.mesh)
@@ -153,7 +152,7 @@ def _bound(renderer: Renderer, inputs: Inputs, scene: Scene) -> dict[str, Any]:
     frame.submit()
     measured = made.outputs.light.thickness if made.outputs else None
     thickness = baking_pass.no_thickness(device) if measured is None else measured
-    own = {"curvatures": space.smoothed, "thickness_map": thickness}
+    own: MutableBindings = {"curvatures": space.smoothed, "thickness_map": thickness}
     return {**inputs.lit, "shade": inputs.view, "scattered": made.scattered, **own}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from dermis.frame.features.surface import mips as map_mips
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
 from dermis.frame.renderer import Renderer
-from dermis.gpu import CommandList, upload
+from dermis.gpu import CommandList, Texture, upload
 from dermis.gpu.capture import CapturedFrame, FrameCapture
 from dermis.scene.techniques import TECHNIQUES
 
@@ -46,12 +45,12 @@ def sparser(take: CapturedFrame, times: int) -> CapturedFrame:
     return take
 
 
-def halving(tape: FrameCapture, texture: Any) -> CapturedFrame:
+def halving(tape: FrameCapture, texture: Texture) -> CapturedFrame:
     """The passes that fill a map's mips from its first."""
     return tape.take(lambda graph: map_mips.halve(graph, map_mips.mipped(texture)))
 
 
-def refill(renderer: Renderer, texture: Any, levels: list[NDArray[np.float16]]) -> None:
+def refill(renderer: Renderer, texture: Texture, levels: list[NDArray[np.float16]]) -> None:
     """Put other texels into a map; its mips follow where only the first is given.
 
     levels : (l, h, w, c) of each mip

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.base.summary import Summarised
+from dermis.frame.features.outputs.planes import PlaneArray
 from dermis.frame.features.outputs.readback import Leaving
 from dermis.gpu.memo import same
 from dermis.scene.head_pose import gaze, head_pose
@@ -51,8 +52,8 @@ class Observation(Summarised):
         y down, z forward; None for a head without eyes of true shape
     """
 
-    picture: NDArray[Any]
-    outputs: Mapping[str, NDArray[Any]]
+    picture: NDArray[np.uint8 | np.float32]
+    outputs: Mapping[str, PlaneArray]
     camera: OpenCvCamera
     landmarks: Mapping[str, Landmarks]
     head_pose: NDArray[np.float64]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base import atomic_write as files
 from dermis.base.errors import refuse
+from dermis.frame.features.outputs.planes import PlaneArray
 from dermis.images.codecs import encode_png
 from dermis.images.io import encode_exr_parts
 from dermis.scene.outputs import OUTPUTS, Output
@@ -33,7 +34,7 @@ def beside(path: Path, name: str, kind: Format) -> Path:
     return path.with_name(f"{path.stem}.{name}.{kind}")
 
 
-def encoded(name: str, values: NDArray[Any], kind: Format) -> bytes:
+def encoded(name: str, values: PlaneArray, kind: Format) -> bytes:
     """An output as a file, the same to the byte each time.
 
     values : (h, w) or (h, w, c)
@@ -41,13 +42,13 @@ def encoded(name: str, values: NDArray[Any], kind: Format) -> bytes:
     return _ENCODERS[kind](name, values)
 
 
-def write_output(path: Path, name: str, values: NDArray[Any]) -> None:
+def write_output(path: Path, name: str, values: PlaneArray) -> None:
     """Write an output as .exr, .png or .npy, whole or not at all; values as of `encoded`."""
     kinds: dict[str, Format] = {".exr": "exr", ".png": "png", ".npy": "npy"}
     _write(path, encoded(name, values, kinds[path.suffix.lower()]))
 
 
-def write_together(path: Path, picture: NDArray[Any], values: Mapping[str, NDArray[Any]]) -> None:
+def write_together(path: Path, picture: PlaneArray, values: Mapping[str, PlaneArray]) -> None:
     """Write a linear picture and outputs as the parts of one OpenEXR file.
 
     picture : (h, w, 3 or 4)
@@ -58,7 +59,7 @@ def write_together(path: Path, picture: NDArray[Any], values: Mapping[str, NDArr
     _write(path, encode_exr_parts(parts))
 
 
-def png_levels(name: str, values: NDArray[Any]) -> NDArray[np.uint8 | np.uint16]:
+def png_levels(name: str, values: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
     """(h, w) or (h, w, 3) of an output as a PNG holds it; of two channels the third is 0."""
     if values.dtype == np.uint8:
         return values
@@ -68,29 +69,29 @@ def png_levels(name: str, values: NDArray[Any]) -> NDArray[np.uint8 | np.uint16]
     return found if found.ndim == 2 or found.shape[2] > 2 else np.pad(found, ((0, 0), (0, 0), (0, 1)))
 
 
-def _channels(output: Output, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
+def _channels(output: Output, values: PlaneArray) -> dict[str, PlaneArray]:
     """By their names in a file: depth.Z, normal.X, ..."""
     each = np.atleast_3d(values)
     letters = output.letters or [str(k) for k in range(each.shape[2])]
     return {f"{output.name}.{letter}": each[..., k] for k, letter in enumerate(letters)}
 
 
-def _as_exr(name: str, values: NDArray[Any]) -> bytes:
+def _as_exr(name: str, values: PlaneArray) -> bytes:
     return encode_exr_parts({name: _channels(OUTPUTS[name], values)}, swift=True)
 
 
-def _as_png(name: str, values: NDArray[Any]) -> bytes:
+def _as_png(name: str, values: PlaneArray) -> bytes:
     levels = png_levels(name, values)
     return encode_png(levels[..., None] if levels.ndim == 2 else levels, 6)
 
 
-def _as_npy(name: str, values: NDArray[Any]) -> bytes:
+def _as_npy(name: str, values: PlaneArray) -> bytes:
     into = io.BytesIO()
     np.save(into, values, allow_pickle=False)
     return into.getvalue()
 
 
-_ENCODERS: Mapping[Format, Callable[[str, NDArray[Any]], bytes]] = {
+_ENCODERS: Mapping[Format, Callable[[str, PlaneArray], bytes]] = {
     "exr": _as_exr,
     "png": _as_png,
     "npy": _as_npy,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from dermis.frame.projection import Views, shadow_layers
 from dermis.frame.request import FrameRequest
 from dermis.frame.resources import Resources
 from dermis.frame.techniques.technique import Technique
-from dermis.gpu import Constants, Device, Memo
+from dermis.gpu import Constants, Device, Memo, Record
 from dermis.gpu.memo import same
 from dermis.gpu.memory import OutOfMemoryError
 from dermis.human.skin.movements import movements
@@ -136,7 +136,7 @@ class Preparation:
         """The skin's profiles, its first one alone for techniques that mix none."""
         return self.profiles.mixed(skin) if technique.mixes else ((self.profiles.of(skin),), None)
 
-    def _around(self, head: Head, motion: Motion | None, outline: Outline) -> tuple[Look, Any]:
+    def _around(self, head: Head, motion: Motion | None, outline: Outline) -> tuple[Look, Record]:
         """How the sky sees the head as it is posed, and the shader's record of it."""
         anchors, motion = self.memo.keep(anchors_of, head.topology), motion or head.control.rest
         return self.memo.keep(_looked, outline, using=(motion, self.device, head, anchors))
@@ -181,7 +181,7 @@ def _bytes_of(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionBytes:
     return at_rest._replace(positions=positions, weights=weights, matrices=matrices)
 
 
-def _person(scene: Scene) -> Any:
+def _person(scene: Scene) -> NDArray[np.float32] | None:
     """Where the control points rest, if not where those of the head's topology do."""
     motion = scene.motion or scene.head.control.rest
     places = motion.positions_mm
@@ -214,12 +214,12 @@ def _posed(head: Head, motion: Motion, at_rest: MotionBytes) -> Moved:
 
 def _looked(
     outline: Outline, motion: Motion, device: Device, head: Head, anchors: Anchors
-) -> tuple[Look, Any]:
+) -> tuple[Look, Record]:
     look = look_around(outline, turn_of(anchors, motion))
     return look, sky_record(device, look, len(head.mesh.positions))
 
 
-def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
+def under(layout: AtlasLayout, lights: Record) -> AtlasLayout:
     """The layout under lights.
 
     lights : the shader's array
@@ -233,7 +233,7 @@ def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
 
 def _lights(
     _: Head, __: Lights, outline: Outline, size: int, device: Device, scene: Scene
-) -> tuple[Any, Views, tuple[int, ...]]:
+) -> tuple[Record, Views, tuple[int, ...]]:
     """The shader's array of lights, how shadow maps see the head, and how many parts each light has."""
     views, parts = light_views(scene, outline, size), light_parts(scene)
     return light_records(shade_program(device), scene, views), shadow_layers(views), parts

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -187,7 +187,7 @@ def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[b
         refuse(culprit, "a place outside the head", came, "Move it away or set shadows = false")
 
 
-def _steepest(sides: NDArray[Any], depth: NDArray[Any]) -> list[float]:
+def _steepest(sides: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
     """The largest tangent in each view; overwrites `sides`, as new memory takes longer than arithmetic."""
     for side in sides:
         side /= depth  # one by one: dividing them at once makes numpy allocate buffers

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import refuse
 from dermis.base.summary import Summarised
 from dermis.frame.features import outputs as output_features
+from dermis.frame.features.outputs.planes import PlaneArray
 from dermis.frame.features.outputs.readback import Leaving
 from dermis.frame.features.post.meter import Meter, read_meter
 from dermis.frame.features.post.picture import Picture
@@ -95,7 +96,7 @@ class Rendered(Summarised):
         """(h, w, 4) float32 over the background "none", multiplied by alpha as OpenEXR has it."""
         return self._exposed()
 
-    def output(self, name: str) -> NDArray[Any]:
+    def output(self, name: str) -> PlaneArray:
         """(h, w) or (h, w, channels) of an output that was asked of the frame, row 0 at the top.
 
         Raises DermisError for one that was not asked.
@@ -128,7 +129,7 @@ class Rendered(Summarised):
         return found
 
 
-def _read_output(at: Shown, name: str) -> NDArray[Any]:
+def _read_output(at: Shown, name: str) -> PlaneArray:
     """One of the outputs of a frame; waits for it."""
     assert at.outputs is not None
     planes = at.outputs.planes_of(name)

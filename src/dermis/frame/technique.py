@@ -30,7 +30,7 @@ class ProfileSplit:
     blurred_mm2: Floats
     weight: Floats
     others: tuple[ProfileSplit, ...] = ()
-    fine: dict[str, float | Floats] = field(default_factory=dict)
+    fine: dict[str, float | NDArray[np.floating]] = field(default_factory=dict)
 
     @property
     def relit_changes(self) -> Floats:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from dermis.frame.lights.kind import Kind
+from dermis.frame.lights.kind import Kind, Members
 from dermis.frame.projection import Triple
 from dermis.scene.lights import DirectionalLight
 
@@ -16,7 +15,7 @@ class _Directional(Kind[DirectionalLight]):
     def has_size(self, light: DirectionalLight) -> bool:
         return light.angle_degrees > 0
 
-    def members(self, light: DirectionalLight, centre: Triple, distance: float) -> dict[str, Any]:
+    def members(self, light: DirectionalLight, centre: Triple, distance: float) -> Members:
         return {"extent": math.tan(0.5 * math.radians(light.angle_degrees))}
 
 

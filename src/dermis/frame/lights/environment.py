@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import Sun, load_panorama
 from dermis.environment.prefilter import prefilter
 from dermis.frame.lights.records import sun_lights
-from dermis.gpu import ComputeProgram, Device, Memo, make_texture, upload
+from dermis.gpu import ComputeProgram, Device, Memo, Record, Texture, make_texture, upload
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin, lobe_name
@@ -31,7 +30,7 @@ class Surroundings:
     brightest : largest irradiance from the rest
     """
 
-    panorama: Any
+    panorama: Texture
     suns: tuple[Sun, ...]
     brightest: float = 0.0
 
@@ -47,13 +46,13 @@ def load_surroundings(device: Device, name: str | None) -> Surroundings:
     return Surroundings(_layered(device, made.layers), made.suns, float(made.layers[0].max()))
 
 
-def sharp_panorama(device: Device, name: str) -> Any:
+def sharp_panorama(device: Device, name: str) -> Texture:
     """A panorama as it is, suns included, as the first of two layers."""
     radiance = load_panorama(name, most_rows=_SHARPEST_ROWS).astype(np.float32)
     return _layered(device, [radiance, np.zeros_like(radiance)])
 
 
-def _layered(device: Device, layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]) -> Any:
+def _layered(device: Device, layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]) -> Texture:
     height, width = layers[0].shape[:2]
     size = width + 2, height + 2
     texture = make_texture(device, size, "rgba16float", layers=len(layers), use="map")
@@ -89,8 +88,12 @@ def brightest(scene: Scene, surroundings: Surroundings) -> float:
 
 
 def environment_record(
-    program: ComputeProgram, environment: Environment | None, skin: Skin, total: Any, occluded: bool
-) -> Any:
+    program: ComputeProgram,
+    environment: Environment | None,
+    skin: Skin,
+    total: NDArray[np.float64],
+    occluded: bool,
+) -> Record:
     """The shader's record of the environment.
 
     total : (3,) the profile's albedo as the frame uses it

@@ -6,12 +6,16 @@ import inspect
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from numpy.typing import ArrayLike
+
 from dermis.base.registry import Registry
 from dermis.frame.projection import Triple, axes_of, between
 from dermis.gpu.wgsl_source import Member
 from dermis.mesh.head import Head
 from dermis.scene.lights import Light, PointLight
 
+Members = dict[str, ArrayLike]
+"""Members of a shader's struct, by their names."""
 L = TypeVar("L", bound=Light)
 
 
@@ -49,7 +53,7 @@ class Kind(Generic[L]):
     def check(self, light: L, head: Head, culprit: str) -> None:
         """Raise DermisError if the light cannot stand where it is."""
 
-    def members(self, light: L, centre: Triple, distance: float) -> dict[str, Any]:
+    def members(self, light: L, centre: Triple, distance: float) -> Members:
         """Members of the shader's `Light` that are this kind's own.
 
         centre : of the head [mm]
@@ -69,7 +73,7 @@ KINDS: Registry[Kind[Any]] = Registry(
 """By the names of scene files: each shader of this folder, with the module beside it."""
 
 
-def facing(light: PointLight, radiance: float, half_width: float, half_height: float) -> dict[str, Any]:
+def facing(light: PointLight, radiance: float, half_width: float, half_height: float) -> Members:
     """Members of an area light that faces its target; `irradiance` holds its radiance.
 
     radiance : for an irradiance of 1 at the target [1/sr]

@@ -6,14 +6,13 @@ import math
 from collections.abc import Sequence
 from functools import cache
 from itertools import count
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.environment.panorama import Sun
-from dermis.frame.lights.kind import KINDS, override_of
+from dermis.frame.lights.kind import KINDS, Members, override_of
 from dermis.frame.projection import (
     ShadowView,
     Triple,
@@ -23,7 +22,7 @@ from dermis.frame.projection import (
     point_views,
     unit,
 )
-from dermis.gpu import ComputeProgram, Constants
+from dermis.gpu import ComputeProgram, Constants, Record
 from dermis.mesh.outline import Outline
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight, Light
@@ -112,7 +111,7 @@ def light_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | 
     return [view(light) if light.shadows else None for _, light in numbered]
 
 
-def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> Any:
+def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> Record:
     """The shader's array of lights.
 
     views : one for each part of each light
@@ -140,7 +139,7 @@ def places_on_lights() -> Floats:
     return np.hstack([disc, 2.0 * even - 1.0])
 
 
-def _members(light: Light, centre: Triple, view: ShadowView | None, siblings: int) -> dict[str, Any]:
+def _members(light: Light, centre: Triple, view: ShadowView | None, siblings: int) -> Members:
     """A light's members in the shader's array, without those that are 0.
 
     siblings : how many parts its light has
@@ -152,7 +151,7 @@ def _members(light: Light, centre: Triple, view: ShadowView | None, siblings: in
     else:
         along, place = between(light.position, light.target), place_of(light.position, centre)
         distance = math.hypot(*along)
-    seen: dict[str, Any] = {}
+    seen: Members = {}
     if view:
         clip, texel, place, right, up, near, far = view
         seen = {"to_map": clip.T, "map_right": right, "map_up": up, "map_near": near, "map_far": far}

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from dermis.frame.lights.kind import Kind, facing
+from dermis.frame.lights.kind import Kind, Members, facing
 from dermis.frame.projection import Triple, axes_of, between
 from dermis.scene.lights import Light, RectangleLight
 
@@ -49,7 +48,7 @@ class _Rectangle(Kind[RectangleLight]):
             for move in moves
         ]
 
-    def members(self, light: RectangleLight, centre: Triple, distance: float) -> dict[str, Any]:
+    def members(self, light: RectangleLight, centre: Triple, distance: float) -> Members:
         radiance = 1.0 / facing_irradiance(light.width_mm, light.height_mm, distance)
         return facing(light, radiance, 0.5 * light.width_mm, 0.5 * light.height_mm)
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from dermis.base.errors import refuse
-from dermis.frame.lights.kind import Kind, facing
+from dermis.frame.lights.kind import Kind, Members, facing
 from dermis.frame.projection import Triple, place_of
 from dermis.mesh.head import Head
 from dermis.scene.lights import SphereLight
@@ -24,7 +23,7 @@ class _Sphere(Kind[SphereLight]):
             came = f"the head is {near:.0f} mm from its middle"
             refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", came, "Move it away")
 
-    def members(self, light: SphereLight, centre: Triple, distance: float) -> dict[str, Any]:
+    def members(self, light: SphereLight, centre: Triple, distance: float) -> Members:
         radiance = 1.0 / (math.pi * (light.radius_mm / distance) ** 2)
         return facing(light, radiance, light.radius_mm, light.radius_mm)
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from dermis.frame.lights.kind import Kind
+from dermis.frame.lights.kind import Kind, Members
 from dermis.frame.projection import Triple, frame_of, place_of
 from dermis.scene.lights import StripeLight
 
@@ -14,7 +12,7 @@ from dermis.scene.lights import StripeLight
 class _Stripe(Kind[StripeLight]):
     sheet = True
 
-    def members(self, light: StripeLight, centre: Triple, distance: float) -> dict[str, Any]:
+    def members(self, light: StripeLight, centre: Triple, distance: float) -> Members:
         right, up, _ = frame_of(np.array(light.direction), np.array(light.up))
         across, along = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm
         return {"position": place_of(light.position, centre), "half_u": across, "half_v": along}

@@ -62,7 +62,8 @@ class GpuGems3(AtlasTechnique):
             self.shader(graph.device, (("AXIS", axis), ("SKIPPED", blur.edge == "skipped")))
             for axis in (0, 1)
         ]
-        source, before, (stretch, spare) = atlas.resources["stretch_map"], 0.0, levels.stretch
+        before, (stretch, spare) = 0.0, levels.stretch
+        source: TextureOrView = atlas.resources["stretch_map"]
         for k, variance in enumerate(blur.variance_mm2, start=1):
             record = shaders[0].record(
                 "Spread", sigma_mm=np.sqrt(variance - before), clear=blur.scale * np.asarray(blur.clear)
@@ -73,7 +74,12 @@ class GpuGems3(AtlasTechnique):
             )
             for shader, (light, wide, blurred, wider) in zip(shaders, passes, strict=True):
                 linear = graph.device.sampler(mag_filter="linear", min_filter="linear")
-                bound = {"spread": record, "linear": linear, "source": light, "stretch": wide}
+                bound: MutableBindings = {
+                    "spread": record,
+                    "linear": linear,
+                    "source": light,
+                    "stretch": wide,
+                }
                 self.run(graph, shader, bound, (blurred, wider), levels.size)
             source, before = stretch, float(variance)
 

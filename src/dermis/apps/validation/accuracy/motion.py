@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from dermis.atlas.cached import cached_atlas
 from dermis.formats.maps import load_maps
 from dermis.frame.features.occlusion.baked import bake_occlusion
 from dermis.frame.renderer import Renderer
-from dermis.gpu import download
+from dermis.gpu import Texture, download
 from dermis.human.expressions import expression
 from dermis.human.person import Human
 from dermis.mesh.head import Head
@@ -184,7 +185,7 @@ def followed(renderer: Renderer, scene: Scene, which: str) -> Open:
     """Return (n, n) open shares that a frame of the scene reads."""
     settings = BAKED.model_copy(update={"occlusion": which})
     renderer.draw(scene, settings)
-    made = renderer.prepare(scene, settings).lit["occlusion_map"]
+    made = cast(Texture, renderer.prepare(scene, settings).lit["occlusion_map"])
     return download(renderer.device, made)[:SIDE].astype(float)
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.programs import program
 from dermis.frame.seams import FEATHER_MM
-from dermis.gpu import Recorder
+from dermis.gpu import Recorder, Texture
 
 
-def draw(graph: Recorder, first: LitAtlas, second: LitAtlas, into: Any) -> None:
+def draw(graph: Recorder, first: LitAtlas, second: LitAtlas, into: Texture) -> None:
     """Blend the first layout's light, near its edges the second's, into a texture of the first's atlas."""
     bound = {
         **second.lit,  # whose triangle table has places in the second layout

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from dermis.atlas.stitched.surface import sides_across
 from dermis.frame.features.atlas.textures import ENTRY_BYTES, AtlasTextures
 from dermis.frame.features.shape.mesh import HeadResources
 from dermis.frame.programs import each, program
-from dermis.gpu import Device, Recorder
+from dermis.gpu import Bindings, Buffer, Device, Recorder
 from dermis.mesh.mesh import Mesh
 
 Words = NDArray[np.uint32]
@@ -29,9 +28,9 @@ class Walks:
     halvings : of the coarser atlases that have gutters, as gutter_halve.wgsl reads them
     """
 
-    walks: Any
-    sides: Any
-    halvings: tuple[dict[str, Any], ...]
+    walks: Buffer
+    sides: Buffer
+    halvings: tuple[Bindings, ...]
 
 
 def make_walks(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> Walks:
@@ -70,7 +69,7 @@ def _side_words(mesh: Mesh) -> Words:
     return np.where((beside >= 0) & skin[beside], word, _NONE).astype(np.uint32)
 
 
-def _halving(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> dict[str, Any]:
+def _halving(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
     """Which texels of the finer list each texel of the coarser one stands for."""
     wide = int(finer.gutter_texels.max()) + 1
 
@@ -95,10 +94,12 @@ def draw(graph: Recorder, atlas: AtlasTextures, walks: Walks, head: HeadResource
     head : at rest
     """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)
-    begun = {"walks": walks.walks, "sides": walks.sides, "gutter": atlas.gutter}
+    assert atlas.gutter is not None
+    begun: Bindings = {**head.resources, "walks": walks.walks, "sides": walks.sides, "gutter": atlas.gutter}
     walk, halve = program(device, "atlas/gutter_walk.wgsl", size), program(device, "atlas/gutter_halve.wgsl")
-    graph.dispatch("gutters", walk, head.resources | begun, each(len(atlas.gutter_texels)))
+    graph.dispatch("gutters", walk, begun, each(len(atlas.gutter_texels)))
     listed = [sheet for sheet in (atlas, *atlas.coarser) if sheet.gutter]
     for (finer, coarser), halving in zip(pairwise(listed), walks.halvings, strict=True):
-        bound = halving | {"finer": finer.gutter, "coarser": coarser.gutter}
+        assert finer.gutter is not None and coarser.gutter is not None
+        bound = {**halving, "finer": finer.gutter, "coarser": coarser.gutter}
         graph.dispatch("gutters", halve, bound, each(len(coarser.gutter_texels)))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from dermis.frame.features.atlas.gutters import Walks
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.shape.mesh import HeadResources
+from dermis.gpu import MutableBindings, Texture
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class LitAtlas:
 
     atlas: AtlasTextures
     head: HeadResources
-    lit: dict[str, Any]
-    surfaces: Any
-    scattered: Any
+    lit: MutableBindings
+    surfaces: Texture
+    scattered: Texture
     walked: Walked | None = None

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dermis.frame.features.atlas.textures import ENTRY_BYTES, AtlasTextures
 from dermis.frame.programs import TILE, program
-from dermis.gpu import Recorder
+from dermis.gpu import Recorder, TextureOrView
 
 _ROW = 1024  # as in gutter.wgsl
 
 
-def draw(graph: Recorder, stage: str, atlas: AtlasTextures, light: Any, texel: str) -> None:
+def draw(graph: Recorder, stage: str, atlas: AtlasTextures, light: TextureOrView, texel: str) -> None:
     """Fill the gutter of `light` by way of a list, as no texture can be read and written at once.
 
     texel : its format
     """
-    if atlas.gutter is None:
+    if atlas.gutter is None or atlas.gathered is None:
         return
     device = graph.device
     gather = program(device, "atlas/stitch_gather.wgsl", source=texel)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.shape.mesh import HeadResources
 from dermis.frame.programs import TILE, each, program
-from dermis.gpu import Device, Recorder, make_texture
+from dermis.gpu import Device, Recorder, Texture, make_texture
 
 _ROOTED_BYTES = 12  # of a texel in the list of stretch_beyond.wgsl
 
@@ -34,6 +34,6 @@ def draw_coarser(graph: Recorder, atlas: AtlasTextures) -> None:
         finer = sheet.resources
 
 
-def _no_edges(device: Device) -> object:
-    """Stands for the distances to the edges where nobody asks for them."""
+def _no_edges(device: Device) -> Texture:
+    """Return a placeholder for the distances to the edges."""
     return device.shared("no edges", lambda: make_texture(device, (1, 1), "r32float", use="map"))

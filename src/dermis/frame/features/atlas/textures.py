@@ -12,7 +12,7 @@ from dermis.atlas.atlas import GUTTER, MOST_SHEAR, Atlas
 from dermis.atlas.stitched.walk import INNER, INWARD
 from dermis.base.disk import cached_arrays
 from dermis.frame.seams import FEATHER_MM, REMEDIES, Remedy
-from dermis.gpu import Constants, Device, make_texture, scratch
+from dermis.gpu import Buffer, Constants, Device, Texture, make_texture, scratch
 from dermis.gpu.textures import texture_from
 
 _HALVING = "halved 2"  # raise when `halved` gives other results
@@ -47,13 +47,13 @@ class AtlasTextures:
     usual_per_mm : median of the texels per mm along the axis that has fewer, at rest
     """
 
-    resources: dict[str, Any]
+    resources: dict[str, Texture]
     sheared: bool = True
     stretching: Constants = ()
-    rooted: Any = None
-    gutter: Any = None
+    rooted: Buffer | None = None
+    gutter: Buffer | None = None
     gutter_texels: NDArray[np.uint16] = field(default_factory=lambda: np.zeros((0, 2), np.uint16))
-    gathered: Any = None
+    gathered: Buffer | None = None
     coarser: tuple[AtlasTextures, ...] = ()
     usual_per_mm: float = 0.0
 
@@ -110,7 +110,7 @@ def _usual(stretch: NDArray[np.float16], own: NDArray[np.bool_]) -> float:
     return float(middle.astype(np.uint16).view(np.float16).astype(np.float64).mean())
 
 
-def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: Any) -> AtlasTextures:
+def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Texture], **more: Any) -> AtlasTextures:
     reach = sheet.reach.copy()
     reach[..., 0] |= np.where(sheet.covered & ~sheet.own, _GUTTER_BIT, 0).astype(np.uint16)
     resources = resources | {
@@ -138,7 +138,7 @@ def _coarser(device: Device, sheet: Sheet) -> tuple[AtlasTextures, ...]:
     while count < MOST_HALVINGS and len(sheet.reach) % (2 << count) == 0:
         count += 1
 
-    def make() -> dict[str, NDArray[Any]]:
+    def make() -> dict[str, NDArray[np.generic]]:
         made = [sheet]
         for _ in range(count):
             made.append(halved(made[-1]))
@@ -150,7 +150,7 @@ def _coarser(device: Device, sheet: Sheet) -> tuple[AtlasTextures, ...]:
     return tuple(_uploaded(device, one, {}) for one in sheets)
 
 
-def packed_texels(triangle: NDArray[Any], barycentric: NDArray[Any]) -> NDArray[np.uint32]:
+def packed_texels(triangle: NDArray[np.integer], barycentric: NDArray[np.number]) -> NDArray[np.uint32]:
     """(n, n, 2) places on the mesh as the shaders read them.
 
     triangle : (n, n) -1 for none
@@ -201,7 +201,7 @@ def halved(sheet: Sheet) -> Sheet:
     return Sheet(some, some & ~stitched, _reach(sheet.reach, counted), *_gutter(sheet, stitched))
 
 
-def _quads(image: NDArray[Any]) -> NDArray[Any]:
+def _quads(image: NDArray[np.generic]) -> NDArray[np.generic]:
     """(4, n/2, n/2) texels (0, 0), (1, 0), (0, 1), (1, 1) of each square of four."""
     return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from dermis.frame.features.diffusion.kernels import (
 )
 from dermis.frame.features.diffusion.levels import Blur, Levels
 from dermis.frame.programs import TILE, program
-from dermis.gpu import ComputeProgram, Device, Recorder
+from dermis.gpu import ComputeProgram, Device, MutableBindings, Recorder, Texture, TextureOrView
 from dermis.gpu.textures import texture_from
 
 EDGES = ("repeated", "cleared", "skipped")
@@ -32,7 +31,7 @@ _AVERAGED, _READ = 1 / 16, 3 / 16
 def draw(graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
     """Fill layer k with the light of layer 0 spread by blur.variance_mm2[k - 1]."""
     variance_mm2, sheets = blur.variance_mm2, atlas.sheets(blur.edge)
-    source = levels.layer(0)
+    source: TextureOrView = levels.layer(0)
     first = np.sqrt(variance_mm2[0]) * atlas.usual_per_mm  # [texel]
     alone = len(variance_mm2) == 1 or first > NARROW
     for k, added in enumerate(_added(variance_mm2, blur.halvings), start=1):
@@ -46,13 +45,13 @@ def draw(graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> N
         for axis, blurred in enumerate((levels.spare(here), levels.layer(k, here))):
             along = _along(graph.device, levels.texel, axis, atlas.sheared, blur.edge)
             spread = along.record("Spread", truncation=cut, clear=clear, **added)
-            kernels = {"spread": spread, "kernel_table": _kernel_texture(graph.device)}
-            light = {"source": source, "stored": blurred}
-            _run(graph, along, sheets[here].resources | kernels | light, levels.size >> here)
+            bound: MutableBindings = {**sheets[here].resources, "source": source, "stored": blurred}
+            bound |= {"spread": spread, "kernel_table": _kernel_texture(graph.device)}
+            _run(graph, along, bound, levels.size >> here)
             source = blurred
 
 
-def _halved(graph: Recorder, levels: Levels, source: Any, k: int, times: int) -> Any:
+def _halved(graph: Recorder, levels: Levels, source: TextureOrView, k: int, times: int) -> TextureOrView:
     """Layer k at half its resolution."""
     into = levels.layer(k, times)
     halve = program(graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel, levels.texel)
@@ -60,7 +59,7 @@ def _halved(graph: Recorder, levels: Levels, source: Any, k: int, times: int) ->
     return into
 
 
-def _run(graph: Recorder, shader: ComputeProgram, bound: dict[str, Any], side: int) -> None:
+def _run(graph: Recorder, shader: ComputeProgram, bound: MutableBindings, side: int) -> None:
     linear = graph.device.sampler(mag_filter="linear", min_filter="linear")
     graph.compute("diffuse", shader, bound | {"linear": linear}, (side, side), TILE)
 
@@ -72,8 +71,8 @@ def _along(device: Device, texel: str, axis: int, sheared: bool, edge: str) -> C
     return program(device, "diffusion/diffuse.wgsl", chosen, texel, texel)
 
 
-def _kernel_texture(device: Device) -> Any:
-    def make() -> Any:
+def _kernel_texture(device: Device) -> Texture:
+    def make() -> Texture:
         table = kernel_table()
         return texture_from(device, np.dstack([table[:-1], table[1:]]), "rg32float")
 

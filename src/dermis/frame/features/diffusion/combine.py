@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from dermis.frame.features.diffusion.levels import Blur, Levels
 from dermis.frame.programs import FLOATS, TILE, program
-from dermis.gpu import ComputeProgram, Device, Recorder, Texture, make_texture
+from dermis.gpu import Bindings, ComputeProgram, Device, Recorder, Texture, TextureOrView, make_texture
 from dermis.optics.gaussians import MOST_GAUSSIANS
 
 
@@ -18,7 +16,12 @@ def make_sum(device: Device, side: int) -> Texture:
 
 
 def draw(
-    graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: Any = None, lost: Any = None
+    graph: Recorder,
+    levels: Levels,
+    blur: Blur,
+    into: TextureOrView,
+    transmitted: Texture | None = None,
+    lost: Texture | None = None,
 ) -> None:
     """Sum the blurred layers, all but the first, from coarse resolution to fine.
 
@@ -37,7 +40,7 @@ def draw(
         padded[0, 3] = 1.0
         layers = {"first": 1 + first - levels.first[mip], "count": count, "weight": padded}
         scales = {"scale": 1.0, "through": blur.scale} if mip else {"scale": 1.0 / blur.scale, "through": 1.0}
-        bound = {
+        bound: Bindings = {
             "weights": shader.record("Weights", **layers, **scales),
             "levels": levels.stacks[mip],
             "source": levels.spare(mip + 1) if mip < coarsest else levels.layer(0),
@@ -49,7 +52,7 @@ def draw(
         graph.compute("combine", shader, bound, (levels.size >> mip,) * 2, TILE)
 
 
-def nothing(device: Device) -> Any:
+def nothing(device: Device) -> Texture:
     """Placeholder for transmitted light where there is none."""
     return device.shared("nothing", lambda: make_texture(device, (1, 1), "rgba32float", use="map"))
 
@@ -62,6 +65,6 @@ def _program(
     return program(device, "diffusion/combine.wgsl", constants, texel, texel if between else FLOATS)
 
 
-def _finest_for(transmitted: Any, size: int, coarsest: int) -> int:
+def _finest_for(transmitted: Texture | None, size: int, coarsest: int) -> int:
     """Halvings of the resolution at which transmitted light is added: 1 if it has no finer detail, else 0."""
     return int(transmitted is not None and coarsest > 0 and 2 * transmitted.size[0] <= size)

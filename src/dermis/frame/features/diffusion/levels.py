@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.programs import FLOATS
-from dermis.gpu import Device, make_texture, scratch
+from dermis.gpu import Device, Texture, TextureView, make_texture, scratch
 from dermis.gpu.textures import view_of
 
 _BRIGHT = 16.0  # scaled irradiance of all lights, a 4000th of the largest half
@@ -31,21 +30,21 @@ class Levels:
     texel : format of the textures
     """
 
-    stacks: tuple[Any, ...]
+    stacks: tuple[Texture, ...]
     first: tuple[int, ...]
-    scratch: Any
+    scratch: Texture
     size: int
     texel: str
-    _views: dict[tuple[int, int], Any] = field(default_factory=dict)
+    _views: dict[tuple[int, int], TextureView] = field(default_factory=dict)
 
-    def layer(self, k: int, halvings: int = 0) -> Any:
+    def layer(self, k: int, halvings: int = 0) -> TextureView:
         """A view of level k at one resolution."""
         if (k, halvings) not in self._views:
             layer = k - self.first[halvings]
             self._views[k, halvings] = view_of(self.stacks[halvings], layer=layer)
         return self._views[k, halvings]
 
-    def spare(self, halvings: int = 0) -> Any:
+    def spare(self, halvings: int = 0) -> TextureView:
         """A view of the texture between two passes."""
         if (-1, halvings) not in self._views:
             self._views[-1, halvings] = view_of(self.scratch, mip=halvings)

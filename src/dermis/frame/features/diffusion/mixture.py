@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,8 @@ from dermis.frame.features.atlas import stitch
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.features.diffusion.levels import Levels
 from dermis.frame.programs import FLOATS, HALVES, TILE, program
-from dermis.gpu import Device, Recorder, make_texture, upload
+from dermis.gpu import Bindings, Device, Recorder, Texture, TextureView, make_texture, upload
+from dermis.gpu.textures import view_of
 from dermis.images.filters import mip_chain
 
 _KEPT = 4
@@ -34,21 +34,20 @@ class Mixture:
         light leaves, and by what it is where light enters
     """
 
-    shares_over_uv: Any
+    shares_over_uv: Texture
     given: tuple[Levels, ...]
-    shares: tuple[Any, ...]
-    sums: Any
-    _views: dict[int, Any] = field(default_factory=dict)
+    shares: tuple[Texture, ...]
+    sums: Texture
+    _views: dict[int, TextureView] = field(default_factory=dict)
 
-    def sum(self, layer: int) -> Any:
+    def sum(self, layer: int) -> TextureView:
         """A view of one of the sums."""
         if layer not in self._views:
-            options = {"dimension": "2d", "array_layer_count": 1}
-            self._views[layer] = self.sums.create_view(base_array_layer=layer, **options)
+            self._views[layer] = view_of(self.sums, layer=layer)
         return self._views[layer]
 
 
-def make_mixture(device: Device, shares: Any, given: tuple[Levels, ...], layouts: int) -> Mixture:
+def make_mixture(device: Device, shares: Texture, given: tuple[Levels, ...], layouts: int) -> Mixture:
     """Space for a mixture over atlases of the size of its levels."""
     side, texel = given[0].size, given[0].texel
     over_atlas = tuple(
@@ -64,7 +63,7 @@ def sums_of(others: int) -> int:
     return 1 + 2 * others
 
 
-def upload_shares(device: Device, shares: NDArray[np.float32]) -> Any:
+def upload_shares(device: Device, shares: NDArray[np.float32]) -> Texture:
     """A texture of (h, w, 2) shares with all its mips."""
     height, width = shares.shape[:2]
     levels = mip_chain(np.pad(shares, ((0, 0), (0, 0), (0, 2))))
@@ -103,7 +102,12 @@ def share(graph: Recorder, layout: LitAtlas, mixture: Mixture, number: int) -> N
     number : of the layout
     """
     into, texel = mixture.shares[number], mixture.given[0].texel
-    bound = {**layout.lit, **layout.atlas.resources, "share_map": mixture.shares_over_uv, "stored": into}
+    bound: Bindings = {
+        **layout.lit,
+        **layout.atlas.resources,
+        "share_map": mixture.shares_over_uv,
+        "stored": into,
+    }
     shader = program(graph.device, "diffusion/profile_shares.wgsl", store=texel)
     graph.compute("profiles", shader, bound, into.size[:2])
     stitch.draw(graph, "profiles", layout.atlas, into, texel)
@@ -114,12 +118,13 @@ def give(graph: Recorder, levels: Levels, mixture: Mixture, number: int, other: 
     given, device = mixture.given[other], graph.device
     shader = program(device, "diffusion/profile_given.wgsl", (("OTHER", other),), levels.texel, levels.texel)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
-    light = {"source": levels.layer(0), "linear": linear, "stored": given.layer(0)}
-    graph.compute("profiles", shader, light | {"shares": mixture.shares[number]}, (levels.size,) * 2, TILE)
+    light = {"source": levels.layer(0), "stored": given.layer(0)}
+    bound: Bindings = {**light, "linear": linear, "shares": mixture.shares[number]}
+    graph.compute("profiles", shader, bound, (levels.size,) * 2, TILE)
 
 
-def draw(graph: Recorder, mixture: Mixture, number: int, into: Any) -> None:
+def draw(graph: Recorder, mixture: Mixture, number: int, into: Texture) -> None:
     """Mix the sums of blurred light, and put the shares beside them."""
     shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.given)),))
-    bound = {"sums": mixture.sums, "shares": mixture.shares[number], "mixed": into}
+    bound: Bindings = {"sums": mixture.sums, "shares": mixture.shares[number], "mixed": into}
     graph.compute("profiles", shader, bound, into.size[:2], TILE)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from dermis.frame.features.hair.resources import TILE, WINDOW_KNOTS, Resources, StrandTables, drawn_of
@@ -11,7 +9,17 @@ from dermis.frame.features.shape.mesh import HeadResources
 from dermis.frame.features.shape.shape import Shape
 from dermis.frame.programs import each, program
 from dermis.frame.projection import Views
-from dermis.gpu import Bindings, ComputeProgram, Constants, Device, Graph, Record, Recorder
+from dermis.gpu import (
+    Bindings,
+    ComputeProgram,
+    Constants,
+    Device,
+    Graph,
+    MutableBindings,
+    Record,
+    Recorder,
+    Texture,
+)
 
 Look = tuple[Bindings, Record, Constants]
 
@@ -31,7 +39,7 @@ def draw_shadows(graph: Graph, made: Resources, shape: Shape, shadow_views: View
 
 def pose(graph: Recorder, made: StrandTables, shape: Shape) -> None:
     """Put the hairs where the skin is."""
-    bound = {
+    bound: MutableBindings = {
         "points": shape.surface["points"],
         "strands": made.strands,
         "knots": made.knots,
@@ -46,7 +54,7 @@ def shadow(graph: Recorder, strands: Resources, lit: Bindings) -> None:
     made = strands.tables
     pieces = made.fine.pieces() + made.coarse.pieces(made.shading)
     knots = made.fine.hairs * made.fine.knots + made.shading * made.coarse.knots
-    bound = {**lit, "posed": made.posed, "hairs": made.record}
+    bound: MutableBindings = {**lit, "posed": made.posed, "hairs": made.record}
     bound |= {"windows": strands.shadows, "splatted": strands.shadows}
     graph.dispatch("strands", program(graph.device, "hair/strands_clear.wgsl"), bound, (_CLEARING, 1, 1))
     ends = program(graph.device, "hair/strands_window.wgsl")
@@ -60,10 +68,10 @@ def draw(
     strands: Resources,
     look: Look,
     head: HeadResources,
-    visibility: Any,
-    radiance: Any,
+    visibility: Texture,
+    radiance: Texture,
     labels: Bindings | None = None,
-) -> Any:
+) -> Texture:
     """The picture with hairs over it, a texture of theirs.
 
     look : resources and record of the shading, and pipeline constants of the lights
@@ -73,16 +81,16 @@ def draw(
     made, picture, (lit, view, lights) = strands.tables, strands.picture, look
     light = program(graph.device, "hair/strands_light.wgsl", (*lights, ("RAYS_APART", _RAYS_APART)))
     record, coarse = _view_record(light, strands, view)
-    seen = {"strand_view": record, "drawn": made.drawn, "hairs": made.record}
+    seen: Bindings = {"strand_view": record, "drawn": made.drawn, "hairs": made.record}
     knots = made.fine.hairs * made.fine.knots + coarse * made.coarse.knots
     pieces = made.fine.pieces() + made.coarse.pieces(coarse)
     graph.dispatch("strands", light, {**lit, **seen, "posed": made.posed}, each(knots))
-    listed = {"chains": picture.chains, "links": picture.links}
+    listed: Bindings = {"chains": picture.chains, "links": picture.links}
     _each(graph, "hair/strands_empty.wgsl", listed, picture.chains.size // 4)
     ways = (("WAYS", picture.ways),)
-    _each(graph, "hair/strands_bin.wgsl", seen | listed, pieces, ways)
-    bound = head.resources | seen | listed
-    bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result, **(labels or {})}
+    _each(graph, "hair/strands_bin.wgsl", {**seen, **listed}, pieces, ways)
+    over: Bindings = {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
+    bound = {**head.resources, **seen, **listed, **over, **(labels or {})}
     width, height = picture.result.size[:2]
     if picture.ways > 1:
         shader = program(graph.device, "hair/strands_draw_tiles.wgsl", ways, labels=labels is not None)
@@ -94,7 +102,7 @@ def draw(
     return picture.result
 
 
-def _view_record(shader: ComputeProgram, strands: Resources, view: Any) -> tuple[Any, int]:
+def _view_record(shader: ComputeProgram, strands: Resources, view: Record) -> tuple[Record, int]:
     """A shader's record StrandView, and how many coarse hairs stand for all.
 
     view : record of the shading
@@ -108,7 +116,7 @@ def _view_record(shader: ComputeProgram, strands: Resources, view: Any) -> tuple
     return record, coarse
 
 
-def _rows_for(device: Device, strands: Resources, view: Any) -> int:
+def _rows_for(device: Device, strands: Resources, view: Record) -> int:
     """`rows_of` what tiles of this picture may list."""
     made = strands.tables
     pixel_mm = _pixel_mm(view, made, strands.picture.result.size[1])
@@ -116,7 +124,7 @@ def _rows_for(device: Device, strands: Resources, view: Any) -> int:
     return rows_of(device, _most_in_tile(made, pieces, pixel_mm))
 
 
-def _pixel_mm(view: Any, made: StrandTables, height: int) -> float:
+def _pixel_mm(view: Record, made: StrandTables, height: int) -> float:
     """Side of a pixel where the coarse hairs are [mm]."""
     deep = float(np.dot(made.middle_mm - view["eye"], view["forward"]))
     return 2.0 * float(np.linalg.norm(view["up"])) * max(deep, 1.0) / height
@@ -142,6 +150,6 @@ def rows_of(device: Device, pieces: int) -> int:
     return 1 << most.bit_length() - 1
 
 
-def _each(graph: Recorder, name: str, bound: Any, count: int, constants: Any = ()) -> None:
+def _each(graph: Recorder, name: str, bound: Bindings, count: int, constants: Constants = ()) -> None:
     """A pass of one invocation for each of `count`."""
     graph.dispatch("strands", program(graph.device, name, constants), bound, each(count))

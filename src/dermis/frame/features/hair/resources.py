@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import refuse
 from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.frame.request import FrameRequest
-from dermis.gpu import Constants, Device, Memo, make_texture
+from dermis.gpu import Buffer, Constants, Device, Memo, Record, Texture, make_texture
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Strands, corners, weights
 from dermis.scene.settings import Settings
@@ -54,8 +54,8 @@ class Room(NamedTuple):
 class StrandSpace:
     """What hairs of a frame are worked out in: knots in space, and in the picture."""
 
-    posed: Any
-    drawn: Any
+    posed: Buffer
+    drawn: Buffer
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +67,9 @@ class StrandPicture:
     ways : chains of a tile
     """
 
-    chains: Any
-    links: Any
-    result: Any
+    chains: Buffer
+    links: Buffer
+    result: Texture
     ways: int
 
 
@@ -111,17 +111,17 @@ def ways_of(device: Device, tiles: int) -> int:
     return _WAYS if fits and device.adapter.kind != "CPU" else 1
 
 
-def make_strand_shadows(device: Device, layers: int) -> Any:
+def make_strand_shadows(device: Device, layers: int) -> Buffer:
     """Space for what hairs hold back of so many lights."""
     return _space(device, (HEAD_WORDS + (1 + LAYERS) * WINDOW**2 // 2) * max(1, layers))
 
 
-def no_strand_shadows(device: Device) -> Any:
+def no_strand_shadows(device: Device) -> Buffer:
     """Placeholder where there are no hairs."""
     return device.shared("no strand shadows", lambda: _space(device, HEAD_WORDS))
 
 
-def _space(device: Device, words: int) -> Any:
+def _space(device: Device, words: int) -> Buffer:
     return device.space(4 * words)
 
 
@@ -149,11 +149,11 @@ class StrandTables:
     cover : of their roots by hair, on average [-]
     """
 
-    strands: Any
-    knots: Any
-    posed: Any
-    drawn: Any
-    record: Any
+    strands: Buffer
+    knots: Buffer
+    posed: Buffer
+    drawn: Buffer
+    record: Record
     fine: Counts
     coarse: Counts
     shading: int
@@ -172,7 +172,7 @@ class Resources:
 
     tables: StrandTables
     picture: StrandPicture
-    shadows: Any
+    shadows: Buffer
     skin: tuple[float, ...]
 
 
@@ -230,7 +230,7 @@ def make_tables(device: Device, head: Head, space: StrandSpace) -> StrandTables:
     )
 
 
-def _tell(rows: NDArray[Any], head: Head, strands: Strands) -> None:
+def _tell(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
     """Fill in what strands_pose.wgsl reads of each hair."""
     if int(strands.roots.quad.max()) >= len(head.mesh.quads):
         came = f"its mesh has {len(head.mesh.quads)} quads"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import cycle, islice
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.interreflection import SAMPLES, SIDE, Links, cached_links
 from dermis.frame.programs import EACH, each, program
-from dermis.gpu import Bindings, Constants, Device, Memo, Recorder, scratch
+from dermis.gpu import Bindings, Buffer, Constants, Device, Memo, Recorder, scratch
 from dermis.mesh.head import Head
 
+LinkBuffers = tuple[tuple[Buffer, int], dict[str, Buffer], dict[str, Buffer]]
+"""Places and their number, links of patches, links of cells."""
 _TEXEL = 16  # bytes of four floats
 
 
@@ -37,16 +39,16 @@ class LinkSpace:
     from_skin, unlit : buffers of the light that reaches cells, and of none
     """
 
-    places: tuple[Any, int]
-    bounces: dict[str, Any]
-    cells: dict[str, Any]
+    places: tuple[Buffer, int]
+    bounces: dict[str, Buffer]
+    cells: dict[str, Buffer]
     occluded: bool
-    emitted: Any
-    leaving: Any
-    around: Any
-    patches: tuple[Any, Any]
-    from_skin: Any
-    unlit: Any
+    emitted: Buffer
+    leaving: Buffer
+    around: Buffer
+    patches: tuple[Buffer, Buffer]
+    from_skin: Buffer
+    unlit: Buffer
 
     @property
     def nbytes(self) -> int:
@@ -86,7 +88,7 @@ def interreflection_of(
     return Interreflection(memo.keep(_space, device, buffers, occluded, light, of=f"{of} {light}"), albedo)
 
 
-def no_interreflection(device: Device) -> Any:
+def no_interreflection(device: Device) -> Buffer:
     """A buffer of no light."""
     return device.shared("no interreflection", lambda: device.space(_TEXEL * SIDE * SIDE))
 
@@ -95,7 +97,7 @@ def _found(head: Head, atlas: Atlas) -> Links:
     return cached_links(head.mesh, atlas.place, atlas.mapped)
 
 
-def _uploaded(device: Device, links: Links) -> tuple[tuple[Any, int], dict[str, Any], dict[str, Any]]:
+def _uploaded(device: Device, links: Links) -> LinkBuffers:
     """Places, and links of patches and cells."""
     places = np.stack([links.triangle, links.weights], axis=1)
     bounces = _rows(device, links.bounce_first, links.bounce_patch, links.bounce_share)
@@ -107,14 +109,17 @@ def _uploaded(device: Device, links: Links) -> tuple[tuple[Any, int], dict[str, 
 
 def _rows(
     device: Device, first: NDArray[np.uint32], patch: NDArray[np.uint32], share: NDArray[np.float32]
-) -> dict[str, Any]:
+) -> dict[str, Buffer]:
     links = np.stack([patch, share.view(np.uint32)], axis=1)
     links = links if len(links) else np.zeros((1, 2), np.uint32)
     return {"first": device.buffer(first, "STORAGE"), "links": device.buffer(links, "STORAGE")}
 
 
 def _space(
-    device: Device, buffers: tuple[tuple[Any, int], dict[str, Any], dict[str, Any]], occluded: bool, _: str
+    device: Device,
+    buffers: LinkBuffers,
+    occluded: bool,
+    _: str,
 ) -> LinkSpace:
     places, bounces, cells = buffers
     leaving, around, *patches = (
@@ -152,12 +157,12 @@ def draw(graph: Recorder, lit: Bindings, made: Interreflection, constants: Const
     )
     (places, count), footprint = space.places, 2.0 / (SIDE * SAMPLES**0.5)
     record = shader.record("Leaving", places=count, footprint=footprint, albedo=albedo)
-    own = {"leaving": record, "places": places, "emitted": space.emitted, "from_skin": space.unlit}
+    own: Bindings = {"leaving": record, "places": places, "emitted": space.emitted, "from_skin": space.unlit}
     graph.dispatch("interreflection", shader, {**lit, **own}, each(count))
     graph.repeat(_carry, space)
 
 
-def _carry(graph: Any, made: LinkSpace) -> None:
+def _carry(graph: Recorder, made: LinkSpace) -> None:
     """Let light bounce between the patches, and gather it."""
     device, sent, team = graph.device, made.leaving, _team(graph.device)
     chosen: Constants = (("TEAM", team), ("MEAN", int(made.occluded)))
@@ -167,12 +172,12 @@ def _carry(graph: Any, made: LinkSpace) -> None:
     graph.dispatch("interreflection", means, {"emitted": made.emitted, **alike}, patches)
     bounce = program(device, "interreflection/interreflection_bounce.wgsl", chosen)
     for after in islice(cycle(made.patches), _BOUNCES):
-        bound = {**made.bounces, **alike, "sent": sent, "after": after}
+        bound: Bindings = {**made.bounces, **alike, "sent": sent, "after": after}
         graph.dispatch("interreflection", bounce, bound, patches)
         sent = after
     gather = program(device, "interreflection/interreflection_gather.wgsl", chosen)
-    bound = {**made.cells, "sent": sent, "from_skin": made.from_skin}
-    graph.dispatch("interreflection", gather, bound, cells)
+    gathered: Bindings = {**made.cells, "sent": sent, "from_skin": made.from_skin}
+    graph.dispatch("interreflection", gather, gathered, cells)
 
 
 def _team(device: Device) -> int:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.lights.records import oblique
 from dermis.frame.programs import FLOATS, program
-from dermis.gpu import Constants, Recorder
+from dermis.gpu import Constants, Recorder, TextureOrView
 
 FINE_LEVELS = 8
 """Narrowest levels that are made whole in the picture; wider ones, texels hold as they are."""
@@ -25,7 +23,7 @@ def fine_numbers() -> dict[str, float]:
 
 def fine_levels(
     variance_mm2: NDArray[np.float64], weight: NDArray[np.float64], relit_mm2: float
-) -> dict[str, Any]:
+) -> dict[str, float | NDArray[np.floating]]:
     """Members of the shader's struct Fine.
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
@@ -41,7 +39,7 @@ def draw(
     graph: Recorder,
     layout: LitAtlas,
     constants: Constants,
-    into: Any,
+    into: TextureOrView,
     side: int,
     texel: str = FLOATS,
     scale: float = 1.0,

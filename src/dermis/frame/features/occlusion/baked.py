@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +13,7 @@ from dermis.frame.features.shape.shape import rest_shape, shape_tables
 from dermis.frame.features.visibility.layers import draw_layers, make_layers
 from dermis.frame.programs import program
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
-from dermis.gpu import Bindings, CommandList, ComputeProgram, Device, make_texture
+from dermis.gpu import Bindings, CommandList, ComputeProgram, Device, Record, Texture, make_texture
 from dermis.gpu.textures import texture_from
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
@@ -33,7 +31,7 @@ def bake_occlusion(
     head: Head,
     atlas: Atlas,
     lit: Bindings,
-    texels: Any,
+    texels: Texture,
     side: int,
     directions: int = DIRECTIONS,
     map_size: int = MAP_SIZE,
@@ -56,8 +54,8 @@ def bake_occlusion(
         views = [parallel_view(-d, mesh.outline, map_size) for d in towards[first : first + _BATCH]]
         draw_layers(frame, "occlusion", layers, shadow_layers(views), resting)
         sky = shader.record("Sky", directions=len(views), side=side, vertices=len(mesh.positions))
-        own = {"lights": _lights(shader, views), "shadow_maps": layers.texture, "sky": sky}
-        bound = {**lit, **resting.resources, **own, "atlas": texels, "open": sums}
+        own: Bindings = {"lights": _lights(shader, views), "shadow_maps": layers.texture, "sky": sky}
+        bound: Bindings = {**lit, **resting.resources, **own, "atlas": texels, "open": sums}
         frame.compute("occlusion", shader, bound, (side, rows))
     frame.submit()
     raw = np.frombuffer(device.handle.queue.read_buffer(sums), np.float32).reshape(rows, side, 2)
@@ -65,7 +63,7 @@ def bake_occlusion(
         return np.asarray(raw[..., 0] / raw[..., 1])
 
 
-def _lights(shader: ComputeProgram, views: list[ShadowView]) -> Any:
+def _lights(shader: ComputeProgram, views: list[ShadowView]) -> Record:
     record = shader.record("Lights")
     for layer, view in enumerate(views):
         light = record["light"][layer]
@@ -90,7 +88,7 @@ def whole_map(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:
     return np.nan_to_num(np.vstack([texels, texels[-1:], baked[side:]]), nan=1.0)
 
 
-def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Bindings, texels: Any) -> Any:
+def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Bindings, texels: Texture) -> Texture:
     """The open share of the sky of the atlas' texels and of the vertices, baked or read from disk.
 
     lit : what the lighting passes read, lights aside
@@ -108,6 +106,6 @@ def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Bindings, texel
     return texture_from(device, levels / np.float32(65535.0), "r32float")
 
 
-def no_occlusion(device: Device) -> Any:
+def no_occlusion(device: Device) -> Texture:
     """Placeholder for the map where nothing is occluded."""
     return device.shared("no occlusion", lambda: make_texture(device, (1, 1), "r32float", use="map"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from dermis.frame.features.shape.mesh import HeadResources, upload_bare
 from dermis.frame.features.visibility.layers import Layers, draw_layers, make_layers
 from dermis.frame.programs import TILE, each, program
 from dermis.frame.projection import MIDDLE, Views, frame_of
-from dermis.gpu import CommandList, Device, Recorder, make_texture
+from dermis.gpu import Bindings, Buffer, CommandList, Device, Record, Texture, make_texture
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 from dermis.mesh.morph_targets import no_targets
@@ -129,8 +129,8 @@ class MovingOcclusion:
     corners : texture of the vertices between which each texel lies, as moving_occlusion_corners.wgsl fills it
     """
 
-    resting: Any
-    corners: Any
+    resting: Texture
+    corners: Texture
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ class Sky:
 
     layers: Layers
     occluders: HeadResources
-    shares: Any
+    shares: Buffer
     vertices: int
 
 
@@ -164,7 +164,7 @@ def make_sky(device: Device, head: Head, resting: HeadResources) -> Sky:
     return sky
 
 
-def make_map(device: Device, resting: Any) -> tuple[Any, MovingOcclusion]:
+def make_map(device: Device, resting: Texture) -> tuple[Texture, MovingOcclusion]:
     """An empty map like one of a head as it rests, and what it is to be made from."""
     side, rows = resting.size[:2]
     corners = make_texture(device, (side, side), "rgba32uint")
@@ -175,7 +175,7 @@ def draw(
     graph: Recorder,
     sky: Sky,
     look: Look,
-    record: Any,
+    record: Record,
     maps: Sequence[tuple[LitAtlas, MovingOcclusion | None]],
 ) -> None:
     """Update the occlusion maps of all layouts for the current shape.
@@ -190,16 +190,20 @@ def draw(
 
 def _draw_map(graph: Recorder, sky: Sky, layout: LitAtlas, follows: MovingOcclusion) -> None:
     """Fill a layout's map; where its texels lie is found once."""
-    moved = layout.lit["occlusion_map"]
-    bound = {**layout.head.resources, "atlas": layout.atlas.resources["atlas"], "corners": follows.corners}
+    moved = cast(Texture, layout.lit["occlusion_map"])
+    bound: Bindings = {
+        **layout.head.resources,
+        "atlas": layout.atlas.resources["atlas"],
+        "corners": follows.corners,
+    }
     find = program(graph.device, "occlusion/moving_occlusion_corners.wgsl")
     graph.compute("occlusion", find, bound, follows.corners.size[:2])
-    made = {"resting_map": follows.resting, "shares": sky.shares, "moved_map": moved}
+    made: Bindings = {"resting_map": follows.resting, "shares": sky.shares, "moved_map": moved}
     fill = program(graph.device, "occlusion/moving_occlusion.wgsl")
-    graph.compute("occlusion", fill, bound | made, moved.size[:2], TILE)
+    graph.compute("occlusion", fill, {**bound, **made}, moved.size[:2], TILE)
 
 
-def sky_record(device: Device, look: Look, vertices: int) -> Any:
+def sky_record(device: Device, look: Look, vertices: int) -> Record:
     """The shader's record of views from all around."""
     record = program(device, _VERTICES).record("Sky", vertices=vertices)
     views = record["views"]
@@ -210,10 +214,10 @@ def sky_record(device: Device, look: Look, vertices: int) -> Any:
 
 
 def _draw_vertices(
-    graph: Recorder, sky: Sky, look: Look, record: Any, head: HeadResources, resting: bool = False
+    graph: Drawer, sky: Sky, look: Look, record: Record, head: HeadResources, resting: bool = False
 ) -> None:
     """Find the shares of a head as it is drawn now."""
     draw_layers(graph, "occlusion", sky.layers, look.views, sky.occluders.placed(head))
-    bound = {**head.resources, "sky": record, "maps": sky.layers.texture, "shares": sky.shares}
+    bound: Bindings = {**head.resources, "sky": record, "maps": sky.layers.texture, "shares": sky.shares}
     find = program(graph.device, _VERTICES, (("RESTING", resting),) if resting else ())
     graph.dispatch("occlusion", find, bound, each(sky.vertices))

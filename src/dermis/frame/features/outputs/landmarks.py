@@ -15,6 +15,8 @@ from dermis.gpu import Buffer, Device, Recorder, Texture
 from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landmark_points
 from dermis.mesh.head import Head
 
+FoundLandmarks = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
+"""Names of each set, and (n, 4) places [mm] with 1 for those that are seen."""
 TOLERANCE_MM = 2.0
 """By which the mesh at the pixels around a landmark may lie before it where it still counts as seen."""
 _ROW = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("material", "u4", 4)])  # as in landmarks.wgsl
@@ -35,7 +37,7 @@ class LandmarkSpace:
     buffer: Buffer
     count: int
 
-    def found(self, raw: NDArray[np.uint8]) -> dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]:
+    def found(self, raw: NDArray[np.uint8]) -> FoundLandmarks:
         """Return the names of each set, and (n, 4) places [mm] with 1 for those that are seen.
 
         raw : bytes of the buffer

@@ -16,6 +16,7 @@ from dermis.frame.features.translucency.resources import PairBuffers, Translucen
 from dermis.frame.programs import each, program
 from dermis.frame.request import FrameRequest
 from dermis.gpu import (
+    Bindings,
     ComputeProgram,
     Device,
     Memo,
@@ -137,7 +138,7 @@ def measure_thickness(graph: Recorder, thin: Translucency, into: Texture) -> Non
     pairs, shader = thin.pairs, program(graph.device, "outputs/thickness_map.wgsl")
     count, cells = pairs.receivers[1], pairs.cells
     reach = {"count": count, "radius_mm": cells.radius_mm, "spacing2_mm2": cells.spacing_mm**2}
-    bound = {
+    bound: Bindings = {
         "reach": shader.record("Reach", **reach),
         "listed": pairs.sums,
         "pairs": pairs.pairs,

@@ -15,7 +15,7 @@ from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Reco
 from dermis.scene.outputs import OUTPUTS
 
 _WORD = 4  # bytes
-PlaneArray = NDArray[Any]
+PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 """An output as an array: float32, int32 or uint8, as its line in `OUTPUTS` says."""
 
 

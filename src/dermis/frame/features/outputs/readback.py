@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
+from dermis.frame.features.outputs.landmarks import FoundLandmarks
+from dermis.frame.features.outputs.planes import PlaneArray
 from dermis.frame.features.outputs.resources import Resources
 from dermis.frame.features.post.picture import Picture, encoding_of
 from dermis.frame.programs import program
-from dermis.gpu import Device, Graph
+from dermis.gpu import Buffer, Device, Graph, MutableBindings
 from dermis.gpu.readback import Fetched
 from dermis.scene.settings import Settings
 
+PictureArray = NDArray[Any]  # callers choose the dtype
+"""(h, w, 3 or 4): sRGB bytes, or linear floats."""
 _ROW = 1024  # as in the shaders
 _WORD = 4  # bytes
 _PIXELS, _WORDS = 4, 3  # read and written by one invocation that packs bytes
@@ -39,13 +43,13 @@ class Leaving:
     words: int
     outputs: Resources | None = None
 
-    def image(self) -> NDArray[Any]:
+    def image(self) -> PictureArray:
         """(h, w, 3 or 4) sRGB bytes or linear floats; waits for them. To be called once."""
         return self._image(self.fetched.array())
 
-    def all(self) -> tuple[NDArray[Any], dict[str, NDArray[Any]], dict[str, Any]]:
+    def all(self) -> tuple[PictureArray, dict[str, PlaneArray], FoundLandmarks]:
         """The same, outputs by name and `LandmarkSpace.found`; in its place, to be called once."""
-        raw, start, found = self.fetched.array(), _WORD * self.words, dict[str, NDArray[Any]]()
+        raw, start, found = self.fetched.array(), _WORD * self.words, dict[str, PlaneArray]()
         if self.outputs is None:
             return self._image(raw), {}, {}
         for planes in self.outputs.planes:
@@ -56,7 +60,7 @@ class Leaving:
         landmarks = places.found(raw[start : start + places.buffer.size]) if places else {}
         return self._image(raw), {name: found[name] for name in self.outputs.names}, landmarks
 
-    def _image(self, raw: NDArray[np.uint8]) -> NDArray[Any]:
+    def _image(self, raw: NDArray[np.uint8]) -> PictureArray:
         width, height = self.size
         count = self.channels * width * height
         numbers = raw[: count * np.dtype(self.kind).itemsize].view(self.kind)
@@ -80,17 +84,18 @@ def draw(
 
     Raises DermisError for more than the device has in one buffer.
     """
-    device, pixels = graph.device, picture.size[0] * picture.size[1]
+    device, pixels, bound = graph.device, picture.size[0] * picture.size[1], MutableBindings()
     channels = 4 if alpha else 3
     if linear:
         shader = program(device, "outputs/pack_linear.wgsl", (("CHANNELS", channels),))
-        count, words, bound = pixels, channels * pixels, {"exposed": picture.exposed}
+        count, words, bound["exposed"] = pixels, channels * pixels, picture.exposed
     elif alpha:
         shader, count, words = program(device, "outputs/pack_straight.wgsl"), pixels, pixels
-        bound = {"exposed": picture.exposed, "settings": shader.record("Straight", **encoding_of(alpha))}
+        bound["exposed"] = picture.exposed
+        bound["settings"] = shader.record("Straight", **encoding_of(alpha))
     else:
         count = -(-pixels // _PIXELS)
-        shader, words, bound = program(device, "outputs/pack.wgsl"), _WORDS * count, {"bytes": picture.bytes}
+        shader, words, bound["bytes"] = program(device, "outputs/pack.wgsl"), _WORDS * count, picture.bytes
     _check(device, _WORD * words, pixels)
     packed = _packed(device, picture, words)
     buffers = [packed, *(outputs.buffers if outputs else ())]
@@ -107,14 +112,14 @@ def _check(device: Device, size: int, pixels: int) -> None:
         refuse("size", limit, f"there are {pixels}", "Choose a smaller one")
 
 
-def _check_sum(device: Device, buffers: list[Any], pixels: int) -> None:
+def _check_sum(device: Device, buffers: list[Buffer], pixels: int) -> None:
     size, most = sum(buffer.size for buffer in buffers), device.max_buffer_bytes
     if size > most:
         limit = f"outputs of at most {most * pixels // size} pixels at once from {device.adapter.name}"
         refuse("size", limit, f"there are {pixels}", "Ask for fewer outputs, or a smaller size")
 
 
-def _packed(device: Device, picture: Picture, words: int) -> Any:
+def _packed(device: Device, picture: Picture, words: int) -> Buffer:
     """A buffer of words of 4 bytes, which lives as long as the picture."""
     if words not in picture.packed:
         picture.packed[words] = device.buffer(np.zeros(words, np.uint32), "STORAGE")

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from dermis.frame.features.post.meter import Meter, exposed_by
 from dermis.frame.features.shading.view import rays_of
 from dermis.frame.programs import program
-from dermis.gpu import Bindings, Recorder
+from dermis.gpu import Bindings, Record, Recorder, Texture
 from dermis.scene.settings import Settings
 
 _KINDS = ("gradient", "environment")  # numbered from 1 as in background.wgsl; 0 is a colour
@@ -21,18 +20,18 @@ class Backdrop:
     panorama : the one that is seen there where it is not that of the reflections
     """
 
-    result: Any
-    panorama: Any = None
+    result: Texture
+    panorama: Texture | None = None
 
 
 def draw(
     graph: Recorder,
     backdrop: Backdrop,
-    look: tuple[Bindings, Any],
-    image: Any,
+    look: tuple[Bindings, Record],
+    image: Texture,
     meter: Meter | None,
     settings: Settings,
-) -> Any:
+) -> Texture:
     """The picture with what is behind the head, a texture of `backdrop`.
 
     look : resources and record of the shading

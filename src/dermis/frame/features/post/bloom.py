@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from dermis.frame.programs import program
-from dermis.gpu import Device, Recorder, make_texture
+from dermis.gpu import Bindings, Device, Recorder, Texture, make_texture
 
 _COARSEST = 4  # halvings short of one pixel: the widest Gaussian spans a sixteenth of the picture
 
@@ -16,9 +15,9 @@ _COARSEST = 4  # halvings short of one pixel: the widest Gaussian spans a sixtee
 class Glow:
     """Textures for a picture's halvings, for the sums on the way back up, and for the result."""
 
-    halved: list[Any]
-    sums: list[Any]
-    result: Any
+    halved: list[Texture]
+    sums: list[Texture]
+    result: Texture
 
 
 def make_glow(device: Device, size: tuple[int, int]) -> Glow:
@@ -29,7 +28,7 @@ def make_glow(device: Device, size: tuple[int, int]) -> Glow:
     return Glow(halved, sums[:-1], make_texture(device, size, "rgba32float"))
 
 
-def draw(graph: Recorder, glow: Glow, picture: Any, share: float) -> Any:
+def draw(graph: Recorder, glow: Glow, picture: Texture, share: float) -> Texture:
     """The picture with `share` of its light scattered, none of it lost; a texture of `glow`."""
     source = picture
     for halved in glow.halved:
@@ -42,8 +41,10 @@ def draw(graph: Recorder, glow: Glow, picture: Any, share: float) -> Any:
     return glow.result
 
 
-def _step(graph: Recorder, widen: int, own: Any, smaller: Any, into: Any, *factors: float) -> None:
+def _step(
+    graph: Recorder, widen: int, own: Texture, smaller: Texture, into: Texture, *factors: float
+) -> None:
     shader = program(graph.device, "post/bloom.wgsl", (("WIDEN", widen),))
     record = shader.record("Bloom", own=factors[0], wider=factors[1])
-    bound = {"bloom": record, "picture": own, "smaller": smaller, "result": into}
+    bound: Bindings = {"bloom": record, "picture": own, "smaller": smaller, "result": into}
     graph.compute("bloom", shader, bound, into.size[:2])

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from dermis.frame.features.shading.view import rays_of
 from dermis.frame.programs import program
-from dermis.gpu import Bindings, Constants, Device, Recorder
+from dermis.gpu import Bindings, Buffer, Constants, Device, Record, Recorder, Texture
 from dermis.scene.settings import Settings
 
 SIDE = 64
@@ -32,8 +31,8 @@ def meter_numbers() -> dict[str, float]:
 class Meter:
     """Buffers of what is metered at each point, and of the exposure that follows."""
 
-    points: Any
-    exposure: Any
+    points: Buffer
+    exposure: Buffer
 
 
 def make_meter(device: Device) -> Meter:
@@ -42,7 +41,11 @@ def make_meter(device: Device) -> Meter:
 
 
 def draw(
-    graph: Recorder, meter: Meter, look: tuple[Bindings, Any, Constants], visibility: Any, image: Any
+    graph: Recorder,
+    meter: Meter,
+    look: tuple[Bindings, Record, Constants],
+    visibility: Texture,
+    image: Texture,
 ) -> None:
     """Meter the skin that a picture shows.
 
@@ -61,7 +64,7 @@ def draw(
     graph.dispatch("meter", key, {"points": meter.points, "exposure": meter.exposure}, (1, 1, 1))
 
 
-def exposed_by(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Any]:
+def exposed_by(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Buffer]:
     """The exposure for exposure.wgsl, 0 where it is metered, and the buffer that it reads."""
     if settings.exposure == "auto":
         assert meter is not None

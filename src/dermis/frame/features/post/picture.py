@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 from dermis.frame.features.post.meter import Meter, exposed_by
 from dermis.frame.programs import program
-from dermis.gpu import Device, Recorder, make_texture
+from dermis.gpu import Buffer, Device, MutableBindings, Recorder, Texture, make_texture
 from dermis.scene.settings import Settings
 
 _TONES = ("none", "filmic", "neutral")  # numbered as in tone.wgsl
@@ -20,11 +19,11 @@ class Picture:
     packed : buffers for reading it back, by their number of words
     """
 
-    radiance: Any
-    exposed: Any
-    bytes: Any
+    radiance: Texture
+    exposed: Texture
+    bytes: Texture
     size: tuple[int, int]
-    packed: dict[int, Any] = field(default_factory=dict)
+    packed: dict[int, Buffer] = field(default_factory=dict)
 
 
 def make_picture(device: Device, size: tuple[int, int]) -> Picture:
@@ -34,7 +33,7 @@ def make_picture(device: Device, size: tuple[int, int]) -> Picture:
 
 
 def draw(
-    graph: Recorder, radiance: Any, picture: Picture, settings: Settings, meter: Meter | None = None
+    graph: Recorder, radiance: Texture, picture: Picture, settings: Settings, meter: Meter | None = None
 ) -> None:
     """Expose, apply the tone curve and encode: fill the picture's linear and byte images.
 
@@ -43,7 +42,7 @@ def draw(
     shader = program(graph.device, "post/post.wgsl")
     exposure, metered = exposed_by(graph.device, settings, meter)
     record = shader.record("Post", exposure=exposure, **encoding_of(settings))
-    bound = {"settings": record, "image": radiance, "metered": metered}
+    bound: MutableBindings = {"settings": record, "image": radiance, "metered": metered}
     bound |= {"exposed": picture.exposed, "bytes": picture.bytes}
     graph.compute("post", shader, bound, picture.size)
 

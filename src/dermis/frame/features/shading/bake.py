@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.programs import each, program
-from dermis.gpu import Bindings, CommandList, Constants, Device, make_texture
+from dermis.gpu import Bindings, CommandList, Constants, Device, Texture, make_texture
 
 CHANNELS: Mapping[str, int] = MappingProxyType(
     {
@@ -76,6 +75,6 @@ def bake(
     return np.frombuffer(raw, np.float32).reshape(-1, COUNT).copy()
 
 
-def no_thickness(device: Device) -> Any:
+def no_thickness(device: Device) -> Texture:
     """Placeholder for the map of thickness where nothing measures it."""
     return device.shared("no thickness", lambda: make_texture(device, (1, 1), "rgba32float"))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from dermis.frame.features.shape.mesh import HeadResources
 from dermis.frame.features.visibility.layers import Layers, draw_layers, make_layers
 from dermis.frame.programs import program
 from dermis.frame.projection import Views
-from dermis.gpu import Device, Recorder, make_texture
+from dermis.gpu import Bindings, Device, Texture, make_texture
 from dermis.gpu.memory import check_memory
 
 SHADOW_BYTES = 4
@@ -23,10 +22,10 @@ class ShadowMaps:
     """
 
     layers: Layers
-    bounds: Any
+    bounds: Texture
 
     @property
-    def texture(self) -> Any:
+    def texture(self) -> Texture:
         """Depth from each light: 1 near, 0 nothing."""
         return self.layers.texture
 
@@ -52,7 +51,11 @@ def draw(graph: Recorder, maps: ShadowMaps, views: Views, head: HeadResources, b
         return
     draw_layers(graph, "shadows", maps.layers, views, head)
     if bounded:
-        bound = {"maps": maps.texture, "maps_sampler": graph.device.sampler(), "bounds": maps.bounds}
+        bound: Bindings = {
+            "maps": maps.texture,
+            "maps_sampler": graph.device.sampler(),
+            "bounds": maps.bounds,
+        }
         groups = _squares(maps.layers.size[0]) // 16
         shader = program(graph.device, "shadows/shadow_bounds.wgsl")
         graph.dispatch("shadows", shader, bound, (groups, groups, len(views.clips)))

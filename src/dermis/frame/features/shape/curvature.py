@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from dermis.frame.features.shape.mesh import HeadResources
 from dermis.frame.features.shape.shape import spans_of
 from dermis.frame.programs import each, program
-from dermis.gpu import Device, Recorder
+from dermis.gpu import Buffer, Device, Recorder
 from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Mesh
 
@@ -33,9 +32,9 @@ class Curvature:
     vertices : count
     """
 
-    smoothed: Any
-    between: Any
-    tables: dict[str, Any]
+    smoothed: Buffer
+    between: Buffer
+    tables: dict[str, Buffer]
     steps: int
     vertices: int
 
@@ -60,7 +59,7 @@ def make_curvature(device: Device, mesh: Mesh) -> Curvature:
     return Curvature(space, between, buffers, _steps(mesh, pairs, both), count)
 
 
-def no_curvature(device: Device) -> Any:
+def no_curvature(device: Device) -> Buffer:
     """Placeholder for its buffer where nothing reads it."""
     return device.shared("no curvature", lambda: device.buffer(np.zeros(1, np.float32), "STORAGE"))
 
@@ -91,5 +90,5 @@ def draw(graph: Recorder, head: HeadResources, curvature: Curvature) -> None:
     smooth = program(device, "shape/curvature_smooth.wgsl")
     for step in range(curvature.steps):
         before, after = spaces[step % 2], spaces[1 - step % 2]
-        bound = curvature.tables | {"before": before, "curvatures": after}
-        graph.dispatch(_STAGE, smooth, bound, groups)
+        smoothing = curvature.tables | {"before": before, "curvatures": after}
+        graph.dispatch(_STAGE, smooth, smoothing, groups)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.frame.features.shape.shape import VERTICES, Shape, ShapeTables, rest_shape
-from dermis.gpu import Device, Memo
+from dermis.gpu import Buffer, Device, Memo, Texture
 from dermis.gpu.textures import texture_from
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -27,8 +26,8 @@ class HeadResources:
     triangles : count
     """
 
-    resources: dict[str, Any]
-    indices: Any
+    resources: dict[str, Texture | Buffer]
+    indices: Buffer
     triangles: int
 
     def shaped(self, shape: Shape) -> HeadResources:
@@ -57,10 +56,12 @@ def upload_bare(device: Device, triangles: NDArray[np.integer]) -> HeadResources
     return _uploaded(device, table, {})
 
 
-def _uploaded(device: Device, table: NDArray[np.uint32], vertices: dict[str, Any]) -> HeadResources:
+def _uploaded(
+    device: Device, table: NDArray[np.uint32], vertices: dict[str, Texture | Buffer]
+) -> HeadResources:
     rows = np.concatenate([_rows(part, _TRIANGLES_PER_ROW) for part in table])
     read = device.adapter.kind != "CPU"  # see geometry.wgsl; what is not read still needs to be there
-    resources = {
+    resources: dict[str, Texture | Buffer] = {
         "triangle_table": texture_from(device, rows, "rgba32uint"),
         "triangle_buffer": device.buffer(rows if read else rows[:1, :3], "STORAGE"),
     }
@@ -78,7 +79,7 @@ def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
     return table
 
 
-def _rows(table: NDArray[Any], per_row: int) -> NDArray[Any]:
+def _rows(table: NDArray[np.uint32], per_row: int) -> NDArray[np.uint32]:
     rows = -(-len(table) // per_row)
     padded = np.zeros((rows * per_row, table.shape[1]), dtype=table.dtype)
     padded[: len(table)] = table
@@ -86,14 +87,19 @@ def _rows(table: NDArray[Any], per_row: int) -> NDArray[Any]:
 
 
 def surface_at_rest(
-    memo: Memo, device: Device, held: HeadResources, tables: ShapeTables, head: Head, person: Any, index: int
+    memo: Memo,
+    device: Device,
+    held: HeadResources,
+    tables: ShapeTables,
+    head: Head,
+    person: NDArray[np.float32] | None,
+    index: int,
 ) -> HeadResources:
     """The triangles of an atlas at rest.
 
     person : (p, 3) places of the head's control points where another person rests, None for the head's own
     index : of the atlas among several
     """
-    own = person is None
-    positions, of = (head.control.positions_mm, "head") if own else (person, "person")
+    positions, of = (head.control.positions_mm, "head") if person is None else (person, "person")
     shape = memo.keep(rest_shape, device, tables, positions, of=of)
     return memo.keep(HeadResources.shaped, held, shape, of=f"{of} {index}")

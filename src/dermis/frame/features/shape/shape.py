@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.programs import each, program
-from dermis.gpu import Bindings, CommandList, Device, Recorder, make_texture
+from dermis.gpu import (
+    Bindings,
+    Buffer,
+    CommandList,
+    Constants,
+    Device,
+    Graph,
+    Recorder,
+    Texture,
+    make_texture,
+)
 from dermis.mesh.eyeball import Contact
 from dermis.mesh.geometry import MIN_UV_CROSS, vertex_normals
 from dermis.mesh.head import Head
@@ -40,9 +50,9 @@ class ShapeTables:
     slides : whether some points stay off eyeballs
     """
 
-    morphs: dict[str, Any]
-    stencils: dict[str, Any]
-    surface: dict[str, Any]
+    morphs: dict[str, Buffer]
+    stencils: dict[str, Buffer]
+    surface: dict[str, Buffer]
     control: int
     points: int
     vertices: int
@@ -60,16 +70,16 @@ class Shape:
     tables : those that it is made by
     """
 
-    rest: Any
-    weights: Any
-    matrices: Any
-    morphs: dict[str, Any]
-    stencils: dict[str, Any]
-    surface: dict[str, Any]
+    rest: Buffer
+    weights: Buffer
+    matrices: Buffer
+    morphs: dict[str, Buffer]
+    stencils: dict[str, Buffer]
+    surface: dict[str, Texture | Buffer]
     tables: ShapeTables
 
     @property
-    def vertices(self) -> dict[str, Any]:
+    def vertices(self) -> dict[str, Texture | Buffer]:
         """The vertices by their names in the shaders that read them."""
         return {name: self.surface[name] for name in VERTICES}
 
@@ -96,7 +106,7 @@ def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Sh
 
     moves : False for one that no morph target and no bone moves
     """
-    rest, morphs, stencils = _points(device, tables.control), dict[str, Any](), dict[str, Any]()
+    rest, morphs, stencils = _points(device, tables.control), dict[str, Buffer](), dict[str, Buffer]()
     weights, matrices = _floats(device, max(1, tables.targets)), _floats(device, 12 * max(1, tables.bones))
     points = rest
     if moves and tables.morphs:
@@ -110,19 +120,19 @@ def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Sh
     return Shape(rest, weights, matrices, morphs, stencils, surface, tables)
 
 
-def _points(device: Device, count: int) -> Any:
+def _points(device: Device, count: int) -> Buffer:
     return _floats(device, 3 * count)
 
 
-def _floats(device: Device, count: int) -> Any:
+def _floats(device: Device, count: int) -> Buffer:
     return device.buffer(np.zeros(count, np.float32), "STORAGE")
 
 
-def _buffers(device: Device, tables: dict[str, NDArray[Any]]) -> dict[str, Any]:
+def _buffers(device: Device, tables: dict[str, NDArray[np.generic]]) -> dict[str, Buffer]:
     return {name: device.buffer(table, "STORAGE") for name, table in tables.items()}
 
 
-def _vertices(device: Device, count: int) -> dict[str, Any]:
+def _vertices(device: Device, count: int) -> dict[str, Texture | Buffer]:
     """Space for vertices; GPUs read the buffer and software the texture, the other is there to be bound."""
     rows, software = -(-count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
@@ -132,7 +142,7 @@ def _vertices(device: Device, count: int) -> dict[str, Any]:
     )
 
 
-def _morph_tables(rig: Rig) -> dict[str, NDArray[Any]]:
+def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
     """Displacements and influences point by point."""
     count = len(rig.positions_mm)
     return {
@@ -174,13 +184,13 @@ def _contacts(contact: Contact | None, count: int) -> Words:
     return found
 
 
-def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[Any]]:
+def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:
     weight = stencils.weight.astype(np.float32).view(np.uint32)
     terms = np.stack([stencils.point.astype(np.uint32), weight], axis=1)
     return {"first": stencils.first.astype(np.uint32), "terms": terms}
 
 
-def _surface_tables(mesh: Mesh) -> dict[str, NDArray[Any]]:
+def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     """The vertices, the corners of triangles around them, and which of these are each one's own."""
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
     table = np.zeros(count, _VERTEX)
@@ -294,6 +304,6 @@ def _evaluate(graph: Recorder, shape: Shape) -> None:
     _each(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, least)
 
 
-def _each(graph: Recorder, name: str, bound: Bindings, count: int, constants: Any = ()) -> None:
+def _each(graph: Recorder, name: str, bound: Bindings, count: int, constants: Constants = ()) -> None:
     """A pass of one invocation for each of `count`."""
     graph.dispatch("shape", program(graph.device, name, constants), bound, each(count))

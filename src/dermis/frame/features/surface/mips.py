@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.programs import HALVES, program
-from dermis.gpu import CommandList, Device, Recorder, make_texture, upload
+from dermis.gpu import (
+    Bindings,
+    Buffer,
+    CommandList,
+    Device,
+    Recorder,
+    Texture,
+    TextureView,
+    make_texture,
+    upload,
+)
 from dermis.gpu.textures import texture_from, view_of
 from dermis.images.filters import mip_chain
 
@@ -21,8 +31,8 @@ _BAND_BYTES = 96 << 20  # of heights at a time: every device can bind so many
 class Mipped(NamedTuple):
     """A texture, and views of its mips to read from and to store to."""
 
-    texture: Any
-    levels: tuple[Any, ...]
+    texture: Texture
+    levels: tuple[TextureView, ...]
 
     @property
     def size(self) -> tuple[int, int]:
@@ -31,7 +41,7 @@ class Mipped(NamedTuple):
         return width, height
 
 
-def colours(device: Device, image: Floats) -> Any:
+def colours(device: Device, image: Floats) -> Texture:
     """A texture of an (h, w, 3) picture."""
     made = empty(device, image.shape)
     upload(device, made.texture, np.dstack([image.astype(np.float16), np.ones(image.shape[:2], np.float16)]))
@@ -41,12 +51,12 @@ def colours(device: Device, image: Floats) -> Any:
     return made.texture
 
 
-def slopes(device: Device, image: Floats | None) -> Any:
+def slopes(device: Device, image: Floats | None) -> Texture:
     """A texture of (h, w, 2) slopes and their squares; flat without any."""
     if image is None:
         return _flat(device)
     made, frame = empty(device, image.shape), CommandList(device, timed=False)
-    bound = {"slopes": texture_from(device, image, "rg32float"), "stored": made.levels[0]}
+    bound: Bindings = {"slopes": texture_from(device, image, "rg32float"), "stored": made.levels[0]}
     shader = program(device, "surface/map_moments.wgsl", store=HALVES)
     frame.compute("maps", shader, bound, image.shape[1::-1])
     halve(frame, made)
@@ -54,7 +64,7 @@ def slopes(device: Device, image: Floats | None) -> Any:
     return made.texture
 
 
-def detail(device: Device, slopes: Floats) -> Any:
+def detail(device: Device, slopes: Floats) -> Texture:
     """A texture of two layers: a tile's (h, w, 4) slopes of two kinds, and the squares of either's."""
     squares = slopes * slopes
     sums = np.stack([squares[..., 0] + squares[..., 1], squares[..., 2] + squares[..., 3]], axis=-1)
@@ -68,7 +78,7 @@ def detail(device: Device, slopes: Floats) -> Any:
     return texture
 
 
-def relief(device: Device, height: Floats | None) -> Any:
+def relief(device: Device, height: Floats | None) -> Texture:
     """A texture of the slopes of an (h, w) height map [mm per texel] and their squares; flat without any.
 
     Beyond the edge a plane goes on.
@@ -81,7 +91,7 @@ def relief(device: Device, height: Floats | None) -> Any:
     return relief_of(device, bands, height.shape, band)
 
 
-def relief_of(device: Device, bands: Iterable[Any], shape: tuple[int, ...], band: int) -> Any:
+def relief_of(device: Device, bands: Iterable[Buffer], shape: tuple[int, ...], band: int) -> Texture:
     """The same of heights in buffers, of so many rows each, with a texel more on all sides."""
     made, frame, (rows, columns) = empty(device, shape), CommandList(device, timed=False), shape
     for index, heights in enumerate(bands):
@@ -91,23 +101,28 @@ def relief_of(device: Device, bands: Iterable[Any], shape: tuple[int, ...], band
     return made.texture
 
 
-def relieve(recorder: Recorder, relief: Mipped, heights: Any) -> None:
+def relieve(recorder: Recorder, relief: Mipped, heights: Buffer) -> None:
     """Fill a texture of even sides, and its mips, with the slopes of heights in one buffer."""
     _relieve(recorder, relief, heights, 0, relief.size[1])
     halve(recorder, relief, 2)
 
 
-def _relieve(recorder: Recorder, relief: Mipped, heights: Any, top: int, rows: int) -> None:
+def _relieve(recorder: Recorder, relief: Mipped, heights: Buffer, top: int, rows: int) -> None:
     device = recorder.device
     first = device.shared(
         f"relief from row {top}", lambda: device.buffer(np.array([top], np.uint32), "STORAGE")
     )
-    bound = {"top": first, "heights": heights, "stored": relief.levels[0], "halved": relief.levels[1]}
+    bound: Bindings = {
+        "top": first,
+        "heights": heights,
+        "stored": relief.levels[0],
+        "halved": relief.levels[1],
+    }
     size = -(-relief.size[0] // 2), -(-rows // _ROWS)
     recorder.compute("maps", program(device, "surface/relief.wgsl", store=HALVES), bound, size)
 
 
-def _flat(device: Device) -> Any:
+def _flat(device: Device) -> Texture:
     return device.shared("no relief", lambda: make_texture(device, (1, 1), HALVES, use="map"))
 
 
@@ -118,7 +133,7 @@ def empty(device: Device, shape: tuple[int, ...]) -> Mipped:
     return mipped(texture)
 
 
-def mipped(texture: Any) -> Mipped:
+def mipped(texture: Texture) -> Mipped:
     """A texture with views of its mips."""
     return Mipped(texture, tuple(view_of(texture, mip=mip) for mip in range(texture.mip_level_count)))
 
@@ -128,5 +143,5 @@ def halve(recorder: Recorder, mipped: Mipped, first: int = 1) -> None:
     shader, levels = program(recorder.device, "surface/map_halve.wgsl", store=HALVES), mipped.levels
     width, height = mipped.size
     for mip in range(first, len(levels)):
-        bound = {"finer": levels[mip - 1], "stored": levels[mip]}
+        bound: Bindings = {"finer": levels[mip - 1], "stored": levels[mip]}
         recorder.compute("maps", shader, bound, (max(width >> mip, 1), max(height >> mip, 1)))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from dermis.gpu import ComputeProgram
+from dermis.gpu import ComputeProgram, Record
 from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
 from dermis.human import teeth
@@ -60,7 +58,7 @@ def eye_numbers() -> dict[str, float]:
     }
 
 
-def fill_eye(record: Any, look: EyeLook) -> None:
+def fill_eye(record: Record, look: EyeLook) -> None:
     """Tell a shader's `Eye`, or some of them, what eyes look like."""
     for name in ("eumelanin", "pupil_mm", "redness"):
         record[name] = getattr(look, name)
@@ -75,7 +73,7 @@ def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
 
 def skin_record(
     program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
-) -> Any:
+) -> Record:
     """The shader's `Skin`: members that the model has by name come from it, the others are derived.
 
     profile : of the skin
@@ -85,7 +83,7 @@ def skin_record(
     return program.record("Skin", **dials, **_derived(skin, maps, profile), light_count=light_count)
 
 
-def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
+def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Members that no field or property of the model holds; the usual roughness leaves a map as it is."""
     energy, usual = ENERGY[skin.energy], USUAL_ROUGHNESS if maps.rough else 1.0
     return {
@@ -111,7 +109,7 @@ def half_space_of(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats,
     return colour, 1.0 if skin.specular == "none" else SKIN_ETA
 
 
-def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
+def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Members that direction.wgsl reads, for half-spaces of the skin's mean colour."""
     half_space = half_space_of(skin, maps, profile)
     law = forward_directions(*half_space, skin.anisotropy)

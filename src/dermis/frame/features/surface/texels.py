@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.programs import program
-from dermis.gpu import Device, Recorder, make_texture, scratch
+from dermis.gpu import Device, Recorder, Texture, make_texture, scratch
 
 SURFACE_BYTES = 32
 """Bytes of a texel."""
 
 
-def make_surfaces(device: Device, side: int) -> Any:
+def make_surfaces(device: Device, side: int) -> Texture:
     """A texture for positions, normals, colours and gloss: two layers, as packed_surface.wgsl packs them."""
     return scratch(device, make_texture(device, (side, side), "rgba32uint", layers=2, name="atlas's surface"))
 

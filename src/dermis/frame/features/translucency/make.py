@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import count
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +30,7 @@ from dermis.frame.features.translucency.passes import (
 )
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.request import FrameRequest
-from dermis.gpu import Bindings, Device, Memo, make_texture, scratch, upload
+from dermis.gpu import Bindings, Device, Memo, Texture, make_texture, scratch, upload
 from dermis.optics.flesh import medium_of
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.thin_parts import ThinParts, thin_parts
@@ -167,7 +166,7 @@ def _sums(cells: Cells, found: Found) -> NDArray[np.uint32]:
     return listed if len(listed) else np.zeros((1, 3), np.uint32)
 
 
-def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
+def _unlit(device: Device, surface: NDArray[np.bool_]) -> Texture:
     light = np.zeros((*surface.shape, 4), np.float32)
     light[..., 3] = surface
     texture = make_texture(device, surface.shape, "rgba32float")

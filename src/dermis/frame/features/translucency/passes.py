@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +11,7 @@ from dermis.frame.features.diffusion.levels import Blur, Levels
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.lights.records import oblique
 from dermis.frame.programs import each, program
-from dermis.gpu import Bindings, ComputeProgram, Constants, Device, Recorder
+from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Record, Recorder, Texture
 from dermis.optics.gaussians import MOST_GAUSSIANS
 from dermis.optics.thin_parts import ROWS, ThinParts
 
@@ -23,7 +21,7 @@ RECEIVER_BYTES, SOURCE_BYTES = 48, 32
 _FACETS: Constants = (("FACETS", 1),)
 
 
-def space(device: Device, count: int, size: int = 4) -> Any:
+def space(device: Device, count: int, size: int = 4) -> Buffer:
     """A buffer for a number of things of some bytes; never without any."""
     return device.space(size * max(1, count))
 
@@ -32,8 +30,8 @@ def draw_receivers(
     graph: Recorder,
     surface: Bindings,
     cells: Cells,
-    asked: tuple[Any, int],
-    points: Any,
+    listed: tuple[Buffer, int],
+    points: Buffer,
     facets: bool = False,
 ) -> None:
     """Points, normals and metric of cells that take light.
@@ -44,13 +42,13 @@ def draw_receivers(
     facets : whether the metric is that of the triangles, and not the stretch map's
     """
     shader = program(graph.device, "translucency/translucency_receivers.wgsl", _FACETS if facets else ())
-    listed, count = asked
-    bound = {"cells": _record(shader, cells, count), "receivers": listed, "receiver_points": points}
+    places, count = listed
+    bound: Bindings = {"cells": _record(shader, cells, count), "receivers": places, "receiver_points": points}
     graph.dispatch("pairs", shader, {**surface, **bound}, each(count))
 
 
 def draw_sources(
-    graph: Recorder, surface: Bindings, cells: Cells, asked: tuple[Any, int], points: Any
+    graph: Recorder, surface: Bindings, cells: Cells, listed: tuple[Buffer, int], points: Buffer
 ) -> None:
     """Centres, normals and areas of cells that give light.
 
@@ -59,12 +57,12 @@ def draw_sources(
     points : buffer to write to
     """
     shader = program(graph.device, "translucency/translucency_sources.wgsl")
-    listed, count = asked
-    bound = {"cells": _record(shader, cells, count), "sources": listed, "source_points": points}
+    places, count = listed
+    bound: Bindings = {"cells": _record(shader, cells, count), "sources": places, "source_points": points}
     graph.dispatch("pairs", shader, {**surface, **bound}, each(count))
 
 
-def _record(shader: ComputeProgram, cells: Cells, count: int) -> np.ndarray[Any, Any]:
+def _record(shader: ComputeProgram, cells: Cells, count: int) -> Record:
     shape = {"size": cells.size, "side": cells.side, "stride": cells.stride}
     return shader.record("Cells", **shape, count=count)
 
@@ -74,7 +72,9 @@ _ALONE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # software adapt
 _GATHERING = 64  # invocations of a workgroup, as in translucency_gather.wgsl
 
 
-def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, constants: Constants = ()) -> Any:
+def draw(
+    graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, constants: Constants = ()
+) -> Texture:
     """The light through thin parts: that of the blurred layers, summed over each receiver's sources.
 
     constants : of translucency.wgsl, in place of those that suit the device
@@ -91,7 +91,7 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
         halved=halved,
         scale=1.0 / blur.scale,
     )
-    entering = {
+    entering: Bindings = {
         "entering": record,
         "levels": levels.stacks[halved],
         "source_points": thin.source_points,
@@ -110,7 +110,7 @@ def draw_slants(graph: Recorder, layout: LitAtlas, thin: Translucency, constants
     """
     shader = program(graph.device, "translucency/translucency_slants.wgsl", oblique(constants))
     count = thin.pairs.sources[1]
-    bound = {
+    bound: Bindings = {
         **layout.lit,
         "surfaces": layout.surfaces,
         "slanted": shader.record("Slanted", sources=count),
@@ -123,8 +123,8 @@ def draw_slants(graph: Recorder, layout: LitAtlas, thin: Translucency, constants
 def add_up(
     graph: Recorder,
     thin: Translucency,
-    gathered: Any,
-    into: Any,
+    gathered: Buffer,
+    into: Texture,
     constants: Constants = (),
     stage: str = "translucency",
 ) -> None:
@@ -134,7 +134,12 @@ def add_up(
     into : texture of the coarse atlas
     """
     device, pairs = graph.device, thin.pairs
-    bound = {"receivers": pairs.sums, "weights": thin.weights, "gathered": gathered, "transmitted": into}
+    bound: Bindings = {
+        "receivers": pairs.sums,
+        "weights": thin.weights,
+        "gathered": gathered,
+        "transmitted": into,
+    }
     chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + constants)
     shader = program(device, "translucency/translucency.wgsl", tuple(chosen.items()))
     receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
@@ -154,7 +159,7 @@ def draw_weights(graph: Recorder, thin: Translucency) -> None:
     pairs, cells = thin.pairs, thin.pairs.cells
     draw_receivers(graph, thin.surface, cells, pairs.receivers, thin.receiver_points)
     draw_sources(graph, thin.surface, cells, pairs.sources, thin.source_points)
-    bound = {
+    bound: Bindings = {
         "pairs": pairs.pairs,
         "receiver_points": thin.receiver_points,
         "source_points": thin.source_points,

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 from dermis.atlas.translucency.cells import Cells
-from dermis.gpu import Bindings
+from dermis.gpu import Bindings, Buffer, Texture
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +23,13 @@ class PairBuffers:
     """
 
     cells: Cells
-    receivers: tuple[Any, int]
-    sources: tuple[Any, int]
-    pairs: Any
+    receivers: tuple[Buffer, int]
+    sources: tuple[Buffer, int]
+    pairs: Buffer
     count: int
-    sums: Any
-    light: Any
-    lost: Any
+    sums: Buffer
+    light: Texture
+    lost: Texture
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +51,12 @@ class Translucency:
 
     pairs: PairBuffers
     surface: Bindings
-    receiver_points: Any
-    source_points: Any
-    weights: Any
-    gathered: Any
-    evenly: Any
-    slants: Any
+    receiver_points: Buffer
+    source_points: Buffer
+    weights: Buffer
+    gathered: Buffer
+    evenly: Buffer
+    slants: Buffer
     weighing: Bindings = field(default_factory=dict)
     losing: Bindings = field(default_factory=dict)
     gaussians: int = 0
@@ -65,11 +64,11 @@ class Translucency:
     layer: int = 0
 
     @property
-    def light(self) -> Any:
+    def light(self) -> Texture:
         """Texture of the coarse atlas for what comes through."""
         return self.pairs.light
 
     @property
-    def lost(self) -> Any:
+    def lost(self) -> Texture:
         """Texture of the coarse atlas for the share that is not returned."""
         return self.pairs.lost

@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from dermis.gpu import (
     Device,
     DrawTarget,
     RasterProgram,
+    Record,
     Recorder,
     Texture,
     TextureView,
@@ -100,7 +100,7 @@ def _compute_layers(device: Device, size: tuple[int, int], count: int, triangles
     return Layers(texture, size, count, triangles, [], [], nearness, found, tiles)
 
 
-def _words(device: Device, count: int) -> Any:
+def _words(device: Device, count: int) -> Buffer:
     return device.buffer(np.zeros(count, np.uint32), "STORAGE")
 
 
@@ -177,7 +177,7 @@ def _raster_program(device: Device, triangles: bool) -> RasterProgram:
     return compiled(device, ("visibility buffer", triangles), (), make)
 
 
-def _views(shader: Program, layers: Layers, clips: Matrix, head: HeadResources) -> Any:
+def _views(shader: Program, layers: Layers, clips: Matrix, head: HeadResources) -> Record:
     record = shader.record("Views", triangles=head.triangles)
     record["width"], record["height"] = layers.size
     record["clip"][: len(clips)] = clips.swapaxes(1, 2)

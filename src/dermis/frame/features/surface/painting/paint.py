@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -17,7 +17,19 @@ from dermis.base.errors import refuse
 from dermis.base.progress import preparing
 from dermis.frame.features.surface import mips as map_mips
 from dermis.frame.programs import FEATURES, HALVES, each, program, shader_folders
-from dermis.gpu import CommandList, Device, Graph, Recorder, make_texture, upload
+from dermis.gpu import (
+    Bindings,
+    Buffer,
+    CommandList,
+    Device,
+    Graph,
+    MutableBindings,
+    Record,
+    Recorder,
+    Texture,
+    make_texture,
+    upload,
+)
 from dermis.gpu.program import source_of
 from dermis.gpu.shader_types import record_of, struct_dtype
 from dermis.gpu.textures import download
@@ -70,8 +82,8 @@ class Given(NamedTuple):
     colours : (2, n, n, 3) of the face's skin and of the lips'
     """
 
-    paint: Any
-    tables: Any
+    paint: Record
+    tables: NDArray[np.float32]
     colours: NDArray[np.float32]
     surface: Painting
 
@@ -136,8 +148,8 @@ class Resting(NamedTuple):
     colour: map_mips.Mipped
     specular: map_mips.Mipped
     roughness: map_mips.Mipped
-    heights: Any
-    moved: Any
+    heights: Buffer
+    moved: Texture | None
 
 
 def resting(device: Device, given: Given, side: int, moving: bool = False) -> Resting:
@@ -163,23 +175,28 @@ def resting(device: Device, given: Given, side: int, moving: bool = False) -> Re
 @preparing("painting the skin")
 def painted(device: Device, given: Given, side: int) -> Resting:
     """The maps, painted."""
-    owned = {"paint": given.paint} | _owned(device, given, side)
+    owned: Bindings = {"paint": given.paint, **_owned(device, given, side)}
     maps = {name: map_mips.empty(device, (side, side)) for name in _MAPS}
     heights = device.space(_WORD * (side + 2) ** 2)
     moved = make_texture(device, (side, side), HALVES, layers=2)
-    into = {name: one.levels[0] for name, one in maps.items()} | {"heights": heights, "moved": moved}
-    tables = {"tables": given.tables, "colour_tables": _colours(device, given)}
+    into = {name: one.levels[0] for name, one in maps.items()}
+    tables: Bindings = {
+        "tables": given.tables,
+        "colour_tables": _colours(device, given),
+        "heights": heights,
+        "moved": moved,
+    }
     frame = CommandList(device, timed=False)
-    frame.compute("maps", program(device, SKIN), owned | tables | into, (side, side))
+    frame.compute("maps", program(device, SKIN), {**owned, **tables, **into}, (side, side))
     frame.submit()
     return Resting(**maps, heights=heights, moved=moved)
 
 
-def _owned(device: Device, given: Given, side: int) -> dict[str, Any]:
+def _owned(device: Device, given: Given, side: int) -> dict[str, Buffer]:
     """Buffers of the surface, and of whose each texel is; made once for all people with its layout."""
     surface = given.surface
-    known = device.shared("painted surfaces", WeakKeyDictionary[Painting, dict[int, dict[str, Any]]])
-    sides: dict[int, dict[str, Any]] = known.setdefault(surface, {})
+    known = device.shared("painted surfaces", WeakKeyDictionary[Painting, dict[int, dict[str, Buffer]]])
+    sides: dict[int, dict[str, Buffer]] = known.setdefault(surface, {})
     if side not in sides:
         sides.clear()
         made = {
@@ -188,13 +205,14 @@ def _owned(device: Device, given: Given, side: int) -> dict[str, Any]:
             "owners": device.space(_WORD * side * side),
         }
         frame = CommandList(device, timed=False)
-        frame.dispatch("maps", program(device, OWNER), {"paint": given.paint} | made, each(surface.count))
+        bound: Bindings = {"paint": given.paint, **made}
+        frame.dispatch("maps", program(device, OWNER), bound, each(surface.count))
         frame.submit()
         sides[side] = made
     return sides[side]
 
 
-def _colours(device: Device, given: Given) -> Any:
+def _colours(device: Device, given: Given) -> Texture:
     nodes = given.colours.shape[1]
     texture = make_texture(device, (nodes, nodes), "rgba32float", layers=len(given.colours), use="map")
     for layer, table in enumerate(given.colours):
@@ -205,7 +223,7 @@ def _colours(device: Device, given: Given) -> Any:
 def _downloaded(device: Device, made: Resting, moving: bool) -> Arrays:
     found = {name: download(device, getattr(made, name).texture) for name in _MAPS}
     found["heights"] = np.frombuffer(device.handle.queue.read_buffer(made.heights), np.float32)
-    if moving:
+    if moving and made.moved is not None:
         found["moved"] = np.stack([download(device, made.moved, layer=layer) for layer in range(2)])
     return found
 
@@ -234,14 +252,18 @@ class Face:
     colour, relief : textures with all their mips
     """
 
-    bound: dict[str, Any]
-    heights: Any
+    bound: MutableBindings
+    heights: Buffer
     colour: map_mips.Mipped
     relief: map_mips.Mipped
 
 
 def make_face(
-    device: Device, resting: Any, at_rest: Any, moved: Any, into: tuple[map_mips.Mipped, map_mips.Mipped]
+    device: Device,
+    resting: Texture,
+    at_rest: Buffer,
+    moved: Texture,
+    into: tuple[map_mips.Mipped, map_mips.Mipped],
 ) -> Face:
     """Space for a face that moves.
 
@@ -250,7 +272,7 @@ def make_face(
     """
     colour, relief = into
     heights = device.space(at_rest.size)
-    bound = {"resting": resting, "at_rest": at_rest, "moved": moved, "heights": heights}
+    bound: MutableBindings = {"resting": resting, "at_rest": at_rest, "moved": moved, "heights": heights}
     return Face(bound | {"colour": colour.levels[0]}, heights, colour, relief)
 
 
@@ -275,10 +297,10 @@ def _maps(graph: Recorder, face: Face) -> None:
 class PaintedTextures(NamedTuple):
     """Textures with all their mips, as skin.wgsl of the frame reads them."""
 
-    colour: Any
-    specular: Any
-    roughness: Any
-    relief: Any
+    colour: Texture
+    specular: Texture
+    roughness: Texture
+    relief: Texture
     face: Face | None
 
 
@@ -311,7 +333,7 @@ def draw(
         map_mips.halve(frame, one)
     frame.submit()
     gloss = made.specular.texture, made.roughness.texture
-    if not moving:
+    if not moving or made.moved is None:
         relief = map_mips.relief_of(device, [made.heights], (side, side), side)
         return PaintedTextures(colour.texture, *gloss, relief, None)
     raised = map_mips.empty(device, (side, side))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from dermis.frame.features.translucency.passes import (
     space,
 )
 from dermis.frame.programs import each, program
-from dermis.gpu import Bindings, CommandList, Constants, Device
+from dermis.gpu import Bindings, Buffer, CommandList, Constants, Device
 
 Words = NDArray[np.uint32]
 Index = NDArray[np.int64]
@@ -33,10 +32,10 @@ class CellTables:
     gutters : as copies.wgsl reads it
     """
 
-    every: Any
-    triangle_first: Any
-    triangles: Any
-    gutters: Any
+    every: Buffer
+    triangle_first: Buffer
+    triangles: Buffer
+    gutters: Buffer
 
 
 def cell_tables(device: Device, cells: Cells) -> CellTables:
@@ -67,25 +66,25 @@ class SearchPasses:
             "block": block,
         }
 
-    def add(self, name: str, count: int, bound: dict[str, Any], constants: Constants = ()) -> None:
+    def add(self, name: str, count: int, bound: Bindings, constants: Constants = ()) -> None:
         """A pass of a number of invocations; its shader is told of the search."""
         shader = program(self.device, f"translucency/pair_search/{name}.wgsl", constants)
         record = shader.record("Search", **self._told, count=count)
         self.frame.dispatch("pair search", shader, {**bound, "search": record}, each(count))
 
-    def read(self, buffer: Any, count: int) -> Index:
+    def read(self, buffer: Buffer, count: int) -> Index:
         """The first words that the passes so far leave there."""
         self.frame.submit()
         self.frame = CommandList(self.device, timed=False)
         words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
         return words[:count].astype(np.int64)
 
-    def upload(self, *columns: NDArray[np.integer]) -> Any:
+    def upload(self, *columns: NDArray[np.integer]) -> Buffer:
         """Buffer of a table of words, with zeros where there are no rows."""
         return upload_words(self.device, *columns)
 
 
-def upload_words(device: Device, *columns: NDArray[np.integer]) -> Any:
+def upload_words(device: Device, *columns: NDArray[np.integer]) -> Buffer:
     """Buffer of a table of words, given by its columns; one row of zeros where there are none."""
     table = np.zeros((max(1, len(columns[0])), len(columns)), np.uint32)
     for k, column in enumerate(columns):
@@ -112,10 +111,10 @@ class Facing:
     listed : buffer of the tiles that they face
     """
 
-    bounds: Any
+    bounds: Buffer
     tile: Index
     first: Index
-    listed: Any
+    listed: Buffer
 
 
 def find_facing(passes: SearchPasses, surface: Bindings, cells: Cells, tables: CellTables) -> Facing:
@@ -135,7 +134,7 @@ def find_facing(passes: SearchPasses, surface: Bindings, cells: Cells, tables: C
     return Facing(tiles, tile, first, listed)
 
 
-def _near(passes: SearchPasses, surface: Bindings, tables: CellTables, tiles: Any, count: int) -> Any:
+def _near(passes: SearchPasses, surface: Bindings, tables: CellTables, tiles: Buffer, count: int) -> Buffer:
     """Buffer of the blocks of tiles that may have pairs with each other.
 
     tiles, count : buffer to fill with the bounds of tiles, and how many there are
@@ -216,7 +215,7 @@ def looks(passes: SearchPasses, places: Places) -> tuple[Bindings, int]:
     return bound, int(word[-1])
 
 
-def draw_copies(passes: SearchPasses, cells: Cells, source: Index, bound: Bindings) -> Any:
+def draw_copies(passes: SearchPasses, cells: Cells, source: Index, bound: Bindings) -> Buffer:
     """Buffer of the places in gutters that show sources, as copies.wgsl writes it.
 
     source : (n,) cells
@@ -235,13 +234,13 @@ def draw_copies(passes: SearchPasses, cells: Cells, source: Index, bound: Bindin
     return copies
 
 
-def upload_receivers(device: Device, cells: Cells, receiver: Index) -> tuple[Any, int]:
+def upload_receivers(device: Device, cells: Cells, receiver: Index) -> tuple[Buffer, int]:
     """Buffer of triangles, weights and cells of some of the cells that take light, and how many there are."""
     columns = *cells.middle[receiver].T, cells.taking[receiver], np.zeros(len(receiver), np.int64)
     return upload_words(device, *columns), len(receiver)
 
 
-def upload_sources(device: Device, cells: Cells, cell: Index) -> tuple[Any, int]:
+def upload_sources(device: Device, cells: Cells, cell: Index) -> tuple[Buffer, int]:
     """Buffer of cells that give light, and how many there are."""
     return upload_words(device, cell % cells.side | (cell // cells.side << 16)), len(cell)
 
@@ -262,7 +261,7 @@ class Found:
     receiver: Index
     first: Index
     source: Index
-    pairs: Any
+    pairs: Buffer
 
 
 def search(device: Device, surface: Bindings, cells: Cells, tables: CellTables) -> Found | None:
