@@ -15,7 +15,6 @@ from dermis.gpu import (
     CommandList,
     Constants,
     Device,
-    Graph,
     Recorder,
     Texture,
     make_texture,
