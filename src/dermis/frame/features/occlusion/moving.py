@@ -15,7 +15,7 @@ from dermis.frame.features.shape.mesh import HeadResources, upload_bare
 from dermis.frame.features.visibility.layers import Layers, draw_layers, make_layers
 from dermis.frame.programs import TILE, each, program
 from dermis.frame.projection import MIDDLE, Views, frame_of
-from dermis.gpu import Bindings, Buffer, CommandList, Device, Record, Texture, make_texture
+from dermis.gpu import Bindings, Buffer, CommandList, Device, Record, Recorder, Texture, make_texture
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 from dermis.mesh.morph_targets import no_targets
@@ -214,7 +214,7 @@ def sky_record(device: Device, look: Look, vertices: int) -> Record:
 
 
 def _draw_vertices(
-    graph: Drawer, sky: Sky, look: Look, record: Record, head: HeadResources, resting: bool = False
+    graph: Recorder, sky: Sky, look: Look, record: Record, head: HeadResources, resting: bool = False
 ) -> None:
     """Find the shares of a head as it is drawn now."""
     draw_layers(graph, "occlusion", sky.layers, look.views, sky.occluders.placed(head))

@@ -8,7 +8,7 @@ from dermis.frame.features.shape.mesh import HeadResources
 from dermis.frame.features.visibility.layers import Layers, draw_layers, make_layers
 from dermis.frame.programs import program
 from dermis.frame.projection import Views
-from dermis.gpu import Bindings, Device, Texture, make_texture
+from dermis.gpu import Bindings, Device, Recorder, Texture, make_texture
 from dermis.gpu.memory import check_memory
 
 SHADOW_BYTES = 4
