@@ -23,6 +23,8 @@ ENTRY_BYTES = 16
 _NAME = "map of the atlas"
 _LIGHT = 16  # bytes of what a texel beyond a chart shows
 _GUTTER_BIT = 1 << 15  # of the first number of a texel's reach, see reach.wgsl
+SAME_PLACE = 4.0
+"""Texels within which the sources of four gutter neighbours are averaged."""
 
 
 def atlas_numbers() -> dict[str, int | float]:
@@ -167,10 +169,6 @@ def edge_texels(atlas: Atlas) -> NDArray[np.float32]:
     inner = atlas.own & (atlas.reach > 0).all(axis=-1)  # charts may touch without an empty texel between
     texels = distance_transform_edt(np.pad(inner, 1))[1:-1, 1:-1] - GUTTER
     return np.asarray(np.maximum(texels, 0.0), np.float32)
-
-
-SAME_PLACE = 4.0
-"""Texels within which the sources of four gutter neighbours are averaged."""
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,13 @@ NARROW = 1.5
 """Standard deviation up to which a Gaussian that starts from unblurred light may be cut off there [texel]."""
 _MOST_TAPS = math.ceil(TRUNCATION * math.sqrt(WIDEST))
 _BISECTIONS = 60
+_WIDE_TRUNCATION, _SMOOTH = 4.0, 1.6  # as in diffuse.wgsl
+_OTHER_READS = 5.0  # of a texel in one pass beside taps: how the map lies there, gutters, what is stored
+_LEVEL = 2.0  # what a level costs whatever its size, in reads of every texel
+_LEAST_SAVED = 0.25  # of a chain's cost: for less, a chain stays as it is
+_PAST = 1.001  # of the variance that permits a halving, so that rounding does not forbid it
+_EVEN = 1.0  # least deviation of a level between in its own texels: a point of light keeps its place
+_APART = 1.5  # variances that are nearer are one level
 
 
 def taps(variance: float, truncation: float = TRUNCATION) -> int:
@@ -64,15 +71,6 @@ def _variance(q: Floats, inside: NDArray[np.bool_]) -> Floats:
         weights = np.where(inside, q[..., None] ** n2, 0.0)
     variance: Floats = 2.0 * (weights @ n2) / (2.0 * weights.sum(axis=-1) - 1.0)
     return variance
-
-
-_WIDE_TRUNCATION, _SMOOTH = 4.0, 1.6  # as in diffuse.wgsl
-_OTHER_READS = 5.0  # of a texel in one pass beside taps: how the map lies there, gutters, what is stored
-_LEVEL = 2.0  # what a level costs whatever its size, in reads of every texel
-_LEAST_SAVED = 0.25  # of a chain's cost: for less, a chain stays as it is
-_PAST = 1.001  # of the variance that permits a halving, so that rounding does not forbid it
-_EVEN = 1.0  # least deviation of a level between in its own texels: a point of light keeps its place
-_APART = 1.5  # variances that are nearer are one level
 
 
 def lead_up(

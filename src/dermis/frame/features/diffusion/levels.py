@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
 """Of each layout, how often the resolution of each level is halved, see `Blur`."""
 SHARP = 0.45  # least standard deviation [mm] of a halved level, over its squared texel side [mm^2]
+LEAST_WEIGHT = 1e-12
+"""By which shares of a colour that nothing blurs are taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +79,6 @@ class Blur:
     def own(self) -> tuple[int, ...]:
         """The layers of the unblurred light and of the profile's levels, without those that lead to them."""
         return tuple(k for k in range(len(self.halvings)) if k not in self.steps)
-
-
-LEAST_WEIGHT = 1e-12
-"""By which shares of a colour that nothing blurs are taken."""
 
 
 def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> Levels:

@@ -26,6 +26,14 @@ HEAD_WORDS = 8  # before them
 _LINKS_OF_PIECE = 4  # for hairs in no more than a few tiles
 _MOST_LINKS = 1 << 22
 _FINE_STEP, _KNOT_STEP = 1 << 12, 1 << 19  # that room is made for, so that most people have room in the same
+_SHADING = 32_000  # coarse hairs that shade as all do
+_LEAST_DRAWN = 5_000
+_DRAWN_PIXELS = 0.45  # width of the coarse hairs that are drawn
+_DENSER = 0.2  # and more of it where hair hides hair
+WINDOW_KNOTS = 1 << 12  # that a workgroup finds the ends of
+_STRAND = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("absorption", "f4", 4)])  # in strands_pose.wgsl
+_COUNTS = "fine", "coarse", "shading", "fine_knots", "coarse_knots"
+_HAIRS = np.dtype([*((name, "u4") for name in _COUNTS), ("wider", "f4")])  # in strand_knots.wgsl
 
 
 class Counts(NamedTuple):
@@ -123,16 +131,6 @@ def no_strand_shadows(device: Device) -> Buffer:
 
 def _space(device: Device, words: int) -> Buffer:
     return device.space(4 * words)
-
-
-_SHADING = 32_000  # coarse hairs that shade as all do
-_LEAST_DRAWN = 5_000
-_DRAWN_PIXELS = 0.45  # width of the coarse hairs that are drawn
-_DENSER = 0.2  # and more of it where hair hides hair
-WINDOW_KNOTS = 1 << 12  # that a workgroup finds the ends of
-_STRAND = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("absorption", "f4", 4)])  # in strands_pose.wgsl
-_COUNTS = "fine", "coarse", "shading", "fine_knots", "coarse_knots"
-_HAIRS = np.dtype([*((name, "u4") for name in _COUNTS), ("wider", "f4")])  # in strand_knots.wgsl
 
 
 @dataclass(frozen=True, eq=False)

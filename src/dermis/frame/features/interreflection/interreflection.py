@@ -18,6 +18,8 @@ from dermis.mesh.head import Head
 LinkBuffers = tuple[tuple[Buffer, int], dict[str, Buffer], dict[str, Buffer]]
 """Places and their number, links of patches, links of cells."""
 _TEXEL = 16  # bytes of four floats
+_BOUNCES = 4  # between patches; gathering adds another
+_TEAM = 16  # invocations of a patch or a cell
 
 
 def link_numbers() -> dict[str, int]:
@@ -137,10 +139,6 @@ def _space(
         from_skin=device.space(_TEXEL * SIDE * SIDE),
         unlit=no_interreflection(device),
     )
-
-
-_BOUNCES = 4  # between patches; gathering adds another
-_TEAM = 16  # invocations of a patch or a cell
 
 
 def draw(graph: Recorder, lit: Bindings, made: Interreflection, constants: Constants) -> None:

@@ -31,6 +31,11 @@ _MARGIN_MM = 1.0
 _BORDER = 2.0  # texels around the head: what is lifted off its surface stays inside
 _AROUND_MM = 100.0  # how far from a head's middle its points count
 _MOST_POINTS = 512
+_VERTICES = "occlusion/moving_occlusion_vertices.wgsl"
+_OCCLUDERS = (
+    5_000,
+    0.4,
+)  # faces, at least; how far the others may be off the surface [mm], a quarter of a texel
 
 
 class Look(NamedTuple):
@@ -112,13 +117,6 @@ def turn_of(anchors: Anchors, motion: Motion) -> Floats:
     left, _, right = np.linalg.svd(moved.T.astype(np.float64) @ anchors.arms)
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     return np.asarray(left @ right)
-
-
-_VERTICES = "occlusion/moving_occlusion_vertices.wgsl"
-_OCCLUDERS = (
-    5_000,
-    0.4,
-)  # faces, at least; how far the others may be off the surface [mm], a quarter of a texel
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ SMOOTH_MM = 3.0
 
 _MOST_STEPS = 256
 Index = NDArray[np.int64]
+_STAGE = "curvature"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +74,6 @@ def _steps(mesh: Mesh, pairs: Index, both: Index) -> int:
     # A step moves a value by an edge or leaves it; its variance along each of the surface's two axes:
     step = 0.5 * float(np.median(square)) * (1.0 - 1.0 / float(np.median(degree)))
     return int(np.clip(np.ceil(SMOOTH_MM**2 / max(step, 1e-12)), 1, _MOST_STEPS))
-
-
-_STAGE = "curvature"
 
 
 def draw(graph: Recorder, head: HeadResources, curvature: Curvature) -> None:

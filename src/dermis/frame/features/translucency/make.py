@@ -37,6 +37,10 @@ from dermis.optics.thin_parts import ThinParts, thin_parts
 
 Floats = NDArray[np.float64]
 _REACH, _FARTHEST_MM = 4.0, 40.0  # standard deviations of the widest Gaussian, beyond all pairs
+_WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
+_WIDTHS = 4  # whose pairs are kept
+_ONE = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, as light_words.wgsl has it
+_COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 
 
 def thin_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
@@ -64,12 +68,6 @@ def _made(
     share = np.minimum(1.0, blurred / np.maximum(made.lost.sum(axis=1), LEAST_WEIGHT))[:, None]
     lost = made.lost * share / np.maximum(blurred, LEAST_WEIGHT)
     return replace(made, through=made.through * share * total, lost=lost)
-
-
-_WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
-_WIDTHS = 4  # whose pairs are kept
-_ONE = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, as light_words.wgsl has it
-_COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 
 
 def translucency_of(

@@ -19,6 +19,15 @@ RECEIVER_BYTES, SOURCE_BYTES = 48, 32
 """Of a place that takes light, and of one that gives it; see translucent_pair.wgsl."""
 
 _FACETS: Constants = (("FACETS", 1),)
+_TEAMS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
+_ALONE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # software adapters pay for barriers
+_GATHERING = 64  # invocations of a workgroup, as in translucency_gather.wgsl
+Floats = NDArray[np.float64]
+GRAIN = (
+    0.72  # sampled at their spacing, Gaussians of more variance than this times its square are even to 1e-6
+)
+_ROW, _SIZE = 1024, 64  # pairs of a row, and of a workgroup in it, as in the shader
+_SMOOTH = 0.45  # of the spacing; light of this standard deviation has no detail that the sources miss
 
 
 def space(device: Device, count: int, size: int = 4) -> Buffer:
@@ -65,11 +74,6 @@ def draw_sources(
 def _record(shader: ComputeProgram, cells: Cells, count: int) -> Record:
     shape = {"size": cells.size, "side": cells.side, "stride": cells.stride}
     return shader.record("Cells", **shape, count=count)
-
-
-_TEAMS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
-_ALONE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # software adapters pay for barriers
-_GATHERING = 64  # invocations of a workgroup, as in translucency_gather.wgsl
 
 
 def draw(
@@ -144,14 +148,6 @@ def add_up(
     shader = program(device, "translucency/translucency.wgsl", tuple(chosen.items()))
     receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
     graph.dispatch(stage, shader, bound, each(pairs.receivers[1], receivers))
-
-
-Floats = NDArray[np.float64]
-GRAIN = (
-    0.72  # sampled at their spacing, Gaussians of more variance than this times its square are even to 1e-6
-)
-_ROW, _SIZE = 1024, 64  # pairs of a row, and of a workgroup in it, as in the shader
-_SMOOTH = 0.45  # of the spacing; light of this standard deviation has no detail that the sources miss
 
 
 def draw_weights(graph: Recorder, thin: Translucency) -> None:

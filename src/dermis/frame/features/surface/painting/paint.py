@@ -51,6 +51,13 @@ _NAMES: dict[str, Sequence[str]] = {
     "amounts": list(AMOUNTS),
     "grounds": list(GROUNDS),
 }
+SKIN, OWNER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
+_MOST_TRIANGLES = 1 << 20  # that painted_surface.wgsl has bits for
+_TEXEL = 4  # floats of a vector
+_FOLDER = "painted"
+_WORD = 4  # bytes
+_MAPS = ("colour", "specular", "roughness")
+_FOLDING = FOLDING + 1  # numbers of the shader's record, the last of which is the flush
 
 
 def texture_names() -> Mapping[str, Callable[[], Sequence[Member]]]:
@@ -68,11 +75,6 @@ def painting_numbers() -> dict[str, float]:
 
 def _members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:
     return lambda: [Member(name, Path()) for name in names]
-
-
-SKIN, OWNER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
-_MOST_TRIANGLES = 1 << 20  # that painted_surface.wgsl has bits for
-_TEXEL = 4  # floats of a vector
 
 
 class Given(NamedTuple):
@@ -132,11 +134,6 @@ def _face(recession: float) -> bytes:
         hairline,
     )
     return b"".join(table.tobytes() for table in tables)
-
-
-_FOLDER = "painted"
-_WORD = 4  # bytes
-_MAPS = ("colour", "specular", "roughness")
 
 
 class Resting(NamedTuple):
@@ -238,9 +235,6 @@ def _uploaded(device: Device, found: Arrays, side: int) -> Resting:
         for layer, texels in enumerate(found["moved"]):
             upload(device, moved, texels, layer=layer)
     return Resting(**maps, heights=device.buffer(found["heights"], "STORAGE"), moved=moved)
-
-
-_FOLDING = FOLDING + 1  # numbers of the shader's record, the last of which is the flush
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,10 @@ from dermis.gpu import Bindings, Buffer, CommandList, Constants, Device
 Words = NDArray[np.uint32]
 Index = NDArray[np.int64]
 _MOST_BLOCKS = 40  # along a side
+_BOUNDS_BYTES = 48  # as in bounds.wgsl
+_LISTED: Constants = (("LISTED", 1),)
+_COPIES = 8  # in gutters, of each source at most, as in map_places.wgsl
+_PAIR_BYTES = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +101,6 @@ def starts(counts: Index) -> Index:
     return np.concatenate([[0], np.cumsum(counts)])
 
 
-_BOUNDS_BYTES = 48  # as in bounds.wgsl
-_LISTED: Constants = (("LISTED", 1),)
-
-
 @dataclass(frozen=True, eq=False)
 class Facing:
     """Tiles that may have pairs.
@@ -147,9 +147,6 @@ def _near(passes: SearchPasses, surface: Bindings, tables: CellTables, tiles: Bu
     passes.add("blocks", blocks, {"tiles": tiles, "blocks": boxes})
     passes.add("near", words, {"blocks": boxes, "near": near})
     return near
-
-
-_COPIES = 8  # in gutters, of each source at most, as in map_places.wgsl
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,9 +240,6 @@ def upload_receivers(device: Device, cells: Cells, receiver: Index) -> tuple[Buf
 def upload_sources(device: Device, cells: Cells, cell: Index) -> tuple[Buffer, int]:
     """Buffer of cells that give light, and how many there are."""
     return upload_words(device, cell % cells.side | (cell // cells.side << 16)), len(cell)
-
-
-_PAIR_BYTES = 12
 
 
 @dataclass(frozen=True, eq=False)
