@@ -1,4 +1,4 @@
-"""Makes the resources of a frame, which depend neither on the camera nor on where lights are."""
+"""Allocation of the resources of a frame, which depend neither on the camera nor on where lights are."""
 
 from __future__ import annotations
 

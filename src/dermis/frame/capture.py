@@ -1,4 +1,4 @@
-"""Frames of scenes taken down for players elsewhere."""
+"""Frames of scenes captured for players elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Refuses frames that exceed the limits of a device, and tells what would fit."""
+"""Limits of a device: frames that exceed them are refused, with settings that would fit."""
 
 from __future__ import annotations
 

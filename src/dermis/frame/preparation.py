@@ -1,4 +1,4 @@
-"""Turns a scene into a frame's inputs, and reuses what has not changed."""
+"""Preparation of the inputs of a frame from a scene; what has not changed is reused."""
 
 from __future__ import annotations
 

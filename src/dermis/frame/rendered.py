@@ -1,4 +1,4 @@
-"""What the renderer returns: an image on the device, and its timings."""
+"""The result of a frame: an image on the device, and its timings."""
 
 from __future__ import annotations
 

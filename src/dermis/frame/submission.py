@@ -1,4 +1,4 @@
-"""Frames on their way: submitted one after the other, each taken while the next ones are drawn."""
+"""Submission of frames: a few are in flight, so that Python and the device overlap."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a frame needs to know of a scattering technique before any of its resources exist."""
+"""Traits of a scattering technique, which a request needs before any resources exist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What it takes to find anew, for another person, where the gutters of a stitched atlas continue."""
+"""Gutters of a stitched atlas that follow another person: walks over the surface from the edges of charts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The stretch map: how an atlas lies on the surface as it is now, at each of its resolutions."""
+"""The stretch map: how an atlas lies on the current surface, at each of its resolutions."""
 
 from __future__ import annotations
 

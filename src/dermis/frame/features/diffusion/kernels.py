@@ -1,4 +1,4 @@
-"""Gaussian kernels at whole texels whose variance is exactly the one asked for."""
+"""Gaussian kernels of exact variance at whole texels, and chains of blurs at falling resolution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Profiles that a map mixes: what it says, and space for the light of each."""
+"""Profiles mixed by a map: shares over the atlas, and the light of each profile."""
 
 from __future__ import annotations
 

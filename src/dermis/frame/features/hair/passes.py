@@ -1,4 +1,4 @@
-"""Hairs: moved by the skin, lit at their knots, drawn over the picture, and the shadows that they cast."""
+"""Passes of hair: posing, shadows, shading at knots, and drawing over the picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Space on the device for hairs: in pictures and shadows, and where they are worked out."""
+"""Resources of hair: tables of strands, and space for the picture and for shadows."""
 
 from __future__ import annotations
 

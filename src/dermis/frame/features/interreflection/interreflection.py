@@ -1,4 +1,4 @@
-"""What light from skin to skin needs on the device: places of patches, links, and space."""
+"""Light from skin to skin: links between patches, and the passes that light them and let light bounce."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Light finer than the atlas' texels: what texels average of it, and the levels that show it whole."""
+"""Light that enters the skin on the atlas, and the levels that show light finer than its texels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Views of a head from all around, through which its places learn how much of the sky they see."""
+"""Ambient occlusion of a moving head: the baked map, changed as the open sky at the vertices changes."""
 
 from __future__ import annotations
 

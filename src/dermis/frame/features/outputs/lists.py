@@ -1,4 +1,4 @@
-"""The outputs as their stages' shaders list them."""
+"""Lists of the outputs that each stage can make, for its shader."""
 
 from __future__ import annotations
 

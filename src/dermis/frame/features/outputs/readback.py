@@ -1,4 +1,4 @@
-"""Packs the finished picture for readback, three or four bytes or floats per pixel, and outputs with it."""
+"""Readback of the picture, packed as three or four bytes or floats per pixel, and of outputs with it."""
 
 from __future__ import annotations
 

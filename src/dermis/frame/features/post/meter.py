@@ -1,4 +1,4 @@
-"""Numbers of the exposure meter, which its shaders fill in."""
+"""The exposure meter, an incident one: it goes by the light on the skin, so that dark skin stays dark."""
 
 from __future__ import annotations
 

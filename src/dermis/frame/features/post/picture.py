@@ -1,4 +1,4 @@
-"""Post-processing: exposure, tone curve and encoding."""
+"""The picture: exposure, tone curve and encoding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The numbers that are baked of each place of the skin, in the order of bake.wgsl."""
+"""The skin as numbers at places of its maps, by the shading of the picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What it takes to find the curvature of a head's surface on the device."""
+"""Curvature of a head's surface, smoothed over the distance that light travels in skin."""
 
 from __future__ import annotations
 

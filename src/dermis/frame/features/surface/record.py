@@ -1,4 +1,4 @@
-"""The surface of the skin as the shaders take it: numbers, pipeline constants and tables."""
+"""The surface of the skin as the shaders read it: numbers, pipeline constants and tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of what thin parts of the skin let pass and return less, as a frame needs them."""
+"""Translucency of a head: pairs of places by their reach, and tables of what passes by thickness."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the cells lie that give and take light through thin parts, by the surface as it is now."""
+"""Passes of the translucency: places of pairs, their weights, and the light that passes."""
 
 from __future__ import annotations
 

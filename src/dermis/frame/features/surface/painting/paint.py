@@ -1,4 +1,4 @@
-"""What the shaders that paint a human's skin share with Python: names and numbers."""
+"""Painted maps of a human's skin: colour, gloss and relief at rest, and what expressions change."""
 
 from __future__ import annotations
 

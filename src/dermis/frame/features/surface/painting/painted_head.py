@@ -1,4 +1,4 @@
-"""Eyes painted as pictures, for programs that have no shader of their own for them."""
+"""A head whose painted maps and eyes are arrays, for files and for programs without these shaders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Takes the passes of a search for translucent pairs, and reads what they count."""
+"""The search for translucent pairs: tiles that face each other, cells in them, then pairs of places."""
 
 from __future__ import annotations
 
