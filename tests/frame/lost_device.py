@@ -110,7 +110,7 @@ def begun_to_read(renderer: Renderer) -> Any:
     """The copy is mapped or about to be."""
     rendered = renderer.draw(scene(), DRAWN)
     known = rendered.srgb8()
-    with losing(readback.Leaving, "image"):
+    with losing(readback.Readback, "image"):
         assert np.array_equal(rendered.srgb8(), known)
     return rendered.linear()
 
@@ -129,7 +129,7 @@ def many(renderer: Renderer) -> Any:
     """Some frames are in flight when the device goes, wherever that is."""
     mixes, drawn = np.linspace(0.0, 1.0, MANY), DRAWN.model_dump()
     known = list(renderer.render_many(map(scene, mixes), **drawn))
-    for target, name, calls in ((CommandList, "submit", 4), (readback.Leaving, "image", 2)):
+    for target, name, calls in ((CommandList, "submit", 4), (readback.Readback, "image", 2)):
         with losing(target, name, calls):
             found = list(renderer.render_many(map(scene, mixes), **drawn))
         assert len(found) == MANY and all(map(np.array_equal, found, known))
@@ -153,7 +153,7 @@ def observing(renderer: Renderer) -> Any:
     opened[-1].handle.destroy()
     assert depth.any() and np.array_equal(rendered.output("depth"), depth)
     known = list(renderer.observe(scenes, DRAWN, outputs=names))
-    for target, name, calls in ((CommandList, "submit", 3), (readback.Leaving, "all", 2)):
+    for target, name, calls in ((CommandList, "submit", 3), (readback.Readback, "all", 2)):
         with losing(target, name, calls):
             found = list(renderer.observe(scenes, DRAWN, outputs=names))
         assert len(found) == len(scenes)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import refuse
 from dermis.base.summary import Summarised
 from dermis.frame.features.outputs.planes import PlaneArray
-from dermis.frame.features.outputs.readback import Leaving
+from dermis.frame.features.outputs.readback import Readback
 from dermis.gpu.memo import same
 from dermis.scene.head_pose import gaze, head_pose
 from dermis.scene.model import Scene
@@ -61,11 +61,11 @@ class Observation(Summarised):
 
 
 def observed_frames(
-    send: Callable[..., Leaving],
+    send: Callable[..., Readback],
     scenes: Iterable[Scene],
     previous: Scene | Iterable[Scene | None] | None,
     settings: Iterable[Settings],
-) -> Iterator[tuple[Callable[[], Leaving], Callable[[Leaving], Observation]]]:
+) -> Iterator[tuple[Callable[[], Readback], Callable[[Readback], Observation]]]:
     """What submits the frame of each scene, and what takes what has arrived of it, for `arriving`.
 
     send : submits the frame of a scene after another, with `settings`
@@ -76,8 +76,8 @@ def observed_frames(
         yield partial(send, scene, before, settings=chosen), partial(_observed, scene, chosen)
 
 
-def _observed(scene: Scene, settings: Settings, leaving: Leaving) -> Observation:
-    picture, outputs, found = leaving.all()
+def _observed(scene: Scene, settings: Settings, readback: Readback) -> Observation:
+    picture, outputs, found = readback.all()
     camera = scene.camera.to_opencv(settings.size)
     landmarks = {name: _landmarks(camera, *one) for name, one in found.items()}
     return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze(scene))

@@ -13,7 +13,7 @@ from dermis.base.errors import refuse
 from dermis.base.summary import Summarised
 from dermis.frame.features import outputs as output_features
 from dermis.frame.features.outputs.planes import PlaneArray
-from dermis.frame.features.outputs.readback import Leaving
+from dermis.frame.features.outputs.readback import Readback
 from dermis.frame.features.post.meter import Meter, read_meter
 from dermis.frame.features.post.picture import Picture
 from dermis.gpu import Device, download
@@ -61,7 +61,7 @@ class Rendered(Summarised):
     unscattered: float
     suns: int
     settings: Settings
-    leave: Callable[..., Leaving]
+    leave: Callable[..., Readback]
     kept: Callable[[Callable[[], Any]], Any]
     is_current: Callable[[], bool]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import refuse, shown_value
 from dermis.base.quantities import whole_number
 from dermis.frame.features.outputs.landmarks import checked_landmarks
-from dermis.frame.features.outputs.readback import Leaving
+from dermis.frame.features.outputs.readback import Readback
 from dermis.frame.observation import Observation, observed_frames
 from dermis.frame.programs import warm_up
 from dermis.frame.rendered import Rendered, Shown
@@ -177,7 +177,7 @@ class Renderer(Submitter):
         Raises DermisError as `draw` does.
         """
         send = partial(self._send, settings=Settings(**settings), linear=linear, alpha=alpha)
-        frames = ((partial(send, Scene.of(scene)), Leaving.image) for scene in scenes)
+        frames = ((partial(send, Scene.of(scene)), Readback.image) for scene in scenes)
         yield from arriving(self.kept_open, lambda: self.device, frames)
 
     def observe(

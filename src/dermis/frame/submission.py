@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any, TypeVar
 
-from dermis.frame.features.outputs import readback
-from dermis.frame.features.outputs.readback import Leaving
+from dermis.frame.features.outputs.readback import Readback, start_readback
 from dermis.frame.features.post.picture import Picture
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
@@ -25,8 +24,8 @@ T = TypeVar("T")
 IN_FLIGHT = 3
 """Frames submitted and not done: Python and the device overlap, with little latency."""
 
-Send = Callable[[], Leaving]
-Take = Callable[[Leaving], T]
+Send = Callable[[], Readback]
+Take = Callable[[Readback], T]
 
 
 def arriving(
@@ -37,11 +36,11 @@ def arriving(
     device : the one of now
     frames : what submits each of them, and what takes what has arrived of it
     """
-    sent: deque[tuple[Leaving, Send, Take[T]]] = deque()
+    sent: deque[tuple[Readback, Send, Take[T]]] = deque()
 
     def arrived() -> T:
-        leaving, send, take = sent.popleft()
-        return kept_open.run(lambda: take(leaving if leaving.fetched.device is device() else send()))
+        readback, send, take = sent.popleft()
+        return kept_open.run(lambda: take(readback if readback.fetched.device is device() else send()))
 
     for send, take in frames:
         sent.append((kept_open.run(send), send, take))
@@ -80,9 +79,9 @@ class Submitter:
             self.graph.forget()
         self.graph.begin()
         draw_frame(self.graph, inputs, TECHNIQUES[inputs.settings.technique])
-        leaving = leave(self.graph, inputs.resources.post.picture) if leave else None
+        readback = leave(self.graph, inputs.resources.post.picture) if leave else None
         frame, self._last = self.graph.submit(timed), None
-        return frame, leaving
+        return frame, readback
 
     def _keep_pace(self, frame: CommandList) -> None:
         """Wait until no more frames than allowed are in flight."""
@@ -90,11 +89,11 @@ class Submitter:
         while len(self._in_flight) > IN_FLIGHT:
             self.device.wait(self._in_flight.popleft())
 
-    def _leave(self, picture: Picture, **how: Any) -> Leaving:
+    def _leave(self, picture: Picture, **how: Any) -> Readback:
         self.graph.begin()
-        leaving = readback.draw(self.graph, picture, **how)
+        readback = start_readback(self.graph, picture, **how)
         self.graph.submit()
-        return leaving
+        return readback
 
     def _send(
         self,
@@ -106,11 +105,11 @@ class Submitter:
         alpha: bool,
         outputs: tuple[str, ...] = (),
         landmarks: tuple[str, ...] = (),
-    ) -> Leaving:
+    ) -> Readback:
         """Submit a frame and start reading it back."""
         inputs = self.prepare(scene, settings, "", outputs, previous, landmarks)
         coverage, more = settings if alpha else None, inputs.resources.outputs
-        leave = partial(readback.draw, linear=linear, alpha=coverage, outputs=more)
-        _, leaving = self._submit(inputs, False, False, leave)
-        assert leaving is not None
-        return leaving
+        leave = partial(readback.start_readback, linear=linear, alpha=coverage, outputs=more)
+        _, readback = self._submit(inputs, False, False, leave)
+        assert readback is not None
+        return readback

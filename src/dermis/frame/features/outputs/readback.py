@@ -26,7 +26,7 @@ _PIXELS, _WORDS = 4, 3  # read and written by one invocation that packs bytes
 
 
 @dataclass(frozen=True)
-class Leaving:
+class Readback:
     """A picture on its way from the device.
 
     size : (width, height) [pixel]
@@ -67,14 +67,14 @@ class Leaving:
         return numbers.reshape(height, width, self.channels)
 
 
-def draw(
+def start_readback(
     graph: Graph,
     picture: Picture,
     *,
     linear: bool = False,
     alpha: Settings | None = None,
     outputs: Resources | None = None,
-) -> Leaving:
+) -> Readback:
     """Pack the picture and start reading it back to NumPy.
 
     linear : floats rather than bytes
@@ -102,7 +102,7 @@ def draw(
     _check_sum(device, buffers, pixels)
     graph.compute("pack", shader, bound | {"packed": packed}, (_ROW, -(-count // _ROW)))
     kind = np.float32 if linear else np.uint8
-    return Leaving(graph.fetch(*buffers), picture.size, kind, channels, words, outputs)
+    return Readback(graph.fetch(*buffers), picture.size, kind, channels, words, outputs)
 
 
 def _check(device: Device, size: int, pixels: int) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from dermis.base.registry import Registry
 from dermis.frame.features.outputs import light
@@ -16,6 +17,8 @@ from dermis.frame.features.shape import shape
 from dermis.frame.features.visibility.layers import draw_layers
 from dermis.frame.projection import MIDDLE, Views
 from dermis.gpu import Bindings, Graph, Texture
+from dermis.gpu.wgsl_source import Member
+from dermis.scene.outputs import OUTPUTS, Output
 
 Stage = Callable[[Graph, Planes, Resources, SeenFrame, Texture], None]
 _OF_THE_SURFACE = ("DETAIL",)  # pipeline constants of surface.wgsl
@@ -111,3 +114,20 @@ STAGES: Registry[Stage] = Registry(
     },
 )
 """By the names of their shaders, features/outputs/STAGE.wgsl."""
+
+
+def output_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
+    """A list for each stage, features/outputs/STAGE.wgsl: STAGE_outputs, the outputs that it can make."""
+    stages = {one.stage for one in OUTPUTS.values()}
+    return {f"{stage}_outputs": partial(_made_by, stage) for stage in sorted(stages)}
+
+
+def _made_by(stage: str) -> list[Member]:
+    return [Member(one.name, one.shader, _words(one)) for one in OUTPUTS.values() if one.stage == stage]
+
+
+def _words(output: Output) -> tuple[tuple[str, str], ...]:
+    """Type of its values in the shader, and the one where nothing is seen."""
+    kind = output.word if output.channels == 1 else f"vec{output.channels}f"
+    nothing = output.background if kind == "f32" else int(output.background)
+    return ("type", kind), ("nothing", f"{kind}({nothing})")
