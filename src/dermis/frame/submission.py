@@ -109,7 +109,7 @@ class Submitter:
         """Submit a frame and start reading it back."""
         inputs = self.prepare(scene, settings, "", outputs, previous, landmarks)
         coverage, more = settings if alpha else None, inputs.resources.outputs
-        leave = partial(readback.start_readback, linear=linear, alpha=coverage, outputs=more)
+        leave = partial(start_readback, linear=linear, alpha=coverage, outputs=more)
         _, readback = self._submit(inputs, False, False, leave)
         assert readback is not None
         return readback
