@@ -17,7 +17,7 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.fit import fit
-from dermis.apps.inverse.fitting.fitted import Fitted
+from dermis.apps.inverse.fitting.result import FitResult
 from dermis.apps.truths.half_space import diffuse_albedo, reflected_radiance
 from dermis.apps.truths.path_traced import PathTraced, Variant
 from dermis.apps.validation.comparisons.person import traced
@@ -208,7 +208,7 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> dict[str, Any
     }
 
 
-def _against(one: Case, found: Fitted) -> dict[str, Any]:
+def _against(one: Case, found: FitResult) -> dict[str, Any]:
     told: dict[str, Any] = {}
     for name in ("melanin", "blood", "roughness"):
         true = float(getattr(one, name))

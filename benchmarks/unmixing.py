@@ -18,9 +18,8 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from dermis.apps.inverse.unmixing.model import SkinModel, Third, skin_model
-from dermis.apps.inverse.unmixing.on_device import Unmixer
-from dermis.apps.inverse.unmixing.solve import solve, weights_of
+from dermis.apps.inverse.unmixing.device_unmixer import Unmixer
+from dermis.apps.inverse.unmixing.skin_model import SkinModel, Third, skin_model, solve, weights_of
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.truths.slab_mc import counted_profile
 from dermis.apps.validation.pages import write_figures

@@ -18,9 +18,9 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 import dermis
-from dermis.apps.inverse.unmixing.model import skin_model
+from dermis.apps.inverse.unmixing.profile_widths import widths_of
+from dermis.apps.inverse.unmixing.skin_model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
-from dermis.apps.inverse.unmixing.widths import widths_of
 from dermis.apps.truths.two_media import exchange
 from dermis.apps.validation.pages import write_figures
 from dermis.base.command_line import run_script

@@ -9,7 +9,7 @@ Sources: dEonLuebke2007, Dudash2007
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 
 def draw(studio):
@@ -19,4 +19,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -9,7 +9,7 @@ Sources: Dudash2007, Tuchin2000
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 PARTS = {"reflected": "specular", "scattered": "diffuse", "both": "all"}
 
@@ -21,4 +21,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

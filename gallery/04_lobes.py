@@ -10,7 +10,7 @@ Columns: 5
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 from dermis.scene.camera import cheek
 
 MODELS = ("phong", "blinn-phong", "torrance-sparrow", "kelemen", "two-lobe")
@@ -31,4 +31,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

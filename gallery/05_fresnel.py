@@ -11,7 +11,8 @@ Sources: Schlick1994
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.picture import main, plotted
+from dermis.apps.gallery.panels import plotted
+from dermis.apps.gallery.script import draw_script
 from dermis.specular.fresnel import dielectric, schlick
 
 
@@ -35,4 +36,4 @@ def curves(axes):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 ALONE = {"parts": "specular", "exposure": 3}
 
@@ -37,4 +37,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -9,7 +9,7 @@ Slider: white, as it is | tinted, as it is not
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 
 def draw(studio):
@@ -25,4 +25,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

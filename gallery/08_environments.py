@@ -10,7 +10,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 SEEN = {"background": "environment", "background_blur": 0.05}
 
@@ -27,4 +27,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -8,7 +8,7 @@ Slider: dry and hard | scattered
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 
 def draw(studio):
@@ -24,4 +24,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -8,7 +8,8 @@ Sources: Jensen2001, DonnerJensen2005, dEonLuebke2007
 """
 
 import dermis
-from dermis.apps.gallery.picture import main, plotted
+from dermis.apps.gallery.panels import plotted
+from dermis.apps.gallery.script import draw_script
 
 MODELS = {"one layer (skin1)": ("skin1", "dipole"), "three layers (dj3)": ("dj3", "multipole")}
 INKS = ("#ff6b5e", "#58d68d", "#5dade2")
@@ -36,4 +37,4 @@ def curves(axes):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -11,7 +11,8 @@ Sources: dEonLuebke2007, DonnerJensen2005
 from functools import partial
 
 import dermis
-from dermis.apps.gallery.picture import main, plotted
+from dermis.apps.gallery.panels import plotted
+from dermis.apps.gallery.script import draw_script
 from dermis.optics.fits.gaussian import single_gaussian
 
 INKS = {"red": "#ff6b5e", "green": "#58d68d", "blue": "#5dade2"}
@@ -34,4 +35,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -10,7 +10,7 @@ Sources: Borshukov2003, Green2004, dEonLuebke2007
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 LEVELS = {"light that enters": 0, "blurred, third level": 3, "blurred, widest level": 5}
 
@@ -21,4 +21,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -11,7 +11,7 @@ Columns: 4
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 VIEWS = ("irradiance", "blur 1", "blur 2", "blur 3", "blur 4", "blur 5", "diffuse", "picture")
 
@@ -25,4 +25,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

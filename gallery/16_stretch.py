@@ -11,7 +11,7 @@ Columns: 4
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 WAYS = {"uniform": "none", "corrected along u and v": "axes", "full metric": "full"}
 
@@ -29,4 +29,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

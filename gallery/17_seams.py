@@ -12,7 +12,7 @@ Columns: 6
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 REMEDIES = ("none", "clear-colour", "stretch-map", "alpha", "multi-uv", "stitch")
 
@@ -29,4 +29,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib import colormaps
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 TERMS = ("none", "published", "full")
 
@@ -37,4 +37,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -11,7 +11,7 @@ Sources: Debevec2000
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 from dermis.scene.light_stage import light_stage, stage_weights
 
 ROOM = dermis.Environment(name="lebombo")
@@ -31,4 +31,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -9,7 +9,8 @@ Sources: DonnerJensen2006, KrishnaswamyBaranoski2004, Jacques1998
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.picture import main, plotted
+from dermis.apps.gallery.panels import plotted
+from dermis.apps.gallery.script import draw_script
 from dermis.images.colour import encode_srgb8
 
 MELANIN = [0.0, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32]
@@ -35,4 +36,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -9,7 +9,7 @@ Slider: without | a tenth of the light
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 
 def draw(studio):
@@ -24,4 +24,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

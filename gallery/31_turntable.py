@@ -9,7 +9,7 @@ Sources: dEonLuebke2007
 import math
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 
 FRAMES = 36
 
@@ -26,4 +26,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 from dermis.mesh.eyes import EyeLook
 
 BESIDE = (-0.75, 0.1, 1.0)
@@ -36,4 +36,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -8,7 +8,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 from dermis.human.expressions import expression
 from dermis.scene.gaze import looking_at
 
@@ -30,4 +30,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -12,7 +12,7 @@ Columns: 2
 import math
 
 import dermis
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.script import draw_script
 from dermis.human.hair.look import HairLook
 
 PEOPLE = {
@@ -36,4 +36,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -8,8 +8,8 @@ Columns: 7
 """
 
 import dermis
-from dermis.apps.gallery.output_colours import coloured
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.panels import output_picture
+from dermis.apps.gallery.script import draw_script
 from dermis.scene.outputs import OUTPUTS
 
 NAMES = [name for name in OUTPUTS if name not in ("normal_geometric", "label_face_synthetics")]
@@ -23,8 +23,10 @@ def draw(studio):
     before = dermis.Scene("human:7", (*dermis.studio(), SUN), camera, pose=BEFORE)
     now, settings = before.replace(pose=NOW), studio.settings()
     rendered = studio.renderer.draw(now, settings, outputs=NAMES, previous=before)
-    return {"picture": rendered.srgb8()} | {name: coloured(name, rendered.output(name)) for name in NAMES}
+    return {"picture": rendered.srgb8()} | {
+        name: output_picture(name, rendered.output(name)) for name in NAMES
+    }
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -8,9 +8,8 @@ Columns: 3
 """
 
 import dermis
-from dermis.apps.gallery.marks import marked
-from dermis.apps.gallery.output_colours import coloured
-from dermis.apps.gallery.picture import main
+from dermis.apps.gallery.panels import draw_landmarks, output_picture
+from dermis.apps.gallery.script import draw_script
 
 SET = "face-synthetics-70"
 PEOPLE = {
@@ -26,10 +25,10 @@ def draw(studio):
     settings = studio.settings(exposure=1.5)
     seen = list(studio.renderer.observe(scenes, settings, outputs=("label",), landmarks=(SET,)))
     named = {f"human:{seed}": one for seed, one in zip(PEOPLE, seen, strict=True)}
-    panels = {name: marked(one.picture, one.landmarks[SET]) for name, one in named.items()}
-    labels = {f"{name}, label": coloured("label", one.outputs["label"]) for name, one in named.items()}
+    panels = {name: draw_landmarks(one.picture, one.landmarks[SET]) for name, one in named.items()}
+    labels = {f"{name}, label": output_picture("label", one.outputs["label"]) for name, one in named.items()}
     return panels | labels
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

@@ -12,8 +12,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.picture import main
-from dermis.apps.inverse.unmixing import change, widths
+from dermis.apps.gallery.script import draw_script
+from dermis.apps.inverse.unmixing.profile_widths import save_widths, widths_of
 
 
 def draw(studio):
@@ -23,18 +23,18 @@ def draw(studio):
     y, x = (np.linspace(0.0, 1.0, side) for side in found.blood.shape)
     mark = 1.0 / (1.0 + np.exp((np.hypot(x - u, y[:, None] - v) - 0.04) / 0.002))
     marked = replace(found, blood=np.float32(found.blood * (1.0 + 9.0 * mark)))
-    colour = marked.recoloured(change.Change(), studio.adapter).clip(0.0, 1.0)
+    colour = marked.recoloured(adapter=studio.adapter).clip(0.0, 1.0)
     told = {"direction": (-0.2, 0, -1), "up": (1, 0, 0), "width_mm": 0.8, "irradiance": (4, 4, 4)}
     lights = [dermis.StripeLight(position=(0, height, 0), **told) for height in (-47, -35, -23, -11)]
     lights += [dermis.RectangleLight(position=(300, 300, 700), irradiance=(0.7, 0.7, 0.7))]
     camera = dermis.portrait(head).model_copy(update={"target": (36, -24, 60), "frame_mm": 55})
     scene = dermis.Scene(replace(head, maps=replace(head.maps, colour=colour)), lights=lights, camera=camera)
     with TemporaryDirectory() as folder:
-        first, *others, shares = map(str, widths.save_widths(Path(folder), widths.widths_of(marked)))
+        first, *others, shares = map(str, save_widths(Path(folder), widths_of(marked)))
         one = dermis.Skin(profile=first, specular="none")
         skins = {"one profile": one, "by maps": one.replace(other_profiles=others, profile_map=shares)}
         return {name: studio.render(replace(scene, skin=own), 1.4) for name, own in skins.items()}
 
 
 if __name__ == "__main__":
-    main(draw)
+    draw_script(draw)

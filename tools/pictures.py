@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from dermis.apps.gallery.picture import sheet
-from dermis.apps.gallery.run import encode_webp
-from dermis.apps.gallery.script import find_scripts
+from dermis.apps.gallery.panels import sheet
+from dermis.apps.gallery.script import encode_webp, find_scripts
 from dermis.apps.gallery.studio import Studio
 from dermis.base.command_line import run_script
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tolerances import UNMIXED
 
-from dermis.apps.inverse.unmixing.model import skin_model
+from dermis.apps.inverse.unmixing.skin_model import skin_model
 from dermis.images.io import read_image, write_image
 
 Run = Callable[..., Any]

@@ -11,15 +11,12 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis import DermisError, DirectionalLight, Environment, Human, Renderer, Scene, Settings
-from dermis.apps.inverse.fitting import sky
-from dermis.apps.inverse.fitting.files import save
+from dermis.apps.inverse.fitting import light_basis
 from dermis.apps.inverse.fitting.fit import fit
-from dermis.apps.inverse.fitting.fitted import Fitted
-from dermis.apps.inverse.fitting.landmarks import read_landmarks
-from dermis.apps.inverse.fitting.linear import strengths_of
-from dermis.apps.inverse.fitting.photograph import read_photograph
-from dermis.apps.inverse.fitting.place import placed
-from dermis.apps.inverse.fitting.subject import subject_of
+from dermis.apps.inverse.fitting.inputs import read_photograph, subject_of
+from dermis.apps.inverse.fitting.light_basis import strengths_of
+from dermis.apps.inverse.fitting.placement import place_by_landmarks, read_landmarks
+from dermis.apps.inverse.fitting.result import FitResult, save_fit
 from dermis.human.landmarks.points import landmark_points
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.geometry import fibonacci_sphere
@@ -58,13 +55,13 @@ def photo(scene: Scene) -> NDArray[np.float32]:
 
 
 @pytest.fixture(scope="module")
-def found(person: Human, scene: Scene, photo: NDArray[np.float32]) -> Fitted:
+def found(person: Human, scene: Scene, photo: NDArray[np.float32]) -> FitResult:
     """From bytes, at half the exposure, under light a fifth redder than white."""
     seen = encode_srgb8(np.clip(0.5 * photo * (1.2, 1.0, 0.9), 0.0, 1.0))
     return fit(seen, person, camera=CAMERA, exposure=0.5, white=(1.2, 1.0, 0.9), adapter="cpu", **SMALL)
 
 
-def test_finds_skin_and_light(found: Fitted) -> None:
+def test_finds_skin_and_light(found: FitResult) -> None:
     assert found.values["melanin"] == pytest.approx(0.05, rel=0.05)
     assert found.values["blood"] == pytest.approx(0.012, rel=0.1)
     assert found.values["roughness"] == pytest.approx(0.25, abs=0.05)
@@ -72,12 +69,12 @@ def test_finds_skin_and_light(found: Fitted) -> None:
     true = np.array([0.5, 0.4, 0.77])
     assert way @ true / np.linalg.norm(true) > np.cos(np.radians(3.0))
     assert strength == pytest.approx(2.0, rel=0.1)
-    assert sky.panorama(found.strengths[: sky.BASIS]).mean() == pytest.approx(0.3, rel=0.2)
+    assert light_basis.panorama(found.strengths[: light_basis.BASIS]).mean() == pytest.approx(0.3, rel=0.2)
     assert found.residual < 0.02
 
 
-def test_files_are_a_scene_that_loads(found: Fitted, tmp_path: Path) -> None:
-    save(tmp_path, found)
+def test_files_are_a_scene_that_loads(found: FitResult, tmp_path: Path) -> None:
+    save_fit(tmp_path, found)
     scene, settings = load_scene(tmp_path / "scene.toml")
     assert settings.size == SIZE and settings.exposure == 0.5
     assert scene.head.maps.look.melanin == pytest.approx(found.values["melanin"])  # type: ignore[attr-defined]
@@ -98,7 +95,7 @@ def test_a_head_without_a_name_is_no_file(person: Human) -> None:
 
 def test_light_is_nowhere_negative_and_what_it_was() -> None:
     random = np.random.default_rng(3)
-    A, light = random.uniform(size=(60, 10)), np.append(sky.mixtures()[0][:, 5], 0.7)
+    A, light = random.uniform(size=(60, 10)), np.append(light_basis.mixtures()[0][:, 5], 0.7)
     assert strengths_of(A, A @ light) == pytest.approx(light, abs=1e-4)
     dark = strengths_of(A, -(A @ light))
     assert np.abs(dark).max() < 1e-9
@@ -108,7 +105,7 @@ def test_lobes_make_up_all_of_the_second_order() -> None:
     places = fibonacci_sphere(200)
     x, y, z = places.T
     wanted = np.stack([np.ones(200), x, y, z, x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1], axis=-1)
-    lobes = sky.lobe(sky.middles(), places)
+    lobes = light_basis.lobe(light_basis.middles(), places)
     made = lobes @ np.linalg.lstsq(lobes, wanted, rcond=None)[0]
     assert np.abs(made - wanted).max() < 1e-9
 
@@ -129,7 +126,7 @@ def test_camera_and_shape_by_landmarks(person: Human, tmp_path: Path) -> None:
     pixels = seen[:, :2] / seen[:, 2:]
     rows = [f"{name},{x},{y}" for name, (x, y) in zip(points.names, pixels.tolist(), strict=True)]
     (tmp_path / "face.csv").write_text("\n".join(["name,x,y", *rows]))
-    made = placed(subject_of(Human()), tmp_path / "face.csv", size)
+    made = place_by_landmarks(subject_of(Human()), tmp_path / "face.csv", size)
     assert made.person is not None
     other = made.scene.camera
     way, true = (np.subtract(one.position, one.target) for one in (other, CAMERA))

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from dermis.apps.gallery.page import _equation, write_page
-from dermis.apps.gallery.picture import sheet
-from dermis.apps.gallery.run import Picture, draw_pictures, encode_webp
-from dermis.apps.gallery.script import Panel, Script, read_script
+from dermis.apps.gallery.panels import sheet
+from dermis.apps.gallery.script import Panel, Picture, Script, draw_pictures, encode_webp, read_script
 
 CHROMIUM = Path("/usr/bin/chromium")
 QUIET = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.apps.gallery.picture import as_bytes, still
+from dermis.apps.gallery.panels import as_bytes, still
 from dermis.apps.gallery.script import Script, find_scripts, read_script
 from dermis.apps.gallery.studio import Studio
 from dermis.base import citations as cite

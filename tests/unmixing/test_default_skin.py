@@ -9,7 +9,7 @@ import pytest
 from tolerances import UNMIXED
 
 import dermis
-from dermis.apps.inverse.fitting.subject import subject_of
+from dermis.apps.inverse.fitting.inputs import subject_of
 from dermis.human.skin.look import SkinLook
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.optics.tissue import load_tissue

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.apps.inverse.unmixing.model import skin_model
+from dermis.apps.inverse.unmixing.profile_widths import CORNERS, save_widths, widths_of
+from dermis.apps.inverse.unmixing.skin_model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
-from dermis.apps.inverse.unmixing.widths import CORNERS, save_widths, widths_of
 from dermis.base.errors import DermisError
 from dermis.frame.features.diffusion.mixture import load_shares
 from dermis.optics.profiles import load_profile

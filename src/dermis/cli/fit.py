@@ -11,7 +11,7 @@ from dermis.base.console import print_json, print_lines, progress
 from dermis.cli.options import Adapter, Json
 
 if TYPE_CHECKING:
-    from dermis.apps.inverse.fitting.fitted import Fitted
+    from dermis.apps.inverse.fitting.result import FitResult
 
 
 def fit(
@@ -76,8 +76,8 @@ def fit(
     adapter:
         Which adapter computes: auto, cpu or part of a name.
     """
-    from dermis.apps.inverse.fitting.files import SUMMARY, save
     from dermis.apps.inverse.fitting.fit import fit as fitted
+    from dermis.apps.inverse.fitting.result import SUMMARY, save_fit
     from dermis.base.atomic_write import check_folder
     from dermis.cli.options import parse_colour
 
@@ -86,11 +86,11 @@ def fit(
     how = {"suns": suns, "exposure": exposure, "white": given, "noise": noise, "side": side, "atlas": atlas}
     with progress("fitting") as told:
         found = fitted(photo, head, camera=camera, landmarks=landmarks, adapter=adapter, told=told, **how)
-    _report(found, save(output, found), as_json)
+    _report(found, save_fit(output, found), as_json)
     return 0
 
 
-def _report(found: Fitted, written: list[Path], as_json: bool) -> None:
+def _report(found: FitResult, written: list[Path], as_json: bool) -> None:
     told = found.summary() | {"files": [str(one) for one in written]}
     if as_json:
         print_json(told)

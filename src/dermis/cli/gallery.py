@@ -11,7 +11,7 @@ from dermis.base.console import note, print_json, print_lines, progress
 from dermis.cli.options import Adapter, Json, Whole
 
 if TYPE_CHECKING:
-    from dermis.apps.gallery.run import Picture
+    from dermis.apps.gallery.script import Picture
 
 _SIZE = 448
 
@@ -49,8 +49,7 @@ def gallery(
         Folder for pictures and page; made if it is not there.
     """
     from dermis.apps.gallery.page import write_page
-    from dermis.apps.gallery.run import draw_pictures, write_panels
-    from dermis.apps.gallery.script import find_scripts
+    from dermis.apps.gallery.script import draw_pictures, find_scripts, write_panels
     from dermis.apps.gallery.studio import Studio
     from dermis.base.atomic_write import refuse_output
     from dermis.base.errors import refuse

@@ -13,8 +13,7 @@ from dermis.cli.options import Adapter, Json
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
-    from dermis.apps.inverse.unmixing.change import Change
-    from dermis.apps.inverse.unmixing.unmix import Unmixed
+    from dermis.apps.inverse.unmixing.unmix import Recolouring, Unmixed
 
 _Share = Annotated[str | None, Parameter(show_default=False)]
 
@@ -87,7 +86,7 @@ def unmix(
     adapter:
         Which adapter computes: auto, cpu or part of a name.
     """
-    from dermis.apps.inverse.unmixing.files import SUMMARY, save
+    from dermis.apps.inverse.unmixing.unmix import SUMMARY, save_maps
     from dermis.apps.inverse.unmixing.unmix import unmix as unmixed
     from dermis.base.atomic_write import check_folder
 
@@ -106,7 +105,7 @@ def unmix(
             told=told,
         )
     recoloured = None if change is None else found.recoloured(change, adapter)
-    written = save(output, found, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))
+    written = save_maps(output, found, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))
     if widths:
         written += _save_widths(output, found)
     _report(found, written, time.perf_counter() - started, as_json)
@@ -114,16 +113,16 @@ def unmix(
 
 
 def _save_widths(folder: Path, found: Unmixed) -> list[Path]:
-    from dermis.apps.inverse.unmixing.widths import save_widths, widths_of
+    from dermis.apps.inverse.unmixing.profile_widths import save_widths, widths_of
 
     return save_widths(folder, widths_of(found))
 
 
 def _change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
-) -> Change | None:
+) -> Recolouring | None:
     """What is to be recoloured, None for nothing."""
-    from dermis.apps.inverse.unmixing.change import Change, share_of
+    from dermis.apps.inverse.unmixing.unmix import Recolouring, parse_share_change
     from dermis.base.quantities import number
 
     if melanin is None and blood is None and oxygen is None and eumelanin is None:
@@ -134,9 +133,9 @@ def _change(
             number(option, value, 0.0, 1.0, "a share")
     words = {"melanin": melanin, "blood": blood}
     found: dict[str, Any] = {
-        name: share_of(f"--{name}", one) for name, one in words.items() if one is not None
+        name: parse_share_change(f"--{name}", one) for name, one in words.items() if one is not None
     }
-    return Change(**found, oxygen=oxygen, eumelanin=eumelanin)
+    return Recolouring(**found, oxygen=oxygen, eumelanin=eumelanin)
 
 
 def _report(found: Unmixed, written: list[Path], seconds: float, as_json: bool) -> None:

@@ -43,7 +43,7 @@ _LONG_WORK = (
         "dermis.apps.viewer.windows.show_window",
         "dermis.apps.validation.benchmarks.run.run",
     ),
-    *("dermis.apps.gallery.run.draw_pictures", "dermis.apps.validation.comparisons.compare.compare"),
+    *("dermis.apps.gallery.script.draw_pictures", "dermis.apps.validation.comparisons.compare.compare"),
 )
 _OUTPUTS = ["out.", "frames", "gallery", "person.json"]
 _KEPT = ["frames/"]  # numbered pictures, each of which is whole

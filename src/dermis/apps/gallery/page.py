@@ -1,4 +1,4 @@
-"""The gallery as a self-contained HTML file that needs no network."""
+"""Gallery page: one self-contained HTML file that needs no network."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from importlib import resources
 from pathlib import Path
 from string import Template
 
-from dermis.apps.gallery.run import Picture
+from dermis.apps.gallery.script import Picture
 from dermis.base import citations as cite
 from dermis.base.atomic_write import replacing
 

@@ -1,4 +1,4 @@
-"""What gallery scripts draw with: one renderer and one head for all of them."""
+"""Renderer and head shared by all gallery scripts."""
 
 from __future__ import annotations
 

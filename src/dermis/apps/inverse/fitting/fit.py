@@ -1,4 +1,4 @@
-"""From a photograph of a face to its light and skin, by frames of the renderer itself."""
+"""Fit of light and skin to a photograph of a face, with the renderer as the forward model."""
 
 from __future__ import annotations
 
@@ -12,14 +12,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.inverse.fitting.certainty import certainty_of
-from dermis.apps.inverse.fitting.fitted import Fitted
 from dermis.apps.inverse.fitting.frames import Frames
-from dermis.apps.inverse.fitting.photograph import Photograph, read_photograph
-from dermis.apps.inverse.fitting.place import placed
-from dermis.apps.inverse.fitting.solve import ROBUST, Problem, State, solve, tint
-from dermis.apps.inverse.fitting.start import Start, suns_around, suns_to_try
-from dermis.apps.inverse.fitting.subject import subject_of
+from dermis.apps.inverse.fitting.initial_guess import InitialGuess, suns_around, suns_to_try
+from dermis.apps.inverse.fitting.inputs import Photograph, read_photograph, subject_of
+from dermis.apps.inverse.fitting.placement import place_by_landmarks
+from dermis.apps.inverse.fitting.result import FitResult
+from dermis.apps.inverse.fitting.solve import ROBUST, Problem, State, certainty_of, solve, tint
 from dermis.apps.inverse.fitting.unknowns import usual_point
 from dermis.base.errors import refuse, shown_value
 from dermis.base.quantities import number, numbers, whole_number
@@ -48,7 +46,7 @@ def fit(
     atlas: int = ATLAS,
     adapter: str = "auto",
     told: Callable[[int, int], None] = lambda done, of: None,
-) -> Fitted:
+) -> FitResult:
     """Light and skin of a photograph of a head whose shape and camera are known.
 
     photo : a file (PNG, JPEG or TIFF in sRGB, EXR linear), or pixels (h, w, 3): bytes in sRGB, floats linear
@@ -79,7 +77,7 @@ def fit(
     small = whole.within(whole_number("side", side, 32, 1024, "pixels"))
     subject = subject_of(head, camera)
     if landmarks is not None:
-        subject = placed(subject, landmarks, whole.size)
+        subject = place_by_landmarks(subject, landmarks, whole.size)
     settings = Settings(
         size=small.size, atlas=atlas, shadow_size=SHADOWS, samples=4, strands=False, technique="texture-space"
     )
@@ -91,7 +89,7 @@ def fit(
         picture = _picture(frames, state, given * exposure)
     known = certainty_of(problem, state, slopes)
     off = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
-    return Fitted(
+    return FitResult(
         subject,
         state.point,
         state.strengths,
@@ -129,10 +127,10 @@ def _solved(
     target = photo.linear[frames.mask] / scale
     problem = Problem(frames, target, noise, free_white, robust)
     first = problem.weights(target.mean(axis=1, keepdims=True) * np.ones(3))
-    start = Start(frames, tried, target, first).best(suns)
+    start = InitialGuess(frames, tried, target, first).best(suns)
     if suns:
         nearer = replace(start, suns=suns_around(start.suns))
-        start = Start(frames, nearer, target, first).best(suns)
+        start = InitialGuess(frames, nearer, target, first).best(suns)
     state, slopes = solve(problem, start, told)
     return state, slopes, problem
 

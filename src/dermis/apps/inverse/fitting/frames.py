@@ -1,4 +1,4 @@
-"""Frames of a face, one for each light: a photograph is a sum of them."""
+"""Frames of a face under each light alone: a photograph is a linear combination of them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.fitting import sky
-from dermis.apps.inverse.fitting.unknowns import Point, skinned, suns_of
+from dermis.apps.inverse.fitting.light_basis import BASIS, panorama
+from dermis.apps.inverse.fitting.unknowns import Point, suns_of, with_skin
 from dermis.base.atomic_write import replacing
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
@@ -46,7 +46,7 @@ class Frames:
 
     def find_mask(self, point: Point, trusted: Floats) -> None:
         """Find the pixels of skin, of which the photograph can be trusted (h, w)."""
-        scene = skinned(self._lit(()), point)
+        scene = with_skin(self._lit(()), point)
         scene = replace(scene, lights=suns_of(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))
         shown = self._draw(scene, "mask", ("label", "normal_camera", "alpha"))
         label, alpha = shown.output("label"), shown.output("alpha")
@@ -77,11 +77,11 @@ class Frames:
 
     def lit(self, point: Point, strengths: Floats, name: str = "light") -> Scene:
         """The scene with this skin in these lights, its panorama in the folder."""
-        suns = suns_of(point.suns, strengths[sky.BASIS :], np.ones(3))
-        radiance = sky.panorama(strengths[: sky.BASIS])
+        suns = suns_of(point.suns, strengths[BASIS:], np.ones(3))
+        radiance = panorama(strengths[:BASIS])
         lights = [one for one in suns if max(one.irradiance) > 0.0]
         around = self._environment(name, radiance) if radiance.max() > 0.0 else None
-        return skinned(replace(self._lit(lights), environment=around), point)
+        return with_skin(replace(self._lit(lights), environment=around), point)
 
     def picture(self, scene: Scene) -> Floats:
         """(h, w, 3) radiance of a whole frame."""
@@ -89,15 +89,15 @@ class Frames:
 
     def _apart(self, point: Point) -> list[tuple[Scene, str]]:
         """A scene for each light, with the name of its view."""
-        base = skinned(self._lit(()), point)
+        base = with_skin(self._lit(()), point)
         found = []
-        for k in range(sky.BASIS):
-            strengths = np.eye(sky.BASIS)[k]
+        for k in range(BASIS):
+            strengths = np.eye(BASIS)[k]
             path = self.folder / f"lobe_{k}.exr"
             around = (
                 Environment(name=str(path))
                 if path.exists()
-                else self._environment(f"lobe_{k}", sky.panorama(strengths))
+                else self._environment(f"lobe_{k}", panorama(strengths))
             )
             found.append((replace(base, environment=around), f"lobe {k}"))
         for k, sun in enumerate(suns_of(point.suns, np.ones(len(point.suns)), np.ones(3))):

@@ -1,4 +1,4 @@
-"""What is looked for in a photograph, as numbers that steps can be taken in."""
+"""Unknowns of a fit, their priors, and the scene for given values."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Unknown:
     step: float
 
 
-SKIN = (
+UNKNOWNS = (
     Unknown("melanin", 0.03, 2.0, 0.0005, 0.6, 0.1),
     Unknown("blood", 0.01, 0.7, 0.0005, 0.2, 0.15),
     Unknown("roughness", 0.3, 0.35, 0.05, 1.0, 0.06),
@@ -70,15 +70,15 @@ class Point:
 
     def values(self) -> dict[str, float]:
         """Of the skin, by name."""
-        return {one.name: float(np.exp(log)) for one, log in zip(SKIN, self.logs, strict=True)}
+        return {one.name: float(np.exp(log)) for one, log in zip(UNKNOWNS, self.logs, strict=True)}
 
     def moved(self, step: Floats) -> Point:
         """Another, kept within the limits.
 
         step : (4 + 2 k + 2,) of the logarithms, of the suns' directions along their tangents, of the white
         """
-        skin, count = len(SKIN), len(self.suns)
-        low, high = np.log([one.low for one in SKIN]), np.log([one.high for one in SKIN])
+        skin, count = len(UNKNOWNS), len(self.suns)
+        low, high = np.log([one.low for one in UNKNOWNS]), np.log([one.high for one in UNKNOWNS])
         turns = step[skin : skin + 2 * count].reshape(count, 2)
         moved = self.suns + np.einsum("kt,ktc->kc", turns, tangents(self.suns))
         return Point(
@@ -90,7 +90,7 @@ class Point:
 
 def usual_point(suns: Floats) -> Point:
     """Before the photograph is seen."""
-    return Point(np.log([one.usual for one in SKIN]), suns, np.zeros(2))
+    return Point(np.log([one.usual for one in UNKNOWNS]), suns, np.zeros(2))
 
 
 def tangents(towards: Floats) -> Floats:
@@ -101,7 +101,7 @@ def tangents(towards: Floats) -> Floats:
     return np.stack([first, np.cross(towards, first)], axis=1)
 
 
-def skinned(scene: Scene, point: Point) -> Scene:
+def with_skin(scene: Scene, point: Point) -> Scene:
     """The scene with this skin.
 
     Painted people are painted with these pigments, and light spreads below as far as pigments near them let

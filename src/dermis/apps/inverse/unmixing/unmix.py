@@ -1,26 +1,27 @@
-"""From a picture of skin's colour to its melanin and blood."""
+"""Melanin and blood of a picture of skin colour, recolouring, and their files."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.inverse.unmixing.change import Change
-from dermis.apps.inverse.unmixing.model import SkinModel, Third, skin_model
-from dermis.apps.inverse.unmixing.on_device import Unmixer, recoloured
-from dermis.apps.inverse.unmixing.shading import shading_of
+from dermis.apps.inverse.unmixing.device_unmixer import Unmixer, recolour, shading_of
+from dermis.apps.inverse.unmixing.skin_model import SkinModel, Third, skin_model
+from dermis.base.atomic_write import replacing
 from dermis.base.errors import refuse
 from dermis.base.quantities import number
 from dermis.formats.maps import colour_map
 from dermis.gpu import Device
 from dermis.gpu.failures import LazyDevice
 from dermis.images.colour import delta_e_2000
-from dermis.images.io import Picture
+from dermis.images.hdr import encode_exr
+from dermis.images.io import Picture, write_image
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
@@ -33,6 +34,65 @@ _JUDGED = 512  # texels along the longer side, for the table
 _NOISE = 1e-4, 0.5
 _BLACK = 1e-3  # as between the charts of a map
 _LIKE_SKIN = 0.15  # largest logarithm of a residual that counts for medians
+_FACTORS = 0.0, 100.0
+
+
+@dataclass(frozen=True)
+class ShareChange:
+    """What becomes of a map of shares: a factor times it, or one of another median.
+
+    A larger median adds the same everywhere, because pale skin's noise would be multiplied with it; a smaller
+    one multiplies.
+    """
+
+    factor: float = 1.0
+    median: float | None = None
+
+    def over(self, median: float) -> tuple[float, float]:
+        """Factor for a map of this median, and what is then added."""
+        if self.median is None:
+            return self.factor, 0.0
+        if self.median < median:
+            return self.median / median, 0.0
+        return 1.0, self.median - median
+
+
+@dataclass(frozen=True)
+class Recolouring:
+    """Other pigments for the same skin; what is None stays.
+
+    oxygen, eumelanin : shares, as of `SkinParameters` [-]
+    """
+
+    melanin: ShareChange = ShareChange()
+    blood: ShareChange = ShareChange()
+    oxygen: float | None = None
+    eumelanin: float | None = None
+
+    def of(self, skin: SkinParameters) -> SkinParameters:
+        """The skin with what is given here."""
+        given = {name: getattr(self, name) for name in ("oxygen", "eumelanin")}
+        return replace(skin, **{name: one for name, one in given.items() if one is not None})
+
+    def over(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
+        """Factors of melanin, blood and the third number for maps of these medians, and what is added."""
+        factors, added = zip(self.melanin.over(melanin), self.blood.over(blood), (1.0, 0.0), strict=True)
+        return np.array(factors), np.array(added)
+
+
+def parse_share_change(option: str, words: str) -> ShareChange:
+    """What somebody wrote: x2 for a factor, 0.1 for a median.
+
+    Raises DermisError for anything else.
+    """
+    factor = words[:1] in "x×*" and bool(words)
+    try:
+        value = float(words[1:] if factor else words)
+    except ValueError:
+        refuse(option, "a factor, such as x2, or a median, such as 0.1", f"{words!r} came", "Correct it")
+    if factor:
+        return ShareChange(factor=number(option, value, *_FACTORS, "a factor"))
+    return ShareChange(median=number(option, value, 0.0, 1.0, "a share of the volume"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +151,7 @@ class Unmixed:
                 told["oxygen"] = _spread(third[skin])
         return told
 
-    def recoloured(self, change: Change, adapter: str = "auto") -> Pixels:
+    def recoloured(self, change: Recolouring = Recolouring(), adapter: str = "auto") -> Pixels:
         """(h, w, 3) the colours, linear Rec. 709, of the same skin with other pigments.
 
         What the model did not account for stays, as does light that was not taken out of the picture.
@@ -101,14 +161,14 @@ class Unmixed:
         kept = self.devices.setdefault(adapter, LazyDevice(adapter))
         return kept.run(lambda device: self._recoloured(device, change))
 
-    def _recoloured(self, device: Device, change: Change) -> Pixels:
+    def _recoloured(self, device: Device, change: Recolouring) -> Pixels:
         fixed = self.third is None or change.oxygen is not None
         target = skin_model(change.of(self.skin), "none") if fixed else self.model
         usual = np.broadcast_to(np.float32(target.usual), self.melanin.shape)
         third = usual if fixed or self.third is None else self.third
         made = np.stack([self.melanin, self.blood, third], axis=-1)
         factors, added = change.over(self._median(self.melanin), self._median(self.blood))
-        return recoloured(device, target, made, self.residual, factors, added)
+        return recolour(device, target, made, self.residual, factors, added)
 
     def skin_texels(self) -> NDArray[np.bool_]:
         """(h, w) whether a texel's colour is near one of the model's."""
@@ -176,3 +236,30 @@ def _array(colours: ArrayLike) -> Pixels:
     if not (np.isfinite(found).all() and found.min() >= 0.0 and found.max() <= 1.0):
         refuse("colours", "reflectances from 0 to 1", "some are outside, or no numbers", "Scale them")
     return found.astype(np.float32, copy=False)
+
+
+SUMMARY = "unmixed.json"
+
+
+def save_maps(
+    folder: Path, found: Unmixed, recoloured: NDArray[np.float32] | None = None, linear: bool = False
+) -> list[Path]:
+    """Write each map as EXR, the table, and the other colours if any; each file whole or not at all.
+
+    linear : whether the other colours are written as EXR rather than PNG
+
+    Raises DermisError when the disk is full, or the folder cannot be written to.
+    """
+    written = []
+    for name, values in found.maps().items():
+        path = folder / f"{name}.exr"
+        with replacing(path) as trial:
+            trial.write_bytes(encode_exr(values if values.ndim == 3 else values[..., None]))
+        written.append(path)
+    if recoloured is not None:
+        path = folder / ("recoloured.exr" if linear else "recoloured.png")
+        write_image(path, recoloured)
+        written.append(path)
+    with replacing(folder / SUMMARY) as trial:
+        trial.write_text(json.dumps(found.summary(), indent=2) + "\n", encoding="utf-8")
+    return [*written, folder / SUMMARY]

@@ -1,20 +1,22 @@
-"""Panels side by side, with captions below, as one picture."""
+"""Panels of gallery pictures: conversion to bytes, plots, landmarks, and sheets with captions."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.gallery.script import Image, Panel, Panels, read_script
-from dermis.apps.gallery.studio import Studio
 from dermis.base.extras import needed
+from dermis.frame.observation import Landmarks
 from dermis.images.colour import encode_srgb8
+from dermis.scene.outputs import OUTPUTS
 
+Image = NDArray[np.uint8] | NDArray[np.float32]
+Panel = Image | list[Image]
+"""A picture, or a film as a list of frames."""
+Panels = Mapping[str, Panel]
 Bytes = NDArray[np.uint8]
 _INCHES = 4.4
 _BAR, _TEXT, _INK, _PAPER = 24, 14, (200, 200, 206), (22, 22, 26)
@@ -42,16 +44,6 @@ def sheet(panels: Panels, columns: int = 0) -> Bytes:
     rows = [_beside(cells[start : start + step]) for start in range(0, len(cells), step)]
     width = max(row.shape[1] for row in rows)
     return np.vstack([_padded(row, row.shape[0], width) for row in rows])
-
-
-def main(draw: Callable[[Studio], Panels]) -> None:
-    """Draw the running script's picture: python gallery/NN_name.py OUTPUT [HEAD]."""
-    from dermis.images.io import write_png
-
-    output, head = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
-    with needed("matplotlib.style", "the gallery").context("dark_background"):
-        panels = draw(Studio(head))
-    write_png(output, sheet(panels, read_script(Path(sys.argv[0])).columns))
 
 
 def plotted(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
@@ -89,3 +81,44 @@ def _padded(image: Bytes, height: int, width: int) -> Bytes:
     room: Bytes = np.full((height, width, 3), _PAPER, np.uint8)
     room[: image.shape[0], : image.shape[1]] = image
     return room
+
+
+_RADIUS, _SEEN, _HIDDEN = 2.0, (90, 255, 120), (255, 70, 70)
+
+
+def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[np.uint8]:
+    """(h, w, 3) the picture with a dot on each landmark: green where it is seen, red where it is hidden."""
+    from PIL import Image, ImageDraw
+
+    image = Image.fromarray(np.ascontiguousarray(picture[..., :3]))
+    draw = ImageDraw.Draw(image)
+    for (x, y), visible in zip(landmarks.pixels.tolist(), landmarks.visible.tolist(), strict=True):
+        box = (x - _RADIUS, y - _RADIUS, x + _RADIUS, y + _RADIUS)
+        draw.ellipse(box, fill=_SEEN if visible else _HIDDEN)
+    return np.array(image)
+
+
+_LIGHT = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
+_COLOURS = 8192
+_RANGE = 0.02, 0.98  # quantiles of what is seen that are black and white
+
+
+def output_picture(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
+    """(h, w, 3) bytes: light as it looks, a colour for each whole number, else dark to bright.
+
+    values : (h, w) or (h, w, c) of the output
+    """
+    if name in _LIGHT:
+        return encode_srgb8(_LIGHT[name] * values)
+    if OUTPUTS[name].kind != "float32":
+        colours = np.random.default_rng(8).integers(40, 255, (_COLOURS, 3), np.uint8)
+        colours = colours[values.astype(int) % _COLOURS]
+        return np.where((values != OUTPUTS[name].background)[..., None], colours, np.uint8(0))
+    each = values.reshape(*values.shape[:2], -1)[..., :3]
+    seen = (each != 0).any(axis=-1)
+    low, high = np.quantile(each[seen], _RANGE, axis=0)
+    levels = np.clip((each - low) / np.maximum(high - low, 1e-6), 0.0, 1.0) * seen[..., None]
+    if levels.shape[2] == 1:
+        levels = levels.repeat(3, axis=2)
+    wide = np.pad(levels, ((0, 0), (0, 0), (0, 3 - levels.shape[2])))
+    return np.asarray(np.rint(255 * wide), np.uint8)

@@ -1,8 +1,9 @@
-"""Camera, focal length and identity by landmarks: least squares of where they are seen."""
+"""Camera, focal length and identity by least squares of landmarks in a photograph."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import csv
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.fitting.landmarks import read_landmarks
-from dermis.apps.inverse.fitting.subject import Subject, subject_of
+from dermis.apps.inverse.fitting.inputs import Subject, subject_of
+from dermis.base.errors import refuse
+from dermis.base.reading import parse_json, read_text, understood
+from dermis.base.tables import parse_rows
 from dermis.human.landmarks.points import LandmarkPoints, landmark_points
+from dermis.human.landmarks.sets import SETS
 from dermis.human.person import Human
 from dermis.human.published import OLD, YOUNG, human_targets
 from dermis.mesh.head import Head
@@ -33,7 +37,7 @@ _BEFORE_MM = 1100.0
 _FRAME_MM = 300.0
 
 
-def placed(subject: Subject, landmarks: str | Path, size: tuple[int, int]) -> Subject:
+def place_by_landmarks(subject: Subject, landmarks: str | Path, size: tuple[int, int]) -> Subject:
     """The subject before the camera that sees its landmarks where the photograph has them.
 
     The human gets the identity that they tell: ancestry, sex, age, weight, muscle and details of the face,
@@ -103,7 +107,7 @@ class _Shape:
         """The person given, changed by so many times what is believed of each number."""
         assert self.given is not None
         macro: dict[str, Any] = {
-            name: float(np.clip(getattr(self.given, name) + _spread(name) * step, *_limits(name)))
+            name: float(np.clip(getattr(self.given, name) + _prior_spread(name) * step, *_limits(name)))
             for name, step in zip(_MACRO, identity, strict=False)
         }
         targets = dict(self.given.targets)
@@ -123,7 +127,7 @@ def _slope(shape: _Shape, places_of: Callable[[Human], Floats], base: Floats, k:
     return np.asarray(change / step[k])
 
 
-def _spread(name: str) -> float:
+def _prior_spread(name: str) -> float:
     return _MACRO_SPREAD * (OLD - YOUNG if name == "age" else 1.0)
 
 
@@ -164,3 +168,52 @@ def _camera(x: Floats, size: tuple[int, int]) -> Camera:
     focal, (cx, cy) = float(np.exp(x[6])), (np.array(size) - 1.0) / 2.0
     K = [[focal, 0.0, cx], [0.0, focal, cy], [0.0, 0.0, 1.0]]
     return Camera.from_opencv(K, Rotation.from_rotvec(x[:3]).as_matrix(), x[3:6], size)
+
+
+_EXPECTED = "landmarks: CSV rows of name,x,y in pixels, or JSON by MediaPipe or dermis render"
+_BY_COUNT = {68: "ibug-68", 70: "face-synthetics-70", 468: "mediapipe", 478: "mediapipe"}
+_MEDIAPIPE = "face_landmarks", "faceLandmarks", "multi_face_landmarks", "landmarks", "landmark"
+_LEAST = 6
+
+
+def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
+    """The name of their set, and where each is: (2,) x to the right, y down, the first pixel's middle at 0.
+
+    size : width and height of the photograph, to which MediaPipe's shares refer [pixel]
+
+    Raises DermisError for files that hold none, and for sets that nobody knows.
+    """
+    text = read_text(path, _EXPECTED)
+    if Path(path).suffix.lower() == ".json":
+        name, found = _of_json(path, parse_json(text, path, _EXPECTED), size)
+    else:
+        with understood(path, _EXPECTED, KeyError, TypeError, csv.Error):
+            rows = [(row["name"], float(row["x"]), float(row["y"])) for row in parse_rows(text)]
+        found = {str(one): np.array([x, y]) for one, x, y in rows}
+        name = _BY_COUNT.get(len(found), "")
+    if len(found) < _LEAST or not all(np.isfinite(one).all() for one in found.values()):
+        refuse(path, f"{_LEAST} landmarks at least", f"{len(found)} came", "Correct the file")
+    if name not in SETS:
+        expected = f"as many landmarks as {', '.join(map(str, _BY_COUNT))}, or JSON that names their set"
+        refuse(path, expected, f"{len(found)} came", "Give all of a set")
+    return name, found
+
+
+def _of_json(path: str | Path, told: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
+    """Those of `dermis render --landmarks`, or of MediaPipe: its points' shares of width and height."""
+    with understood(path, _EXPECTED, KeyError, TypeError, IndexError):
+        if isinstance(told, Mapping) and isinstance(told.get("landmarks"), Mapping):
+            name, rows = next(iter(told["landmarks"].items()))
+            return name, {str(row["name"]): np.asarray(row["pixel"], np.float64) for row in rows}
+        while not _is_points(told):  # of the first face
+            told = (
+                next(told[key] for key in _MEDIAPIPE if key in told) if isinstance(told, Mapping) else told[0]
+            )
+        points = np.array([[one["x"], one["y"]] for one in told], np.float64)
+    return _BY_COUNT.get(len(points), ""), dict(
+        zip(map(str, range(len(points))), points * size - 0.5, strict=True)
+    )
+
+
+def _is_points(told: Any) -> bool:
+    return isinstance(told, list) and bool(told) and isinstance(told[0], Mapping) and "x" in told[0]

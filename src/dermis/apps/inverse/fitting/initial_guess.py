@@ -1,4 +1,4 @@
-"""Where a fit starts: the sun and the pigments that fit best among a few of each."""
+"""Initial guess of a fit: the best of a coarse grid of sun directions and pigments."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.fitting import sky
 from dermis.apps.inverse.fitting.frames import Frames
-from dermis.apps.inverse.fitting.linear import fault_by, strengths_by
-from dermis.apps.inverse.fitting.unknowns import SKIN, Point, tangents
+from dermis.apps.inverse.fitting.light_basis import BASIS, fault_by, strengths_by
+from dermis.apps.inverse.fitting.unknowns import UNKNOWNS, Point, tangents
 from dermis.human.skin.colours import colours
 from dermis.mesh.geometry import fibonacci_sphere
 
@@ -41,7 +40,7 @@ def suns_around(towards: Floats) -> Floats:
     return np.asarray((found / np.linalg.norm(found, axis=2, keepdims=True)).reshape(-1, 3))
 
 
-class Start:
+class InitialGuess:
     """Products of what each light alone makes of the face, below its surface and off it.
 
     frames, point : the face, its `suns` being those to try
@@ -84,7 +83,7 @@ class Start:
     def _fault(self, logs: Floats, suns: list[int]) -> float:
         """Squares left over: what leaves below the skin is as bright as its colour, what leaves off it as its
         strength."""
-        chosen = np.array([*range(sky.BASIS), *(sky.BASIS + k for k in suns)])
+        chosen = np.array([*range(BASIS), *(BASIS + k for k in suns)])
         n, strength = self._lights, float(np.exp(logs[3] - self.point.logs[3]))
         ratio = self._colour(logs) / self._colour(self.point.logs)
         gram, right = np.zeros((len(chosen),) * 2), np.zeros(len(chosen))
@@ -97,5 +96,5 @@ class Start:
         return fault_by(gram, right, self._total, strengths_by(gram, right))
 
     def _colour(self, logs: Floats) -> Floats:
-        shares = np.exp(logs[: len(SKIN)])
+        shares = np.exp(logs[: len(UNKNOWNS)])
         return np.asarray(self._table.read(shares[:1], shares[1:2])[0], np.float64)

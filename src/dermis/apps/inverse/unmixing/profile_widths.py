@@ -1,4 +1,4 @@
-"""How far light spreads in each texel's skin: three profiles, and a map that mixes them."""
+"""Diffusion width of each texel: three profiles and a map that mixes them."""
 
 from __future__ import annotations
 

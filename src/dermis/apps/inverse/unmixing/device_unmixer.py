@@ -1,4 +1,4 @@
-"""Pictures unmixed and recoloured on a device, strip by strip."""
+"""Unmixing and recolouring of pictures on a device, in strips; separation of slow shading."""
 
 from __future__ import annotations
 
@@ -9,11 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.unmixing.model import BLOOD_SPREAD, DARKEST, USUAL_BLOOD, SkinModel
-from dermis.apps.inverse.unmixing.solve import FLOOR
+from dermis.apps.inverse.unmixing.skin_model import (
+    BLOOD_SPREAD,
+    DARKEST,
+    FLOOR,
+    USUAL_BLOOD,
+    SkinModel,
+    skin_model,
+)
 from dermis.gpu import CommandList, ComputeProgram, Device, compiled, download, make_texture
 from dermis.gpu.program import declared
 from dermis.gpu.textures import texture_from, upload
+from dermis.optics.pigments.parameters import SkinParameters
 
 Pixels = NDArray[np.float32]
 Told = Callable[[int, int], None]
@@ -79,7 +86,7 @@ class Unmixer:
         return {"model": record, "table": self._table, "starts": self._starts}
 
 
-def recoloured(
+def recolour(
     device: Device, model: SkinModel, made: Pixels, residual: Pixels, factors: Any, added: Any
 ) -> Pixels:
     """Colours (h, w, 3) of the model's skins with a residual (h, w, 3).
@@ -139,3 +146,51 @@ def _record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) 
     numbers = {"usual": model.usual, "spread": model.spread, "noise": noise, "floor": FLOOR}
     believed = {"blood": (USUAL_BLOOD, BLOOD_SPREAD), "darkest": DARKEST}
     return shader.record("Model", span=model.span, steps=steps, **believed, **numbers)
+
+
+_SHADING_SIDE = 256  # of the picture that is looked at
+_SLOW = 1.0 / 24.0  # of the longer side: standard deviation of the blur
+
+
+def shading_of(device: Device, colours: Pixels, skin: SkinParameters, noise: float) -> Pixels:
+    """(h, w) factor that light makes of each texel, 1 on average over the skin [-].
+
+    Each texel of a smaller picture gets the brightness that its melanin and blood leave over; of that what
+    changes slowly is kept, weighed by how well the colour fits a skin.
+    """
+    small = _block_means(colours)
+    made, _, residual = Unmixer(device, skin_model(skin, "shade"), noise).unmix(small)
+    off = (np.log(np.maximum(residual, 1e-6)) ** 2).sum(axis=-1) / noise**2
+    weight = (1.0 / (1.0 + off)) * (small.min(axis=-1) > 0.0)
+    slow = _blurred(made[..., 2].astype(np.float64), weight.astype(np.float64))
+    mean = float((slow * weight).sum() / max(float(weight.sum()), 1e-12))
+    return _upsampled(np.exp(slow - mean), (colours.shape[0], colours.shape[1]))
+
+
+def _block_means(colours: Pixels) -> Pixels:
+    """Means of blocks of texels."""
+    apart = max(1, max(colours.shape[:2]) // _SHADING_SIDE)
+    height, width = (max(1, side // apart) for side in colours.shape[:2])
+    whole = colours[: height * apart, : width * apart] if apart > 1 else colours
+    rows, columns = min(apart, colours.shape[0]), min(apart, colours.shape[1])
+    return np.asarray(whole.reshape(height, rows, width, columns, 3).mean(axis=(1, 3)), np.float32)
+
+
+def _blurred(values: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:
+    from scipy.ndimage import gaussian_filter
+
+    sigma = _SLOW * max(values.shape)
+    both = [gaussian_filter(one, sigma, mode="nearest") for one in (values * weight, weight)]
+    return np.asarray(both[0] / np.maximum(both[1], 1e-6))
+
+
+def _upsampled(values: NDArray[np.float64], shape: tuple[int, int]) -> Pixels:
+    """Bilinear between the middles of blocks."""
+    from scipy.ndimage import map_coordinates
+
+    found = np.empty(shape, np.float32)
+    across = (np.arange(shape[1]) + 0.5) * values.shape[1] / shape[1] - 0.5
+    for row in range(shape[0]):
+        down = np.full(shape[1], (row + 0.5) * values.shape[0] / shape[0] - 0.5)
+        found[row] = map_coordinates(values, [down, across], order=1, mode="nearest")
+    return found

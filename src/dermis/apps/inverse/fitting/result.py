@@ -1,0 +1,204 @@
+"""Result of a fit: light, skin and their uncertainty, written as files of a folder."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.inverse.fitting.inputs import Subject
+from dermis.apps.inverse.fitting.light_basis import BASIS, panorama
+from dermis.apps.inverse.fitting.solve import Certainty
+from dermis.apps.inverse.fitting.unknowns import (
+    TURN_SPREAD,
+    UNKNOWNS,
+    WHITE_SPREAD,
+    Point,
+    suns_of,
+    with_skin,
+)
+from dermis.base.atomic_write import replacing
+from dermis.base.errors import refuse
+from dermis.human.person_file import write_numbers
+from dermis.images.hdr import encode_exr
+from dermis.images.io import write_image
+from dermis.scene.environment import Environment
+from dermis.scene.model import Scene
+from dermis.scene.saving import save_scene
+from dermis.scene.settings import Settings
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """Light and skin of a photograph.
+
+    subject : head, person, camera and pose
+    point : skin and directions of suns
+    strengths : (9 + k,) of the lobes of light from around and of the suns
+    white : (3,) colour of the light, green 1, linear Rec. 709
+    certainty : how well each number is known
+    photo, picture : (h, w, 3) as large as was fitted, linear, with exposure and white balance in them
+    mask : (h, w) pixels that counted
+    residual : median of the absolute differences over the photograph, on these [-]
+    frames, seconds : that it took
+    """
+
+    subject: Subject
+    point: Point
+    strengths: Floats
+    white: Floats
+    exposure: float
+    size: tuple[int, int]
+    certainty: Certainty
+    photo: Floats
+    picture: Floats
+    mask: NDArray[np.bool_]
+    residual: float
+    frames: int
+    seconds: float
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Melanin, blood, roughness and rho_s [-]."""
+        return self.point.values()
+
+    @property
+    def suns(self) -> list[tuple[Floats, float]]:
+        """Unit vectors towards the suns, and the irradiance of what faces them."""
+        return [(way, float(s)) for way, s in zip(self.point.suns, self.strengths[BASIS:], strict=True)]
+
+    def summary(self) -> dict[str, Any]:
+        """Numbers with their standard deviations, what is not determined, and what was believed.
+
+        Deviations are relative for the skin, in degrees for directions. What the frame itself gets wrong
+        everywhere alike is not in them.
+        """
+        return _summary(self)
+
+
+def _summary(found: FitResult) -> dict[str, Any]:
+    known = found.certainty
+    skin = {
+        one.name: {
+            "value": found.values[one.name],
+            "relative_sd": known.sd[one.name],
+            "usual": one.usual,
+            "believed_relative_sd": one.spread,
+        }
+        for one in UNKNOWNS
+    }
+    suns = []
+    for k, (way, strength) in enumerate(found.suns):
+        off = np.degrees([known.sd[f"sun {k + 1} {name}"] for name in ("across", "along")])
+        suns.append({"towards": way.tolist(), "irradiance": strength, "sd_degrees": off.tolist()})
+    coefficients = found.strengths[:BASIS]
+    return {
+        "skin": skin,
+        "suns": suns,
+        "around": {"mean_radiance": float(panorama(coefficients).mean())},
+        "white": found.white.tolist(),
+        "white_sd": [known.sd[name] for name in ("white red", "white blue") if name in known.sd],
+        "exposure": found.exposure,
+        "not_determined": list(known.held),
+        "not_told_apart": [{"pair": [a, b], "correlation": c} for a, b, c in known.alike],
+        "singular_values": list(known.singular),
+        "priors": _priors(found),
+        "residual": found.residual,
+        "pixels": int(found.mask.sum()),
+        "frames": found.frames,
+        "seconds": round(found.seconds, 2),
+    }
+
+
+def _priors(found: FitResult) -> list[str]:
+    """What was believed or given, in words."""
+    told = [
+        f"{one.name}: around {one.usual:g} within a factor of {np.exp(one.spread):.2g}" for one in UNKNOWNS
+    ]
+    if found.suns:
+        told.append(
+            f"directions of suns: within {np.degrees(TURN_SPREAD):.0f} degrees of where the search began"
+        )
+    white = "white red" in found.certainty.sd
+    told.append(
+        f"colour of the light: neutral within {100 * WHITE_SPREAD:.0f} %"
+        if white
+        else f"colour of the light: given, {', '.join(f'{one:.3g}' for one in found.white)}"
+    )
+    told.append(f"exposure: given, {found.exposure:g}; the strength of the light is free")
+    skin = found.subject.scene.skin.pigments
+    assert skin is not None
+    told.append(
+        f"held: eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm"
+    )
+    return told
+
+
+SUMMARY = "fit.json"
+_GREY = 0.5
+
+
+def save_fit(folder: Path, found: FitResult) -> list[Path]:
+    """Write scene.toml with what it needs, fit.json, and pictures; each file whole or not at all.
+
+    Raises DermisError when the disk is full, or the folder cannot be written to.
+    """
+    table = found.subject.table
+    if found.subject.person is None and not table:
+        came = "it came as a head that only its maker knows"
+        refuse("head", "a person by name, or a Human, for a file to name", came, "Fit the Human itself")
+    written = []
+    if _has_sky(found):
+        written.append(folder / "light.exr")
+        _write_light(written[-1], found)
+    if found.subject.person is not None:
+        written.append(folder / "person.json")
+        look = found.subject.person.look
+        look = replace(look, melanin=found.values["melanin"], blood=found.values["blood"])
+        write_numbers(written[-1], replace(found.subject.person, skin=look))
+        table = {"name": "person.json"}
+    written.append(folder / "scene.toml")
+    settings = Settings(size=found.size, exposure=found.exposure)
+    save_scene(written[-1], scene_of(found, folder), settings, table)
+    for name, image in pictures(found).items():
+        written.append(folder / f"{name}.png")
+        write_image(written[-1], image)
+    written.append(folder / SUMMARY)
+    with replacing(written[-1]) as trial:
+        trial.write_text(json.dumps(found.summary(), indent=2) + "\n", encoding="utf-8")
+    return written
+
+
+def scene_of(found: FitResult, folder: Path) -> Scene:
+    """The scene as found; its light from around is a file of the folder."""
+    lights = suns_of(found.point.suns, found.strengths[BASIS:], found.white)
+    lights = [one for one in lights if max(one.irradiance) > 0.0]
+    path = folder / "light.exr"
+    around = Environment(name=str(path)) if _has_sky(found) else None
+    return with_skin(replace(found.subject.scene, lights=lights, environment=around), found.point)
+
+
+def pictures(found: FitResult) -> dict[str, NDArray[np.float64]]:
+    """Linear pictures: photograph, fit, and their difference on grey where skin counted."""
+    peak = max(float(np.percentile(found.photo[found.mask], 99.5)), 1e-9)
+    off = np.where(found.mask[..., None], (found.photo - found.picture) / peak, 0.0)
+    shown = {"photo": found.photo / max(peak, 1.0), "fit": found.picture / max(peak, 1.0)}
+    return {name: np.clip(image, 0.0, 1.0) for name, image in shown.items()} | {
+        "difference": np.clip(_GREY + off, 0.0, 1.0) ** 2.2
+    }
+
+
+def _has_sky(found: FitResult) -> bool:
+    return bool(panorama(found.strengths[:BASIS]).max() > 0.0)
+
+
+def _write_light(path: Path, found: FitResult) -> None:
+    radiance = panorama(found.strengths[:BASIS])[..., None] * found.white
+    with replacing(path) as trial:
+        trial.write_bytes(encode_exr(radiance.astype(np.float32)))
