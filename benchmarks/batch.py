@@ -125,19 +125,19 @@ def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int, count: int =
 
 def workers(plan: Plan, count: int, *, moving: bool = False) -> dict[str, Any]:
     """Plain processes, so many of them."""
-    seats, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).seats()
+    slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
     spec = spec_for(plan, plan.images * count, 2 * count, moving=moving)
-    found = measured_run(plan, Processes(seats), spec, encoders, count)
-    return {"workers": count, "encoders": encoders, "adapters": len({one.adapter for one in seats}), **found}
+    found = measured_run(plan, Processes(slots), spec, encoders, count)
+    return {"workers": count, "encoders": encoders, "adapters": len({one.adapter for one in slots}), **found}
 
 
 def dask(plan: Plan, count: int) -> dict[str, Any]:
     """The same work by plain processes and by as many workers of dask, each timed by whole shards."""
     distributed = needed("distributed", "the comparison with dask")
-    seats, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).seats()
+    slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
     spec = spec_for(plan, plan.images * count, _SHARDS * count)
-    threads = {"LP_NUM_THREADS": str(seats[0].threads)} if seats[0].threads else {}
-    plain = measured_run(plan, Processes(seats), spec, encoders)
+    threads = {"LP_NUM_THREADS": str(slots[0].threads)} if slots[0].threads else {}
+    plain = measured_run(plan, Processes(slots), spec, encoders)
     quiet = {"distributed.worker.profile.enabled": False}  # as docs/batch.md says
     with (
         _environment(threads),

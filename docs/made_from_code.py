@@ -162,7 +162,7 @@ def table_of(model: type[Plain], names: dict[str, str] | None) -> str:
 def _default(value: Any) -> str:
     """A default as it is typed, nothing for a table's."""
     if isinstance(value, Distribution):
-        told = value.told()
+        told = value.spec_value()
         return shown(told) if isinstance(told, str | float) else f"`{value_text(told)}`"
     return "" if isinstance(value, Plain) else shown(value)
 

@@ -12,17 +12,14 @@ from dataclasses import replace
 
 import dermis
 from dermis.apps.gallery.script import draw_script
-from dermis.apps.inverse.unmixing.unmix import Recolouring, ShareChange
+from dermis.apps.inverse.unmixing.unmix import Change, Share
 
 SKINS = {
-    "as scanned": Recolouring(),
-    "pale": Recolouring(blood=ShareChange(0.3)),
-    "flushed": Recolouring(blood=ShareChange(2.5)),
-    "cold: little oxygen": Recolouring(oxygen=0.2, blood=ShareChange(1.4)),
-    **{
-        f"{100 * m:g} % melanosomes": Recolouring(melanin=ShareChange(median=m))
-        for m in (0.05, 0.12, 0.25, 0.4)
-    },
+    "as scanned": Change(),
+    "pale": Change(blood=Share(0.3)),
+    "flushed": Change(blood=Share(2.5)),
+    "cold: little oxygen": Change(oxygen=0.2, blood=Share(1.4)),
+    **{f"{100 * m:g} % melanosomes": Change(melanin=Share(median=m)) for m in (0.05, 0.12, 0.25, 0.4)},
 }
 
 

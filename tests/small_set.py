@@ -9,8 +9,8 @@ from small_head import obj_text
 
 from dermis.apps.batch.run import Report, run
 from dermis.apps.batch.spec import Spec, load_spec
-from dermis.apps.batch.worker import Work
-from dermis.apps.batch.worker_pool import Processes, WorkerSlot
+from dermis.apps.batch.worker import Work, WorkerSlot
+from dermis.apps.batch.worker_pool import Processes
 
 COUNT = 10
 SHARD_SIZE = 2

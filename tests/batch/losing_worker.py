@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from dermis.apps.batch.worker_pool import serve as draw
+from dermis.apps.batch.worker import serve as draw
 from dermis.frame import renderer as renderer_module
 from dermis.gpu import CommandList, Device, open_device
 

@@ -10,7 +10,7 @@ import pytest
 from small_observation import OUTPUT_NAMES, observation, small_spec
 
 from dermis.apps.batch.output_encoding import Encoding, decode_output, encode_output, file_kind, stored_as
-from dermis.apps.batch.reader import decode_image
+from dermis.apps.batch.reader import decoded
 from dermis.apps.batch.records import encode_record
 from dermis.base.errors import DermisError
 from dermis.scene.outputs import OUTPUTS
@@ -64,7 +64,7 @@ def test_names_and_order_of_the_files() -> None:
 
 def test_all_that_is_known_comes_back() -> None:
     seen, files = image(1)
-    found = decode_image(files)
+    found = decoded(files)
     assert found["number"] == 1 and found["parameters"] == small_spec().parameters(1)
     np.testing.assert_array_equal(found["picture"], seen.picture)
     for ours, theirs in zip(found["camera"], seen.camera, strict=True):
@@ -81,7 +81,7 @@ def test_all_that_is_known_comes_back() -> None:
 def test_what_is_not_known_is_none_and_places_without_one_are_nan() -> None:
     spec, seen = small_spec(), observation(2)
     seen.landmarks["ibug-68"].pixels[1] = np.nan
-    found = decode_image(encode_record(2, seen, spec.parameters(2), spec))
+    found = decoded(encode_record(2, seen, spec.parameters(2), spec))
     assert found["gaze"] is None
     assert np.isnan(found["landmarks"]["ibug-68"].pixels[1]).all()
     assert np.isfinite(found["landmarks"]["ibug-68"].pixels[0]).all()

@@ -19,7 +19,7 @@ from small_observation import OUTPUT_NAMES, observation, small_spec, write_all
 import dermis
 from dermis.apps.batch.index import write_index
 from dermis.apps.batch.output_encoding import encode_output
-from dermis.apps.batch.reader import decode_image
+from dermis.apps.batch.reader import decoded
 from dermis.apps.batch.records import encode_record
 from dermis.base.errors import DermisError
 from dermis.base.extras import needed
@@ -192,5 +192,5 @@ def test_no_landmarks_of_a_set_are_read_too() -> None:
     seen = observation(0)
     none = Landmarks((), np.empty((0, 3), np.float32), np.empty((0, 2)), np.empty(0, bool))
     spec, seen = small_spec(), replace(seen, landmarks={"ibug-68": none})
-    found = decode_image(encode_record(0, seen, spec.parameters(0), spec))["landmarks"]["ibug-68"]
+    found = decoded(encode_record(0, seen, spec.parameters(0), spec))["landmarks"]["ibug-68"]
     assert found.pixels.shape == (0, 2) and found.positions_mm.shape == (0, 3) and found.visible.shape == (0,)

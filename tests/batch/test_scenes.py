@@ -13,7 +13,7 @@ import pytest
 
 from dermis.apps.batch.cameras import face_points
 from dermis.apps.batch.lighting import colour_of, lights_of
-from dermis.apps.batch.scenes import SceneMaker, drawn_person
+from dermis.apps.batch.scenes import SceneMaker, sampled_person
 from dermis.apps.batch.spec import Spec, example_text, spec_of
 from dermis.base.errors import DermisError
 from dermis.human.person import Human
@@ -143,7 +143,7 @@ def test_people_are_those_of_their_seed_but_for_what_is_given() -> None:
         "[person]\nage = 70\ncaucasian = 1\n[person.skin]\nmelanin = 0.01\n[person.hair]\nstyle = 'none'"
     )
     parameters = drawn.parameters(3)
-    person, plain = drawn_person(parameters), Human.drawn(int(parameters["person.seed"]))
+    person, plain = sampled_person(parameters), Human.drawn(int(parameters["person.seed"]))
     assert (person.age, person.caucasian, person.african) == (70, 1, 0)
     assert person.look.melanin == 0.01 and person.hairdo.style == "none"
     assert person.look.age > 0.5 and person.sex == plain.sex

@@ -19,8 +19,8 @@ def pretend(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbers: in
     monkeypatch.setattr(seats, "available_cores", lambda: cores)
 
 
-def places(seating: SlotRequest) -> list[str]:
-    return [seat.adapter for seat in seating.seats()[0]]
+def places(request: SlotRequest) -> list[str]:
+    return [slot.adapter for slot in request.slots()[0]]
 
 
 def test_each_gpu_has_a_worker_or_several(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -34,9 +34,9 @@ def test_each_gpu_has_a_worker_or_several(monkeypatch: pytest.MonkeyPatch) -> No
 @pytest.mark.parametrize(("workers", "encoders"), [(1, 7), (2, 3), (8, 1), (16, 1)])
 def test_encoders_share_the_cores(monkeypatch: pytest.MonkeyPatch, workers: int, encoders: int) -> None:
     pretend(monkeypatch, 8, "DiscreteGPU", 0)
-    found, each = SlotRequest(workers=workers).seats()
-    assert each == encoders and all(seat.threads == 0 for seat in found)
-    assert SlotRequest(workers=workers, encoders=5).seats()[1] == 5
+    found, each = SlotRequest(workers=workers).slots()
+    assert each == encoders and all(slot.threads == 0 for slot in found)
+    assert SlotRequest(workers=workers, encoders=5).slots()[1] == 5
 
 
 @pytest.mark.parametrize(("cores", "workers", "threads"), [(1, 1, 1), (2, 1, 2), (8, 4, 2)])
@@ -44,7 +44,7 @@ def test_a_software_adapter_shares_the_cores(
     monkeypatch: pytest.MonkeyPatch, cores: int, workers: int, threads: int
 ) -> None:
     pretend(monkeypatch, cores, "CPU", 0)
-    found, encoders = SlotRequest().seats()
+    found, encoders = SlotRequest().slots()
     assert (len(found), found[0].threads, encoders) == (workers, threads, 0)
 
 

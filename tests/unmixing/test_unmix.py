@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer
 from dermis.apps.inverse.unmixing.skin_model import Third, skin_model, solve, weights_of
-from dermis.apps.inverse.unmixing.unmix import Recolouring, ShareChange, parse_share_change, unmix
+from dermis.apps.inverse.unmixing.unmix import Change, Share, parse_share, unmix
 from dermis.base.errors import DermisError
 from dermis.gpu import failures
 from dermis.gpu.device import Device
@@ -110,39 +110,39 @@ def test_the_same_skin_comes_back_and_twice_the_melanin_is_found_as_that(
     colours: Pixels,
 ) -> None:
     found = unmix(colours, adapter="cpu")
-    np.testing.assert_allclose(found.recoloured(Recolouring(), "cpu"), colours, atol=1e-5)
-    darker = unmix(found.recoloured(Recolouring(melanin=ShareChange(2.0)), "cpu"), adapter="cpu")
+    np.testing.assert_allclose(found.recoloured(Change(), "cpu"), colours, atol=1e-5)
+    darker = unmix(found.recoloured(Change(melanin=Share(2.0)), "cpu"), adapter="cpu")
     ratio = darker.melanin / found.melanin
     assert np.median(ratio) == pytest.approx(2.0, rel=0.01)
     assert np.median(darker.blood / found.blood) == pytest.approx(1.0, rel=0.02)
-    cold = found.recoloured(Recolouring(oxygen=0.2), "cpu")
+    cold = found.recoloured(Change(oxygen=0.2), "cpu")
     assert (cold[..., 0] < colours[..., 0]).mean() > 0.99  # blood without oxygen takes more of the red
 
 
 def test_recolouring_opens_no_further_device(colours: Pixels, monkeypatch: pytest.MonkeyPatch) -> None:
     found = unmix(colours[:4, :4], adapter="cpu")
     monkeypatch.setattr(failures, "open_device", None)
-    assert found.recoloured(Recolouring(), "cpu").shape == (4, 4, 3)
+    assert found.recoloured(Change(), "cpu").shape == (4, 4, 3)
 
 
 def test_a_larger_median_adds_and_a_smaller_one_multiplies() -> None:
-    change = Recolouring(melanin=ShareChange(median=0.2), blood=ShareChange(median=0.005))
+    change = Change(melanin=Share(median=0.2), blood=Share(median=0.005))
     factors, added = change.over(0.05, 0.01)
     np.testing.assert_allclose(factors, [1.0, 0.5, 1.0])
     np.testing.assert_allclose(added, [0.15, 0.0, 0.0])
-    assert parse_share_change("--melanin", "x2") == ShareChange(factor=2.0) and parse_share_change(
-        "--blood", "0.1"
-    ) == ShareChange(median=0.1)
+    assert parse_share("--melanin", "x2") == Share(factor=2.0) and parse_share("--blood", "0.1") == Share(
+        median=0.1
+    )
     for wrong in ("", "x", "2", "-0.1", "nan", "xnan", "x1e9"):
         with pytest.raises(DermisError, match="--melanin: expected"):
-            parse_share_change("--melanin", wrong)
+            parse_share("--melanin", wrong)
 
 
 def test_paint_stays(colours: Pixels) -> None:
     painted = colours.copy()
     painted[10:20, 10:20] = (0.05, 0.4, 0.1)
     found = unmix(painted, adapter="cpu")
-    again = found.recoloured(Recolouring(blood=ShareChange(0.5)), "cpu")
+    again = found.recoloured(Change(blood=Share(0.5)), "cpu")
     assert (again[12:18, 12:18, 1] > 3.0 * again[12:18, 12:18, 0]).all()
     assert found.summary()["skin"] < 1.0 - 90.0 / SIDE**2
 

@@ -149,15 +149,15 @@ def _crew(
 
     if workers is not None and per_gpu is not None:
         refuse("--workers-per-gpu", "no such option beside --workers", "it came", "Leave one of them out")
-    seating = SlotRequest(
+    request = SlotRequest(
         adapter,
         _numbers(adapter, adapters),
         _number("--workers", workers, 1),
         _number("--workers-per-gpu", per_gpu, 1) or 1,
         _number("--encoders", encoders, 0),
     )
-    seats, each = seating.seats()
-    return Processes(seats), each
+    slots, each = request.slots()
+    return Processes(slots), each
 
 
 def _numbers(adapter: str, adapters: str | None) -> tuple[int, ...]:

@@ -13,7 +13,7 @@ from dermis.cli.options import Adapter, Json
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
-    from dermis.apps.inverse.unmixing.unmix import Recolouring, Unmixed
+    from dermis.apps.inverse.unmixing.unmix import Change, Unmixed
 
 _Share = Annotated[str | None, Parameter(show_default=False)]
 
@@ -120,9 +120,9 @@ def _save_widths(folder: Path, found: Unmixed) -> list[Path]:
 
 def _change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
-) -> Recolouring | None:
+) -> Change | None:
     """What is to be recoloured, None for nothing."""
-    from dermis.apps.inverse.unmixing.unmix import Recolouring, parse_share_change
+    from dermis.apps.inverse.unmixing.unmix import Change, parse_share
     from dermis.base.quantities import number
 
     if melanin is None and blood is None and oxygen is None and eumelanin is None:
@@ -133,9 +133,9 @@ def _change(
             number(option, value, 0.0, 1.0, "a share")
     words = {"melanin": melanin, "blood": blood}
     found: dict[str, Any] = {
-        name: parse_share_change(f"--{name}", one) for name, one in words.items() if one is not None
+        name: parse_share(f"--{name}", one) for name, one in words.items() if one is not None
     }
-    return Recolouring(**found, oxygen=oxygen, eumelanin=eumelanin)
+    return Change(**found, oxygen=oxygen, eumelanin=eumelanin)
 
 
 def _report(found: Unmixed, written: list[Path], seconds: float, as_json: bool) -> None:

@@ -1,16 +1,15 @@
-"""The camera of an image: as it is drawn, and moved as little as keeps the face in the picture."""
+"""Camera of an image: as sampled, moved as little as keeps the whole face in the picture."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.lighting import towards
+from dermis.apps.batch.sampling import Parameters, numbers_of
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Motion
 from dermis.scene.camera import Camera
@@ -25,26 +24,26 @@ Aim = tuple[float, float]
 
 
 def face_points(head: Head, count: int = 64) -> NDArray[np.int32]:
-    """(n,) control points that stand out of a face: all others lie between them."""
+    """Return control points (n,) that are extreme in some direction and bound all others of a face."""
     places = head.control.positions_mm - np.array(head.centre_mm, np.float32)
     low, high = np.array(_FACE_MM, np.float32)
     within = [(one > least) & (one < most) for one, least, most in zip(places.T, low, high, strict=True)]
     inside = np.flatnonzero(within[0] & within[1] & within[2])
     if not len(inside):
         inside = np.arange(len(places))
-    return np.unique(inside[(_ways(count) @ places[inside].T).argmax(axis=1)]).astype(np.int32)
+    return np.unique(inside[(_directions(count) @ places[inside].T).argmax(axis=1)]).astype(np.int32)
 
 
 def camera_of(
-    parameters: Mapping[str, Any], head: Head, points: NDArray[np.int32], motion: Motion, aspect: float
+    parameters: Parameters, head: Head, points: NDArray[np.int32], motion: Motion, aspect: float
 ) -> Camera:
-    """The camera of an image by its parameters.
+    """Return the camera of an image by its parameters.
 
     points : of the face, as `face_points` finds them
     aspect : width of the picture over its height
     """
     face = head.control.some_posed(points, motion) - np.array(head.centre_mm)
-    values = {name.removeprefix("camera."): one for name, one in parameters.items()}
+    values = numbers_of(parameters, "camera")
     distance = values["distance_mm"]
     frame = values.get("frame_mm") or distance * _SENSOR_MM / values["focal_mm"]
     middle = 0.5 * (face.min(axis=0) + face.max(axis=0))
@@ -54,7 +53,7 @@ def camera_of(
     frame *= max(_reach(placed, distance, (0.0, 0.0), frame, aspect) / _MARGIN, 1.0)
 
     def aim(share: float) -> Aim:
-        """Where the camera is aimed for a share of the offset."""
+        """Return the aim for a share of the offset."""
         return -0.5 * frame * share * offset[0], -0.5 * frame * share * offset[1]
 
     share, least, most = 1.0, 0.0, 1.0
@@ -70,7 +69,7 @@ def camera_of(
 
 
 def _aimed(middle: Doubles, axes: Doubles, distance: float, frame_mm: float, aim: Aim) -> Camera:
-    """A camera that is aimed at a place beside the middle of the face.
+    """Return a camera that is aimed at a point beside the middle of the face.
 
     axes : (3, 3) rows: right, up, and back towards the camera
     frame_mm : height of what it would show at the middle were it aimed there
@@ -86,7 +85,7 @@ def _aimed(middle: Doubles, axes: Doubles, distance: float, frame_mm: float, aim
 
 
 def _reach(placed: Doubles, distance: float, aim: Aim, frame_mm: float, aspect: float) -> float:
-    """How far from the picture's middle points are seen, 1 at its edges; far beyond what is not before it.
+    """Return the greatest distance of points from the picture's middle, 1 at its edges.
 
     placed : (n, 3) right, up and back from the middle of the face [mm]
     """
@@ -103,7 +102,7 @@ def _reach(placed: Doubles, distance: float, aim: Aim, frame_mm: float, aspect: 
 
 
 def _axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
-    """(3, 3) rows: right, up and back of a camera around the head, turned clockwise about its axis."""
+    """Return the axes of a camera, rows right, up and back (3, 3), rolled clockwise about the last."""
     back = np.array(towards(yaw_deg, pitch_deg))
     yaw, roll = math.radians(yaw_deg), math.radians(roll_deg)
     right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
@@ -119,12 +118,8 @@ def _triple(vector: Doubles) -> tuple[float, float, float]:
 
 
 @cache
-def _ways(count: int) -> NDArray[np.float32]:
-    return np.array([towards(*way) for way in _spiral(count)], np.float32)
-
-
-def _spiral(count: int) -> list[tuple[float, float]]:
-    """Directions all around, as yaw and pitch [degrees]."""
-    heights = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
+def _directions(count: int) -> NDArray[np.float32]:
+    """Return directions (n, 3) on a spiral over the sphere."""
+    pitches = np.degrees(np.arcsin(1.0 - 2.0 * (np.arange(count) + 0.5) / count))
     turns = 137.50776405 * np.arange(count)
-    return list(zip(turns.tolist(), np.degrees(np.arcsin(heights)).tolist(), strict=True))
+    return np.array([towards(*one) for one in zip(turns.tolist(), pitches.tolist(), strict=True)], np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import signal
@@ -10,8 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import connection, resource_tracker
+from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Any
 
 from dermis.base.errors import DermisError
 
@@ -21,21 +22,25 @@ _ENDING_S = 1.0  # that a process may take to end after its pipe has broken
 _BLAS_THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 
 
+class LostProcessError(DermisError):
+    """A process that ended before its work was complete; another one does it again."""
+
+
 @dataclass(frozen=True)
 class Child:
-    """A process and the end of the pipe that leads to it."""
+    """Child process and the parent's end of the pipe to it."""
 
     process: SpawnProcess
-    pipe: Any
+    pipe: Connection
 
     def end(self) -> None:
-        """End it at once, whatever it does: what it has not finished is nowhere."""
+        """Kill it at once, whatever it does."""
         self.process.kill()
         self.process.join()
         self.pipe.close()
 
     def fate(self) -> str:
-        """How a process ended that did not say why."""
+        """Describe how a process ended that did not say why."""
         self.process.join()
         code = self.process.exitcode or 0
         if code >= 0:
@@ -46,25 +51,25 @@ class Child:
             return f"it was ended by signal {-code}"
 
 
-def start(target: Callable[..., None], *args: Any) -> Child:
-    """Start `target(pipe, *args)` in a process of its own, which ends when this one does.
+def start(target: Callable[..., None], *args: object) -> Child:
+    """Start `target(pipe, *args)` in a child process, which ends when this one does.
 
-    Ctrl-C, which the terminal sends to all, is left to this one. NumPy has one thread in it.
+    Ctrl-C, which the terminal sends to all processes, is left to this one. NumPy has one thread in the child.
     """
     ours, theirs = _CONTEXT.Pipe()
     process = _CONTEXT.Process(target=_begin, args=(target, theirs, args))
     with _may_start(), _without_interrupts(), _one_thread():
         process.start()
-    theirs.close()  # only its process holds it now: when that ends, our end tells
+    theirs.close()  # only the child holds it now, so that our end reports its death
     return Child(process, ours)
 
 
-def shared_bytes(size: int) -> Any:
-    """Memory to be handed to a child at its start, which neither of them has to release."""
-    return _CONTEXT.RawArray("B", size)
+def shared_bytes(size: int) -> ctypes.Array[ctypes.c_ubyte]:
+    """Return shared memory for an argument of `start`, which neither process has to release."""
+    return _CONTEXT.RawArray(ctypes.c_ubyte, size)
 
 
-def _begin(target: Callable[..., None], pipe: Any, args: tuple[Any, ...]) -> None:
+def _begin(target: Callable[..., None], pipe: Connection, args: tuple[object, ...]) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_leave_with, args=(parent.sentinel,), daemon=True).start()
@@ -72,7 +77,7 @@ def _begin(target: Callable[..., None], pipe: Any, args: tuple[Any, ...]) -> Non
         target(pipe, *args)
     except (EOFError, ConnectionError):
         if connection.wait([parent.sentinel], _ENDING_S):
-            os._exit(1)  # its pipe broke as it ended: nobody is left to be told
+            os._exit(1)  # the pipe broke because the parent ended
         raise
 
 
@@ -83,7 +88,7 @@ def _leave_with(sentinel: int) -> None:
 
 @contextmanager
 def _may_start() -> Iterator[None]:
-    """Processes of dask are daemons, which multiprocessing denies children; ours end with them anyway."""
+    """Allow children of dask's daemon processes, which multiprocessing forbids; ours end with them anyway."""
     here = multiprocessing.current_process()
     was = here.daemon
     if was:
@@ -97,10 +102,10 @@ def _may_start() -> Iterator[None]:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Let NumPy's linear algebra have one thread, unless the user says how many.
+    """Limit NumPy's linear algebra to one thread in children, unless the user sets a number.
 
-    Of its own it has one for each core, in each process: for the small systems of a person these wait for
-    each other in loops, and took twice the processor time of all else.
+    The default is one for each core in each process: for the small systems of a person these spin, and took
+    twice the processor time of everything else.
     """
     ours = [name for name in _BLAS_THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(ours, "1"))
@@ -113,7 +118,7 @@ def _one_thread() -> Iterator[None]:
 
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Hold Ctrl-C back: a process that is started meanwhile never gets it, this one gets it afterwards."""
+    """Block SIGINT: a process that is started meanwhile never gets it, this one gets it afterwards."""
     if not _BLOCKS:
         yield
         return
@@ -123,7 +128,3 @@ def _without_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-class LostProcessError(DermisError):
-    """A process that ended before its work did."""

@@ -7,32 +7,35 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from dermis.apps.batch.shards import Shard
 from dermis.apps.batch.worker import Work, WorkerEvent
 from dermis.base.errors import DermisError, refuse
 from dermis.base.extras import needed
 
-_RETRIES = 2  # of a shard whose worker says that it failed; dask itself counts those that die
+if TYPE_CHECKING:
+    from distributed import Client
+
+_RETRIES = 2  # of a shard whose worker reports a loss; dask itself counts those that die
 _WAIT_S = 60.0  # for a scheduler, and for its first worker
 
 
 @dataclass(frozen=True)
 class Cluster:
-    """A crew of dask's workers; each draws one shard at a time.
+    """Crew of dask's workers; each renders one shard at a time.
 
     address : of the scheduler; None with a file
     file : that the scheduler wrote
-    adapter : as of `Seating`; the workers of a host take those that fit in turn
+    adapter : as of `SlotRequest`; the workers of a host take those that fit in turn
     """
 
     address: str | None
     file: Path | None
     adapter: str = "auto"
 
-    def draw(self, work: Work, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Draw the shards, each as a task.
+    def render(self, work: Work, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+        """Render the shards, each as a task, and yield an event for each.
 
         Raises DermisError where no worker is reached, where one sees another disk, and for what no worker
         can mend.
@@ -46,13 +49,13 @@ class Cluster:
             try:
                 with _mark(work.out) as mark:
                     _check_disks(client, mark)
-                yield from _told(client, name, shards)
+                yield from _events(client, name, shards)
             finally:
                 with suppress(OSError, TimeoutError):  # the scheduler is gone
                     client.unregister_worker_plugin(name)
 
     @contextmanager
-    def _client(self) -> Iterator[Any]:
+    def _client(self) -> Iterator[Client]:
         from distributed import Client
 
         if self.file is not None and not self.file.is_file():
@@ -73,7 +76,7 @@ class Cluster:
 
 @contextmanager
 def _mark(out: Path) -> Iterator[Path]:
-    """A file that all who share the disk can see."""
+    """Create a file that all workers that share the disk can see, while the block runs."""
     place = out.resolve() / f".dermis-{secrets.token_hex(6)}"
     place.touch()
     try:
@@ -82,7 +85,7 @@ def _mark(out: Path) -> Iterator[Path]:
         place.unlink()
 
 
-def _check_disks(client: Any, mark: Path) -> None:
+def _check_disks(client: Client, mark: Path) -> None:
     """Refuse a folder that is not the same for all workers."""
     from dermis.apps.batch.dask_worker import sees
 
@@ -92,8 +95,8 @@ def _check_disks(client: Any, mark: Path) -> None:
         refuse(mark.parent, "a folder on a disk that all workers share", came, "Choose another one")
 
 
-def _told(client: Any, name: str, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-    """What becomes of the shards."""
+def _events(client: Client, name: str, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    """Yield the completion of each shard."""
     from distributed import as_completed
 
     from dermis.apps.batch.dask_worker import render_shard
@@ -110,9 +113,9 @@ def _told(client: Any, name: str, shards: Sequence[Shard]) -> Iterator[WorkerEve
                     f"shard {shard.index}: expected a worker of dask's to draw it, but they failed: "
                     f"{done.exception()}. What is whole is kept; give the command again to go on."
                 )
-            told: WorkerEvent = done.result()
-            if told.refusal:
-                raise DermisError(told.refusal)
-            yield told
+            event: WorkerEvent = done.result()
+            if event.refusal:
+                raise DermisError(event.refusal)
+            yield event
     finally:
         client.cancel(list(tasks))

@@ -1,4 +1,4 @@
-"""Distributions as a spec states them: a value, or a table such as {uniform = [0, 1]}."""
+"""Distributions as a spec writes them: a value, or a table such as {uniform = [0, 1]}."""
 
 from __future__ import annotations
 
@@ -8,36 +8,38 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import accumulate
 from math import exp, isfinite, log
-from typing import Any
+from typing import TypeGuard
 
 from scipy.special import ndtr, ndtri
 
 Value = float | str
+SpecValue = float | str | dict[str, object]
+"""A distribution as TOML writes it."""
 _WIDEST = 6.0  # standard deviations that a normal distribution reaches
 _LEAST_SHARE = 1e-6
 _MOST_CHOICES = 100_000
 
 
 class Distribution(ABC):
-    """What a parameter is drawn from."""
+    """Distribution that a parameter is sampled from."""
 
     @property
     @abstractmethod
     def ends(self) -> tuple[Value, ...]:
-        """The least and the greatest number, or all texts, that can be drawn."""
+        """Return the least and the greatest number, or all texts, that can be sampled."""
 
     @abstractmethod
     def at(self, share: float) -> Value:
-        """The value below which a share of all lies, 0 to 1."""
+        """Return the quantile of a share from 0 to 1."""
 
     @abstractmethod
-    def told(self) -> Any:
-        """As TOML states it; `stated` of it is the same again."""
+    def spec_value(self) -> SpecValue:
+        """Return what TOML writes; `parse_distribution` reads it as the same distribution."""
 
 
 @dataclass(frozen=True)
 class Constant(Distribution):
-    """Always the same."""
+    """Constant value."""
 
     value: Value
 
@@ -48,13 +50,13 @@ class Constant(Distribution):
     def at(self, share: float) -> Value:
         return self.value
 
-    def told(self) -> Value:
+    def spec_value(self) -> SpecValue:
         return self.value if isinstance(self.value, str) else float(self.value)
 
 
 @dataclass(frozen=True)
 class Uniform(Distribution):
-    """Evenly between two numbers, or evenly in their logarithm."""
+    """Uniform between two numbers, or uniform in the logarithm."""
 
     low: float
     high: float
@@ -76,13 +78,13 @@ class Uniform(Distribution):
         low, high = log(self.low), log(self.high)
         return min(max(exp(low + share * (high - low)), self.low), self.high)
 
-    def told(self) -> dict[str, Any]:
+    def spec_value(self) -> SpecValue:
         return {"log_uniform" if self.logarithmic else "uniform": _floats(self.low, self.high)}
 
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """Normal, within six standard deviations."""
+    """Normal, clamped to six standard deviations."""
 
     mean: float
     sd: float
@@ -98,13 +100,13 @@ class Normal(Distribution):
     def at(self, share: float) -> float:
         return self.mean + self.sd * min(max(float(ndtri(share)), -_WIDEST), _WIDEST)
 
-    def told(self) -> dict[str, Any]:
+    def spec_value(self) -> SpecValue:
         return {"normal": _floats(self.mean, self.sd)}
 
 
 @dataclass(frozen=True)
 class Truncated(Distribution):
-    """Normal between two ends, to which nothing is moved: what lies beyond is not drawn."""
+    """Truncated normal: values beyond the two ends are not sampled, rather than clamped."""
 
     mean: float
     sd: float
@@ -121,7 +123,7 @@ class Truncated(Distribution):
 
     @property
     def _shares(self) -> tuple[float, float]:
-        """Of the whole normal distribution below each end, mirrored where both are above the mean."""
+        """Cumulative probability of the normal at each end, mirrored where both are above the mean."""
         low, high = (self.low - self.mean) / self.sd, (self.high - self.mean) / self.sd
         return (float(ndtr(-high)), float(ndtr(-low))) if low > 0 else (float(ndtr(low)), float(ndtr(high)))
 
@@ -137,13 +139,13 @@ class Truncated(Distribution):
             away = float(ndtri(below + share * (above - below)))
         return min(max(self.mean + self.sd * away, self.low), self.high)
 
-    def told(self) -> dict[str, Any]:
+    def spec_value(self) -> SpecValue:
         return {"truncated": _floats(self.mean, self.sd, self.low, self.high)}
 
 
 @dataclass(frozen=True)
 class Choice(Distribution):
-    """One of several distributions, values mostly, by weights that need not add up to 1."""
+    """Mixture of distributions, mostly constants; the weights need not sum to 1."""
 
     values: tuple[Distribution, ...]
     weights: tuple[float, ...]
@@ -174,16 +176,15 @@ class Choice(Distribution):
         within = (place - (reached[index] - self.weights[index])) / self.weights[index]
         return self.values[index].at(min(max(within, 2.0**-53), 1.0 - 2.0**-53))
 
-    def told(self) -> dict[str, Any]:
-        values = [value.told() for value in self.values]
-        return {"choice": values, "weights": _floats(*self.weights)}
+    def spec_value(self) -> SpecValue:
+        return {"choice": [one.spec_value() for one in self.values], "weights": _floats(*self.weights)}
 
 
 @dataclass(frozen=True, repr=False)
 class Files(Distribution):
-    """One of the files of a pattern, each alike.
+    """One of the files that match a pattern, with equal probability.
 
-    names : relative to the spec's folder, sorted; none until the folder is looked into
+    names : relative to the spec's folder, sorted; empty until the pattern is resolved
     """
 
     pattern: str
@@ -196,11 +197,11 @@ class Files(Distribution):
     def at(self, share: float) -> str:
         return self.names[min(int(share * len(self.names)), len(self.names) - 1)]
 
-    def told(self) -> dict[str, Any]:
+    def spec_value(self) -> SpecValue:
         return {"files": self.pattern}
 
     def __repr__(self) -> str:
-        return repr(self.told())
+        return repr(self.spec_value())
 
 
 def _floats(*values: float) -> list[float]:
@@ -221,47 +222,49 @@ _NUMBERS: Mapping[str, tuple[int, Callable[..., Distribution]]] = {
 }
 
 
-def parse_distribution(told: Any, deep: bool = False) -> Distribution:
-    """What a spec's value says.
+def parse_distribution(value: object, nested: bool = False) -> Distribution:
+    """Return the distribution that a value of a spec describes.
 
-    deep : it is one of a choice's values, which do not choose further
+    nested : it is one of the values of a choice, which cannot be a choice or files
 
-    Raises ValueError, worded as what was expected, for values that state none.
+    Raises ValueError, worded as what was expected, for values that describe none.
     """
-    if isinstance(told, Distribution):
-        return told
-    if isinstance(told, str) or _is_number(told):
-        return Constant(told if isinstance(told, str) else float(told))
-    kind = next(iter(told)) if isinstance(told, Mapping) and told else ""
-    if kind in _NUMBERS and len(told) == 1:
-        count, made = _NUMBERS[kind]
-        if not isinstance(told[kind], list | tuple) or len(told[kind]) != count:
-            raise ValueError(f"{count} numbers in {kind}")
-        if not all(map(_is_number, told[kind])):
-            raise ValueError(f"{count} numbers in {kind}, none beyond {_MOST:g}")
-        return made(*map(float, told[kind]))
-    if kind == "files" and len(told) == 1 and isinstance(told[kind], str) and not deep:
-        return Files(told[kind])
-    if not deep and isinstance(told, Mapping) and "choice" in told and told.keys() <= {"choice", "weights"}:
-        return _choice(told)
+    if isinstance(value, Distribution):
+        return value
+    if isinstance(value, str):
+        return Constant(value)
+    if _is_number(value):
+        return Constant(float(value))
+    table: Mapping[str, object] = value if isinstance(value, Mapping) else {}
+    kind = next(iter(table), "")
+    if kind in _NUMBERS and len(table) == 1:
+        count, make = _NUMBERS[kind]
+        return make(*_numbers(table[kind], f"{count} numbers in {kind}", count))
+    if nested:
+        raise ValueError(_FORMS)
+    if kind == "files" and len(table) == 1 and isinstance(table[kind], str):
+        return Files(str(table[kind]))
+    if "choice" in table and table.keys() <= {"choice", "weights"}:
+        values = table["choice"]
+        if not isinstance(values, list | tuple):
+            raise ValueError("a list in choice")
+        weights = table.get("weights")
+        shares = [1.0] * len(values) if weights is None else _numbers(weights, "a list of numbers in weights")
+        return Choice(tuple(parse_distribution(one, True) for one in values), tuple(shares))
     raise ValueError(_FORMS)
 
 
-def _choice(told: Mapping[str, Any]) -> Choice:
-    values, weights = told["choice"], told.get("weights")
-    if not isinstance(values, list | tuple):
-        raise ValueError("a list in choice")
-    if weights is None:
-        weights = [1.0] * len(values)
-    if not isinstance(weights, list | tuple) or not all(map(_is_number, weights)):
-        raise ValueError("a list of numbers in weights")
-    return Choice(tuple(parse_distribution(value, True) for value in values), tuple(map(float, weights)))
+def _numbers(values: object, expected: str, count: int | None = None) -> list[float]:
+    """Return a list of numbers as floats, or raise ValueError with what was expected."""
+    if not isinstance(values, list | tuple) or count not in (None, len(values)):
+        raise ValueError(expected)
+    numbers = [float(one) for one in values if _is_number(one)]
+    if len(numbers) != len(values):
+        raise ValueError(f"{expected}, none beyond {_MOST:g}" if count else expected)
+    return numbers
 
 
-def _is_number(value: Any) -> bool:
-    return (
-        isinstance(value, int | float)
-        and not isinstance(value, bool)
-        and isfinite(value)
-        and abs(value) <= _MOST
-    )
+def _is_number(value: object) -> TypeGuard[float]:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return isfinite(value) and abs(value) <= _MOST

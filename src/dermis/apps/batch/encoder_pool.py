@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import ctypes
 import pickle
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, Self
+from multiprocessing.connection import Connection
+from typing import Self
 
 from dermis.apps.batch.child_processes import Child, LostProcessError, shared_bytes, start
 from dermis.base.errors import DermisError
 
 Encoded = tuple[int, dict[str, bytes]]
-Job = tuple[Any, ...]
-_AHEAD = 2  # jobs that one of them has and has not given back
+Job = tuple[object, ...]
+_AHEAD = 2  # jobs in flight of each process
 _PAGE = 4096
 _SPARE = 1 << 18  # bytes by which a job may be larger than the first one
 
 
 class Encoders:
-    """Processes that all do one thing, `encode(*job)`, in turn.
+    """Pool of processes that call `encode(*job)` in turn.
 
-    count : how many of them; 0 does it here
-    encode : can be pickled
+    count : number of processes; 0 encodes in this one
+    encode : a function that can be pickled
     """
 
     def __init__(self, count: int, encode: Callable[..., Encoded]) -> None:
@@ -29,9 +31,9 @@ class Encoders:
         self._lanes: list[_Lane] = []
 
     def encoded(self, jobs: Iterable[Job]) -> Iterator[Encoded]:
-        """What `encode` returns for each job, in their order; jobs are asked for a few ahead.
+        """Return the results of `encode` in the order of the jobs, which are taken a few ahead.
 
-        Raises LostProcessError where one of the processes ends, and what `encode` refuses.
+        Raises LostProcessError where one of the processes ends, and errors of `encode`.
         """
         if not self._count:
             yield from (self._encode(*job) for job in jobs)
@@ -39,7 +41,7 @@ class Encoders:
         waiting: deque[_Lane] = deque()
         try:
             for turn, job in enumerate(jobs):
-                parts = _apart(job)
+                parts = _parts(job)
                 if (size := sum(_padded(part.nbytes) for part in parts)) > self._size or not self._lanes:
                     while waiting:
                         yield waiting.popleft().take()
@@ -52,11 +54,11 @@ class Encoders:
             while waiting:
                 yield waiting.popleft().take()
         finally:
-            if waiting:  # nobody will take what they still have
+            if waiting:  # their results will not be read
                 self.close()
 
     def close(self) -> None:
-        """End the processes; others are started when they are needed again."""
+        """End the processes; they are started again when needed."""
         while self._lanes:
             self._lanes.pop().child.end()
 
@@ -67,7 +69,7 @@ class Encoders:
         self.close()
 
     def _open(self, size: int) -> None:
-        """Start the processes, for jobs of at most that many bytes."""
+        """Start the processes for jobs of at most `size` bytes."""
         self.close()
         self._size = size
         for _ in range(self._count):
@@ -75,9 +77,9 @@ class Encoders:
 
 
 class _Lane:
-    """One process, and memory for the jobs that it has: the pipe carries only where they lie.
+    """Process with shared memory for its jobs, whose places go through the pipe.
 
-    Were they to go through the pipe, both ends could wait for each other to read.
+    Jobs do not go through the pipe, where both ends could wait for each other to read.
     """
 
     def __init__(self, size: int, encode: Callable[..., Encoded]) -> None:
@@ -104,15 +106,14 @@ class _Lane:
             raise self._lost() from fault
         if encoded is None:
             raise DermisError(refusal)
-        found: Encoded = encoded
-        return found
+        return encoded  # type: ignore[no-any-return]
 
     def _lost(self) -> LostProcessError:
         return LostProcessError(f"a process that encodes images: {self.child.fate()}")
 
 
-def _apart(job: Job) -> list[memoryview]:
-    """A job without the numbers of its arrays, and these."""
+def _parts(job: Job) -> list[memoryview]:
+    """Return the pickle of a job without its arrays, and the bytes of these."""
     arrays: list[pickle.PickleBuffer] = []
     head = pickle.dumps(job, protocol=5, buffer_callback=arrays.append)
     return [memoryview(head), *(array.raw() for array in arrays)]
@@ -122,8 +123,8 @@ def _padded(size: int) -> int:
     return -(-size // _PAGE) * _PAGE
 
 
-def _serve(pipe: Any, memory: Any, encode: Callable[..., Encoded]) -> None:
-    """What such a process does."""
+def _serve(pipe: Connection, memory: ctypes.Array[ctypes.c_ubyte], encode: Callable[..., Encoded]) -> None:
+    """Encode jobs from the pipe, in a process of the pool."""
     view = memoryview(memory).cast("B")
     while True:
         try:
@@ -131,9 +132,7 @@ def _serve(pipe: Any, memory: Any, encode: Callable[..., Encoded]) -> None:
         except EOFError:
             return
         job = pickle.loads(head, buffers=arrays)
-        answer: tuple[Encoded | None, str]
         try:
-            answer = encode(*job), ""
+            pipe.send((encode(*job), ""))
         except DermisError as fault:
-            answer = None, str(fault)
-        pipe.send(answer)
+            pipe.send((None, str(fault)))

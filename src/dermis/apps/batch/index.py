@@ -2,31 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from dermis.apps.batch.atomic_files import atomic_write
-from dermis.apps.batch.reader import record_of, shard_files
-from dermis.apps.batch.records import RECORD
+from dermis.apps.batch.reader import read_record, shard_files
+from dermis.apps.batch.records import RECORD, Record
 from dermis.apps.batch.shards import is_there, shard_path, shards_of
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import refuse
 from dermis.base.extras import needed
 from dermis.base.reading import is_file
 
+if TYPE_CHECKING:
+    import pyarrow
+    import pyarrow.parquet
+
 INDEX = "index.parquet"
 NUMBERS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
-"""Columns that are lists, row by row of their matrix, and how long."""
+"""Columns of matrices, flattened row by row, and their lengths."""
 _FIRST = "number", "key", "shard"
+_MOST_NAMED = 12
 
-Row = dict[str, Any]
+Row = dict[str, object]
 
 
 def write_index(out: Path, spec: Spec) -> Path:
     """Write the index of the shards that are there, a row for each image by its number.
 
-    number, key, shard : which image it is, and in which file it lies
+    number, key, shard : number of the image, and the file that holds it
     camera.K, camera.R, camera.t, head_pose, gaze : matrices, row by row
     the others : parameters by name, null where an image has none
 
@@ -45,8 +50,8 @@ def write_index(out: Path, spec: Spec) -> Path:
     return target
 
 
-def index_file(out: Path, purpose: str) -> Any:
-    """The index of a data set, open to be read column by column.
+def index_file(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
+    """Return the index of a data set, open to be read column by column.
 
     Raises DermisError where there is none.
     """
@@ -56,15 +61,27 @@ def index_file(out: Path, purpose: str) -> Any:
     return parquet.ParquetFile(out / INDEX)
 
 
+def statistics(out: Path) -> Iterator[tuple[str, int, str]]:
+    """Return the name, the number of images and a summary of each parameter in the index of a data set.
+
+    Raises DermisError where there is no index.
+    """
+    with index_file(out, "the statistics of a data set") as file:
+        for name in file.schema_arrow.names:
+            if name not in (*_FIRST, *NUMBERS):
+                column = file.read(columns=[name]).column(0)
+                yield name, len(column) - column.null_count, _summary(column)
+
+
 def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[Row]]:
-    """Rows of each shard that is there and holds images; one of them is held at a time."""
+    """Yield the rows of each shard that is there and holds images; one of them is held at a time."""
     for shard in shards_of(spec):
         path = shard_path(out, shard, spec)
         if not is_there(out, shard, spec):
             continue
         with shard_files(path) as images:
             rows = [
-                _row(key, path.name, record_of(files[RECORD](), path / key))
+                _row(key, path.name, read_record(files[RECORD](), path / key))
                 for key, files in images.items()
                 if RECORD in files
             ]
@@ -72,20 +89,21 @@ def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[Row]]:
             yield rows
 
 
-def _row(key: str, shard: str, record: Mapping[str, Any]) -> Row:
-    camera = {f"camera.{name}": _flat(value) for name, value in record["camera"].items()}
-    poses = {name: _flat(record[name]) for name in ("head_pose", "gaze")}
-    return {"number": record["number"], "key": key, "shard": shard, **record["parameters"], **camera, **poses}
+def _row(key: str, shard: str, record: Record) -> Row:
+    matrices = {f"camera.{name}": value for name, value in record["camera"].items()}
+    matrices |= {"head_pose": record["head_pose"], "gaze": record["gaze"]}
+    flat = {name: _flat(value) for name, value in matrices.items()}
+    return {"number": record["number"], "key": key, "shard": shard, **record["parameters"], **flat}
 
 
-def _flat(value: Any) -> Any:
-    if value is None or not value or not isinstance(value[0], list):
+def _flat(value: object) -> object:
+    if not isinstance(value, list) or not value or not isinstance(value[0], list):
         return value
     return [one for row in value for one in row]
 
 
-def _schema(out: Path, spec: Spec) -> Any:
-    """Columns with their kinds; those of parameters by name."""
+def _schema(out: Path, spec: Spec) -> pyarrow.Schema:
+    """Return the columns with their types; those of parameters by name."""
     arrow = needed("pyarrow", "the index of a data set")
     kinds: dict[str, set[type]] = {}
     for rows in _rows_of_shards(out, spec):
@@ -96,11 +114,12 @@ def _schema(out: Path, spec: Spec) -> Any:
     parameters = sorted(kinds.keys() - NUMBERS.keys() - set(_FIRST))
     columns = [("number", arrow.int64()), ("key", arrow.string()), ("shard", arrow.string())]
     columns += [(name, arrow.list_(arrow.float64(), size)) for name, size in NUMBERS.items()]
-    columns += [(name, _column_kind(arrow, kinds[name])) for name in parameters]
+    columns += [(name, _column_type(kinds[name])) for name in parameters]
     return arrow.schema(columns)
 
 
-def _column_kind(arrow: Any, kinds: set[type]) -> Any:
+def _column_type(kinds: set[type]) -> pyarrow.DataType:
+    arrow = needed("pyarrow", "the index of a data set")
     if kinds <= {bool}:
         return arrow.bool_()
     if kinds <= {int}:
@@ -110,7 +129,7 @@ def _column_kind(arrow: Any, kinds: set[type]) -> Any:
     return arrow.list_(arrow.float64()) if kinds <= {list} else arrow.string()
 
 
-def _table(rows: list[Row], schema: Any) -> Any:
+def _table(rows: list[Row], schema: pyarrow.Schema) -> pyarrow.Table:
     arrow = needed("pyarrow", "the index of a data set")
     columns = []
     for field in schema:
@@ -121,23 +140,7 @@ def _table(rows: list[Row], schema: Any) -> Any:
     return arrow.Table.from_arrays(columns, schema=schema)
 
 
-_MOST_NAMED = 12
-_NO_PARAMETERS = frozenset(("number", "key", "shard", *NUMBERS))
-
-
-def statistics(out: Path) -> Iterator[tuple[str, int, str]]:
-    """Name, number of images that have it, and values of each parameter in the index of a data set.
-
-    Raises DermisError where there is no index.
-    """
-    with index_file(out, "the statistics of a data set") as file:
-        for name in file.schema_arrow.names:
-            if name not in _NO_PARAMETERS:
-                column = file.read(columns=[name]).column(0)
-                yield name, len(column) - column.null_count, _values(column)
-
-
-def _values(column: Any) -> str:
+def _summary(column: pyarrow.ChunkedArray) -> str:
     arrow = needed("pyarrow", "the statistics of a data set")
     compute = needed("pyarrow.compute", "the statistics of a data set")
     if arrow.types.is_string(column.type) or arrow.types.is_boolean(column.type):
@@ -149,13 +152,11 @@ def _values(column: Any) -> str:
         return ", ".join(named) + (f" and {more:,} more" if more else "")
     if arrow.types.is_list(column.type):
         return "lists of numbers"
-    ends = compute.min_max(column).as_py()
-    if ends["min"] == ends["max"]:
-        return _number(ends["min"])
+    least, most = compute.min_max(column).as_py().values()
+    if least == most:
+        return _number(least)
     mean, spread = compute.mean(column).as_py(), compute.stddev(column).as_py()
-    return (
-        f"{_number(ends['min'])} to {_number(ends['max'])}, mean {mean:.4g}, standard deviation {spread:.4g}"
-    )
+    return f"{_number(least)} to {_number(most)}, mean {mean:.4g}, standard deviation {spread:.4g}"
 
 
 def _number(value: float) -> str:

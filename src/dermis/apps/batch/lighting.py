@@ -1,15 +1,14 @@
-"""The lamps of an image: a rig of the package, or key, fill and rim as they are drawn."""
+"""Lights of an image: a preset of the package, or sampled key, fill and rim lamps."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache, lru_cache
 from math import cos, pi, radians, sin
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.apps.batch.sampling import Parameters, numbers_of
 from dermis.apps.batch.spec_tables import RIG
 from dermis.images.colour import luminance
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
@@ -19,51 +18,44 @@ _SECOND_NM_K = 1.438777e7  # hc / k
 _WHITE_K = 6500.0
 _PLACES = "position", "target", "direction", "up"
 _LAMPS = "key", "fill", "rim"
+_rgb_weights = cache(rgb_weights)
 
 
-def lights_of(parameters: Mapping[str, Any]) -> tuple[Light, ...]:
-    """The lights of an image by its parameters."""
-    kind, strength, turn = (parameters[f"light.{name}"] for name in ("kind", "strength", "turn_deg"))
+def lights_of(parameters: Parameters) -> tuple[Light, ...]:
+    """Return the lights of an image by its parameters."""
+    light = numbers_of(parameters, "light")
+    strength, turn_deg = light["strength"], light["turn_deg"]
     if not strength:
         return ()
-    if kind == RIG:
-        return tuple(_lamp(parameters, f"light.{lamp}.", turn, strength) for lamp in _LAMPS)
-    return tuple(_turned(one, turn, strength) for one in _preset(kind))
+    if parameters["light.kind"] == RIG:
+        lamps = (numbers_of(parameters, f"light.{lamp}") for lamp in _LAMPS)
+        return tuple(_lamp(lamp, turn_deg, strength) for lamp in lamps)
+    presets = _preset(str(parameters["light.kind"]))
+    return tuple(_rotated(one, turn_deg, strength) for one in presets)
 
 
 def towards(yaw_deg: float, pitch_deg: float) -> tuple[float, float, float]:
-    """The unit vector that points so far to the head's left of its front, and so far above it."""
+    """Return the unit vector at a yaw to the head's left of its front and a pitch above it."""
     yaw, pitch = radians(yaw_deg), radians(pitch_deg)
     return sin(yaw) * cos(pitch), sin(pitch), cos(yaw) * cos(pitch)
 
 
 @lru_cache(maxsize=64)
 def colour_of(kelvin: float) -> tuple[float, float, float]:
-    """A black body's light by Planck's law, linear Rec. 709 of luminance 1; white at 6500 K."""
+    """Return a black body's light by Planck's law, linear Rec. 709 of luminance 1; white at 6500 K."""
     white, own = (np.expm1(_SECOND_NM_K / (WAVELENGTHS_NM * one)) for one in (_WHITE_K, kelvin))
-    colour = np.maximum(_weights() @ (white / own), 0.0)
+    colour = np.maximum(_rgb_weights() @ (white / own), 0.0)
     red, green, blue = map(float, colour / luminance(colour))
     return red, green, blue
 
 
-@cache
-def _weights() -> NDArray[np.float64]:
-    """Matrix (3, n) from spectra, which are relative to white's, to colours."""
-    return rgb_weights()
-
-
-def _lamp(parameters: Mapping[str, Any], lamp: str, turn_deg: float, strength: float) -> Light:
-    """A lamp of the rig, by the parameters that begin with its name."""
-    distance, size = parameters[f"{lamp}distance_mm"], parameters[f"{lamp}size_mm"]
-    x, y, z = towards(parameters[f"{lamp}yaw_deg"] + turn_deg, parameters[f"{lamp}pitch_deg"])
-    much = pi * strength * parameters[f"{lamp}strength"]
-    red, green, blue = (much * one for one in colour_of(parameters[f"{lamp}kelvin"]))
-    return RectangleLight(
-        position=(distance * x, distance * y, distance * z),
-        irradiance=(red, green, blue),
-        width_mm=size,
-        height_mm=size,
-    )
+def _lamp(lamp: Mapping[str, float], turn_deg: float, strength: float) -> Light:
+    """Return a lamp of the rig by its parameters, which face the middle of the head."""
+    x, y, z = towards(lamp["yaw_deg"] + turn_deg, lamp["pitch_deg"])
+    distance, size, irradiance = lamp["distance_mm"], lamp["size_mm"], pi * strength * lamp["strength"]
+    red, green, blue = (irradiance * one for one in colour_of(lamp["kelvin"]))
+    position = distance * x, distance * y, distance * z
+    return RectangleLight(position=position, irradiance=(red, green, blue), width_mm=size, height_mm=size)
 
 
 @cache
@@ -71,10 +63,10 @@ def _preset(kind: str) -> tuple[Light, ...]:
     return preset_lights(kind)
 
 
-def _turned(light: Light, degrees: float, strength: float) -> Light:
-    """A light of another strength, turned about the upward axis."""
+def _rotated(light: Light, degrees: float, strength: float) -> Light:
+    """Return a light scaled by a strength and rotated about the upward axis."""
     sine, cosine = sin(radians(degrees)), cos(radians(degrees))
-    values: dict[str, Any] = {"irradiance": tuple(strength * one for one in light.irradiance)}
+    values: dict[str, object] = {"irradiance": tuple(strength * one for one in light.irradiance)}
     for name in _PLACES:
         if hasattr(light, name):
             x, y, z = getattr(light, name)

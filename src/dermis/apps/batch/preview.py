@@ -89,7 +89,7 @@ def _pictures(spec: Spec, count: int, adapter: str) -> Iterator[NDArray[np.uint8
 def _row(spec: Spec, name: str, found: Sequence[Parameters]) -> Row:
     values = [one[name] for one in found if name in one]
     drawn = spec.distributions.get(name)
-    row: Row = {"parameter": name, "drawn": "" if drawn is None else value_text(drawn.told())}
+    row: Row = {"parameter": name, "drawn": "" if drawn is None else value_text(drawn.spec_value())}
     row |= {"first": [one.get(name) for one in found[:SHOWN]], "images": len(values)}
     numbers = [value for value in values if not isinstance(value, str)]
     if not numbers:

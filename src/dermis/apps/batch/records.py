@@ -3,48 +3,77 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import Any
+from typing import TypedDict, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.apps.batch.output_encoding import encode_output, file_kind
+from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.spec import Spec
-from dermis.frame.observation import Landmarks, Observation
+from dermis.frame.observation import Observation
 from dermis.images.codecs import encode_png
 
 PICTURE, RECORD = "png", "json"
-"""Suffixes of the picture, and of what is known of it besides its outputs."""
+"""Suffixes of the picture, and of the record of all other ground truth besides the outputs."""
+Numbers = list[Union["Numbers", float, None]]
+"""Numbers of an array; null where one is not finite."""
 _PIXEL_DIGITS = 3
 _MM_DIGITS = 4
 _UNIT_DIGITS = 8  # of rotations and directions
 
 
+class CameraRecord(TypedDict):
+    """Camera of OpenCV: K (R X + t)."""
+
+    K: Numbers
+    R: Numbers
+    t: Numbers
+
+
+class LandmarksRecord(TypedDict):
+    """Landmarks of an image, see `reader.LandmarkPoints`."""
+
+    pixels: Numbers
+    positions_mm: Numbers
+    visible: list[bool]
+
+
+class Record(TypedDict):
+    """Content of the JSON file of an image."""
+
+    number: int
+    parameters: Parameters
+    camera: CameraRecord
+    head_pose: Numbers
+    gaze: Numbers | None
+    landmarks: dict[str, LandmarksRecord]
+
+
 def encode_record(
-    number: int, observation: Observation, parameters: Mapping[str, Any], spec: Spec
+    number: int, observation: Observation, parameters: Parameters, spec: Spec
 ) -> dict[str, bytes]:
-    """The files of image `number` by suffix: equal bytes for equal arguments.
+    """Return the files of image `number` by suffix: equal bytes for equal arguments.
 
     observation : with the outputs of the spec and a picture of sRGB bytes
 
     png : the picture, with alpha over no background
-    NAME.png, NAME.exr or NAME.npy : each output, as `encodings.stored_as` says
-    json : number, parameters, camera, head_pose, gaze and landmarks
+    NAME.png, NAME.exr or NAME.npy : each output, see `output_encoding.stored_as`
+    json : the `Record`
     """
     found = {PICTURE: encode_png(observation.picture, quick=True)}
     for name in spec.outputs:
         suffix = f"{name}.{file_kind(name, spec.encoding)}"
         found[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
-    found[RECORD] = _json(_record(number, observation, parameters, spec))
+    record = _record(number, observation, parameters, spec)
+    text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    found[RECORD] = f"{text}\n".encode()
     return found
 
 
-def _record(
-    number: int, observation: Observation, parameters: Mapping[str, Any], spec: Spec
-) -> dict[str, Any]:
-    camera, gaze, found = observation.camera, observation.gaze, observation.landmarks
-    named = {place: name for name, place in spec.landmark_tables.items()}  # no paths of this machine
+def _record(number: int, observation: Observation, parameters: Parameters, spec: Spec) -> Record:
+    camera, gaze = observation.camera, observation.gaze
+    names = {path: name for name, path in spec.landmark_tables.items()}  # no paths of this machine
     return {
         "number": number,
         "parameters": dict(parameters),
@@ -55,26 +84,20 @@ def _record(
         },
         "head_pose": _rounded(observation.head_pose, _UNIT_DIGITS),
         "gaze": None if gaze is None else _rounded(gaze, _UNIT_DIGITS),
-        "landmarks": {named.get(place, place): _landmarks(one) for place, one in found.items()},
+        "landmarks": {
+            names.get(path, path): {
+                "pixels": _rounded(one.pixels, _PIXEL_DIGITS),
+                "positions_mm": _rounded(one.positions_mm, _MM_DIGITS),
+                "visible": np.asarray(one.visible, bool).tolist(),
+            }
+            for path, one in observation.landmarks.items()
+        },
     }
 
 
-def _landmarks(found: Landmarks) -> dict[str, Any]:
-    return {
-        "pixels": _rounded(found.pixels, _PIXEL_DIGITS),
-        "positions_mm": _rounded(found.positions_mm, _MM_DIGITS),
-        "visible": np.asarray(found.visible, bool).tolist(),
-    }
-
-
-def _rounded(values: ArrayLike, digits: int) -> Any:
-    """Numbers as lists, null for those that are not finite; -0 is 0."""
+def _rounded(values: ArrayLike, digits: int) -> Numbers:
+    """Return numbers as nested lists, null for those that are not finite; -0 is 0."""
     numbers = np.round(np.asarray(values, np.float64), digits) + 0.0
-    told = numbers.astype(object)
-    told[~np.isfinite(numbers)] = None
-    return told.tolist()
-
-
-def _json(value: Mapping[str, Any]) -> bytes:
-    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return f"{text}\n".encode()
+    found = numbers.astype(object)
+    found[~np.isfinite(numbers)] = None
+    return list(found.tolist())

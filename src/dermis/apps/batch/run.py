@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -23,18 +23,18 @@ SPEC_FILE = "spec.toml"
 
 
 class Crew(Protocol):
-    """Who draws: `Processes` of this machine, or those of a `Cluster`."""
+    """Workers: `Processes` of this machine, or those of a `Cluster`."""
 
-    def draw(self, work: Work, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Draw the shards, each whole or not at all; what happens is told as it does."""
+    def render(self, work: Work, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+        """Render the shards, each completely or not at all, and yield events as they happen."""
         ...
 
 
 @dataclass
 class Progress:
-    """How far a run is.
+    """Progress of a run.
 
-    images : drawn, of those to be drawn
+    images : rendered so far
     to_draw : images of the shards that were missing at the start
     """
 
@@ -44,12 +44,12 @@ class Progress:
 
 @dataclass(frozen=True)
 class Report:
-    """What a run did.
+    """Result of a run.
 
-    images : of the shards that it wrote, less those that were left out
-    seconds : that it took
-    shards : that it wrote
-    skipped : shards that were there and whole
+    images : in the shards that it wrote, without those that were left out
+    seconds : duration
+    shards : number that it wrote
+    skipped : shards that were complete before
     failed : images that were left out
     is_whole : whether all shards of the data set are there, and with them index and datasheet
     """
@@ -58,7 +58,7 @@ class Report:
     seconds: float
     shards: int
     skipped: int
-    failed: tuple[Failure, ...] = field(default=())
+    failed: tuple[Failure, ...] = ()
     is_whole: bool = False
 
 
@@ -68,12 +68,12 @@ def run(
     part: tuple[int, int] = (0, 1),
     told: Callable[[Progress], None] = lambda progress: None,
 ) -> Report:
-    """Draw the missing shards of a data set, or of a part of it.
+    """Render the missing shards of a data set, or of a part of it.
 
     part : (i, n) for every n-th shard from the i-th on, i from 0: n runs, on any machines, make the data set
-    told : called whenever images were drawn
+    told : called whenever images were rendered
 
-    Raises DermisError for what the spec, the disk or the machine is at fault for; what is whole stays.
+    Raises DermisError for faults of the spec, the disk or the machine; complete shards stay.
     """
     began = time.monotonic()
     claim(work.out, work.spec)
@@ -82,11 +82,11 @@ def run(
     missing = [shard for shard in mine if not is_whole(work.out, shard, work.spec)]
     remove_leftovers(work.out, mine)
     try:
-        images, failed = _drawn(crew, work, missing, told)
+        images, failed = _render(crew, work, missing, told)
     finally:
         remove_leftovers(work.out, mine)
     whole = all(is_there(work.out, shard, work.spec) for shard in every)
-    if whole:  # whoever sees it writes the same bytes
+    if whole:  # every run that sees this writes the same bytes
         write_index(work.out, work.spec)
         write_datasheet(work.out, work.spec)
     seconds = time.monotonic() - began
@@ -94,39 +94,38 @@ def run(
 
 
 def claim(out: Path, spec: Spec) -> None:
-    """Make the folder of a data set, or find it begun with the same spec.
+    """Make the folder of a data set, or check that it was begun with the same spec.
 
     Raises DermisError for a folder of another one, and where nothing can be written.
     """
-    place = out / SPEC_FILE
+    path = out / SPEC_FILE
     try:
         out.mkdir(parents=True, exist_ok=True)
-        there = place.exists()
+        exists = path.exists()
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
         refuse_output(out, fault)
-    if there:
-        if read_text(place, "the spec of a data set") != spec.text():
-            remedy = "Choose another folder, or give the spec that it was begun with"
-            refuse(out, "a folder for this data set", f"{SPEC_FILE} in it is another's", remedy)
-        return
-    atomic_write(place, lambda path: path.write_text(spec.text(), encoding="utf-8"))
+    if not exists:
+        atomic_write(path, lambda trial: trial.write_text(spec.text(), encoding="utf-8"))
+    elif read_text(path, "the spec of a data set") != spec.text():
+        remedy = "Choose another folder, or give the spec that it was begun with"
+        refuse(out, "a folder for this data set", f"{SPEC_FILE} in it is another's", remedy)
 
 
-def _drawn(
+def _render(
     crew: Crew, work: Work, missing: Sequence[Shard], told: Callable[[Progress], None]
 ) -> tuple[int, tuple[Failure, ...]]:
-    """How many images are in the shards that were drawn, and what was left out of them."""
+    """Return the number of images in the rendered shards, and those left out of them."""
     progress = Progress(0, sum(shard.stop - shard.first for shard in missing))
     failed: list[Failure] = []
     notes = set[str]()
-    for news in crew.draw(work, missing) if missing else ():
-        if news.note and news.note not in notes:
-            notes.add(news.note)
-            notify(news.note)
-        if news.again:
-            notify(f"{news.again}; its shard is drawn again")
-        failed += news.failed
-        if news.images:
-            progress.images += news.images
+    for event in crew.render(work, missing) if missing else ():
+        if event.note and event.note not in notes:
+            notes.add(event.note)
+            notify(event.note)
+        if event.retry:
+            notify(f"{event.retry}; its shard is drawn again")
+        failed += event.failed
+        if event.images:
+            progress.images += event.images
             told(progress)
     return progress.to_draw - len(failed), tuple(sorted(failed))

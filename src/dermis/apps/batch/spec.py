@@ -1,4 +1,4 @@
-"""What a data set draws: people, faces, light and cameras, from stated distributions by one seed."""
+"""Specification of a data set: distributions of people, faces, light and cameras, and one seed."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import os
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import BaseModel, Field, PrivateAttr
 
 from dermis.apps.batch.distributions import Distribution, Files
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
-from dermis.apps.batch.spec_checks import check_spec
+from dermis.apps.batch.spec_checks import check_landmarks, check_spec
 from dermis.apps.batch.spec_tables import (
     BackgroundTable,
     CameraTable,
@@ -33,12 +33,13 @@ from dermis.base.reading import is_file, named_path, read_file, read_toml
 from dermis.human.expressions import EXPRESSIONS, targets_of
 from dermis.human.landmarks.sets import SETS
 from dermis.scene.field_errors import Because, ImpossibleError
+from dermis.scene.outputs import checked_outputs
 from dermis.scene.plain import Plain
 from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
 MOST_IMAGES = 10**9
-RENDER: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
+RENDER: Mapping[str, object] = {"atlas": 1024, "exposure": "auto"}
 """Settings that a data set has where its spec says nothing."""
 ELSEWHERE = {
     "size": "size, above all tables",
@@ -47,19 +48,16 @@ ELSEWHERE = {
 }
 """Settings that [render] does not hold, and where a spec has them."""
 _Weight = Annotated[float, Field(ge=0, le=1)]
-
-
+_HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
+_MOST_FILES = 100_000
+_MOST_BYTES = 4 << 30
 _FILES = "person.head", "environment.name", "skin.profile"
 """Parameters that may name files."""
 P = TypeVar("P", bound=Plain)
 
 
-def _settings() -> Settings:
-    return Settings(size=(512, 512), **RENDER)
-
-
 class Spec(Plain):
-    """A data set before it is drawn."""
+    """Specification of a data set."""
 
     count: Annotated[int, Field(ge=1, le=MOST_IMAGES), Because("a billion images")] = 1000
     """How many images."""
@@ -77,7 +75,7 @@ class Spec(Plain):
     """Shards as tar files, or as folders."""
     encoding: Encoding = "png"
     """Files of the outputs: png (16 bits where they suffice), exr or npy (all bits)."""
-    render: Settings = Field(default_factory=_settings)
+    render: Settings = Field(default_factory=lambda: Settings(size=(512, 512), **RENDER))
     """How pictures are computed; `size` and the background stand elsewhere."""
     person: PersonTable = PersonTable()
     """Who is seen."""
@@ -108,15 +106,18 @@ class Spec(Plain):
     folder: Path = Field(default=Path(), exclude=True)
     """Where those files lie; no part of a spec's text."""
 
-    _drawing: Sampler = PrivateAttr()
+    _sampler: Sampler = PrivateAttr()
 
-    def model_post_init(self, context: Any) -> None:
-        drawn = _drawn("", self)
+    def model_post_init(self, context: object) -> None:
+        sampled = _distributions("", self)
         expressions = {**EXPRESSIONS, **self.expressions}
-        check_spec(self, drawn, expressions)
+        with about("outputs"):
+            checked_outputs(self.outputs)
+        check_landmarks(self.landmarks, self.folder)
+        check_spec(sampled, expressions, self.correlated, self.folder)
         rows = {name: row for group in self.correlated for name, row in group.rows().items()}
-        drawing = Sampler(self.seed, self.images_per_person, drawn, rows, expressions)
-        BaseModel.__setattr__(self, "_drawing", drawing)
+        sampler = Sampler(self.seed, self.images_per_person, sampled, rows, expressions)
+        BaseModel.__setattr__(self, "_sampler", sampler)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -125,12 +126,12 @@ class Spec(Plain):
 
     @property
     def distributions(self) -> Mapping[str, Distribution]:
-        """By name of the parameter that is drawn from each."""
-        return self._drawing.drawn
+        """Distributions by name of their parameter."""
+        return self._sampler.distributions
 
     @property
     def landmark_tables(self) -> Mapping[str, str]:
-        """By name as the spec has it: a set's own, or the path of its table."""
+        """Sets of landmarks by name in the spec: the same name, or the path of a table."""
         return {name: name if name in SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
@@ -139,44 +140,45 @@ class Spec(Plain):
         return frozenset(targets_of(self.pose))
 
     def parameters(self, k: int) -> Parameters:
-        """All that is drawn for image k, by name: numbers of six digits, and texts.
+        """Return the sampled parameters of image k by name: numbers of six digits, and texts.
 
-        The same on every machine and in any order; another distribution, or one more, changes no other
-        parameter. An image lacks those that it does not use, such as of lamps that are not lit.
+        They are equal on every machine and in any order, and changing or adding a distribution changes no
+        other parameter. An image lacks those that it does not use, such as of lamps that are not lit.
 
         Raises DermisError for an image that the data set does not have.
         """
-        return self._drawing.parameters(whole_number("image", k, 0, self.count - 1))
+        return self._sampler.parameters(whole_number("image", k, 0, self.count - 1))
 
     def text(self) -> str:
-        """The spec in its canonical form: TOML of every value, which reads as the same spec."""
+        """Return the canonical form: TOML of every value, which reads as the same spec."""
         values = plain_values(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
         values["render"] = self.render.model_dump(exclude=set(ELSEWHERE), exclude_none=True)
-        return tables_text({name: one for name, one in values.items() if name != "folder"})
+        del values["folder"]
+        return "\n".join([_HEADER, *_toml_lines("", values)])
 
     def digest(self) -> str:
-        """SHA-256 of the text, by which a data set is known."""
+        """Return the SHA-256 of the text, which identifies a data set."""
         return hashlib.sha256(self.text().encode()).hexdigest()
 
 
-def _drawn(name: str, value: Any) -> dict[str, Distribution]:
-    """Distributions by the dotted names of their keys."""
+def _distributions(name: str, value: object) -> dict[str, Distribution]:
+    """Return the distributions in a table and below, by dotted names."""
     if isinstance(value, Distribution):
         return {name: value}
     parts = plain_values(value) if isinstance(value, Plain) else value
     if not isinstance(parts, Mapping):
         return {}
     start = f"{name}." if name else ""
-    return {key: one for part, below in parts.items() for key, one in _drawn(f"{start}{part}", below).items()}
+    return {key: one for part in parts for key, one in _distributions(f"{start}{part}", parts[part]).items()}
 
 
-def load_spec(path: str | Path, **values: Any) -> Spec:
-    """The spec of a TOML file; files that it names lie relative to its folder.
+def load_spec(path: str | Path, **values: object) -> Spec:
+    """Return the spec of a TOML file; files that it names are relative to its folder.
 
     values : `count`, `seed` or `size` in place of the file's
 
-    Raises DermisError, naming table and key, for what cannot be drawn and for files that are not there.
+    Raises DermisError, naming table and key, for what cannot be rendered and for missing files.
     """
     path = named_path(path, "a spec of a data set in TOML")
     tables = read_toml(path, "a spec of a data set in TOML")
@@ -184,27 +186,27 @@ def load_spec(path: str | Path, **values: Any) -> Spec:
         return spec_of({**tables, **values}, path.parent)
 
 
-def spec_of(tables: Mapping[str, Any], folder: Path = Path()) -> Spec:
-    """The spec of tables as TOML has them.
+def spec_of(tables: Mapping[str, object], folder: Path = Path()) -> Spec:
+    """Return the spec of parsed TOML tables.
 
-    folder : where the files lie that it names
+    folder : of the files that it names
 
     Raises DermisError as `load_spec` does.
     """
     if "folder" in tables:
         refuse("folder", "no such key", "it came", "Files lie relative to the spec's own folder")
     given = {
-        name: table if name == "files" else matched(table, folder, name) for name, table in tables.items()
+        name: table if name == "files" else _with_files(table, folder, name) for name, table in tables.items()
     }
     given["render"] = _render(given.pop("size", (512, 512)), given.get("render", {}))
     if isinstance(groups := given.get("correlated", ()), list | tuple):
-        given["correlated"] = tuple(_made(Correlated, "correlated", group) for group in groups)
-    spec = _made(Spec, "", given | {"folder": folder})
+        given["correlated"] = tuple(_model(Correlated, "correlated", group) for group in groups)
+    spec = _model(Spec, "", given | {"folder": folder})
     ends = [end for name in _FILES if name in spec.distributions for end in spec.distributions[name].ends]
     tables_named = (name for name in spec.landmarks if name not in SETS)
-    found = hashes([*map(str, ends), *tables_named], folder)
+    found = _hashes([*map(str, ends), *tables_named], folder)
     if spec.files:
-        check_hashes(spec.files, found)
+        _check_hashes(spec.files, found)
     return spec.replace(files=found) if found else spec
 
 
@@ -213,81 +215,61 @@ def example_text() -> str:
     return resources.files(__package__).joinpath("example.toml").read_text("utf-8")
 
 
-def _render(size: Any, table: Any) -> Settings:
-    if isinstance(table, Mapping):
-        for key in ELSEWHERE.keys() & table.keys():
-            refuse(
-                f"render: {key}", "it elsewhere in a spec", "it came here", f"Write it as {ELSEWHERE[key]}"
-            )
-    return _made(
-        Settings, "render", {**RENDER, **table, "size": size} if isinstance(table, Mapping) else table
-    )
+def _render(size: object, table: object) -> Settings:
+    if not isinstance(table, Mapping):
+        return _model(Settings, "render", table)
+    for key in ELSEWHERE.keys() & table.keys():
+        refuse(f"render: {key}", "it elsewhere in a spec", "it came here", f"Write it as {ELSEWHERE[key]}")
+    return _model(Settings, "render", {**RENDER, **table, "size": size})
 
 
-def _made(kind: type[P], where: str, table: Any) -> P:
-    """A model of a table and of those below it, which are named when they cannot be."""
+def _model(kind: type[P], where: str, table: object) -> P:
+    """Return a model of a table and of those below it, which are named in errors."""
     if isinstance(table, kind):
         return table
     if not isinstance(table, Mapping):
-        refuse(
-            where, f"a table with {', '.join(kind.model_fields)}", f"{shown_value(table)} came", "Correct it"
-        )
+        expected = f"a table with {', '.join(kind.model_fields)}"
+        refuse(where, expected, f"{shown_value(table)} came", "Correct it")
     values = dict(table)
     for name, info in kind.model_fields.items():
         if name in values and isinstance(info.annotation, type) and issubclass(info.annotation, Plain):
-            values[name] = _made(info.annotation, f"{where}.{name}" if where else name, values[name])
+            values[name] = _model(info.annotation, f"{where}.{name}" if where else name, values[name])
     try:
         return kind(**values)
     except ImpossibleError as error:
         raise ImpossibleError(where or "spec", error.findings) from None
 
 
-HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
+def plain_values(table: Plain) -> dict[str, object]:
+    """Return the fields that have a value, by name."""
+    values = {name: getattr(table, name) for name in type(table).model_fields}
+    return {name: value for name, value in values.items() if value is not None}
 
 
-def tables_text(values: Mapping[str, Any]) -> str:
-    """The TOML of values, distributions, tables and lists of tables, by name."""
-    return "\n".join([HEADER, *_tables("", values)])
-
-
-def plain_values(table: Plain) -> dict[str, Any]:
-    """Fields by name, those left out that have no value."""
-    return {
-        name: getattr(table, name) for name in type(table).model_fields if getattr(table, name) is not None
-    }
-
-
-def _tables(title: str, values: Mapping[str, Any]) -> list[str]:
-    own, below = dict[str, Any](), list[str]()
+def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
+    """Return the TOML of a table and of those below it."""
+    own, below = dict[str, object](), list[str]()
     for name, value in values.items():
-        whole = f"{title}.{key_text(name)}" if title else key_text(name)
-        if isinstance(value, Plain):
-            below += _tables(whole, plain_values(value))
-        elif isinstance(value, Mapping):
-            below += _tables(whole, value)
+        path = f"{title}.{key_text(name)}" if title else key_text(name)
+        if isinstance(value, Plain | Mapping):
+            below += _toml_lines(path, plain_values(value) if isinstance(value, Plain) else value)
         elif isinstance(value, tuple) and value and isinstance(value[0], Plain):
-            below += [table_text(f"[[{whole}]]", plain_values(one)) for one in value]
+            below += [table_text(f"[[{path}]]", plain_values(one)) for one in value]
         else:
-            own[name] = value.told() if isinstance(value, Distribution) else value
+            own[name] = value.spec_value() if isinstance(value, Distribution) else value
     return [table_text(f"[{title}]" if title else "", own), *below] if own or not below else below
 
 
-_MOST_FILES = 100_000
-_MOST_BYTES = 4 << 30
-
-
-def matched(value: Any, folder: Path, key: str) -> Any:
-    """A value of a spec with the files of each {files = PATTERN} in it found, in the order of their names.
-
-    key : of the value
+def _with_files(value: object, folder: Path, key: str) -> object:
+    """Return a value of a spec in which each {files = PATTERN} is replaced by its sorted files.
 
     Raises DermisError for patterns that no file matches.
     """
-    if isinstance(value, Mapping):
-        if value.keys() == {"files"} and isinstance(value["files"], str):
-            return _files(value["files"], folder, key)
-        return {name: matched(one, folder, f"{key}.{name}") for name, one in value.items()}
-    return value
+    if not isinstance(value, Mapping):
+        return value
+    if value.keys() == {"files"} and isinstance(value["files"], str):
+        return _files(value["files"], folder, key)
+    return {name: _with_files(one, folder, f"{key}.{name}") for name, one in value.items()}
 
 
 def _files(pattern: str, folder: Path, key: str) -> Files:
@@ -307,8 +289,8 @@ def _files(pattern: str, folder: Path, key: str) -> Files:
     return Files(pattern, tuple(sorted(names)))
 
 
-def hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
-    """SHA-256 of those names that are files, sorted."""
+def _hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
+    """Return the SHA-256 of those names that are files, sorted by name."""
     found = {}
     for name in sorted(set(names)):
         if is_file(folder / name):
@@ -317,8 +299,8 @@ def hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
     return found
 
 
-def check_hashes(stated: Mapping[str, str], found: Mapping[str, str]) -> None:
-    """Refuse files that are not those that a spec was made with."""
+def _check_hashes(stated: Mapping[str, str], found: Mapping[str, str]) -> None:
+    """Refuse files that differ from those that a spec was made with."""
     for name in sorted(stated.keys() | found.keys()):
         if stated.get(name) != found.get(name):
             expected = f"the file of hash {stated[name][:16]}..." if name in stated else "no such file"

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Annotated, Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Annotated, TypeVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, GetCoreSchemaHandler, model_validator
+from pydantic_core.core_schema import (
+    CoreSchema,
+    no_info_plain_validator_function,
+    plain_serializer_function_ser_schema,
+)
 
 from dermis.apps.batch.distributions import Constant, Distribution, Uniform, parse_distribution
 from dermis.human.published import OLD, YOUNG
@@ -24,34 +29,29 @@ _REACH = "; normal reaches to 6 sd either way, truncated to its ends"
 class DistributionField:
     """For pydantic: `Annotated[Distribution, Anything()]` is read from what a spec states."""
 
-    def check(self, told: Any) -> Distribution | None:
-        """The distribution; None for a field that is left out.
+    def check(self, value: object) -> Distribution | None:
+        """Return the distribution that a value describes; None for a field that is left out.
 
-        Raises ValueError for what is none, and for one that reaches too far, worded as expected.
+        Raises ValueError, worded as what was expected, for other values and for distributions out of bounds.
         """
-        if told is None:
+        if value is None:
             return None
-        found = parse_distribution(told)
+        found = parse_distribution(value)
         self.check_ends(found)
         return found
 
     def check_ends(self, found: Distribution) -> None:
-        """Raises ValueError for values that the field cannot have."""
+        """Raise ValueError for values that the field cannot have."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        from pydantic_core import core_schema
-
-        def told(value: Distribution | None) -> Any:
-            return None if value is None else value.told()
-
-        serialised = core_schema.plain_serializer_function_ser_schema(told)
-        return core_schema.no_info_plain_validator_function(self.check, serialization=serialised)
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        serialised = plain_serializer_function_ser_schema(lambda one: one and one.spec_value())
+        return no_info_plain_validator_function(self.check, serialization=serialised)
 
 
 class Within(DistributionField):
     """Numbers between two bounds.
 
-    why : the reason of the bounds
+    why : reason of the bounds
     """
 
     def __init__(self, low: float, high: float, why: str = "") -> None:
@@ -65,7 +65,7 @@ class Within(DistributionField):
 
 
 class OneOf(DistributionField):
-    """Names: of some where they are known, else any, those of files too."""
+    """Names out of a list where there is one, else any name, of a file too."""
 
     def __init__(self, known: Callable[[], Iterable[str]] | None = None) -> None:
         self.known = known
@@ -84,9 +84,9 @@ _Coefficient = Annotated[float, Field(ge=-1, le=1)]
 
 
 class Correlated(Plain):
-    """Parameters by name, and the correlation of the normal numbers that they are drawn by.
+    """Correlated parameters: a Gaussian copula, which leaves the distribution of each as it is.
 
-    A greater number gives a greater value, and of a choice a later one.
+    A greater normal number gives a greater value, or a later one of a choice.
     """
 
     of: tuple[str, ...]
@@ -111,19 +111,28 @@ class Correlated(Plain):
 
     @property
     def matrix(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-        """(n, n) the correlations of all."""
+        """Correlation matrix (n, n)."""
         if isinstance(self.correlation, tuple):
             return np.array(self.correlation, np.float64)
         count = len(self.of)
         return np.full((count, count), self.correlation) + (1.0 - self.correlation) * np.eye(count)
 
     def rows(self) -> dict[str, dict[str, float]]:
-        """By name the factors of the independent normal numbers of each that make its own."""
+        """Return rows of the Cholesky factor: for each name, weights of independent normal numbers."""
         lower = np.linalg.cholesky(self.matrix)
         return {
             name: {other: float(lower[k, j]) for j, other in enumerate(self.of[: k + 1])}
             for k, name in enumerate(self.of)
         }
+
+
+T = TypeVar("T")
+
+
+def table_of(values: Mapping[str, T], table: str) -> dict[str, T]:
+    """Return the values whose dotted names begin with a table's, by the rest of their names."""
+    start = f"{table}."
+    return {name.removeprefix(start): one for name, one in values.items() if name.startswith(start)}
 
 
 _TURN = Within(-180, 180, "degrees")

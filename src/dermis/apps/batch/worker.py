@@ -4,33 +4,35 @@ from __future__ import annotations
 
 import gc
 import itertools
+import os
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
+from dermis.apps.batch.child_processes import LostProcessError
 from dermis.apps.batch.encoder_pool import Encoded, Encoders
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneMaker
 from dermis.apps.batch.shards import Shard, ShardWriter, is_whole
 from dermis.apps.batch.spec import Spec
-from dermis.base.errors import DermisError
+from dermis.base.errors import DermisError, DermisWarning
 from dermis.frame.observation import Observation
 from dermis.frame.renderer import Renderer
 from dermis.gpu.failures import DeviceError
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-_ROUNDS = (
-    16  # images that may come between two with an environment, whose occlusion takes a second to prepare
-)
+_ROUNDS = 16  # images between two with an environment, whose occlusion is kept
 
 
 class Failure(NamedTuple):
-    """An image that was left out, and why."""
+    """Image that was left out, and the reason."""
 
     number: int
     reason: str
@@ -38,10 +40,10 @@ class Failure(NamedTuple):
 
 @dataclass(frozen=True)
 class Work:
-    """What is to be done, alike for all workers.
+    """What a run asks of all its workers.
 
     out : folder of the data set
-    encoders : processes of each worker that encode; 0 encodes between drawing
+    encoders : encoder processes of each worker; 0 encodes in the worker
     keep_going : leave out images that cannot be made, and record them
     """
 
@@ -51,8 +53,40 @@ class Work:
     keep_going: bool = False
 
 
+@dataclass(frozen=True)
+class WorkerSlot:
+    """Place of one worker on an adapter.
+
+    adapter : as of `Renderer`
+    threads : of a software adapter; 0 is its own default
+    """
+
+    adapter: str
+    threads: int = 0
+
+
+@dataclass(frozen=True)
+class WorkerEvent:
+    """Progress event sent by a worker: one field at a time.
+
+    images : number rendered since the last event
+    shard : that was completed
+    failed : images that were left out of it
+    note : warning for the user
+    retry : why the worker ends and another one has to render its shard
+    refusal : why the run ends
+    """
+
+    images: int = 0
+    shard: Shard | None = None
+    failed: tuple[Failure, ...] = ()
+    note: str = ""
+    retry: str = ""
+    refusal: str = ""
+
+
 class _Plan(NamedTuple):
-    """An image to be drawn."""
+    """Image to be rendered; motion is relative to the scene `before`."""
 
     number: int
     parameters: Parameters
@@ -62,7 +96,7 @@ class _Plan(NamedTuple):
 
 
 class Worker:
-    """Draws shards one after another on one device; an image depends on its number alone.
+    """Renders shards one after another on one device; an image depends on its number alone.
 
     adapter : as of `Renderer`
     """
@@ -72,15 +106,15 @@ class Worker:
         self._renderer = Renderer(adapter, rounds=_ROUNDS)
         self._maker = SceneMaker(work.spec)
         self._encoders = Encoders(work.encoders, partial(_encode, work.spec))
-        gc.freeze()  # what is there by now stays: looking through it took a tenth of an image's time
+        gc.freeze()  # scanning the objects that exist now took a tenth of an image's time
 
-    def draw(self, shard: Shard, drawn: Callable[[], None] = lambda: None) -> tuple[Failure, ...]:
-        """Write a shard, unless it is there and whole; what was left out, always () without keep_going.
+    def render_shard(self, shard: Shard, rendered: Callable[[], None] = lambda: None) -> tuple[Failure, ...]:
+        """Write a shard unless it is whole, and return the images left out: always () without keep_going.
 
-        drawn : called after each image
+        rendered : called after each image
 
-        Raises DermisError for what the spec or the disk is at fault for, DeviceError for a device that was
-        lost twice, LostProcessError where a process that encodes ended.
+        Raises DermisError for faults of the spec or the disk, DeviceError for a device that was lost twice,
+        LostProcessError where an encoder process ended.
         """
         work = self._work
         if is_whole(work.out, shard, work.spec):
@@ -88,25 +122,21 @@ class Worker:
         failed: list[Failure] = []
         adapter = self._renderer.device.adapter.name
         with ShardWriter(work.out, shard, work.spec, adapter) as writer:
-            for number, found in self._encoders.encoded(self._jobs(shard, failed)):
-                writer.add(number, found)
-                drawn()
+            for number, files in self._encoders.encoded(self._jobs(shard, failed)):
+                writer.add(number, files)
+                rendered()
             for failure in sorted(failed):
                 writer.leave_out(*failure)
         return tuple(sorted(failed))
-
-    def close(self) -> None:
-        """End the processes that encode."""
-        self._encoders.close()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
+        self._encoders.close()
 
-    def _jobs(self, shard: Shard, failed: list[Failure]) -> Iterator[tuple[Any, ...]]:
-        """Number, observation and parameters of each image that can be drawn, in their order."""
+    def _jobs(self, shard: Shard, failed: list[Failure]) -> Iterator[tuple[int, Observation, Parameters]]:
+        """Yield number, observation and parameters of each image that can be rendered, in order."""
         groups = deque([deque(range(shard.first, shard.stop))])
         while groups:
             numbers, sent = groups.popleft(), deque[_Plan]()
@@ -122,12 +152,12 @@ class Worker:
                 if len(sent) == 1:
                     failed.append(Failure(sent[0].number, str(fault)))
                     alone = []
-                else:  # any of those in flight: once more, one by one
+                else:  # any of those in flight: render them again one by one
                     alone = [deque([plan.number]) for plan in sent]
                 groups.extendleft(reversed([*alone, numbers]))
 
     def _plans(self, numbers: deque[int], sent: deque[_Plan], failed: list[Failure]) -> Iterator[_Plan]:
-        """Take numbers, and note what is sent to be drawn."""
+        """Take numbers, and append what is sent to be rendered."""
         while numbers:
             number = numbers.popleft()
             parameters = self._work.spec.parameters(number)
@@ -142,18 +172,21 @@ class Worker:
             yield plan
 
     def _observed(self, plans: Iterable[_Plan]) -> Iterator[Observation]:
-        """What is seen of each, frames in flight; those without a background have alpha."""
+        """Yield the observation of each plan, frames in flight; those without a background have alpha."""
         spec = self._work.spec
-        asked: dict[str, Any] = {"outputs": spec.outputs}
-        asked["landmarks"] = spec.landmark_tables.values()
-        for alpha, alike in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
-            each = itertools.tee(alike, 3)
-            scenes, settings = (plan.scene for plan in each[0]), (plan.settings for plan in each[1])
-            before = (plan.before for plan in each[2])  # and never what happened to be drawn before
-            yield from self._renderer.observe(scenes, settings, alpha=alpha, previous=before, **asked)
+        for alpha, group in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
+            each = itertools.tee(group, 3)
+            yield from self._renderer.observe(
+                (plan.scene for plan in each[0]),
+                (plan.settings for plan in each[1]),
+                alpha=alpha,
+                previous=(plan.before for plan in each[2]),  # and never what was rendered before by chance
+                outputs=spec.outputs,
+                landmarks=spec.landmark_tables.values(),
+            )
 
-    def _before(self, number: int) -> Any:
-        """The scene that an image's motion is counted from: the image before it, of the same person."""
+    def _before(self, number: int) -> Scene | None:
+        """Return the scene that an image's motion is relative to: the image before, of the same person."""
         spec = self._work.spec
         if "motion" not in spec.outputs or number % spec.images_per_person == 0:
             return None
@@ -163,25 +196,37 @@ class Worker:
             return None
 
 
+def serve(pipe: Connection, slot: WorkerSlot, work: Work) -> None:
+    """Render the shards that come through a pipe and send events, in a worker process."""
+    if slot.threads:
+        os.environ["LP_NUM_THREADS"] = str(slot.threads)  # before its driver is loaded
+    with warnings.catch_warnings():
+        _forward_notes(lambda text: pipe.send(WorkerEvent(note=text)))
+        try:
+            with Worker(slot.adapter, work) as worker:
+                while True:
+                    shard = pipe.recv()
+                    failed = worker.render_shard(shard, lambda: pipe.send(WorkerEvent(images=1)))
+                    pipe.send(WorkerEvent(shard=shard, failed=failed))
+        except (DeviceError, LostProcessError) as fault:
+            pipe.send(WorkerEvent(retry=str(fault).removesuffix(".")))  # the message continues after it
+        except DermisError as fault:
+            pipe.send(WorkerEvent(refusal=str(fault)))
+
+
+def _forward_notes(forward: Callable[[str], None]) -> None:
+    """Send the package's warnings elsewhere; others are shown as usual."""
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
+        if issubclass(category, DermisWarning):
+            forward(str(message))
+        else:
+            usual(message, category, *more, **named)
+
+    warnings.simplefilter("default", DermisWarning)
+    warnings.showwarning = show
+
+
 def _encode(spec: Spec, number: int, observation: Observation, parameters: Parameters) -> Encoded:
     return number, encode_record(number, observation, parameters, spec)
-
-
-@dataclass(frozen=True)
-class WorkerEvent:
-    """One of these at a time.
-
-    images : that were drawn since the last time
-    shard : that is whole now
-    failed : images that were left out of it
-    note : for who waits
-    again : why the worker ends, and its shard is drawn by another
-    refusal : why the run ends
-    """
-
-    images: int = 0
-    shard: Shard | None = None
-    failed: tuple[Failure, ...] = ()
-    note: str = ""
-    again: str = ""
-    refusal: str = ""

@@ -38,7 +38,7 @@ _FACTORS = 0.0, 100.0
 
 
 @dataclass(frozen=True)
-class ShareChange:
+class Share:
     """What becomes of a map of shares: a factor times it, or one of another median.
 
     A larger median adds the same everywhere, because pale skin's noise would be multiplied with it; a smaller
@@ -58,14 +58,14 @@ class ShareChange:
 
 
 @dataclass(frozen=True)
-class Recolouring:
+class Change:
     """Other pigments for the same skin; what is None stays.
 
     oxygen, eumelanin : shares, as of `SkinParameters` [-]
     """
 
-    melanin: ShareChange = ShareChange()
-    blood: ShareChange = ShareChange()
+    melanin: Share = Share()
+    blood: Share = Share()
     oxygen: float | None = None
     eumelanin: float | None = None
 
@@ -80,7 +80,7 @@ class Recolouring:
         return np.array(factors), np.array(added)
 
 
-def parse_share_change(option: str, words: str) -> ShareChange:
+def parse_share(option: str, words: str) -> Share:
     """What somebody wrote: x2 for a factor, 0.1 for a median.
 
     Raises DermisError for anything else.
@@ -91,8 +91,8 @@ def parse_share_change(option: str, words: str) -> ShareChange:
     except ValueError:
         refuse(option, "a factor, such as x2, or a median, such as 0.1", f"{words!r} came", "Correct it")
     if factor:
-        return ShareChange(factor=number(option, value, *_FACTORS, "a factor"))
-    return ShareChange(median=number(option, value, 0.0, 1.0, "a share of the volume"))
+        return Share(factor=number(option, value, *_FACTORS, "a factor"))
+    return Share(median=number(option, value, 0.0, 1.0, "a share of the volume"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ class Unmixed:
                 told["oxygen"] = _spread(third[skin])
         return told
 
-    def recoloured(self, change: Recolouring = Recolouring(), adapter: str = "auto") -> Pixels:
+    def recoloured(self, change: Change = Change(), adapter: str = "auto") -> Pixels:
         """(h, w, 3) the colours, linear Rec. 709, of the same skin with other pigments.
 
         What the model did not account for stays, as does light that was not taken out of the picture.
@@ -161,7 +161,7 @@ class Unmixed:
         kept = self.devices.setdefault(adapter, LazyDevice(adapter))
         return kept.run(lambda device: self._recoloured(device, change))
 
-    def _recoloured(self, device: Device, change: Recolouring) -> Pixels:
+    def _recoloured(self, device: Device, change: Change) -> Pixels:
         fixed = self.third is None or change.oxygen is not None
         target = skin_model(change.of(self.skin), "none") if fixed else self.model
         usual = np.broadcast_to(np.float32(target.usual), self.melanin.shape)
