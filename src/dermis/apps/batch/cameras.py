@@ -57,13 +57,9 @@ def camera_of(
         return -0.5 * frame * share * offset[0], -0.5 * frame * share * offset[1]
 
     share, least, most = 1.0, 0.0, 1.0
-    for _ in range(_STEPS):
-        if _reach(placed, distance, aim(share), frame, aspect) > _MARGIN:
-            most = share
-        elif share == 1.0:
-            return _aimed(middle, axes, distance, frame, aim(1.0))
-        else:
-            least = share
+    for _ in range(_STEPS):  # bisection, after the whole offset
+        inside = _reach(placed, distance, aim(share), frame, aspect) <= _MARGIN
+        least, most = (share, most) if inside else (least, share)
         share = 0.5 * (least + most)
     return _aimed(middle, axes, distance, frame, aim(least))
 

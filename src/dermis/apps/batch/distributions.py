@@ -20,6 +20,12 @@ _LEAST_SHARE = 1e-6
 _MOST_CHOICES = 100_000
 
 
+def require(holds: bool, expected: str) -> None:
+    """Raise ValueError with what was expected, unless it holds."""
+    if not holds:
+        raise ValueError(expected)
+
+
 class Distribution(ABC):
     """Distribution that a parameter is sampled from."""
 
@@ -63,10 +69,8 @@ class Uniform(Distribution):
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
-        if not self.low < self.high:
-            raise ValueError("a low end that is less than the high one")
-        if self.logarithmic and self.low <= 0:
-            raise ValueError("ends above 0 for log_uniform")
+        require(self.low < self.high, "a low end that is less than the high one")
+        require(self.low > 0 or not self.logarithmic, "ends above 0 for log_uniform")
 
     @property
     def ends(self) -> tuple[Value, ...]:
@@ -90,8 +94,7 @@ class Normal(Distribution):
     sd: float
 
     def __post_init__(self) -> None:
-        if self.sd <= 0:
-            raise ValueError("a standard deviation above 0")
+        require(self.sd > 0, "a standard deviation above 0")
 
     @property
     def ends(self) -> tuple[Value, ...]:
@@ -114,12 +117,12 @@ class Truncated(Distribution):
     high: float
 
     def __post_init__(self) -> None:
-        if self.sd <= 0:
-            raise ValueError("a standard deviation above 0")
-        if not self.low < self.high:
-            raise ValueError("a low end that is less than the high one")
-        if self._shares[1] - self._shares[0] < _LEAST_SHARE:
-            raise ValueError(f"ends between which at least {_LEAST_SHARE:g} of the distribution lies")
+        require(self.sd > 0, "a standard deviation above 0")
+        require(self.low < self.high, "a low end that is less than the high one")
+        require(
+            self._shares[1] - self._shares[0] >= _LEAST_SHARE,
+            f"ends between which at least {_LEAST_SHARE:g} of the distribution lies",
+        )
 
     @property
     def _shares(self) -> tuple[float, float]:
@@ -151,14 +154,13 @@ class Choice(Distribution):
     weights: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if not 0 < len(self.values) <= _MOST_CHOICES:
-            raise ValueError(f"1 to {_MOST_CHOICES:,} values to choose from")
-        if len(self.weights) != len(self.values):
-            raise ValueError(f"as many weights as values ({len(self.values)})")
-        if min(self.weights) < 0 or not sum(self.weights) > 0:
-            raise ValueError("weights from 0, one of them above it")
-        if len({isinstance(end, str) for value in self.values for end in value.ends}) > 1:
-            raise ValueError("either numbers or texts to choose from")
+        require(0 < len(self.values) <= _MOST_CHOICES, f"1 to {_MOST_CHOICES:,} values to choose from")
+        require(len(self.weights) == len(self.values), f"as many weights as values ({len(self.values)})")
+        require(min(self.weights) >= 0 and sum(self.weights) > 0, "weights from 0, one of them above it")
+        require(
+            len({isinstance(end, str) for value in self.values for end in value.ends}) <= 1,
+            "either numbers or texts to choose from",
+        )
 
     @property
     def ends(self) -> tuple[Value, ...]:

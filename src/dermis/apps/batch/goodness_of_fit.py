@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from math import sqrt
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from dermis.apps.batch.spec_tables import NONE
 from dermis.human.expressions import targets_of
 
 LEAST_CHANCE = 1e-6
-"""Below it, what was drawn is not what is stated."""
+"""p-value below which the values are reported as not of the distribution."""
 _USUAL = sqrt(np.pi / 2) * np.log(2)  # mean of Kolmogorov's distribution
 _GRID = 10_000  # shares that means are taken over
 _HALF_DIGIT = 5e-6  # of a number, by which six digits move it at most
@@ -28,16 +28,17 @@ _MOST_NAMED = 12  # texts
 _FEWEST = 5.0  # of a kind, expected, that count by themselves in chi-square
 
 Array = NDArray[np.float64]
+Values = Sequence[float | str]
 
 
 class FitTest(NamedTuple):
-    """A parameter as it is stated and as it was found.
+    """Test of the sampled values of a parameter against its distribution.
 
     draws : images that have it, or people
-    stated, found : mean and standard deviation, or how often the values come
+    stated, found : mean and standard deviation, or shares of the values
     distance : of Kolmogorov and Smirnov, or the greatest difference of two shares [-]
-    usual : the mean of such distances for so many draws from what is stated [-]; 0 where there is none
-    chance : that one is at least as great, were all drawn from what is stated [-]
+    usual : mean of such distances for so many draws from the distribution [-]; 0 where there is none
+    chance : p-value of the distance, or of a chi-square test of the shares [-]
     """
 
     parameter: str
@@ -54,13 +55,16 @@ class FitTest(NamedTuple):
 
 
 def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
-    """Each parameter that varies in the index of a data set, against its own distribution in the spec.
+    """Yield a test of each parameter that varies in the index of a data set.
 
     People count once, however many images show them. Raises DermisError where there is no index.
     """
     with index_file(out, "the statistics of a data set") as file:
         names = set(file.schema_arrow.names)
-        first = _of_people(file) if "person.number" in names else slice(None)
+        first: NDArray[np.int64] | slice = slice(None)
+        if "person.number" in names:  # rows of the first image of each person
+            people = np.array(file.read(columns=["person.number"]).column(0).to_pylist(), np.int64)
+            first = np.unique(people, return_index=True)[1]
         for name, law in spec.distributions.items():
             column = _column(name)
             if isinstance(law, Constant) or column not in names:
@@ -69,18 +73,18 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
             drawn = values[first] if name.startswith("person.") else values
             there = [value for value in drawn if value is not None]
             if there:
-                yield _compared(name, law, there, spec)
+                yield _spec_test(name, law, there, spec)
 
 
-def fit_test(name: str, law: Distribution, values: Sequence[Any]) -> FitTest:
-    """Values of a parameter against the distribution that they were drawn from, one by one."""
+def fit_test(name: str, law: Distribution, values: Values) -> FitTest:
+    """Return the test of values against the distribution that they were sampled from."""
     if any(isinstance(end, str) for end in law.ends):
-        return _texts(name, shares(law), [str(value) for value in values])
-    return _numbers(name, law, np.sort(np.array(values, np.float64)))
+        return _shares_test(name, shares(law), [str(value) for value in values])
+    return _numbers_test(name, law, np.sort(np.array(values, np.float64)))
 
 
 def share_below(law: Distribution, x: Array, *, closed: bool) -> Array:
-    """Of all numbers of a distribution, the share below each of `x`, or up to it where closed."""
+    """Return the cumulative distribution at `x`: the share below, or up to it where closed."""
     match law:
         case Constant(value):
             at = float(value)
@@ -103,29 +107,29 @@ def share_below(law: Distribution, x: Array, *, closed: bool) -> Array:
 
 
 def shares(law: Distribution) -> dict[str, float]:
-    """Of each text of a distribution."""
+    """Return the probability of each text of a distribution."""
     if isinstance(law, Files):
         return dict.fromkeys(law.names, 1.0 / len(law.names))
-    found = Counter[str]()
+    found = defaultdict[str, float](float)
     for one, weight in zip(law.values, law.weights, strict=True) if isinstance(law, Choice) else [(law, 1.0)]:
         for text, share in ({str(one.at(0.5)): 1.0} if isinstance(one, Constant) else shares(one)).items():
-            found[text] += weight * share  # type: ignore[assignment]
+            found[text] += weight * share
     total = sum(found.values())
     return {text: share / total for text, share in found.items() if share}
 
 
-def _compared(name: str, law: Distribution, values: Sequence[Any], spec: Spec) -> FitTest:
+def _spec_test(name: str, law: Distribution, values: Values, spec: Spec) -> FitTest:
     if name != "background.kind" or NONE not in spec.distributions["environment.name"].ends:
         return fit_test(name, law, values)
-    plain = {"environment": "gradient"}  # where there is no environment, see `Drawing.parameters`
-    stated = Counter[str]()
+    plain = {"environment": "gradient"}  # without an environment, see `Sampler.parameters`
+    stated = defaultdict[str, float](float)
     for text, share in shares(law).items():
-        stated[plain.get(text, text)] += share  # type: ignore[assignment]
-    return _texts(name, dict(stated), [plain.get(value, value) for value in values])
+        stated[plain.get(text, text)] += share
+    return _shares_test(name, stated, [plain.get(str(value), str(value)) for value in values])
 
 
-def _numbers(name: str, law: Distribution, values: Array) -> FitTest:
-    """values : sorted"""
+def _numbers_test(name: str, law: Distribution, values: Array) -> FitTest:
+    """Return the Kolmogorov-Smirnov test of sorted values, which are rounded to six digits."""
     count, near = len(values), _HALF_DIGIT * np.abs(values)
     up_to = np.searchsorted(values, values, "right") / count
     below = np.searchsorted(values, values, "left") / count
@@ -138,21 +142,22 @@ def _numbers(name: str, law: Distribution, values: Array) -> FitTest:
     return FitTest(name, count, stated, found, distance, float(_USUAL / sqrt(count)), chance)
 
 
-def _texts(name: str, stated: dict[str, float], values: Sequence[str]) -> FitTest:
-    count, found = len(values), Counter(values)
-    distance = max(abs(found[text] / count - stated.get(text, 0.0)) for text in {*stated, *found})
+def _shares_test(name: str, stated: Mapping[str, float], values: Sequence[str]) -> FitTest:
+    """Return the chi-square test of texts against their probabilities."""
+    count, counts = len(values), Counter(values)
+    distance = max(abs(counts[text] / count - stated.get(text, 0.0)) for text in {*stated, *counts})
     usual = max(sqrt(2 / np.pi * share * (1 - share) / count) for share in stated.values())
-    chance = 0.0 if found.keys() - stated.keys() else _chi_square(stated, found, count)
-    came = {text: found[text] / count for text in stated}
-    return FitTest(name, count, _told(stated), _told(came), distance, usual, chance)
+    chance = 0.0 if counts.keys() - stated.keys() else _chi_square(stated, counts, count)
+    found = {text: counts[text] / count for text in stated}
+    return FitTest(name, count, _listed(stated), _listed(found), distance, usual, chance)
 
 
-def _told(of: dict[str, float]) -> str:
-    return ", ".join(f"{text} {of[text]:.3g}" for text in sorted(of)[:_MOST_NAMED])
+def _listed(found: Mapping[str, float]) -> str:
+    return ", ".join(f"{text} {found[text]:.3g}" for text in sorted(found)[:_MOST_NAMED])
 
 
-def _chi_square(stated: dict[str, float], found: Counter[str], count: int) -> float:
-    """The chance of counts as far from their shares; rare texts count as one."""
+def _chi_square(stated: Mapping[str, float], found: Counter[str], count: int) -> float:
+    """Return the p-value of counts against their probabilities; rare texts are pooled."""
     cells = [(found[text], count * share) for text, share in stated.items() if count * share >= _FEWEST]
     rest = count - sum(one for one, _ in cells), count - sum(mean for _, mean in cells)
     if rest[1] > _FEWEST or rest[0]:
@@ -167,13 +172,7 @@ def _moments(values: Array) -> str:
     return f"{rounded(float(values.mean())):.5g}, {rounded(float(values.std())):.5g}"
 
 
-def _of_people(file: Any) -> NDArray[np.int64]:
-    """Rows of the first image of each person."""
-    numbers = np.array(file.read(columns=["person.number"]).column(0).to_pylist(), np.int64)
-    return np.unique(numbers, return_index=True)[1]
-
-
 def _column(name: str) -> str:
-    """Of a parameter; a pair of targets has two, which are alike."""
+    """Return the column of a parameter; a pair of targets has two, which are equal."""
     start, _, target = name.partition(".")
     return f"pose.{targets_of([target])[0]}" if start == "pose" else name

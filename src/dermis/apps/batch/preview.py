@@ -1,10 +1,10 @@
-"""A data set before it is drawn: what its images would be, as a table and on a contact sheet."""
+"""Preview of a data set: its sampled parameters as a table, and a contact sheet of its first images."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +22,34 @@ _COLUMNS, _SIDE, _GAP = 4, 192, 4
 _SMALL = {"atlas": 512, "shadow_size": 1024}
 _WIDEST = 60  # letters of a column
 _NUMBERS_OF_PEOPLE = "person.number", "person.seed"
-_SHORTER_WAY = 12  # values that are counted one by one
+_SHORTER_WAY = 12  # values that are listed
 
-Row = dict[str, Any]
+
+class _RowFields(TypedDict):
+    """Fields of every row.
+
+    drawn : the distribution as TOML
+    first : values of the first 16 images, None where one has none
+    images : number of the first 20,000 that have it
+    """
+
+    parameter: str
+    drawn: str
+    first: list[float | str | None]
+    images: int
+
+
+class Row(_RowFields, total=False):
+    """Row of the table: extremes and mean of numbers, or counts by value of texts."""
+
+    min: float
+    mean: float
+    max: float
+    counts: dict[str, int]
 
 
 def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[Row], NDArray[np.uint8]]:
-    """Parameters of a data set, and its first 16 pictures, small.
-
-    Rows have: parameter; drawn, as the spec has it; first, values of the first 16 images, None where one has
-    none; images, how many of the first 20,000 have it; min, mean and max of them, or counts by value.
-    The picture is (h, w, 3) sRGB.
+    """Return the table of parameters of a data set, and a sheet (h, w, 3) of its first 16 pictures, sRGB.
 
     Raises DermisError as `SceneMaker.scene` and `Renderer.draw` do.
     """
@@ -40,15 +57,15 @@ def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[Row], NDArray[np.ui
 
 
 def parameter_rows(spec: Spec) -> list[Row]:
-    """A row for each parameter, see `dry_run`; those that never change are left out."""
+    """Return a row for each parameter that varies."""
     found = [spec.parameters(k) for k in range(min(spec.count, MOST_COUNTED))]
     names = dict.fromkeys(name for one in found for name in one)
-    changing = [name for name in names if not isinstance(spec.distributions.get(name), Constant)]
-    return [_row(spec, name, found) for name in changing if name not in _NUMBERS_OF_PEOPLE]
+    varying = [name for name in names if not isinstance(spec.distributions.get(name), Constant)]
+    return [_row(spec, name, found) for name in varying if name not in _NUMBERS_OF_PEOPLE]
 
 
 def table_lines(rows: Sequence[Row]) -> list[str]:
-    """The rows as a table for people: parameter, what it is drawn from, and what comes of it."""
+    """Return the rows as lines of a table for people."""
     cells = [("parameter", "drawn", "images", "min", "mean", "max"), *map(_cells, rows)]
     widths = [max(len(row[k]) for row in cells if len(row) > 4 or k < 3) for k in range(3)]
     lines = []
@@ -60,48 +77,44 @@ def table_lines(rows: Sequence[Row]) -> list[str]:
 
 
 def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
-    """(h, w, 3) the first 16 pictures with their numbers, sRGB."""
+    """Return the first 16 pictures with their numbers (h, w, 3), sRGB."""
     from PIL import Image, ImageDraw
 
     width, height = (max(_SIDE * side // max(spec.size), 1) for side in spec.size)
     small = {name: min(value, getattr(spec.render, name)) for name, value in _SMALL.items()}
-    tried = spec.replace(render=spec.render.replace(size=(width, height), **small))
+    spec = spec.replace(render=spec.render.replace(size=(width, height), **small))
     count = min(spec.count, SHOWN)
     across = min(count, _COLUMNS)
     down = -(-count // across)
     size = across * (width + _GAP) - _GAP, down * (height + _GAP) - _GAP
     sheet = Image.new("RGB", size, (20, 20, 20))
     draw = ImageDraw.Draw(sheet)
-    for k, picture in enumerate(_pictures(tried, count, adapter)):
-        place = (k % across) * (width + _GAP), (k // across) * (height + _GAP)
-        sheet.paste(Image.fromarray(picture), place)
-        told = place[0] + 4, place[1] + 2
-        draw.text(told, str(k), fill=(255, 255, 255), stroke_width=1, stroke_fill=(0, 0, 0))
-    return np.array(sheet)
-
-
-def _pictures(spec: Spec, count: int, adapter: str) -> Iterator[NDArray[np.uint8]]:
     maker, renderer = SceneMaker(spec), Renderer(adapter)
     for k in range(count):
-        yield renderer.draw(*maker.scene(spec.parameters(k)), timed=False).srgb8()
+        picture = renderer.draw(*maker.scene(spec.parameters(k)), timed=False).srgb8()
+        x, y = (k % across) * (width + _GAP), (k // across) * (height + _GAP)
+        sheet.paste(Image.fromarray(picture), (x, y))
+        draw.text((x + 4, y + 2), str(k), fill=(255, 255, 255), stroke_width=1, stroke_fill=(0, 0, 0))
+    return np.array(sheet)
 
 
 def _row(spec: Spec, name: str, found: Sequence[Parameters]) -> Row:
     values = [one[name] for one in found if name in one]
     drawn = spec.distributions.get(name)
-    row: Row = {"parameter": name, "drawn": "" if drawn is None else value_text(drawn.spec_value())}
-    row |= {"first": [one.get(name) for one in found[:SHOWN]], "images": len(values)}
+    text = "" if drawn is None else value_text(drawn.spec_value())
+    first = [one.get(name) for one in found[:SHOWN]]
+    row: Row = {"parameter": name, "drawn": text, "first": first, "images": len(values)}
     numbers = [value for value in values if not isinstance(value, str)]
     if not numbers:
-        return row | {"counts": dict(Counter(map(str, values)).most_common())}
-    return row | {"min": min(numbers), "mean": float(np.mean(numbers)), "max": max(numbers)}
+        return {**row, "counts": dict(Counter(map(str, values)).most_common())}
+    return {**row, "min": min(numbers), "mean": float(np.mean(numbers)), "max": max(numbers)}
 
 
 def _cells(row: Row) -> tuple[str, ...]:
     drawn = row["drawn"] if len(row["drawn"]) <= _WIDEST else f"{row['drawn'][: _WIDEST - 4]} ..."
     start = row["parameter"], drawn, str(row["images"])
     if "counts" not in row:
-        return *start, *(f"{row[name]:.4g}" for name in ("min", "mean", "max"))
+        return *start, *(f"{one:.4g}" for one in (row["min"], row["mean"], row["max"]))
     counts = [f"{name} {count}" for name, count in row["counts"].items()]
     more = f", and {len(counts) - _SHORTER_WAY} more" if len(counts) > _SHORTER_WAY else ""
     return *start, ", ".join(counts[:_SHORTER_WAY]) + more

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from dermis.apps.batch.atomic_files import sync
 from dermis.base.reading import parse_json, read_file, understood
@@ -26,13 +26,13 @@ MOST_STAMP_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Stamp:
-    """What a shard says of itself.
+    """Record that ends a shard and proves that it is whole.
 
-    spec : digest of the data set's
-    first, stop : its images, from the first to before the last
+    spec : digest of the spec
+    first, stop : its images, from `first` to before `stop`
     left_out : number and reason of images that could not be made
-    sha256 : of all that is in it before this
-    made_with : the adapter, and versions of what drew
+    sha256 : of all bytes before the stamp
+    made_with : adapter and versions of the software
     """
 
     spec: str
@@ -44,43 +44,38 @@ class Stamp:
     made_with: dict[str, str] = field(default_factory=dict)
 
     def data(self) -> bytes:
-        """Its bytes, the last of which are a hash of the others."""
-        told = asdict(self)
-        check = hashlib.sha256(json.dumps(told).encode()).hexdigest()
-        return (json.dumps({**told, "check": check}, indent=1) + "\n").encode()
+        """Return the bytes, which end with a hash of the others."""
+        values = asdict(self)
+        check = hashlib.sha256(json.dumps(values).encode()).hexdigest()
+        return (json.dumps({**values, "check": check}, indent=1) + "\n").encode()
 
 
 def read_stamp(data: bytes, culprit: object) -> Stamp:
-    """The stamp of its bytes.
+    """Return the stamp of its bytes.
 
-    Raises DermisError for what is none.
+    Raises DermisError for other bytes.
     """
-    told = parse_json(data, culprit, "what a whole shard says of itself")
+    values = parse_json(data, culprit, "what a whole shard says of itself")
     with understood(culprit, "what a whole shard says of itself", KeyError, TypeError, AttributeError):
-        index, first, stop = (told[name] for name in ("index", "first", "stop"))
-        texts = [told["spec"], told["sha256"], *told["made_with"], *told["made_with"].values()]
-        left_out = tuple((number, reason) for number, reason in told["left_out"])
-        numbers = [index, first, stop, *(number for number, _ in left_out)]
-        texts += [reason for _, reason in left_out]
-        if any(type(one) is not int or one < 0 for one in numbers) or not all(
-            isinstance(text, str) for text in texts
-        ):
+        span = tuple(values[name] for name in ("index", "first", "stop"))
+        left_out = tuple((number, reason) for number, reason in values["left_out"])
+        spec, sha256, made = values["spec"], values["sha256"], values["made_with"]
+        numbers = [*span, *(number for number, _ in left_out)]
+        texts = [spec, sha256, *made, *made.values(), *(reason for _, reason in left_out)]
+        whole = all(type(one) is int and one >= 0 for one in numbers)
+        if not whole or not all(isinstance(text, str) for text in texts):
             raise ValueError("its values are of other kinds")
-        found = Stamp(told["spec"], index, first, stop, left_out, told["sha256"], dict(told["made_with"]))
+        found = Stamp(spec, *span, left_out, sha256, dict(made))
         if found.data() != data:
             raise ValueError("its hash is that of another text")
         return found
 
 
 @cache
-def versions() -> dict[str, str]:
-    """Of what draws."""
-    return {"dermis": version(), "wgpu": metadata.version("wgpu"), "python": platform.python_version()}
-
-
 def made_with(adapter: str) -> dict[str, str]:
-    """What a shard is made with."""
-    return {"adapter": adapter, **versions()}
+    """Return the adapter and the versions of the software that renders."""
+    versions = {"dermis": version(), "wgpu": metadata.version("wgpu"), "python": platform.python_version()}
+    return {"adapter": adapter, **versions}
 
 
 _BLOCK = 512
@@ -89,24 +84,24 @@ _CHUNK = 1 << 20
 
 
 class TarWriter:
-    """A tar file of regular files: fixed time, owner and mode, in the order in which they come."""
+    """Writer of a tar file of regular files with fixed time, owner and mode."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("xb")
         self._hash = hashlib.sha256()
 
     def add(self, name: str, data: bytes) -> None:
-        """Raises OSError when the disk is full."""
+        """Write a file. Raises OSError when the disk is full."""
         for piece in _pieces(name, data):
             self._file.write(piece)
             self._hash.update(piece)
 
     def sha256(self) -> str:
-        """Of all bytes so far."""
+        """Return the hash of all bytes so far."""
         return self._hash.hexdigest()
 
     def finish(self, stamp: bytes) -> None:
-        """Close it with its stamp; it is on the disk then."""
+        """Close it with its stamp, after it has reached the disk."""
         self.add(STAMP_NAME, stamp)
         self._file.write(_END)
         self._file.flush()
@@ -114,12 +109,12 @@ class TarWriter:
         self._file.close()
 
     def close(self) -> None:
-        """Close it as it is."""
+        """Close it unfinished."""
         self._file.close()
 
 
 class TarMember(NamedTuple):
-    """A file in a tar file, whose bytes lie at a place of it."""
+    """File in a tar file: its name, and where its bytes are."""
 
     name: str
     place: int
@@ -127,9 +122,9 @@ class TarMember(NamedTuple):
 
 
 def tar_members(file: BinaryIO) -> Iterator[TarMember]:
-    """The files in a tar file.
+    """Yield the files of a tar file.
 
-    ValueError : it is damaged or cut off, or holds what is no regular file
+    Raises ValueError where it is damaged or cut off, or holds something else than regular files.
     """
     length, place = file.seek(0, os.SEEK_END), 0
     while True:
@@ -145,9 +140,9 @@ def tar_members(file: BinaryIO) -> Iterator[TarMember]:
 
 
 def tar_stamp(file: BinaryIO) -> tuple[int, bytes]:
-    """Where the stamp of a tar file begins, and its bytes, found from the end.
+    """Return where the stamp of a tar file begins, and its bytes, found from the end.
 
-    ValueError : there is none, or other bytes follow it
+    Raises ValueError where there is none, or other bytes follow it.
     """
     length = file.seek(0, os.SEEK_END)
     start = max(0, length - MOST_STAMP_BYTES - 3 * _BLOCK)
@@ -164,7 +159,7 @@ def tar_stamp(file: BinaryIO) -> tuple[int, bytes]:
 
 
 def tar_sha256(file: BinaryIO, stop: int) -> str:
-    """Of the bytes of a tar file before a place."""
+    """Return the hash of the bytes of a tar file before an offset."""
     digest = hashlib.sha256()
     file.seek(0)
     while stop > 0 and (piece := file.read(min(_CHUNK, stop))):
@@ -174,7 +169,7 @@ def tar_sha256(file: BinaryIO, stop: int) -> str:
 
 
 def _pieces(name: str, data: bytes) -> tuple[bytes, bytes, bytes]:
-    """A file in a tar file: its header, its bytes, and what fills the last block."""
+    """Return a file of a tar file: header, bytes, and padding of the last block."""
     head = tarfile.TarInfo(name)
     head.size = len(data)
     return head.tobuf(tarfile.USTAR_FORMAT), data, bytes(-len(data) % _BLOCK)
@@ -191,43 +186,43 @@ def _member(block: bytes, place: int) -> TarMember:
 
 
 class FolderWriter:
-    """A folder of files, in the order in which they come."""
+    """Writer of a folder of files."""
 
     def __init__(self, path: Path) -> None:
         path.mkdir()
         self._path, self._hash = path, hashlib.sha256()
 
     def add(self, name: str, data: bytes) -> None:
-        """Raises OSError when the disk is full."""
+        """Write a file. Raises OSError when the disk is full."""
         with (self._path / name).open("xb") as file:
             file.write(data)
-        _count(self._hash, name, data)
+        self._hash.update(_hashed(name, data))
 
     def sha256(self) -> str:
-        """Of the names and bytes so far."""
+        """Return the hash of the names and bytes so far."""
         return self._hash.hexdigest()
 
     def finish(self, stamp: bytes) -> None:
-        """Close it with its stamp; what a loss of power takes away is missed by the hash."""
+        """Write the stamp; files lost with the power are detected by the hash."""
         self.add(STAMP_NAME, stamp)
         sync(self._path / STAMP_NAME)
         sync(self._path)
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no file is open."""
 
 
 def folder_sha256(path: Path, names: Iterable[str]) -> str:
-    """As `FolderWriter.sha256` of the files in a folder.
+    """Return `FolderWriter.sha256` of the files in a folder.
 
     Raises DermisError for one that cannot be read.
     """
     digest = hashlib.sha256()
     for name in names:
-        _count(digest, name, read_file(path / name, "a file of a shard", MOST_BYTES))
+        digest.update(_hashed(name, read_file(path / name, "a file of a shard", MOST_BYTES)))
     return digest.hexdigest()
 
 
-def _count(digest: Any, name: str, data: bytes) -> None:
-    digest.update(f"{name} {len(data)}\n".encode())
-    digest.update(data)
+def _hashed(name: str, data: bytes) -> bytes:
+    """Return the bytes of a file in the hash of a folder."""
+    return f"{name} {len(data)}\n".encode() + data

@@ -1,14 +1,13 @@
-"""Shards: the unit in which a data set is drawn, written and found again."""
+"""Shards: the unit in which a data set is rendered, written and found again."""
 
 from __future__ import annotations
 
-import contextlib
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 from dermis.apps.batch.atomic_files import leftovers, remove, take_name, unfinished_name
 from dermis.apps.batch.shard_formats import (
@@ -33,8 +32,7 @@ _SHARD_NAME = re.compile(r"shard-(\d{5,9})(\.tar)?")
 _LONGEST_REASON = 200  # letters
 
 
-@dataclass(frozen=True, order=True)
-class Shard:
+class Shard(NamedTuple):
     """Images from `first` to before `stop`."""
 
     index: int
@@ -43,31 +41,31 @@ class Shard:
 
 
 def shards_of(spec: Spec) -> list[Shard]:
-    """All shards of a data set, the last one with the images that are left."""
+    """Return all shards of a data set, the last one with the remaining images."""
     starts = range(0, spec.count, spec.shard_size)
     return [Shard(k, first, min(first + spec.shard_size, spec.count)) for k, first in enumerate(starts)]
 
 
 def shard_path(out: Path, shard: Shard, spec: Spec) -> Path:
-    """Its tar file or folder."""
+    """Return the path of a shard's tar file or folder."""
     return out / f"shard-{shard.index:05d}{'.tar' if spec.format == 'webdataset' else ''}"
 
 
 def shard_index(path: Path) -> int | None:
-    """The number of a shard by its name, None for what is none."""
+    """Return the number of a shard by its name, None for other names."""
     found = _SHARD_NAME.fullmatch(path.name)
     return int(found[1]) if found else None
 
 
 def key_of(number: int) -> str:
-    """How the names of an image's files begin."""
+    """Return the prefix of the names of an image's files."""
     return f"{number:09d}"
 
 
 class ShardWriter:
-    """Writes a shard under another name, which becomes its own when the context is left and it is whole.
+    """Writer of a shard, which gets its name when the context is left without an error.
 
-    adapter : what draws it, for the data sheet
+    adapter : that renders it, for the datasheet
 
     Raises DermisError when it cannot be written, with nothing left of it.
     """
@@ -87,7 +85,7 @@ class ShardWriter:
         return self
 
     def add(self, number: int, entries: Mapping[str, bytes]) -> None:
-        """Write the files of an image, by suffix; images come in the order of their numbers."""
+        """Write the files of an image by suffix; images come in the order of their numbers."""
         if not self._next <= number < self._shard.stop:
             raise ValueError(f"image {number} comes after {self._next - 1}, in {self._shard}")
         self._next, self._written = number + 1, self._written + 1
@@ -111,7 +109,7 @@ class ShardWriter:
         except OSError as fault:
             refuse_output(self._target, fault)
         finally:
-            with contextlib.suppress(OSError):  # a full disk says so again
+            with suppress(OSError):  # a full disk says so again
                 self._files.close()
             remove(self._unfinished)
 
@@ -121,7 +119,7 @@ class ShardWriter:
             raise ValueError(f"{self._written} images and {len(self._left_out)} left out are not {shard}")
         left_out = tuple(sorted(self._left_out.items()))
         digest, made = self._files.sha256(), made_with(self._adapter)
-        stamp = Stamp(spec.digest(), shard.index, shard.first, shard.stop, left_out, digest, made).data()
+        stamp = Stamp(spec.digest(), *shard, left_out, digest, made).data()
         if len(stamp) > MOST_STAMP_BYTES:
             came = f"{len(left_out)} could not be made, such as: {left_out[0][1]}"
             refuse(self._target, "a shard of images most of which can be made", came, "Correct the spec")
@@ -129,9 +127,9 @@ class ShardWriter:
 
 
 def stamp_of(path: Path) -> Stamp:
-    """What a shard says of itself; its other bytes are not read.
+    """Return the stamp of a shard; its other bytes are not read.
 
-    Raises DermisError where it is not whole, as far as its end tells.
+    Raises DermisError where it is not whole, as far as its end shows.
     """
     if path.is_dir():
         return read_stamp(read_file(path / STAMP_NAME, EXPECTED, MOST_STAMP_BYTES), path)
@@ -140,7 +138,7 @@ def stamp_of(path: Path) -> Stamp:
 
 
 def is_there(out: Path, shard: Shard, spec: Spec) -> bool:
-    """Whether a shard stands under its name, which it gets when it is whole.
+    """Return whether a shard exists under its name, which it gets when it is whole.
 
     Raises DermisError for a shard of another data set.
     """
@@ -149,34 +147,29 @@ def is_there(out: Path, shard: Shard, spec: Spec) -> bool:
         stamp = stamp_of(path)
     except DermisError:
         return False
-    if stamp.spec != spec.digest() or (stamp.index, stamp.first, stamp.stop) != (
-        shard.index,
-        shard.first,
-        shard.stop,
-    ):
+    if (stamp.spec, stamp.index, stamp.first, stamp.stop) != (spec.digest(), *shard):
         remedy = "Choose another folder, or give the spec that it was begun with"
         refuse(path, "a shard of this data set", "it belongs to that of another spec", remedy)
     return True
 
 
 def is_whole(out: Path, shard: Shard, spec: Spec) -> bool:
-    """Whether a shard is there with every byte as it was written: all of it is read.
+    """Return whether a shard exists with every byte as it was written: all of it is read.
 
     Raises DermisError for a shard of another data set.
     """
-    path = shard_path(out, shard, spec)
     if not is_there(out, shard, spec):
         return False
-    try:
+    path = shard_path(out, shard, spec)
+    with suppress(DermisError):
         return _sha256(path) == stamp_of(path).sha256
-    except DermisError:
-        return False
+    return False
 
 
 def remove_leftovers(out: Path, shards: Collection[Shard] | None = None) -> None:
-    """Remove what killed runs left unfinished.
+    """Remove unfinished files of killed runs.
 
-    shards : of which no other run is at work; all where None
+    shards : that no other run works on; all where None
     """
     mine = None if shards is None else {shard.index for shard in shards}
     for path, name in leftovers(out).items():
@@ -186,7 +179,7 @@ def remove_leftovers(out: Path, shards: Collection[Shard] | None = None) -> None
 
 
 def _sha256(path: Path) -> str:
-    """Of what lies in a shard before its stamp."""
+    """Return the hash of all files of a shard before its stamp."""
     if path.is_dir():
         return folder_sha256(path, sorted(one.name for one in path.iterdir() if one.name != STAMP_NAME))
     with opened(path, EXPECTED) as file, understood(path, EXPECTED):

@@ -11,22 +11,11 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import BaseModel, Field, PrivateAttr
 
+from dermis.apps.batch import spec_tables as tables
 from dermis.apps.batch.distributions import Distribution, Files
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
 from dermis.apps.batch.spec_checks import check_landmarks, check_spec
-from dermis.apps.batch.spec_tables import (
-    BackgroundTable,
-    CameraTable,
-    Correlated,
-    DistributionField,
-    EnvironmentTable,
-    ExpressionTable,
-    GazeTable,
-    LightTable,
-    PersonTable,
-    TurnTable,
-)
 from dermis.base.errors import about, refuse, shown_value
 from dermis.base.quantities import whole_number
 from dermis.base.reading import is_file, named_path, read_file, read_toml
@@ -41,11 +30,8 @@ from dermis.scene.toml_text import key_text, table_text
 MOST_IMAGES = 10**9
 RENDER: Mapping[str, object] = {"atlas": 1024, "exposure": "auto"}
 """Settings that a data set has where its spec says nothing."""
-ELSEWHERE = {
-    "size": "size, above all tables",
-    "background": "[background]",
-    "background_blur": "[background]",
-}
+_BACKGROUND = "[background]"
+ELSEWHERE = {"size": "size, above all tables", "background": _BACKGROUND, "background_blur": _BACKGROUND}
 """Settings that [render] does not hold, and where a spec has them."""
 _Weight = Annotated[float, Field(ge=0, le=1)]
 _HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
@@ -77,29 +63,29 @@ class Spec(Plain):
     """Files of the outputs: png (16 bits where they suffice), exr or npy (all bits)."""
     render: Settings = Field(default_factory=lambda: Settings(size=(512, 512), **RENDER))
     """How pictures are computed; `size` and the background stand elsewhere."""
-    person: PersonTable = PersonTable()
+    person: tables.PersonTable = tables.PersonTable()
     """Who is seen."""
-    expression: ExpressionTable = ExpressionTable()
+    expression: tables.ExpressionTable = tables.ExpressionTable()
     """What the face does."""
     expressions: dict[str, dict[str, _Weight]] = Field(default_factory=dict)
     """Expressions of the spec's own: weights of targets, or of pairs without Left and Right."""
-    pose: dict[str, Annotated[Distribution, DistributionField()]] = Field(default_factory=dict)
+    pose: dict[str, Annotated[Distribution, tables.DistributionField()]] = Field(default_factory=dict)
     """Weights of morph targets, or of pairs, in place of those that the expression gives."""
-    head: TurnTable = TurnTable()
+    head: tables.TurnTable = tables.TurnTable()
     """How the head is turned."""
-    gaze: GazeTable = GazeTable()
+    gaze: tables.GazeTable = tables.GazeTable()
     """Where the eyes look."""
-    camera: CameraTable = CameraTable()
+    camera: tables.CameraTable = tables.CameraTable()
     """From where the face is seen."""
-    skin: dict[str, Annotated[Distribution, DistributionField()]] = Field(default_factory=dict)
+    skin: dict[str, Annotated[Distribution, tables.DistributionField()]] = Field(default_factory=dict)
     """Dials of the skin, as of scenes: roughness, oiliness, ..."""
-    light: LightTable = LightTable()
+    light: tables.LightTable = tables.LightTable()
     """Lamps."""
-    environment: EnvironmentTable = EnvironmentTable()
+    environment: tables.EnvironmentTable = tables.EnvironmentTable()
     """Light from all around."""
-    background: BackgroundTable = BackgroundTable()
+    background: tables.BackgroundTable = tables.BackgroundTable()
     """What is behind the head."""
-    correlated: tuple[Correlated, ...] = ()
+    correlated: tuple[tables.Correlated, ...] = ()
     """Parameters that go together."""
     files: dict[str, str] = Field(default_factory=dict)
     """SHA-256 of each file that the spec names; found when it is read, and checked where it is stated."""
@@ -181,26 +167,26 @@ def load_spec(path: str | Path, **values: object) -> Spec:
     Raises DermisError, naming table and key, for what cannot be rendered and for missing files.
     """
     path = named_path(path, "a spec of a data set in TOML")
-    tables = read_toml(path, "a spec of a data set in TOML")
+    data = read_toml(path, "a spec of a data set in TOML")
     with about(path):
-        return spec_of({**tables, **values}, path.parent)
+        return spec_of({**data, **values}, path.parent)
 
 
-def spec_of(tables: Mapping[str, object], folder: Path = Path()) -> Spec:
-    """Return the spec of parsed TOML tables.
+def spec_of(data: Mapping[str, object], folder: Path = Path()) -> Spec:
+    """Return the spec of parsed TOML.
 
     folder : of the files that it names
 
     Raises DermisError as `load_spec` does.
     """
-    if "folder" in tables:
+    if "folder" in data:
         refuse("folder", "no such key", "it came", "Files lie relative to the spec's own folder")
     given = {
-        name: table if name == "files" else _with_files(table, folder, name) for name, table in tables.items()
+        name: table if name == "files" else _with_files(table, folder, name) for name, table in data.items()
     }
     given["render"] = _render(given.pop("size", (512, 512)), given.get("render", {}))
     if isinstance(groups := given.get("correlated", ()), list | tuple):
-        given["correlated"] = tuple(_model(Correlated, "correlated", group) for group in groups)
+        given["correlated"] = tuple(_model(tables.Correlated, "correlated", group) for group in groups)
     spec = _model(Spec, "", given | {"folder": folder})
     ends = [end for name in _FILES if name in spec.distributions for end in spec.distributions[name].ends]
     tables_named = (name for name in spec.landmarks if name not in SETS)

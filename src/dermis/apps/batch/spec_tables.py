@@ -13,7 +13,7 @@ from pydantic_core.core_schema import (
     plain_serializer_function_ser_schema,
 )
 
-from dermis.apps.batch.distributions import Constant, Distribution, Uniform, parse_distribution
+from dermis.apps.batch.distributions import Constant, Distribution, Uniform, parse_distribution, require
 from dermis.human.published import OLD, YOUNG
 from dermis.scene.lights import light_presets
 from dermis.scene.plain import Plain
@@ -96,17 +96,16 @@ class Correlated(Plain):
 
     @model_validator(mode="after")
     def _possible(self) -> Correlated:
-        if not 2 <= len(set(self.of)) == len(self.of) <= _MOST_NAMES:
-            raise ValueError(f"2 to {_MOST_NAMES} names, each once")
-        if isinstance(self.correlation, tuple) and {len(self.of), *map(len, self.correlation)} != {
-            len(self.correlation)
-        }:
-            raise ValueError(f"a correlation of {len(self.of)} rows of {len(self.of)} numbers")
+        count = len(self.of)
+        require(2 <= len(set(self.of)) == count <= _MOST_NAMES, f"2 to {_MOST_NAMES} names, each once")
+        if isinstance(self.correlation, tuple):
+            square = [len(row) for row in self.correlation] == [count] * count
+            require(square, f"a correlation of {count} rows of {count} numbers")
         matrix = self.matrix
-        if not (np.array_equal(matrix, matrix.T) and (np.diag(matrix) == 1).all()):
-            raise ValueError("a correlation that is symmetric, with 1 on its diagonal")
-        if np.linalg.eigvalsh(matrix)[0] < 1e-6:
-            raise ValueError("a correlation that is positive definite: these cannot all be at once")
+        symmetric = np.array_equal(matrix, matrix.T) and (np.diag(matrix) == 1).all()
+        require(bool(symmetric), "a correlation that is symmetric, with 1 on its diagonal")
+        definite = np.linalg.eigvalsh(matrix)[0] >= 1e-6
+        require(definite, "a correlation that is positive definite: these cannot all be at once")
         return self
 
     @property
