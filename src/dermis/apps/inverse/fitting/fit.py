@@ -7,24 +7,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dermis.apps.inverse.fitting.frames import Frames
 from dermis.apps.inverse.fitting.initial_guess import InitialGuess, suns_around, suns_to_try
 from dermis.apps.inverse.fitting.inputs import Photograph, read_photograph, subject_of
 from dermis.apps.inverse.fitting.placement import place_by_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
-from dermis.apps.inverse.fitting.solve import ROBUST, Problem, State, certainty_of, solve, tint
-from dermis.apps.inverse.fitting.unknowns import usual_point
+from dermis.apps.inverse.fitting.solve import ROBUST, Problem, certainty_of, solve, tint
+from dermis.apps.inverse.fitting.unknowns import Point, usual_point
 from dermis.base.errors import refuse, shown_value
 from dermis.base.quantities import number, numbers, whole_number
 from dermis.frame.renderer import Renderer
+from dermis.optics.media import Floats
 from dermis.scene.settings import Settings
 
-Floats = NDArray[np.float64]
 NOISE = 0.02
 SIDE, ATLAS, SHADOWS = 128, 256, 512
 _LEAST_PIXELS = 200
@@ -47,7 +47,7 @@ def fit(
     adapter: str = "auto",
     told: Callable[[int, int], None] = lambda done, of: None,
 ) -> FitResult:
-    """Light and skin of a photograph of a head whose shape and camera are known.
+    """Fit light and skin to a photograph of a head whose shape and camera are known.
 
     photo : a file (PNG, JPEG or TIFF in sRGB, EXR linear), or pixels (h, w, 3): bytes in sRGB, floats linear
     head : a scene or its file (.toml), a head or what `load_head` takes, a `Human`
@@ -73,6 +73,7 @@ def fit(
     exposure = number("exposure", exposure, 1e-6, 1e6, "20 stops either way")
     noise, robust = number("noise", noise, 1e-4, 1.0), number("robust", robust, 0.5, 1e12)
     given = _white(white)
+    scale = given * exposure
     whole = read_photograph(photo)
     small = whole.within(whole_number("side", side, 32, 1024, "pixels"))
     subject = subject_of(head, camera)
@@ -83,11 +84,11 @@ def fit(
     )
     with TemporaryDirectory() as folder:
         frames = Frames(Renderer(adapter, depth=2), subject.scene, settings, Path(folder))
-        state, slopes, problem = _solved(
-            frames, small, (given * exposure, noise, robust, white == "specular"), suns, told
-        )
-        picture = _picture(frames, state, given * exposure)
-    known = certainty_of(problem, state, slopes)
+        tried = _find_skin(frames, small)
+        problem = Problem(frames, small.linear[frames.mask] / scale, noise, white == "specular", robust)
+        state, slopes = solve(problem, _start(problem, tried, suns), told)
+        scene = frames.lit(state.point, state.strengths)
+        picture = frames.picture(scene) * scale * tint(state.point)
     off = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
     return FitResult(
         subject,
@@ -96,7 +97,7 @@ def fit(
         given * tint(state.point),
         exposure,
         whole.size,
-        known,
+        certainty_of(problem, state, slopes),
         small.linear,
         picture,
         frames.mask,
@@ -106,42 +107,31 @@ def fit(
     )
 
 
-def _solved(
-    frames: Frames,
-    photo: Photograph,
-    how: tuple[Floats, float, float, bool],
-    suns: int,
-    told: Callable[[int, int], None],
-) -> tuple[State, Floats, Problem]:
-    """The best state with the derivatives there."""
-    scale, noise, robust, free_white = how
+def _find_skin(frames: Frames, photo: Photograph) -> Point:
+    """Find the pixels of lit skin, and return the usual point with the suns to try."""
     camera = frames.scene.camera
     way = np.subtract(camera.position, camera.target)
     tried = usual_point(suns_to_try(way / np.linalg.norm(way)))
     frames.find_mask(tried, photo.trusted)
-    lit = photo.linear.max(axis=2) > 0.0
-    frames.mask &= lit
+    frames.mask &= photo.linear.max(axis=2) > 0.0
     if frames.mask.sum() < _LEAST_PIXELS:
         came = f"{int(frames.mask.sum())} pixels of it are neither clipped nor black"
         refuse("photo", "skin where the head is", came, "Check camera and exposure, or take a larger side")
-    target = photo.linear[frames.mask] / scale
-    problem = Problem(frames, target, noise, free_white, robust)
-    first = problem.weights(target.mean(axis=1, keepdims=True) * np.ones(3))
-    start = InitialGuess(frames, tried, target, first).best(suns)
+    return tried
+
+
+def _start(problem: Problem, tried: Point, suns: int) -> Point:
+    """Return the point at which the fit starts: a coarse search, then a finer one around its suns."""
+    frames, target, weight = problem.frames, problem.target, problem.even_weights()
+    start = InitialGuess(frames, tried, target, weight).best(suns)
     if suns:
         nearer = replace(start, suns=suns_around(start.suns))
-        start = InitialGuess(frames, nearer, target, first).best(suns)
-    state, slopes = solve(problem, start, told)
-    return state, slopes, problem
+        start = InitialGuess(frames, nearer, target, weight).best(suns)
+    return start
 
 
-def _picture(frames: Frames, state: State, scale: Floats) -> Floats:
-    """(h, w, 3) of the fit, as the photograph is."""
-    return frames.picture(frames.lit(state.point, state.strengths)) * scale * tint(state.point)
-
-
-def _white(white: Any) -> Floats:
-    """(3,) with green 1."""
+def _white(white: White) -> Floats:
+    """Return the given white (3,), green 1."""
     if isinstance(white, str):
         if white != "specular":
             came = f"{shown_value(white)} came"

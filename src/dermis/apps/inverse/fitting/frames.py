@@ -15,11 +15,11 @@ from dermis.base.atomic_write import replacing
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.images.hdr import encode_exr
+from dermis.optics.media import Floats
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _SKIN = 1, 2  # classes of labels: face and scalp, nose
 _GRAZING = 0.3
@@ -45,7 +45,7 @@ class Frames:
     drawn: int = 0
 
     def find_mask(self, point: Point, trusted: Floats) -> None:
-        """Find the pixels of skin, of which the photograph can be trusted (h, w)."""
+        """Find the pixels of skin at which the photograph can be trusted (h, w)."""
         scene = with_skin(self._lit(()), point)
         scene = replace(scene, lights=suns_of(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))
         shown = self._draw(scene, "mask", ("label", "normal_camera", "alpha"))
@@ -55,11 +55,11 @@ class Frames:
         self.mask = _within(skin) & (trusted > _COVERED)
 
     def basis(self, point: Point) -> Floats:
-        """(9 + k, p, 3) radiance of the pixels in each lobe of radiance 1 and each sun of irradiance 1."""
+        """Return the radiance (9 + k, p, 3) in each lobe of radiance 1 and each sun of irradiance 1."""
         return np.stack([self._image(scene, view) for scene, view in self._apart(point)])
 
     def parts(self, point: Point) -> tuple[Floats, Floats]:
-        """The same apart: from below the skin, and off its surface."""
+        """Return the same separately: from below the skin, and off its surface."""
         found = []
         for scene, view in self._apart(point):
             shown = self._draw(scene, view, ("diffuse", "specular"))
@@ -68,7 +68,7 @@ class Frames:
         return both[:, 0], both[:, 1]
 
     def together(self, point: Point, strengths: Floats, name: str) -> Floats:
-        """(p, 3) radiance in all lights at once.
+        """Return the radiance (p, 3) in all lights at once.
 
         strengths : (9 + k,)
         name : of the panorama
@@ -76,7 +76,7 @@ class Frames:
         return self._image(self.lit(point, strengths, name), "together")
 
     def lit(self, point: Point, strengths: Floats, name: str = "light") -> Scene:
-        """The scene with this skin in these lights, its panorama in the folder."""
+        """Return the scene with the skin of a point in lights, whose panorama is in the folder."""
         suns = suns_of(point.suns, strengths[BASIS:], np.ones(3))
         radiance = panorama(strengths[:BASIS])
         lights = [one for one in suns if max(one.irradiance) > 0.0]
@@ -84,21 +84,17 @@ class Frames:
         return with_skin(replace(self._lit(lights), environment=around), point)
 
     def picture(self, scene: Scene) -> Floats:
-        """(h, w, 3) radiance of a whole frame."""
+        """Return the radiance (h, w, 3) of a frame."""
         return np.asarray(self._draw(scene, "together").linear(), np.float64)
 
     def _apart(self, point: Point) -> list[tuple[Scene, str]]:
-        """A scene for each light, with the name of its view."""
+        """Return a scene for each light, with the name of its view."""
         base = with_skin(self._lit(()), point)
         found = []
         for k in range(BASIS):
-            strengths = np.eye(BASIS)[k]
             path = self.folder / f"lobe_{k}.exr"
-            around = (
-                Environment(name=str(path))
-                if path.exists()
-                else self._environment(f"lobe_{k}", panorama(strengths))
-            )
+            known = Environment(name=str(path)) if path.exists() else None
+            around = known or self._environment(path.stem, panorama(np.eye(BASIS)[k]))
             found.append((replace(base, environment=around), f"lobe {k}"))
         for k, sun in enumerate(suns_of(point.suns, np.ones(len(point.suns)), np.ones(3))):
             found.append((replace(base, lights=(sun,)), f"sun {k}"))
@@ -122,7 +118,7 @@ class Frames:
 
 
 def _within(mask: Mask) -> Mask:
-    """Pixels whose neighbours are in the mask too."""
+    """Return the pixels whose neighbours are in the mask too."""
     padded = np.pad(mask, 1)
     rows = padded[:-2] & padded[1:-1] & padded[2:]
     return np.asarray(rows[:, :-2] & rows[:, 1:-1] & rows[:, 2:])

@@ -6,15 +6,14 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.frames import Frames
 from dermis.apps.inverse.fitting.light_basis import BASIS, fault_by, strengths_by
 from dermis.apps.inverse.fitting.unknowns import UNKNOWNS, Point, tangents
 from dermis.human.skin.colours import colours
 from dermis.mesh.geometry import fibonacci_sphere
+from dermis.optics.media import Floats
 
-Floats = NDArray[np.float64]
 _AROUND = 28
 _BEHIND = -0.35  # along z: suns farther behind leave the face dark
 _MELANIN, _BLOOD = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
@@ -23,7 +22,7 @@ _RINGS, _RING = (9.0, 18.0), 6  # degrees, and directions on each; those tried f
 
 
 def suns_to_try(towards_camera: Floats) -> Floats:
-    """(k, 3) directions around a camera from which a sun may be seen on the face.
+    """Return directions (k, 3) around a camera from which a sun lights the face.
 
     towards_camera : (3,) unit vector
     """
@@ -32,7 +31,7 @@ def suns_to_try(towards_camera: Floats) -> Floats:
 
 
 def suns_around(towards: Floats) -> Floats:
-    """(k, 3) the directions themselves, and others about them: half as far as those tried first are apart."""
+    """Return directions (k, 3) and others around them, at half the distance of those tried first."""
     turn = np.linspace(0.0, 2.0 * np.pi, _RING, endpoint=False)
     ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     off = np.concatenate([[[0.0, 0.0]], *(np.tan(np.radians(angle)) * ring for angle in _RINGS)])
@@ -41,7 +40,7 @@ def suns_around(towards: Floats) -> Floats:
 
 
 class InitialGuess:
-    """Products of what each light alone makes of the face, below its surface and off it.
+    """Normal equations of the radiance under each light alone, below the surface and off it.
 
     frames, point : the face, its `suns` being those to try
     target : (p, 3) the photograph's radiance
@@ -63,7 +62,7 @@ class InitialGuess:
         self._table = colours(held["eumelanin"], held["oxygen"], held["epidermis_mm"])
 
     def best(self, count: int) -> Point:
-        """The best of all, with so many suns."""
+        """Return the best point with `count` suns."""
         every = list(product(np.log(_MELANIN), np.log(_BLOOD), np.log(_STRENGTH)))
         at, suns = self.point.logs, self._nearest(self.point.logs, count)
         for _ in range(2):
@@ -73,7 +72,7 @@ class InitialGuess:
         return replace(self.point, logs=at, suns=self.point.suns[suns])
 
     def _nearest(self, logs: Floats, count: int) -> list[int]:
-        """The suns that together leave least, found one after the other."""
+        """Return the suns with the smallest residual, chosen greedily."""
         found: list[int] = []
         for _ in range(count):
             left = [k for k in range(len(self.point.suns)) if k not in found]
@@ -81,8 +80,9 @@ class InitialGuess:
         return found
 
     def _fault(self, logs: Floats, suns: list[int]) -> float:
-        """Squares left over: what leaves below the skin is as bright as its colour, what leaves off it as its
-        strength."""
+        """Return the squared residual, with radiance below the surface scaled by the skin's colour, and radiance
+        off it by its strength.
+        """
         chosen = np.array([*range(BASIS), *(BASIS + k for k in suns)])
         n, strength = self._lights, float(np.exp(logs[3] - self.point.logs[3]))
         ratio = self._colour(logs) / self._colour(self.point.logs)

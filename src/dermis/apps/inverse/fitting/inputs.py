@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from dermis.human.skin.painted import PaintedMaps
 from dermis.images.colour import decode_srgb_levels
 from dermis.images.io import Picture, read_image
 from dermis.mesh.head import Head
+from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL
 from dermis.scene.camera import Camera
 from dermis.scene.files import head_table, load_camera, load_scene
@@ -24,7 +25,6 @@ from dermis.scene.heads import is_person, person_of
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-Floats = NDArray[np.float64]
 _CLIPPED = 0.985  # of what bytes can show, in the picture's own encoding
 _LEAST_SIDE = 16
 
@@ -46,7 +46,7 @@ class Photograph:
         return self.linear.shape[1], self.linear.shape[0]
 
     def within(self, side: int) -> Photograph:
-        """The same with a longer side of at most so many pixels: means of what each of them covers."""
+        """Return the photograph downsampled to at most `side` pixels along the longer side, by area."""
         width, height = self.size
         if max(width, height) <= side:
             return self
@@ -56,7 +56,7 @@ class Photograph:
 
 
 def read_photograph(given: str | Path | Picture | ArrayLike) -> Photograph:
-    """A photograph of a file (PNG, JPEG or TIFF in sRGB; EXR and HDR linear) or of pixels.
+    """Return the photograph of a file (PNG, JPEG or TIFF in sRGB; EXR and HDR linear) or of pixels.
 
     given : a file, (h, w, 3) bytes in sRGB, or floats, linear Rec. 709
 
@@ -81,7 +81,7 @@ def read_photograph(given: str | Path | Picture | ArrayLike) -> Photograph:
 
 
 def _averaged(image: Floats, size: tuple[int, int]) -> Floats:
-    """(h, w, c) of means over each pixel's part of a larger picture; edges count by their shares."""
+    """Return a picture (h, w, c) downsampled by area; pixels on edges count by their shares."""
     for axis, count in ((0, size[1]), (1, size[0])):
         sums = np.cumsum(image, axis=axis)
         sums = np.concatenate([np.zeros_like(np.take(sums, [0], axis)), sums], axis=axis)
@@ -98,7 +98,7 @@ _SAME_MM = 0.01
 
 @dataclass(frozen=True)
 class Subject:
-    """A scene without light.
+    """Subject of a photograph: a scene without light.
 
     person : whose skin is painted, None for other heads
     table : [head] of a scene's file for those; empty for people who were given as heads without a name
@@ -106,18 +106,18 @@ class Subject:
 
     scene: Scene
     person: Human | None
-    table: dict[str, Any]
+    table: Mapping[str, object]
 
 
 def subject_of(given: object, camera: object = None) -> Subject:
-    """The head, camera, pose and surface of what is given.
+    """Return the subject with the head, camera, pose and surface of what is given.
 
     given : a scene or its file (.toml), a head or what `load_head` takes, or a `Human`
     camera : a camera, a preset's name or a file; the scene's own when left out
 
     Raises DermisError for anything else.
     """
-    table: dict[str, Any] = {}
+    table: Mapping[str, object] = {}
     if isinstance(given, str | os.PathLike) and Path(given).suffix.lower() == ".toml":
         table = head_table(Path(given))
         scene = load_scene(Path(given))[0]
@@ -132,7 +132,7 @@ def subject_of(given: object, camera: object = None) -> Subject:
     return Subject(_plain(scene), person, table)
 
 
-def _camera(given: object, head: Head) -> Any:
+def _camera(given: object, head: Head) -> Camera | Callable[[Head], Camera]:
     if isinstance(given, str | os.PathLike):
         return load_camera(str(given), head)
     if not (isinstance(given, Camera) or callable(given)):
@@ -142,7 +142,7 @@ def _camera(given: object, head: Head) -> Any:
 
 
 def _person(head: Head) -> Human | None:
-    """The person that a painted head is, with the skin that is painted on it."""
+    """Return the person of a painted head, with the skin that is painted on it."""
     if not isinstance(head.maps, PaintedMaps) or head.maps.colour is not None or not is_person(head.name):
         return None
     person = replace(person_of(head.name), skin=head.maps.look)
@@ -152,7 +152,7 @@ def _person(head: Head) -> Human | None:
 
 
 def _plain(scene: Scene) -> Scene:
-    """Without light, and with what is held of the skin's pigments."""
+    """Return the scene without light, with the pigments that are held."""
     own = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):
         look = scene.head.maps.look

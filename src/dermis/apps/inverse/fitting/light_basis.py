@@ -5,12 +5,11 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.environment.panorama import directions
 from dermis.mesh.geometry import fibonacci_sphere
+from dermis.optics.media import Floats
 
-Floats = NDArray[np.float64]
 ROWS = 32
 """Of the panoramas."""
 BASIS = 9
@@ -21,7 +20,7 @@ _CANDIDATES = 400
 
 
 def lobe(towards: Floats, places: Floats) -> Floats:
-    """Radiance that falls off from 1 to 0 behind: the sharpest that second-order harmonics hold exactly.
+    """Return a radiance from 1 ahead to 0 behind, the sharpest that second-order harmonics represent.
 
     towards : (k, 3) unit vectors of the middles
     places : (..., 3) unit vectors
@@ -31,7 +30,7 @@ def lobe(towards: Floats, places: Floats) -> Floats:
 
 @cache
 def middles() -> Floats:
-    """(9, 3) middles of lobes that all others are sums of, spread as far as a greedy choice has it."""
+    """Return the middles (9, 3) of a basis of lobes, chosen greedily."""
     every = fibonacci_sphere(_CANDIDATES)
     chosen = [int(np.argmax(every[:, 2]))]
     for _ in range(BASIS - 1):  # the candidate that the lobes chosen so far describe worst
@@ -44,7 +43,7 @@ def middles() -> Floats:
 
 @cache
 def mixtures() -> tuple[Floats, Floats]:
-    """(9, n) shares of the nine lobes that make up n others all around, and their middles (n, 3)."""
+    """Return shares (9, n) of the nine lobes in n others all around, and the middles of these (n, 3)."""
     towards = fibonacci_sphere(_LOBES)
     places = fibonacci_sphere(_CANDIDATES)
     shares = np.linalg.lstsq(lobe(middles(), places), lobe(towards, places), rcond=None)[0]
@@ -52,7 +51,7 @@ def mixtures() -> tuple[Floats, Floats]:
 
 
 def panorama(strengths: Floats) -> Floats:
-    """(h, w) radiance of the nine lobes, which rounding leaves a little below 0 nowhere.
+    """Return the radiance (h, w) of the nine lobes, clamped to 0.
 
     strengths : (9,)
     """
@@ -63,7 +62,7 @@ _RIDGE = 1e-9
 
 
 def strengths_of(A: Floats, b: Floats) -> Floats:
-    """(9 + k,) strengths of nine lobes and k suns under which all light is from 0 on.
+    """Return strengths (9 + k,) of nine lobes and k suns with non-negative light from every direction.
 
     A : (m, 9 + k) weighed pixels in each light alone
     b : (m,) the weighed photograph
@@ -72,7 +71,7 @@ def strengths_of(A: Floats, b: Floats) -> Floats:
 
 
 def strengths_by(gram: Floats, right: Floats) -> Floats:
-    """The same by A' A (9 + k, 9 + k) and A' b (9 + k,)."""
+    """Return the same by A' A (9 + k, 9 + k) and A' b (9 + k,)."""
     from scipy.optimize import nnls
 
     R = np.linalg.cholesky(gram + _RIDGE * np.trace(gram) * np.eye(len(gram)))
@@ -82,7 +81,7 @@ def strengths_by(gram: Floats, right: Floats) -> Floats:
 
 
 def mixing(suns: int) -> Floats:
-    """(9 + k, n + k) of the lobes and suns, by the n lobes of which all light from around is a sum."""
+    """Return the lobes and suns (9 + k, n + k) in terms of the n lobes all around and the suns."""
     shares, _ = mixtures()
     made = np.zeros((BASIS + suns, shares.shape[1] + suns))
     made[:BASIS, : shares.shape[1]] = shares
@@ -91,5 +90,5 @@ def mixing(suns: int) -> Floats:
 
 
 def fault_by(gram: Floats, right: Floats, total: float, x: Floats) -> float:
-    """Sum of squares of A x - b, by their products and b' b."""
+    """Return the sum of squares of A x - b by A' A, A' b and b' b."""
     return float(total - 2.0 * right @ x + x @ gram @ x)

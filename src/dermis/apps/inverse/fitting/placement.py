@@ -20,9 +20,9 @@ from dermis.human.landmarks.sets import SETS
 from dermis.human.person import Human
 from dermis.human.published import OLD, YOUNG, human_targets
 from dermis.mesh.head import Head
+from dermis.optics.media import Floats
 from dermis.scene.camera import Camera
 
-Floats = NDArray[np.float64]
 _NOISE = 0.004
 """Of landmarks, of the photograph's height: how well they are placed."""
 _FOCAL_SPREAD = 0.3
@@ -38,10 +38,10 @@ _FRAME_MM = 300.0
 
 
 def place_by_landmarks(subject: Subject, landmarks: str | Path, size: tuple[int, int]) -> Subject:
-    """The subject before the camera that sees its landmarks where the photograph has them.
+    """Return the subject with the camera, and the identity, that project its landmarks into the photograph.
 
-    The human gets the identity that they tell: ancestry, sex, age, weight, muscle and details of the face,
-    each believed to be near the person given. Other heads, as they are, need a table of their own landmarks.
+    A human gets ancestry, sex, age, weight, muscle and details of the face with priors at the given person.
+    Other heads keep their shape and need a table of their own landmarks.
 
     Raises DermisError for files without landmarks, and for heads without those.
     """
@@ -65,10 +65,10 @@ def place_by_landmarks(subject: Subject, landmarks: str | Path, size: tuple[int,
 
 @dataclass(frozen=True, eq=False)
 class _Shape:
-    """Where landmarks lie on a head, and how they move with its identity.
+    """Places of landmarks on a head, and their derivatives by its identity.
 
     places : (n, 3) from the head's centre [mm]
-    slopes : (u, n, 3) by the unknowns of the identity in units of what is believed
+    slopes : (u, n, 3) by the unknowns of the identity in units of the priors
     """
 
     names: tuple[str, ...]
@@ -79,7 +79,7 @@ class _Shape:
 
     @classmethod
     def of(cls, person: Human | None, head: Head, name: str, seen: dict[str, Floats]) -> _Shape:
-        """Of a person, or of a head as it is."""
+        """Return the shape of a person, or of a head without unknowns."""
         plain = head if person is None else replace(person, targets={}).head(subdivide=0)
         points = landmark_points(plain, name)
         chosen = np.array([k for k, one in enumerate(points.names) if one in seen])
@@ -100,11 +100,11 @@ class _Shape:
 
     @property
     def count(self) -> int:
-        """How many numbers the identity has."""
+        """Number of unknowns of the identity."""
         return len(self.slopes)
 
     def person(self, identity: Floats) -> Human:
-        """The person given, changed by so many times what is believed of each number."""
+        """Return the given person changed by the identity, in units of the priors."""
         assert self.given is not None
         macro: dict[str, Any] = {
             name: float(np.clip(getattr(self.given, name) + _prior_spread(name) * step, *_limits(name)))
@@ -117,7 +117,7 @@ class _Shape:
 
 
 def _slope(shape: _Shape, places_of: Callable[[Human], Floats], base: Floats, k: int, count: int) -> Floats:
-    """(n, 3) by one number of the identity, away from its limit."""
+    """Return the derivative (n, 3) by one number of the identity, away from its limit."""
     step = np.zeros(count)
     step[k] = 0.2
     change = places_of(shape.person(step)) - base
@@ -140,7 +140,7 @@ def _at(points: LandmarkPoints, chosen: NDArray[np.int64], places: Floats) -> Fl
 
 
 def _solved(shape: _Shape, pixels: Floats, size: tuple[int, int], start: Floats) -> Floats:
-    """Turn, shift, logarithm of the focal length and identity of least squares."""
+    """Return rotation, translation, logarithm of the focal length and identity by least squares."""
     from scipy.optimize import least_squares
 
     usual = np.log(size[1] * _BEFORE_MM / _FRAME_MM)
@@ -155,7 +155,7 @@ def _solved(shape: _Shape, pixels: Floats, size: tuple[int, int], start: Floats)
 
 
 def _seen(x: Floats, places: Floats, size: tuple[int, int]) -> Floats:
-    """(n, 2) pixels of places."""
+    """Return the pixels of places (n, 2)."""
     from scipy.spatial.transform import Rotation
 
     there = places @ Rotation.from_rotvec(x[:3]).as_matrix().T + x[3:6]
@@ -177,7 +177,7 @@ _LEAST = 6
 
 
 def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
-    """The name of their set, and where each is: (2,) x to the right, y down, the first pixel's middle at 0.
+    """Return the name of the set, and the pixel (2,) of each landmark: the first pixel's middle is 0.
 
     size : width and height of the photograph, to which MediaPipe's shares refer [pixel]
 
@@ -199,21 +199,14 @@ def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[s
     return name, found
 
 
-def _of_json(path: str | Path, told: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
-    """Those of `dermis render --landmarks`, or of MediaPipe: its points' shares of width and height."""
+def _of_json(path: str | Path, data: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
+    """Return the landmarks of `dermis render --landmarks`, or of MediaPipe as shares of width and height."""
     with understood(path, _EXPECTED, KeyError, TypeError, IndexError):
-        if isinstance(told, Mapping) and isinstance(told.get("landmarks"), Mapping):
-            name, rows = next(iter(told["landmarks"].items()))
+        if isinstance(data, Mapping) and isinstance(data.get("landmarks"), Mapping):
+            name, rows = next(iter(data["landmarks"].items()))
             return name, {str(row["name"]): np.asarray(row["pixel"], np.float64) for row in rows}
-        while not _is_points(told):  # of the first face
-            told = (
-                next(told[key] for key in _MEDIAPIPE if key in told) if isinstance(told, Mapping) else told[0]
-            )
-        points = np.array([[one["x"], one["y"]] for one in told], np.float64)
-    return _BY_COUNT.get(len(points), ""), dict(
-        zip(map(str, range(len(points))), points * size - 0.5, strict=True)
-    )
-
-
-def _is_points(told: Any) -> bool:
-    return isinstance(told, list) and bool(told) and isinstance(told[0], Mapping) and "x" in told[0]
+        while not (isinstance(data, list) and data and isinstance(data[0], Mapping) and "x" in data[0]):
+            nested = isinstance(data, Mapping)  # else a list of faces, of which the first one counts
+            data = data[next(key for key in _MEDIAPIPE if key in data) if nested else 0]
+        pixels = np.array([[one["x"], one["y"]] for one in data], np.float64) * size - 0.5
+    return _BY_COUNT.get(len(pixels), ""), {str(k): pixel for k, pixel in enumerate(pixels)}

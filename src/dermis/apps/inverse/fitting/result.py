@@ -26,12 +26,14 @@ from dermis.base.errors import refuse
 from dermis.human.person_file import write_numbers
 from dermis.images.hdr import encode_exr
 from dermis.images.io import write_image
+from dermis.optics.media import Floats
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.saving import save_scene
 from dermis.scene.settings import Settings
 
-Floats = NDArray[np.float64]
+SUMMARY = "fit.json"
+_GREY = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,74 +76,59 @@ class FitResult:
         return [(way, float(s)) for way, s in zip(self.point.suns, self.strengths[BASIS:], strict=True)]
 
     def summary(self) -> dict[str, Any]:
-        """Numbers with their standard deviations, what is not determined, and what was believed.
+        """Return all numbers with their standard deviations, what is not determined, and the priors.
 
-        Deviations are relative for the skin, in degrees for directions. What the frame itself gets wrong
-        everywhere alike is not in them.
+        Deviations are relative for the skin, in degrees for directions. Systematic errors of the renderer are
+        not in them.
         """
-        return _summary(self)
-
-
-def _summary(found: FitResult) -> dict[str, Any]:
-    known = found.certainty
-    skin = {
-        one.name: {
-            "value": found.values[one.name],
-            "relative_sd": known.sd[one.name],
-            "usual": one.usual,
-            "believed_relative_sd": one.spread,
+        known = self.certainty
+        skin = {
+            one.name: {
+                "value": self.values[one.name],
+                "relative_sd": known.sd[one.name],
+                "usual": one.usual,
+                "believed_relative_sd": one.spread,
+            }
+            for one in UNKNOWNS
         }
-        for one in UNKNOWNS
-    }
-    suns = []
-    for k, (way, strength) in enumerate(found.suns):
-        off = np.degrees([known.sd[f"sun {k + 1} {name}"] for name in ("across", "along")])
-        suns.append({"towards": way.tolist(), "irradiance": strength, "sd_degrees": off.tolist()})
-    coefficients = found.strengths[:BASIS]
-    return {
-        "skin": skin,
-        "suns": suns,
-        "around": {"mean_radiance": float(panorama(coefficients).mean())},
-        "white": found.white.tolist(),
-        "white_sd": [known.sd[name] for name in ("white red", "white blue") if name in known.sd],
-        "exposure": found.exposure,
-        "not_determined": list(known.held),
-        "not_told_apart": [{"pair": [a, b], "correlation": c} for a, b, c in known.alike],
-        "singular_values": list(known.singular),
-        "priors": _priors(found),
-        "residual": found.residual,
-        "pixels": int(found.mask.sum()),
-        "frames": found.frames,
-        "seconds": round(found.seconds, 2),
-    }
+        suns = []
+        for k, (way, strength) in enumerate(self.suns):
+            off = np.degrees([known.sd[f"sun {k + 1} {name}"] for name in ("across", "along")])
+            suns.append({"towards": way.tolist(), "irradiance": strength, "sd_degrees": off.tolist()})
+        return {
+            "skin": skin,
+            "suns": suns,
+            "around": {"mean_radiance": float(panorama(self.strengths[:BASIS]).mean())},
+            "white": self.white.tolist(),
+            "white_sd": [known.sd[name] for name in ("white red", "white blue") if name in known.sd],
+            "exposure": self.exposure,
+            "not_determined": list(known.held),
+            "not_told_apart": [{"pair": [a, b], "correlation": c} for a, b, c in known.alike],
+            "singular_values": list(known.singular),
+            "priors": self._priors(),
+            "residual": self.residual,
+            "pixels": int(self.mask.sum()),
+            "frames": self.frames,
+            "seconds": round(self.seconds, 2),
+        }
 
-
-def _priors(found: FitResult) -> list[str]:
-    """What was believed or given, in words."""
-    told = [
-        f"{one.name}: around {one.usual:g} within a factor of {np.exp(one.spread):.2g}" for one in UNKNOWNS
-    ]
-    if found.suns:
-        told.append(
-            f"directions of suns: within {np.degrees(TURN_SPREAD):.0f} degrees of where the search began"
-        )
-    white = "white red" in found.certainty.sd
-    told.append(
-        f"colour of the light: neutral within {100 * WHITE_SPREAD:.0f} %"
-        if white
-        else f"colour of the light: given, {', '.join(f'{one:.3g}' for one in found.white)}"
-    )
-    told.append(f"exposure: given, {found.exposure:g}; the strength of the light is free")
-    skin = found.subject.scene.skin.pigments
-    assert skin is not None
-    told.append(
-        f"held: eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm"
-    )
-    return told
-
-
-SUMMARY = "fit.json"
-_GREY = 0.5
+    def _priors(self) -> list[str]:
+        """Describe priors and given numbers."""
+        skin = self.subject.scene.skin.pigments
+        assert skin is not None
+        sun = f"directions of suns: within {np.degrees(TURN_SPREAD):.0f} degrees of where the search began"
+        white = f"neutral within {100 * WHITE_SPREAD:.0f} %"
+        if "white red" not in self.certainty.sd:
+            white = f"given, {', '.join(f'{one:.3g}' for one in self.white)}"
+        held = f"eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm"
+        spreads = {one: f"{one.usual:g} within a factor of {np.exp(one.spread):.2g}" for one in UNKNOWNS}
+        return [
+            *(f"{one.name}: around {spread}" for one, spread in spreads.items()),
+            *([sun] if self.suns else []),
+            f"colour of the light: {white}",
+            f"exposure: given, {self.exposure:g}; the strength of the light is free",
+            f"held: {held}",
+        ]
 
 
 def save_fit(folder: Path, found: FitResult) -> list[Path]:
@@ -149,19 +136,20 @@ def save_fit(folder: Path, found: FitResult) -> list[Path]:
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
-    table = found.subject.table
-    if found.subject.person is None and not table:
+    person, table = found.subject.person, found.subject.table
+    if person is None and not table:
         came = "it came as a head that only its maker knows"
         refuse("head", "a person by name, or a Human, for a file to name", came, "Fit the Human itself")
     written = []
-    if _has_sky(found):
+    radiance = panorama(found.strengths[:BASIS])
+    if radiance.max() > 0.0:
         written.append(folder / "light.exr")
-        _write_light(written[-1], found)
-    if found.subject.person is not None:
+        with replacing(written[-1]) as trial:
+            trial.write_bytes(encode_exr((radiance[..., None] * found.white).astype(np.float32)))
+    if person is not None:
         written.append(folder / "person.json")
-        look = found.subject.person.look
-        look = replace(look, melanin=found.values["melanin"], blood=found.values["blood"])
-        write_numbers(written[-1], replace(found.subject.person, skin=look))
+        look = replace(person.look, melanin=found.values["melanin"], blood=found.values["blood"])
+        write_numbers(written[-1], replace(person, skin=look))
         table = {"name": "person.json"}
     written.append(folder / "scene.toml")
     settings = Settings(size=found.size, exposure=found.exposure)
@@ -176,29 +164,18 @@ def save_fit(folder: Path, found: FitResult) -> list[Path]:
 
 
 def scene_of(found: FitResult, folder: Path) -> Scene:
-    """The scene as found; its light from around is a file of the folder."""
-    lights = suns_of(found.point.suns, found.strengths[BASIS:], found.white)
-    lights = [one for one in lights if max(one.irradiance) > 0.0]
-    path = folder / "light.exr"
-    around = Environment(name=str(path)) if _has_sky(found) else None
+    """Return the fitted scene, whose ambient light is a file of the folder."""
+    suns = suns_of(found.point.suns, found.strengths[BASIS:], found.white)
+    has_sky = panorama(found.strengths[:BASIS]).max() > 0.0
+    around = Environment(name=str(folder / "light.exr")) if has_sky else None
+    lights = [one for one in suns if max(one.irradiance) > 0.0]
     return with_skin(replace(found.subject.scene, lights=lights, environment=around), found.point)
 
 
-def pictures(found: FitResult) -> dict[str, NDArray[np.float64]]:
-    """Linear pictures: photograph, fit, and their difference on grey where skin counted."""
+def pictures(found: FitResult) -> dict[str, Floats]:
+    """Return linear pictures: photograph, fit, and their difference on grey where skin counted."""
     peak = max(float(np.percentile(found.photo[found.mask], 99.5)), 1e-9)
     off = np.where(found.mask[..., None], (found.photo - found.picture) / peak, 0.0)
     shown = {"photo": found.photo / max(peak, 1.0), "fit": found.picture / max(peak, 1.0)}
-    return {name: np.clip(image, 0.0, 1.0) for name, image in shown.items()} | {
-        "difference": np.clip(_GREY + off, 0.0, 1.0) ** 2.2
-    }
-
-
-def _has_sky(found: FitResult) -> bool:
-    return bool(panorama(found.strengths[:BASIS]).max() > 0.0)
-
-
-def _write_light(path: Path, found: FitResult) -> None:
-    radiance = panorama(found.strengths[:BASIS])[..., None] * found.white
-    with replacing(path) as trial:
-        trial.write_bytes(encode_exr(radiance.astype(np.float32)))
+    shown = {name: np.clip(image, 0.0, 1.0) for name, image in shown.items()}
+    return shown | {"difference": np.clip(_GREY + off, 0.0, 1.0) ** 2.2}

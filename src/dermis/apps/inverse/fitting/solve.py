@@ -1,5 +1,5 @@
-"""Skin and light of a photograph by least squares over frames: strengths of lights linearly, the rest by
-Gauss-Newton's steps with Levenberg's damping."""
+"""Least squares of skin and light over frames: strengths of lights linearly, the rest by damped Gauss-Newton;
+standard deviations of the result."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from dermis.apps.inverse.fitting.frames import Frames
 from dermis.apps.inverse.fitting.light_basis import BASIS, strengths_of
 from dermis.apps.inverse.fitting.unknowns import TURN_SPREAD, TURN_STEP, UNKNOWNS, WHITE_SPREAD, Point
+from dermis.optics.media import Floats
 
-Floats = NDArray[np.float64]
 _FLOOR = 0.03
 """Of the median of the photograph: what darker pixels are known to, as noise does not fall with them."""
 ROBUST = 3.0
@@ -29,7 +29,7 @@ _LONGEST = 0.7  # step of a logarithm or a direction
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A point with the strengths that fit best there.
+    """Point with the strengths of lights that fit best there.
 
     basis : (9 + k, p, 3) radiance in each light alone
     weight : (p, 3) one over the standard deviation of each pixel, robust ones
@@ -45,7 +45,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A photograph to be fitted.
+    """Photograph to be fitted.
 
     target : (p, 3) radiance of the pixels that count, the given white taken out
     noise : relative standard deviation of a pixel
@@ -59,32 +59,34 @@ class Problem:
     robust: float = ROBUST
 
     def weights(self, shown: Floats) -> Floats:
-        """(p, 3) one over the standard deviation of pixels that are this bright."""
+        """Return the inverse standard deviation (p, 3) of pixels of a radiance."""
         return np.asarray(1.0 / (self.noise * (shown + _FLOOR * float(np.median(self.target)))))
 
+    def even_weights(self) -> Floats:
+        """Return weights by the photograph's own brightness, before there is a model of it."""
+        return self.weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
+
     def state(self, point: Point, weight: Floats) -> State:
-        """The best light at a point."""
-        basis = self.frames.basis(point) * tint(point)
-        A = (basis * weight).reshape(len(basis), -1).T
-        x = strengths_of(A, (self.target * weight).ravel())
-        residual = self.target - np.einsum("a,apc->pc", x, basis)
-        cost = float(((residual * weight) ** 2).sum()) + self._believed(point)
-        return State(point, x, basis, residual, weight, cost)
+        """Return the state with the best light at a point."""
+        return self._state(point, self.frames.basis(point) * tint(point), weight)
 
     def reweighed(self, state: State) -> State:
-        """The same with weights of what the model shows, and less for what it cannot explain."""
+        """Return the state with weights by the model's brightness, less for what it cannot explain."""
         plain = self.weights(np.maximum(self.target - state.residual, 0.0))
         scaled = np.abs(state.residual * plain)
         limit = self.robust * max(_MAD * float(np.median(scaled)), 1.0)
-        weight = plain * np.sqrt(limit / np.maximum(scaled, limit))
-        A = (state.basis * weight).reshape(len(state.basis), -1).T
+        return self._state(state.point, state.basis, plain * np.sqrt(limit / np.maximum(scaled, limit)))
+
+    def _state(self, point: Point, basis: Floats, weight: Floats) -> State:
+        A = (basis * weight).reshape(len(basis), -1).T
         x = strengths_of(A, (self.target * weight).ravel())
-        residual = self.target - np.einsum("a,apc->pc", x, state.basis)
-        cost = float(((residual * weight) ** 2).sum()) + self._believed(state.point)
-        return State(state.point, x, state.basis, residual, weight, cost)
+        residual = self.target - np.einsum("a,apc->pc", x, basis)
+        prior = (self.far(point) / self.believed(2 * len(point.suns))) ** 2
+        cost = float(((residual * weight) ** 2).sum()) + float(prior.sum())
+        return State(point, x, basis, residual, weight, cost)
 
     def slopes(self, state: State, name: str) -> Floats:
-        """(p, 3, u) derivatives of the picture by finite differences of frames in all lights at once."""
+        """Return derivatives of the picture (p, 3, u) by finite differences of frames in all lights."""
         point, count = state.point, 2 * len(state.point.suns)
         middle = self.frames.together(point, state.strengths, name)
         found = []
@@ -101,37 +103,33 @@ class Problem:
         return np.moveaxis(slopes, 0, -1)
 
     def steps(self, turns: int) -> list[float]:
-        """Of finite differences."""
+        """Return the steps of finite differences."""
         return [one.step for one in UNKNOWNS] + [TURN_STEP] * turns
 
     def believed(self, turns: int) -> Floats:
-        """(u,) standard deviations of what is believed of each number before."""
+        """Return the standard deviation of the prior of each number (u,)."""
         white = WHITE_SPREAD if self.free_white else 1e-6
         return np.array([one.spread for one in UNKNOWNS] + [TURN_SPREAD] * turns + [white] * 2)
 
     def far(self, point: Point) -> Floats:
-        """(u,) how far the numbers are from what is usual; directions have no usual."""
+        """Return the differences of the numbers from the means of their priors (u,); directions have none."""
         skin = point.logs - np.log([one.usual for one in UNKNOWNS])
         return np.concatenate([skin, np.zeros(2 * len(point.suns)), point.white])
 
-    def _believed(self, point: Point) -> float:
-        return float(((self.far(point) / self.believed(2 * len(point.suns))) ** 2).sum())
-
 
 def tint(point: Point) -> Floats:
-    """(3,) colour of the light over the given white, green 1."""
+    """Return the colour of the light relative to the given white (3,), green 1."""
     return np.array([np.exp(point.white[0]), 1.0, np.exp(point.white[1])])
 
 
 def solve(
     problem: Problem, start: Point, told: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[State, Floats]:
-    """The best state, and derivatives (p, 3, u) from one step before it at most.
+    """Return the best state, and derivatives (p, 3, u) at most one step before it.
 
-    By variable projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975]: light follows skin.
+    By variable projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975]: lights are eliminated.
     """
-    first = problem.weights(problem.target.mean(axis=1, keepdims=True) * np.ones(3))
-    state = problem.reweighed(problem.state(start, first))
+    state = problem.reweighed(problem.state(start, problem.even_weights()))
     damping = _DAMPING
     for turn in range(_MOST_STEPS):
         told(turn, _MOST_STEPS)
@@ -149,7 +147,7 @@ def solve(
 def _improved(
     problem: Problem, state: State, slopes: Floats, damping: float
 ) -> tuple[State | None, Floats, float]:
-    """A better state, the step to it and the damping for the next."""
+    """Return a better state or None, the step to it and the damping for the next."""
     H, g = _system(problem, state, slopes)
     for _ in range(_TRIALS):
         step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
@@ -164,21 +162,19 @@ def _improved(
 
 
 def _system(problem: Problem, state: State, slopes: Floats) -> tuple[Floats, Floats]:
-    """Curvature and downward slope of half the cost, where lights follow."""
+    """Return the curvature and the negative gradient of half the cost, with lights eliminated."""
     J = (slopes * state.weight[..., None]).reshape(-1, slopes.shape[-1])
-    A = _active(state)
-    Q = np.linalg.qr(A)[0]
-    J = J - Q @ (Q.T @ J)
-    r = (state.residual * state.weight).ravel()
+    J, r = _projected(state, J)
     spread = problem.believed(2 * len(state.point.suns))
     H = J.T @ J + np.diag(spread**-2.0)
     return H, J.T @ r - problem.far(state.point) / spread**2
 
 
-def _active(state: State) -> Floats:
-    """(m, a) weighed frames of the lights that are free to follow: suns at 0 are not."""
+def _projected(state: State, J: Floats) -> tuple[Floats, Floats]:
+    """Return weighted derivatives less what the lights can follow, suns at 0 excepted, and the residual."""
     free = [k for k in range(len(state.basis)) if k < BASIS or state.strengths[k] > 0.0]
-    return (state.basis[free] * state.weight).reshape(len(free), -1).T
+    Q = np.linalg.qr((state.basis[free] * state.weight).reshape(len(free), -1).T)[0]
+    return J - Q @ (Q.T @ J), (state.residual * state.weight).ravel()
 
 
 _BLOCKS = 16
@@ -190,13 +186,13 @@ _ALIKE = 0.95
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """Of the unknowns by name, all as logarithms or angles.
+    """Uncertainty of the unknowns by name, all as logarithms or angles.
 
-    sd : standard deviations, from residuals that are alike within blocks of the picture
-    held : names whose deviation is more than half of what was believed before, so that the belief says them,
-        and those that ended on a limit
+    sd : standard deviations, from residuals that are correlated within blocks of the picture
+    held : names whose deviation is more than half of their prior's, which determines them, and those that
+        ended on a limit
     alike : pairs that the photograph cannot tell apart, with their correlation
-    singular : values of the derivatives in units of what is believed, largest first
+    singular : singular values of the derivatives in units of the priors, largest first
     """
 
     sd: dict[str, float]
@@ -206,21 +202,19 @@ class Certainty:
 
 
 def names_of(suns: int) -> list[str]:
-    """Of all unknowns."""
+    """Return the names of all unknowns."""
     turns = [f"sun {k + 1} {way}" for k in range(suns) for way in ("across", "along")]
     return [*(one.name for one in UNKNOWNS), *turns, "white red", "white blue"]
 
 
 def certainty_of(problem: Problem, state: State, slopes: Floats) -> Certainty:
-    """By the derivatives where lights follow, and sums over blocks of pixels [White1980]."""
+    """Return the uncertainty by derivatives with lights eliminated, over blocks of pixels [White1980]."""
     turns = 2 * len(state.point.suns)
     names, spread = names_of(turns // 2), problem.believed(turns)
     count = len(names) if problem.free_white else len(names) - 2
     J = (slopes * state.weight[..., None]).reshape(-1, len(names))[:, :count]
-    free = [k for k in range(len(state.basis)) if k < BASIS or state.strengths[k] > 0.0]
-    Q = np.linalg.qr((state.basis[free] * state.weight).reshape(len(free), -1).T)[0]
-    J, spread = J - Q @ (Q.T @ J), spread[:count]
-    r = (state.residual * state.weight).ravel()
+    J, r = _projected(state, J)
+    spread = spread[:count]
     H = np.linalg.inv(J.T @ J + np.diag(spread**-2.0))
     block = np.repeat(_blocks(problem.frames), 3)
     sums = np.stack([np.bincount(block, column) for column in (J * r[:, None]).T], axis=-1)
@@ -237,12 +231,11 @@ def certainty_of(problem: Problem, state: State, slopes: Floats) -> Certainty:
         if abs(correlation[a, b]) > _ALIKE and names[a][:5] != names[b][:5]
     )
     singular = np.linalg.svd(J * spread, compute_uv=False)
-    told = dict(zip(names, map(float, sd), strict=False))
-    return Certainty(told, held, alike, tuple(map(float, singular)))
+    return Certainty(dict(zip(names, map(float, sd), strict=False)), held, alike, tuple(map(float, singular)))
 
 
 def _on_limits(state: State) -> set[str]:
-    """Names of the skin's numbers that ended as low or as high as they may."""
+    """Return the names of the skin's numbers that ended on a limit."""
     found = state.point.values()
     return {
         one.name for one in UNKNOWNS if not one.low * (1 + _EDGE) < found[one.name] < one.high * (1 - _EDGE)
@@ -250,7 +243,7 @@ def _on_limits(state: State) -> set[str]:
 
 
 def _blocks(frames: Frames) -> NDArray[np.int64]:
-    """(p,) number of each pixel's block."""
+    """Return the number of each pixel's block (p,)."""
     rows, columns = np.nonzero(frames.mask)
     side = max(1, max(frames.mask.shape) // _BLOCKS)
     return np.asarray(rows // side * (_BLOCKS * 2) + columns // side, np.int64)

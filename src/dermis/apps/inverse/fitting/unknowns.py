@@ -4,28 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.head import Head
+from dermis.optics.media import Floats
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-Floats = NDArray[np.float64]
 SUN_DEGREES = 0.53
 """Angle that the sun spans, for shadows."""
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number of the skin, looked for as its logarithm.
+    """Number of the skin, fitted as its logarithm.
 
-    usual, spread : what it is believed to be before the photograph is seen: median and standard deviation of
-        the logarithm
+    usual, spread : prior: median, and standard deviation of the logarithm
     low, high : limits
     step : of finite differences, in the logarithm
     """
@@ -57,7 +54,7 @@ WHITE_SPREAD = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One value of everything but the strengths of lights.
+    """Values of all unknowns except the strengths of lights.
 
     logs : (4,) logarithms of `SKIN`
     suns : (k, 3) unit vectors towards them
@@ -69,11 +66,11 @@ class Point:
     white: Floats
 
     def values(self) -> dict[str, float]:
-        """Of the skin, by name."""
+        """Return the numbers of the skin by name."""
         return {one.name: float(np.exp(log)) for one, log in zip(UNKNOWNS, self.logs, strict=True)}
 
     def moved(self, step: Floats) -> Point:
-        """Another, kept within the limits.
+        """Return another point within the limits.
 
         step : (4 + 2 k + 2,) of the logarithms, of the suns' directions along their tangents, of the white
         """
@@ -89,12 +86,12 @@ class Point:
 
 
 def usual_point(suns: Floats) -> Point:
-    """Before the photograph is seen."""
+    """Return the means of the priors."""
     return Point(np.log([one.usual for one in UNKNOWNS]), suns, np.zeros(2))
 
 
 def tangents(towards: Floats) -> Floats:
-    """(k, 2, 3) unit vectors at right angles to each direction (k, 3) and to each other."""
+    """Return two tangents (k, 2, 3) of each direction (k, 3)."""
     helper = np.where(np.abs(towards[:, 1:2]) < 0.9, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
     first = np.cross(helper, towards)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -102,14 +99,14 @@ def tangents(towards: Floats) -> Floats:
 
 
 def with_skin(scene: Scene, point: Point) -> Scene:
-    """The scene with this skin.
+    """Return the scene with the skin of a point.
 
     Painted people are painted with these pigments, and light spreads below as far as pigments near them let
     it; other heads take the colour of the pigments' profile all over, for what pigments a colour map was made
     of is not known.
     """
     found = point.values()
-    changed: dict[str, Any] = {name: found[name] for name in ("roughness", "rho_s")}
+    changed: dict[str, object] = {name: found[name] for name in ("roughness", "rho_s")}
     changed |= {"oiliness": 0.0, "profile": "spectral"}
     if isinstance(scene.head.maps, PaintedMaps):
         head = painted(scene.head, found["melanin"], found["blood"])
@@ -123,14 +120,14 @@ def with_skin(scene: Scene, point: Point) -> Scene:
 
 
 def painted(head: Head, melanin: float, blood: float) -> Head:
-    """A painted person with these pigments."""
+    """Return a painted person with other pigments."""
     assert isinstance(head.maps, PaintedMaps)
     look = replace(head.maps.look, melanin=melanin, blood=blood)
     return replace(head, maps=replace(head.maps, look=look))
 
 
 def suns_of(towards: Floats, strengths: Sequence[float] | Floats, white: Floats) -> list[DirectionalLight]:
-    """Suns of a colour (3,) and strengths (k,), irradiance of what faces them."""
+    """Return suns of a colour (3,) and strengths (k,), irradiance at normal incidence."""
     return [
         DirectionalLight(
             direction=tuple(-way),

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.unmixing.skin_model import (
-    BLOOD_SPREAD,
-    DARKEST,
-    FLOOR,
-    USUAL_BLOOD,
-    SkinModel,
-    skin_model,
+from dermis.apps.inverse.unmixing import skin_model as skins
+from dermis.apps.inverse.unmixing.skin_model import SkinModel, skin_model
+from dermis.gpu import (
+    CommandList,
+    ComputeProgram,
+    Device,
+    MutableBindings,
+    Record,
+    Texture,
+    compiled,
+    download,
+    make_texture,
 )
-from dermis.gpu import CommandList, ComputeProgram, Device, compiled, download, make_texture
 from dermis.gpu.program import declared
 from dermis.gpu.textures import texture_from, upload
+from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import SkinParameters
 
 Pixels = NDArray[np.float32]
@@ -32,7 +37,7 @@ _TEXEL = "rgba32float"
 
 
 class Unmixer:
-    """Turns colours into melanin and blood on a device.
+    """Inverse of a skin model on a device: colours to melanin and blood.
 
     noise : standard deviation of a channel, relative [-]
     """
@@ -40,7 +45,7 @@ class Unmixer:
     def __init__(self, device: Device, model: SkinModel, noise: float) -> None:
         self.device, self.model, self.noise = device, model, noise
         self._table = _table_of(device, model)
-        self._found: tuple[Any, Any] | None = None
+        self._found: tuple[Texture, Texture] | None = None
         self._starts = device.space(8 * _SIDE**2, "first guesses")
         shader = _program(device, "unmix_start", model)
         frame = CommandList(device, timed=False)
@@ -48,8 +53,8 @@ class Unmixer:
         frame.submit()
 
     def unmix(self, colours: Pixels, told: Told = lambda done, of: None) -> tuple[Pixels, Pixels, Pixels]:
-        """Of colours (h, w, 3): melanin, blood and the third number (h, w, 3), standard deviations of the
-        first two (h, w, 2), and the residual (h, w, 3).
+        """Return melanin, blood and the third number (h, w, 3) of colours (h, w, 3), the standard deviations
+        of the first two (h, w, 2), and the residual (h, w, 3).
         """
         height, width = colours.shape[:2]
         made, unsure, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
@@ -61,16 +66,16 @@ class Unmixer:
             told(rows.stop, height)
         return made, unsure, residual
 
-    def strip(self, colours: Any) -> tuple[Any, Any]:
-        """Two textures of what a texture's colours are made of: see `record`."""
+    def strip(self, colours: Texture) -> tuple[Texture, Texture]:
+        """Return the two textures of `record` for a texture of colours."""
         frame = CommandList(self.device, timed=False)
         made = self.record(frame, colours)
         frame.submit()
         return made
 
-    def record(self, frame: CommandList, colours: Any) -> tuple[Any, Any]:
-        """Record the pass that finds, of a texture's colours, melanin, blood and their standard deviations,
-        and the residual with the third number; in textures that the next of the same size takes again.
+    def record(self, frame: CommandList, colours: Texture) -> tuple[Texture, Texture]:
+        """Record the pass from a texture of colours to melanin, blood and their standard deviations, and to
+        the residual with the third number; the textures are reused for the next of the same size.
         """
         size = colours.size[:2]
         shader = _program(self.device, "unmix", self.model)
@@ -81,37 +86,37 @@ class Unmixer:
         frame.compute("unmix", shader, bound | self._bound(shader, _STEPS), size)
         return shares, residual
 
-    def _bound(self, shader: ComputeProgram, steps: int) -> dict[str, Any]:
+    def _bound(self, shader: ComputeProgram, steps: int) -> MutableBindings:
         record = _record(shader, self.model, self.noise, steps)
         return {"model": record, "table": self._table, "starts": self._starts}
 
 
 def recolour(
-    device: Device, model: SkinModel, made: Pixels, residual: Pixels, factors: Any, added: Any
+    device: Device, model: SkinModel, made: Pixels, residual: Pixels, factors: Floats, added: Floats
 ) -> Pixels:
-    """Colours (h, w, 3) of the model's skins with a residual (h, w, 3).
+    """Return the colours (h, w, 3) of the model's skins with a residual (h, w, 3).
 
     made : (h, w, 3) melanin, blood and the third number
-    factors, added : (3,) what each of them is multiplied by, and what is then added to it
+    factors, added : (3,) applied to each of them, in this order
     """
     table, shader = _table_of(device, model), _program(device, "recolour", model)
     change = shader.record("Change", factors=factors, added=added)
     found = np.empty(residual.shape, np.float32)
     for rows in strips(*made.shape[:2]):
-        images = (texture_from(device, _four(one[rows]), _TEXEL, "maps") for one in (made, residual))
-        first, second = images
-        texture = make_texture(device, first.size[:2], _TEXEL)
-        bound = {"model": _record(shader, model, 1.0, 0), "table": table, "change": change}
+        first, second = (texture_from(device, _four(one[rows]), _TEXEL, "maps") for one in (made, residual))
+        size = first.size[:2]
+        texture = make_texture(device, size, _TEXEL)
+        bound: MutableBindings = {"model": _record(shader, model, 1.0, 0), "table": table, "change": change}
         bound |= {"made": first, "residual": second, "recoloured": texture}
         frame = CommandList(device, timed=False)
-        frame.compute("recolour", shader, bound, first.size[:2])
+        frame.compute("recolour", shader, bound, size)
         frame.submit()
         found[rows] = download(device, texture)[..., :3]
     return found
 
 
 def strips(height: int, width: int) -> Iterator[slice]:
-    """Rows that go over a picture, few enough for a device's memory."""
+    """Return the strips of rows of a picture, few enough for a device's memory."""
     rows = max(1, _STRIP // width)
     return (slice(first, min(first + rows, height)) for first in range(0, height, rows))
 
@@ -122,7 +127,7 @@ def _four(colours: Pixels) -> Pixels:
     return padded
 
 
-def _table_of(device: Device, model: SkinModel) -> Any:
+def _table_of(device: Device, model: SkinModel) -> Texture:
     layers = [_four(layer.astype(np.float32)) for layer in model.logs]
     texture = make_texture(device, layers[0].shape[1::-1], _TEXEL, layers=len(layers), use="map")
     for number, layer in enumerate(layers):
@@ -135,16 +140,13 @@ def _program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
     numbers = {"NODES": nodes, "THIRDS": thirds, "SHADE": int(model.third == "shade"), "SIDE": _SIDE}
     path = _FOLDER / f"{name}.wgsl"
     constants = declared(path, (), tuple(numbers.items()))
-
-    def make() -> ComputeProgram:
-        return ComputeProgram(device, path, (), constants)
-
+    make = partial(ComputeProgram, device, path, (), constants)
     return compiled(device, ("unmixing", name), tuple(constants.items()), make)
 
 
-def _record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> Any:
-    numbers = {"usual": model.usual, "spread": model.spread, "noise": noise, "floor": FLOOR}
-    believed = {"blood": (USUAL_BLOOD, BLOOD_SPREAD), "darkest": DARKEST}
+def _record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> Record:
+    numbers = {"usual": model.usual, "spread": model.spread, "noise": noise, "floor": skins.FLOOR}
+    believed = {"blood": (skins.USUAL_BLOOD, skins.BLOOD_SPREAD), "darkest": skins.DARKEST}
     return shader.record("Model", span=model.span, steps=steps, **believed, **numbers)
 
 
@@ -153,10 +155,10 @@ _SLOW = 1.0 / 24.0  # of the longer side: standard deviation of the blur
 
 
 def shading_of(device: Device, colours: Pixels, skin: SkinParameters, noise: float) -> Pixels:
-    """(h, w) factor that light makes of each texel, 1 on average over the skin [-].
+    """Return the shading of each texel (h, w), 1 on average over the skin [-].
 
-    Each texel of a smaller picture gets the brightness that its melanin and blood leave over; of that what
-    changes slowly is kept, weighed by how well the colour fits a skin.
+    Each texel of a smaller picture has the brightness that its melanin and blood do not explain; its low
+    frequencies are kept, weighted by how well the colour fits a skin.
     """
     small = _block_means(colours)
     made, _, residual = Unmixer(device, skin_model(skin, "shade"), noise).unmix(small)
@@ -168,7 +170,7 @@ def shading_of(device: Device, colours: Pixels, skin: SkinParameters, noise: flo
 
 
 def _block_means(colours: Pixels) -> Pixels:
-    """Means of blocks of texels."""
+    """Return means of blocks of texels."""
     apart = max(1, max(colours.shape[:2]) // _SHADING_SIDE)
     height, width = (max(1, side // apart) for side in colours.shape[:2])
     whole = colours[: height * apart, : width * apart] if apart > 1 else colours
@@ -185,7 +187,7 @@ def _blurred(values: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArra
 
 
 def _upsampled(values: NDArray[np.float64], shape: tuple[int, int]) -> Pixels:
-    """Bilinear between the middles of blocks."""
+    """Return a picture interpolated bilinearly between the centres of blocks."""
     from scipy.ndimage import map_coordinates
 
     found = np.empty(shape, np.float32)

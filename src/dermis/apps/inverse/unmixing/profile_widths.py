@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +34,11 @@ _STIFF = 1e4  # of the equation that shares sum to 1
 
 @dataclass(frozen=True, eq=False)
 class Widths:
-    """Profiles on the same Gaussians, and where skin has which.
+    """Three profiles on the same Gaussians, and a map that mixes them.
 
     shares : (h, w, 2) of the second and the third [-]
     error, alone : (3,) root mean square over the grid of E_b, by channel, of the mixture against each node's
-        own profile, colour aside; and of the one profile at the middle instead [-]
+        own profile of equal energy; and of the one profile at the middle instead [-]
     """
 
     profiles: tuple[GaussianSum, ...]
@@ -47,13 +46,13 @@ class Widths:
     error: Floats
     alone: Floats
 
-    def summary(self) -> dict[str, Any]:
-        """The errors."""
+    def summary(self) -> dict[str, list[float]]:
+        """Return the errors."""
         return {"mixed": self.error.tolist(), "one_profile": self.alone.tolist()}
 
 
 def widths_of(found: Unmixed) -> Widths:
-    """Three profiles and their shares by each texel's melanin and blood; beyond their ends the nearest.
+    """Return three profiles and their shares by each texel's melanin and blood, clamped to their ends.
 
     Raises DermisError for a picture without skin.
     """
@@ -97,13 +96,13 @@ def _tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:
 
 
 def _white(tissue: Tissue) -> Floats:
-    """(n, 3) share of what leaves that leaves through each ring."""
+    """Return the share (n, 3) of the diffuse reflectance that leaves through each ring."""
     rings = tissue.rings()
     return np.asarray(rings.energy / rings.total)
 
 
 def _shares(nodes: Floats, corners: Floats) -> Floats:
-    """(n, k) shares of the corners that come nearest to each node: none below 0, their sum 1."""
+    """Return shares (n, k) of the corners that approximate each node: non-negative, with sum 1."""
     from scipy.optimize import nnls
 
     sides = np.vstack([corners.reshape(len(corners), -1).T, np.full((1, len(corners)), _STIFF)])
@@ -112,13 +111,13 @@ def _shares(nodes: Floats, corners: Floats) -> Floats:
 
 
 def _off(made: Floats, nodes: Floats) -> Floats:
-    """(3,) root mean square of E_b over all nodes."""
+    """Return the root mean square of E_b over all nodes (3,)."""
     squares = ((made - nodes) ** 2).sum(axis=1) / (nodes**2).sum(axis=1)
     return np.asarray(np.sqrt(squares.mean(axis=0)))
 
 
 def _over_map(shares: Floats, axes: Sequence[Floats], found: Unmixed) -> Pixels:
-    """(h, w, 2) shares between nodes, by the logarithms of melanin and blood."""
+    """Return shares (h, w, 2) interpolated between nodes in the logarithms of melanin and blood."""
     from scipy.interpolate import RegularGridInterpolator
 
     between = RegularGridInterpolator([np.log(axis) for axis in axes], shares)

@@ -29,7 +29,7 @@ Pixels = NDArray[np.float32]
 NOISE = 0.01
 SKIN = 5.0
 """CIEDE2000 from the model's nearest colour up to which a texel counts as skin."""
-_TOLD = 1.0, 2.0, SKIN
+_LIMITS = 1.0, 2.0, SKIN
 _JUDGED = 512  # texels along the longer side, for the table
 _NOISE = 1e-4, 0.5
 _BLACK = 1e-3  # as between the charts of a map
@@ -39,17 +39,17 @@ _FACTORS = 0.0, 100.0
 
 @dataclass(frozen=True)
 class Share:
-    """What becomes of a map of shares: a factor times it, or one of another median.
+    """Change of a map of shares: a factor, or another median.
 
-    A larger median adds the same everywhere, because pale skin's noise would be multiplied with it; a smaller
-    one multiplies.
+    A larger median adds a constant, because a factor would multiply the noise of pale skin; a smaller one
+    multiplies.
     """
 
     factor: float = 1.0
     median: float | None = None
 
     def over(self, median: float) -> tuple[float, float]:
-        """Factor for a map of this median, and what is then added."""
+        """Return the factor for a map of this median, and the constant that is then added."""
         if self.median is None:
             return self.factor, 0.0
         if self.median < median:
@@ -59,7 +59,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Change:
-    """Other pigments for the same skin; what is None stays.
+    """Change of the pigments of a skin; None keeps one.
 
     oxygen, eumelanin : shares, as of `SkinParameters` [-]
     """
@@ -70,18 +70,18 @@ class Change:
     eumelanin: float | None = None
 
     def of(self, skin: SkinParameters) -> SkinParameters:
-        """The skin with what is given here."""
+        """Return a skin with the given oxygen and eumelanin."""
         given = {name: getattr(self, name) for name in ("oxygen", "eumelanin")}
         return replace(skin, **{name: one for name, one in given.items() if one is not None})
 
     def over(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
-        """Factors of melanin, blood and the third number for maps of these medians, and what is added."""
+        """Return factors and constants for melanin, blood and the third number of maps of these medians."""
         factors, added = zip(self.melanin.over(melanin), self.blood.over(blood), (1.0, 0.0), strict=True)
         return np.array(factors), np.array(added)
 
 
 def parse_share(option: str, words: str) -> Share:
-    """What somebody wrote: x2 for a factor, 0.1 for a median.
+    """Parse x2 as a factor, 0.1 as a median.
 
     Raises DermisError for anything else.
     """
@@ -97,14 +97,14 @@ def parse_share(option: str, words: str) -> Share:
 
 @dataclass(frozen=True, eq=False)
 class Unmixed:
-    """What a picture of skin is made of. All maps are (h, w), row 0 at the top.
+    """Pigments of a picture of skin. All maps are (h, w), row 0 at the top.
 
     melanin, blood : shares of the volume of epidermis and dermis [-]
     melanin_sd, blood_sd : standard deviations that noise leaves at least, by the Cramér-Rao bound [-]
-    third : oxygen, the share of haemoglobin that carries it, where that was asked for [-]
-    shading : (h, w) light that was taken out of the colours, where that was asked for [-]
-    residual : (h, w, 3) the colour over that of the model's skin: paint, hair, and all else that is none [-]
-    devices : those that the skin was computed on, by what was asked for; they stay open for more
+    third : oxygen, the share of haemoglobin that carries it, where it was requested [-]
+    shading : (h, w) shading by which the colours were divided, where it was requested [-]
+    residual : (h, w, 3) colour divided by that of the model: paint, hair, and all else that is no skin [-]
+    devices : that the skin was computed on, by requested adapter; they stay open
     """
 
     melanin: Pixels
@@ -119,42 +119,37 @@ class Unmixed:
     devices: dict[str, LazyDevice] = field(default_factory=dict)
 
     def maps(self) -> dict[str, Pixels]:
-        """Those that are there, by the names of their files."""
-        named = {
-            name: getattr(self, name) for name in ("melanin", "blood", "melanin_sd", "blood_sd", "residual")
-        }
+        """Return the maps that exist, by the names of their files."""
+        names = "melanin", "blood", "melanin_sd", "blood_sd", "residual"
+        named = {name: getattr(self, name) for name in names}
         further = {"oxygen": self.third, "shading": self.shading}
         return named | {name: one for name, one in further.items() if one is not None}
 
     def summary(self) -> dict[str, Any]:
-        """Medians over the skin, how far the way back is off, and how much is no skin of the model.
+        """Return medians over the skin, errors of the reconstruction, and the share of skin.
 
-        Of every n-th texel, so that 512 are taken along the longer side; what is black is no skin.
+        Of every n-th texel, so that 512 are taken along the longer side; black is no skin.
         """
         apart = max(1, max(self.melanin.shape) // _JUDGED)
         maps = {name: one[::apart, ::apart].astype(np.float64) for name, one in self.maps().items()}
-        m, b, third = (
-            maps[name].ravel() if name in maps else None for name in ("melanin", "blood", "oxygen")
-        )
-        assert m is not None and b is not None
-        back = self.model.colours(m, b, third)
+        shares = {name: maps[name].ravel() for name in ("melanin", "blood", "oxygen") if name in maps}
+        back = self.model.colours(shares["melanin"], shares["blood"], shares.get("oxygen"))
         colours = back * maps["residual"].reshape(-1, 3)
         off = delta_e_2000(back, colours)
         skin = (off <= SKIN) & (colours.max(axis=-1) > _BLACK)
-        told: dict[str, Any] = {"texels": int(off.size), "skin": float(skin.mean())}
+        found: dict[str, Any] = {"texels": int(off.size), "skin": float(skin.mean())}
         if skin.any():
-            told["delta_e"] = _spread(off[skin])
-            told["delta_e"] |= {f"above_{limit:g}": float((off > limit).mean()) for limit in _TOLD}
-            told["melanin"] = _spread(m[skin]) | {"sd": float(np.median(maps["melanin_sd"].ravel()[skin]))}
-            told["blood"] = _spread(b[skin]) | {"sd": float(np.median(maps["blood_sd"].ravel()[skin]))}
-            if third is not None:
-                told["oxygen"] = _spread(third[skin])
-        return told
+            above = {f"above_{limit:g}": float((off > limit).mean()) for limit in _LIMITS}
+            found["delta_e"] = _spread(off[skin]) | above
+            for name, share in shares.items():
+                sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
+                found[name] = _spread(share[skin]) | sd
+        return found
 
     def recoloured(self, change: Change = Change(), adapter: str = "auto") -> Pixels:
-        """(h, w, 3) the colours, linear Rec. 709, of the same skin with other pigments.
+        """Return the colours (h, w, 3), linear Rec. 709, of the same skin with other pigments.
 
-        What the model did not account for stays, as does light that was not taken out of the picture.
+        The residual stays, as does shading that was not removed.
 
         Raises DermisError as `dermis.gpu.open_device`.
         """
@@ -171,11 +166,11 @@ class Unmixed:
         return recolour(device, target, made, self.residual, factors, added)
 
     def skin_texels(self) -> NDArray[np.bool_]:
-        """(h, w) whether a texel's colour is near one of the model's."""
+        """Return a mask (h, w) of texels whose colour is near one of the model's."""
         return np.asarray(np.abs(np.log(np.maximum(self.residual, _BLACK))).max(axis=-1) < _LIKE_SKIN)
 
     def _median(self, share: Pixels) -> float:
-        """Over the skin of the model."""
+        """Return the median over the skin."""
         skin = self.skin_texels()
         return float(np.median(share[skin] if skin.any() else share))
 
@@ -195,14 +190,14 @@ def unmix(
     adapter: str = "auto",
     told: Callable[[int, int], None] = lambda done, of: None,
 ) -> Unmixed:
-    """Melanin and blood of a picture of skin's colour: an albedo map, of a scan or by an artist.
+    """Return melanin and blood of a picture of skin colour: an albedo map of a scan or by an artist.
 
     picture : a file (PNG or JPEG in sRGB, EXR linear), or (h, w, 3) diffuse reflectance, linear Rec. 709
     skin : of the model; its melanin and blood are ignored, its thickness, eumelanin and oxygen are held
     third : "oxygen" finds that too, as far as colour and what is usual tell: 0.1 of standard deviation around
         the skin's own; "none" holds it
     noise : standard deviation of a channel, relative [-]
-    shading : whether to take slow changes of brightness for light, and divide by them
+    shading : whether to estimate low-frequency shading, and divide by it
     told : how many rows are done of how many
 
     Raises DermisError for what is no picture of colours, numbers that cannot be, and as
@@ -230,9 +225,8 @@ def _array(colours: ArrayLike) -> Pixels:
     found = np.asarray(colours)
     if found.ndim != 3 or found.shape[2] != 3 or not found.size or found.dtype.kind != "f":
         came = f"shape {found.shape} and type {found.dtype} came"
-        refuse(
-            "colours", "floats (h, w, 3), linear Rec. 709", came, "Decode sRGB first, or give the file's name"
-        )
+        remedy = "Decode sRGB first, or give the file's name"
+        refuse("colours", "floats (h, w, 3), linear Rec. 709", came, remedy)
     if not (np.isfinite(found).all() and found.min() >= 0.0 and found.max() <= 1.0):
         refuse("colours", "reflectances from 0 to 1", "some are outside, or no numbers", "Scale them")
     return found.astype(np.float32, copy=False)
@@ -244,9 +238,9 @@ SUMMARY = "unmixed.json"
 def save_maps(
     folder: Path, found: Unmixed, recoloured: NDArray[np.float32] | None = None, linear: bool = False
 ) -> list[Path]:
-    """Write each map as EXR, the table, and the other colours if any; each file whole or not at all.
+    """Write each map as EXR, the summary, and the recoloured picture if any; each file whole or not at all.
 
-    linear : whether the other colours are written as EXR rather than PNG
+    linear : whether the recoloured picture is written as EXR rather than PNG
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
