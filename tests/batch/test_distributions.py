@@ -106,7 +106,7 @@ def test_what_states_none_is_refused(told: Any, said: str) -> None:
 def test_any_value_lies_between_the_ends_and_any_text_says_the_same(told: Any, share: float) -> None:
     found = parse_distribution(told)
     assert isinstance(found, Distribution)
-    assert parse_distribution(found.told()) == found
+    assert parse_distribution(found.spec_value()) == found
     low, high = min(found.ends), max(found.ends)  # type: ignore[type-var]
     assert low <= found.at(share) <= high  # type: ignore[operator]
 

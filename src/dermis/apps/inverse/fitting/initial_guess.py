@@ -80,8 +80,8 @@ class InitialGuess:
         return found
 
     def _fault(self, logs: Floats, suns: list[int]) -> float:
-        """Return the squared residual, with radiance below the surface scaled by the skin's colour, and radiance
-        off it by its strength.
+        """Return the squared residual, with radiance below the surface scaled by the colour of the skin, and
+        radiance off it by its strength.
         """
         chosen = np.array([*range(BASIS), *(BASIS + k for k in suns)])
         n, strength = self._lights, float(np.exp(logs[3] - self.point.logs[3]))

@@ -201,29 +201,25 @@ class Certainty:
     singular: tuple[float, ...]
 
 
-def names_of(suns: int) -> list[str]:
-    """Return the names of all unknowns."""
-    turns = [f"sun {k + 1} {way}" for k in range(suns) for way in ("across", "along")]
-    return [*(one.name for one in UNKNOWNS), *turns, "white red", "white blue"]
-
-
 def certainty_of(problem: Problem, state: State, slopes: Floats) -> Certainty:
     """Return the uncertainty by derivatives with lights eliminated, over blocks of pixels [White1980]."""
     turns = 2 * len(state.point.suns)
-    names, spread = names_of(turns // 2), problem.believed(turns)
+    suns = [f"sun {k + 1} {way}" for k in range(turns // 2) for way in ("across", "along")]
+    names = [*(one.name for one in UNKNOWNS), *suns, "white red", "white blue"]
     count = len(names) if problem.free_white else len(names) - 2
     J = (slopes * state.weight[..., None]).reshape(-1, len(names))[:, :count]
     J, r = _projected(state, J)
-    spread = spread[:count]
+    spread = problem.believed(turns)[:count]
     H = np.linalg.inv(J.T @ J + np.diag(spread**-2.0))
     block = np.repeat(_blocks(problem.frames), 3)
     sums = np.stack([np.bincount(block, column) for column in (J * r[:, None]).T], axis=-1)
     covariance = H @ (sums.T @ sums + np.diag(spread**-2.0)) @ H
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
-    ended = _on_limits(state)
+    found = state.point.values()
+    inside = {one.name: one.low * (1 + _EDGE) < found[one.name] < one.high * (1 - _EDGE) for one in UNKNOWNS}
     each = zip(names, sd, spread, strict=False)
-    held = tuple(name for name, one, before in each if one > _HELD * before or name in ended)
+    held = tuple(name for name, one, prior in each if one > _HELD * prior or not inside.get(name, True))
     alike = tuple(
         (names[a], names[b], float(correlation[a, b]))
         for a in range(count)
@@ -232,14 +228,6 @@ def certainty_of(problem: Problem, state: State, slopes: Floats) -> Certainty:
     )
     singular = np.linalg.svd(J * spread, compute_uv=False)
     return Certainty(dict(zip(names, map(float, sd), strict=False)), held, alike, tuple(map(float, singular)))
-
-
-def _on_limits(state: State) -> set[str]:
-    """Return the names of the skin's numbers that ended on a limit."""
-    found = state.point.values()
-    return {
-        one.name for one in UNKNOWNS if not one.low * (1 + _EDGE) < found[one.name] < one.high * (1 - _EDGE)
-    }
 
 
 def _blocks(frames: Frames) -> NDArray[np.int64]:

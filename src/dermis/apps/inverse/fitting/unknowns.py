@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dermis.human.skin.painted import PaintedMaps
-from dermis.mesh.head import Head
 from dermis.optics.media import Floats
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
@@ -108,8 +107,9 @@ def with_skin(scene: Scene, point: Point) -> Scene:
     found = point.values()
     changed: dict[str, object] = {name: found[name] for name in ("roughness", "rho_s")}
     changed |= {"oiliness": 0.0, "profile": "spectral"}
-    if isinstance(scene.head.maps, PaintedMaps):
-        head = painted(scene.head, found["melanin"], found["blood"])
+    if isinstance(maps := scene.head.maps, PaintedMaps):
+        look = replace(maps.look, melanin=found["melanin"], blood=found["blood"])
+        head = replace(scene.head, maps=replace(maps, look=look))
         melanin, blood = np.exp(_COARSE * np.rint(point.logs[:2] / _COARSE))
     else:
         head, melanin, blood = scene.head, found["melanin"], found["blood"]
@@ -119,20 +119,9 @@ def with_skin(scene: Scene, point: Point) -> Scene:
     return replace(scene, head=head, skin=Skin(**(scene.skin.model_dump() | changed | {"pigments": own})))
 
 
-def painted(head: Head, melanin: float, blood: float) -> Head:
-    """Return a painted person with other pigments."""
-    assert isinstance(head.maps, PaintedMaps)
-    look = replace(head.maps.look, melanin=melanin, blood=blood)
-    return replace(head, maps=replace(head.maps, look=look))
-
-
 def suns_of(towards: Floats, strengths: Sequence[float] | Floats, white: Floats) -> list[DirectionalLight]:
     """Return suns of a colour (3,) and strengths (k,), irradiance at normal incidence."""
     return [
-        DirectionalLight(
-            direction=tuple(-way),
-            irradiance=tuple(float(strength) * white),
-            angle_degrees=SUN_DEGREES,
-        )
-        for way, strength in zip(towards, strengths, strict=True)
+        DirectionalLight(direction=tuple(-way), irradiance=tuple(float(s) * white), angle_degrees=SUN_DEGREES)
+        for way, s in zip(towards, strengths, strict=True)
     ]

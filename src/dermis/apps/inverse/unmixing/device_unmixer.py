@@ -59,19 +59,15 @@ class Unmixer:
         height, width = colours.shape[:2]
         made, unsure, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
         for rows in strips(height, width):
-            textures = self.strip(texture_from(self.device, _four(colours[rows]), _TEXEL, "colours"))
+            frame = CommandList(self.device, timed=False)
+            strip = texture_from(self.device, _four(colours[rows]), _TEXEL, "colours")
+            textures = self.record(frame, strip)
+            frame.submit()
             shares, left = (download(self.device, texture) for texture in textures)
             made[rows, :, :2], unsure[rows] = shares[..., :2], shares[..., 2:]
             made[rows, :, 2], residual[rows] = left[..., 3], left[..., :3]
             told(rows.stop, height)
         return made, unsure, residual
-
-    def strip(self, colours: Texture) -> tuple[Texture, Texture]:
-        """Return the two textures of `record` for a texture of colours."""
-        frame = CommandList(self.device, timed=False)
-        made = self.record(frame, colours)
-        frame.submit()
-        return made
 
     def record(self, frame: CommandList, colours: Texture) -> tuple[Texture, Texture]:
         """Record the pass from a texture of colours to melanin, blood and their standard deviations, and to
@@ -122,9 +118,7 @@ def strips(height: int, width: int) -> Iterator[slice]:
 
 
 def _four(colours: Pixels) -> Pixels:
-    padded = np.ones((*colours.shape[:2], 4), np.float32)
-    padded[..., :3] = colours
-    return padded
+    return np.pad(colours, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
 
 
 def _table_of(device: Device, model: SkinModel) -> Texture:
