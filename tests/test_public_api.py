@@ -86,8 +86,8 @@ with warnings.catch_warnings(record=True) as told:
     warnings.simplefilter("always")
     from dermis.unmixing.change import Change
 assert [one.filename for one in told] == [__file__], told
-from dermis.apps.inverse.unmixing import change
-assert Change is change.Change
+from dermis.apps.inverse.unmixing import unmix
+assert Change is unmix.Change
 """
 
 

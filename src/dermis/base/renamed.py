@@ -20,6 +20,7 @@ NAMES: Mapping[str, str] = {
 """Old to new names of objects, both without the package's name."""
 
 MODULES: Mapping[str, str] = {
+    "batch.samples": "apps.batch.reader",
     "batch": "apps.batch",
     "benchmark": "apps.validation.benchmarks",
     "comparison": "apps.validation.comparisons",
@@ -29,6 +30,7 @@ MODULES: Mapping[str, str] = {
     "gallery": "apps.gallery",
     "reference": "apps.truths",
     "registry": "base.registry",
+    "unmixing.change": "apps.inverse.unmixing.unmix",
     "unmixing": "apps.inverse.unmixing",
     "viewer": "apps.viewer",
 }

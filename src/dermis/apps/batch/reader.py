@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
@@ -238,7 +238,7 @@ def _landmarks(record: LandmarksRecord) -> LandmarkPoints:
 
 def _array(values: Numbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Return numbers as an array, NaN where there is null."""
-    flat: list[object] = values if isinstance(values, list) else [values]
+    flat: Sequence[object] = values if isinstance(values, list) else [values]
     while flat and isinstance(flat[0], list):
         flat = [one for row in flat if isinstance(row, list) for one in row]
     if any(isinstance(one, str | bool) for one in flat):

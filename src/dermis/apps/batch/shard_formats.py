@@ -57,15 +57,15 @@ def read_stamp(data: bytes, culprit: object) -> Stamp:
     """
     values = parse_json(data, culprit, "what a whole shard says of itself")
     with understood(culprit, "what a whole shard says of itself", KeyError, TypeError, AttributeError):
-        span = tuple(values[name] for name in ("index", "first", "stop"))
+        index, first, stop = (values[name] for name in ("index", "first", "stop"))
         left_out = tuple((number, reason) for number, reason in values["left_out"])
         spec, sha256, made = values["spec"], values["sha256"], values["made_with"]
-        numbers = [*span, *(number for number, _ in left_out)]
+        numbers = [index, first, stop, *(number for number, _ in left_out)]
         texts = [spec, sha256, *made, *made.values(), *(reason for _, reason in left_out)]
         whole = all(type(one) is int and one >= 0 for one in numbers)
         if not whole or not all(isinstance(text, str) for text in texts):
             raise ValueError("its values are of other kinds")
-        found = Stamp(spec, *span, left_out, sha256, dict(made))
+        found = Stamp(spec, index, first, stop, left_out, sha256, dict(made))
         if found.data() != data:
             raise ValueError("its hash is that of another text")
         return found

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 from contextlib import suppress
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Self
 
 from dermis.apps.batch.atomic_files import leftovers, remove, take_name, unfinished_name
 from dermis.apps.batch.shard_formats import (
@@ -32,7 +33,8 @@ _SHARD_NAME = re.compile(r"shard-(\d{5,9})(\.tar)?")
 _LONGEST_REASON = 200  # letters
 
 
-class Shard(NamedTuple):
+@dataclass(frozen=True, order=True)
+class Shard:
     """Images from `first` to before `stop`."""
 
     index: int
@@ -119,7 +121,7 @@ class ShardWriter:
             raise ValueError(f"{self._written} images and {len(self._left_out)} left out are not {shard}")
         left_out = tuple(sorted(self._left_out.items()))
         digest, made = self._files.sha256(), made_with(self._adapter)
-        stamp = Stamp(spec.digest(), *shard, left_out, digest, made).data()
+        stamp = Stamp(spec.digest(), shard.index, shard.first, shard.stop, left_out, digest, made).data()
         if len(stamp) > MOST_STAMP_BYTES:
             came = f"{len(left_out)} could not be made, such as: {left_out[0][1]}"
             refuse(self._target, "a shard of images most of which can be made", came, "Correct the spec")
@@ -147,7 +149,7 @@ def is_there(out: Path, shard: Shard, spec: Spec) -> bool:
         stamp = stamp_of(path)
     except DermisError:
         return False
-    if (stamp.spec, stamp.index, stamp.first, stamp.stop) != (spec.digest(), *shard):
+    if (stamp.spec, stamp.index, stamp.first, stamp.stop) != (spec.digest(), *astuple(shard)):
         remedy = "Choose another folder, or give the spec that it was begun with"
         refuse(path, "a shard of this data set", "it belongs to that of another spec", remedy)
     return True

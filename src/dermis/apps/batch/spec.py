@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, Field, PrivateAttr
 
@@ -28,7 +28,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
 MOST_IMAGES = 10**9
-RENDER: Mapping[str, object] = {"atlas": 1024, "exposure": "auto"}
+RENDER: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
 """Settings that a data set has where its spec says nothing."""
 _BACKGROUND = "[background]"
 ELSEWHERE = {"size": "size, above all tables", "background": _BACKGROUND, "background_blur": _BACKGROUND}

@@ -124,7 +124,7 @@ def subject_of(given: object, camera: object = None) -> Subject:
     else:
         scene = given if isinstance(given, Scene) else Scene(given_head(given))
     if camera is not None:
-        scene = replace(scene, camera=_camera(camera, scene.head))
+        scene = replace(scene, camera=_camera(camera, scene.head))  # type: ignore[arg-type]
     person = given if isinstance(given, Human) else _person(scene.head)
     name = scene.head.name
     if not table and (person is not None or not is_person(name)):

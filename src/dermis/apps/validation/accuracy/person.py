@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dermis.apps.gallery.panels import sheet
-from dermis.apps.gallery.script import Panels, encode_webp
+from dermis.apps.gallery.panels import Panels, sheet
+from dermis.apps.gallery.script import encode_webp
 from dermis.apps.truths.metrics import Estimate
 from dermis.apps.validation.comparisons.person import EYE_MM, VIEWS, Pair, compare_person, iris_of, scene_of
 from dermis.apps.validation.comparisons.person_paint import paint_of
