@@ -20,8 +20,8 @@ NAMES: Mapping[str, str] = {
 """Old to new names of objects, both without the package's name."""
 
 MODULES: Mapping[str, str] = {
-    "batch.samples": "apps.batch.reader",
     "batch": "apps.batch",
+    "batch.samples": "apps.batch.reader",
     "benchmark": "apps.validation.benchmarks",
     "comparison": "apps.validation.comparisons",
     "errors": "base.errors",
@@ -30,8 +30,8 @@ MODULES: Mapping[str, str] = {
     "gallery": "apps.gallery",
     "reference": "apps.truths",
     "registry": "base.registry",
-    "unmixing.change": "apps.inverse.unmixing.unmix",
     "unmixing": "apps.inverse.unmixing",
+    "unmixing.change": "apps.inverse.unmixing.unmix",
     "viewer": "apps.viewer",
 }
 """Old to new paths of modules and packages, both without the package's name."""
@@ -77,9 +77,9 @@ def _moved(fullname: str) -> str | None:
     package, _, path = fullname.partition(".")
     if package != _PACKAGE:
         return None
-    for old, new in MODULES.items():
+    for old in sorted(MODULES, reverse=True):  # longer paths first
         if path == old or path.startswith(f"{old}."):
-            return new + path[len(old) :]
+            return MODULES[old] + path[len(old) :]
     return None
 
 
