@@ -7,11 +7,11 @@ import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from dermis.base.errors import refuse
 from dermis.gpu.memory import check_drivers
 from dermis.gpu.native_types import register_wgpu_types
+from dermis.gpu.types import Untyped
 
 WANTED_FEATURES = ("timestamp-query",)
 """Optional features, requested where the adapter has them; everything works without them."""
@@ -78,7 +78,7 @@ class Adapter:
     kind: str
     backend: str
     features: tuple[str, ...]
-    handle: Any
+    handle: Untyped
     number: int = 0
 
     @property
@@ -176,7 +176,7 @@ def _numbered(adapters: list[Adapter], number: int) -> Adapter:
     return adapters[number]
 
 
-def _describe(handle: Any) -> Adapter:
+def _describe(handle: Untyped) -> Adapter:
     info = handle.info
     return Adapter(
         name=info["device"],

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
-from typing import Any, Generic, TypeVar
+from collections.abc import Sequence, Sized
+from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from dermis.gpu.device import Device
-from dermis.gpu.shader_types import Binding
+from dermis.gpu.shader_types import Binding, Entry
+from dermis.gpu.types import Native, Texture, TextureOrView, Untyped, is_texture
 
 UNIFORM = {"type": "uniform"}
 
@@ -31,7 +32,7 @@ class BindGroup:
 
     __slots__ = ("__weakref__", "_internal")
 
-    def __init__(self, device: Device, layout: Any, entries: Any) -> None:
+    def __init__(self, device: Device, layout: Native, entries: Sized) -> None:
         described = device.ffi.new("WGPUBindGroupDescriptor *")
         described.layout, described.entries, described.entryCount = layout._internal, entries, len(entries)
         made = device.checked.wgpuDeviceCreateBindGroup(device.handle._internal, described)
@@ -39,7 +40,11 @@ class BindGroup:
 
 
 def make_group(
-    device: Device, layout: Any, bindings: Sequence[Binding], values: Sequence[Any], records: Sequence[int]
+    device: Device,
+    layout: Native,
+    bindings: Sequence[Binding],
+    values: Sequence[Untyped],
+    records: Sequence[int],
 ) -> BindGroup:
     """The bind group of values for bindings.
 
@@ -69,7 +74,7 @@ class ResourceCache(Generic[T]):
 
     def __init__(self) -> None:
         self._kept: dict[Key, T] = {}
-        self._users: dict[int, tuple[weakref.ref[Any], set[Key]]] = {}
+        self._users: dict[int, tuple[weakref.ref[object], set[Key]]] = {}
 
     def __len__(self) -> int:
         return len(self._kept)
@@ -83,19 +88,19 @@ class ResourceCache(Generic[T]):
         """The entry for a key from `key_of`, None without one."""
         return self._kept.get(key)
 
-    def keep(self, key: Key, resources: Sequence[Any], made: T) -> None:
+    def keep(self, key: Key, resources: Sequence[object], made: T) -> None:
         """Keep an entry for as long as all of its key's resources live."""
         self._kept[key] = made
         for resource in resources:
             self._user(resource).add(key)
 
-    def _user(self, resource: Any) -> set[Key]:
+    def _user(self, resource: object) -> set[Key]:
         """The keys that contain a resource; new resources are watched until they are released."""
         name = id(resource)
         if name not in self._users:
             this = weakref.ref(self)
 
-            def gone(_: Any) -> None:
+            def gone(_: object) -> None:
                 kept = this()
                 if kept is not None:
                     kept._forget(name)
@@ -111,23 +116,27 @@ class ResourceCache(Generic[T]):
                 self._users[other][1].discard(key)
 
 
-def key_of(resources: Sequence[Any]) -> Key:
+def key_of(resources: Sequence[object]) -> Key:
     """The key for these resources in this order."""
     return tuple(map(id, resources))
 
 
-def _view(device: Device, value: Any, texture: dict[str, Any]) -> Any:
+def _view(device: Device, value: TextureOrView, texture: Entry) -> object:
     """The library's view of a whole texture, made once for each dimension; a view's own."""
-    if not hasattr(value, "create_view"):
-        return value._internal
-    known = device.shared("whole views", WeakKeyDictionary[Any, dict[str, Any]])
-    views: dict[str, Any] = known.setdefault(value, {})
-    dimension = texture["view_dimension"]
+    if is_texture(value):
+        return _whole_view(device, value, texture["view_dimension"])
+    return value._internal
+
+
+def _whole_view(device: Device, texture: Texture, dimension: str) -> object:
+    views = device.shared("whole views", WeakKeyDictionary[Texture, dict[str, object]]).setdefault(
+        texture, {}
+    )
     if dimension not in views:
         described = device.ffi.new("WGPUTextureViewDescriptor *")
         described.dimension, described.aspect = _DIMENSIONS[dimension], _WHOLE
         described.mipLevelCount = _ALL_LEVELS
         described.arrayLayerCount = 1 if dimension == "2d" else _ALL_LAYERS
-        made = device.checked.wgpuTextureCreateView(value._internal, described)
+        made = device.checked.wgpuTextureCreateView(texture._internal, described)
         views[dimension] = device.ffi.gc(made, device.lib.wgpuTextureViewRelease)
     return views[dimension]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar, TypeVarTuple
+from itertools import product
+from typing import Any, TypeVar, TypeVarTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +16,25 @@ from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterP
 from dermis.gpu.recorder import DrawTarget, Groups, Recorder
 from dermis.gpu.shader_types import Binding, record_type
 from dermis.gpu.textures import download
-from dermis.gpu.types import Bindings, Buffer, Record, TextureOrView
+from dermis.gpu.types import (
+    Bindable,
+    Bindings,
+    Buffer,
+    Record,
+    TextureOrView,
+    Untyped,
+    is_buffer,
+    is_sampler,
+    is_texture,
+    is_view,
+)
 
 T = TypeVar("T")
 
 Ts = TypeVarTuple("Ts")
 
+Description = dict[str, Any]
+"""Plain data for JSON."""
 Bound = list[int]
 """In the order of the program's bindings: numbers of resources, and -1 - k for the take's record k."""
 
@@ -84,17 +98,17 @@ class FrameCapture(Graph):
     def __init__(self, device: Device) -> None:
         super().__init__(device)
         self.shaders: list[str] = []
-        self.programs: list[dict[str, Any]] = []
-        self.resources: list[dict[str, Any]] = []
-        self.structs: dict[str, np.dtype[Any]] = {}
-        self._objects: list[Any] = []
+        self.programs: list[Description] = []
+        self.resources: list[Description] = []
+        self.structs: dict[str, np.dtype[np.generic]] = {}
+        self._objects: list[Bindable] = []
         self._numbers: dict[int, int] = {}
         self._take = CapturedFrame()
         self._unit: int | None = None
         self._taken: dict[int, int] = {}
         self._kept: list[Program] = []
 
-    def take(self, declare: Callable[[FrameCapture], Any]) -> CapturedFrame:
+    def take(self, declare: Callable[[FrameCapture], object]) -> CapturedFrame:
         """The frame that `declare` declares."""
         self._take = take = CapturedFrame()
         self._unit = None
@@ -105,33 +119,24 @@ class FrameCapture(Graph):
         """The bytes that a resource holds now: of a texture those of each layer, mip by mip."""
         return content_of(self.device, self._objects[number])
 
-    def object(self, number: int) -> Any:
+    def object(self, number: int) -> Untyped:
         """A resource by its number."""
         return self._objects[number]
 
-    def resource(self, value: Any) -> int:
+    def resource(self, value: Bindable) -> int:
         """The number of a texture, view, buffer or sampler."""
         if id(value) not in self._numbers:
-            texture = getattr(value, "texture", None)
-            found = (
-                description_of(self.device, value)
-                if texture is None
-                else {"kind": "view", "part": value.part}
-            )
-            if texture is not None:
-                found["of"] = self.resource(texture)
+            if is_view(value):
+                found: Description = {"kind": "view", "part": value.part, "of": self.resource(value.texture)}
+            else:
+                found = description_of(self.device, value)
             self._numbers[id(value)] = len(self.resources)
             self.resources.append(found)
             self._objects.append(value)
         return self._numbers[id(value)]
 
     def dispatch(
-        self,
-        stage: str,
-        program: ComputeProgram,
-        resources: Bindings,
-        groups: Groups,
-        completes: str = "",
+        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
     ) -> None:
         """Take a pass down."""
         taken = self._pass(stage, program, resources, groups)
@@ -184,12 +189,12 @@ class FrameCapture(Graph):
         self._take.add(taken, self._unit)
         return taken
 
-    def _bound(self, program: Program, binding: Binding, value: Any) -> int:
-        if binding.entry.get("buffer") != {"type": "uniform"}:
+    def _bound(self, program: Program, binding: Binding, value: Bindable) -> int:
+        if not isinstance(value, np.ndarray):
             return self.resource(value)
         struct = record_type(program.source.text, binding.name)
         self.structs[struct] = value.dtype
-        return -1 - self._take.record(struct, value)
+        return -1 - self._take.record(struct, cast("Record", value))
 
     def _program(self, program: Program) -> int:
         if id(program) not in self._taken:
@@ -212,29 +217,22 @@ class FrameCapture(Graph):
         return self.shaders.index(text)
 
 
-def description_of(device: Device, value: Any) -> dict[str, Any]:
+def description_of(device: Device, value: Bindable) -> Description:
     """What it takes to make a resource: its kind, sizes and uses by WebGPU's numbers, or options."""
-    if hasattr(value, "mip_level_count"):
-        return {
-            "kind": "texture",
-            "format": value.format,
-            "size": list(value.size),
-            "mips": value.mip_level_count,
-            "usage": int(value.usage),
-        }
-    if hasattr(value, "size"):
+    if is_texture(value):
+        size, mips = list(value.size), value.mip_level_count
+        sizes = {"format": value.format, "size": size, "mips": mips, "usage": int(value.usage)}
+        return {"kind": "texture", **sizes}
+    if is_buffer(value):
         return {"kind": "buffer", "size": value.size, "usage": int(value.usage)}
+    assert is_sampler(value)
     return {"kind": "sampler", "options": device.sampler_options(value)}
 
 
-def content_of(device: Device, value: Any) -> list[NDArray[np.uint8]]:
+def content_of(device: Device, value: Bindable) -> list[NDArray[np.uint8]]:
     """The bytes of a buffer, or of a texture's layers, mip by mip and in a mip layer by layer."""
-    if not hasattr(value, "mip_level_count"):
+    if not is_texture(value):
         return [np.frombuffer(device.handle.queue.read_buffer(value), np.uint8)]
-    layers = range(value.size[2])
-    texels = [
-        download(device, value, mip=mip, layer=layer)
-        for mip in range(value.mip_level_count)
-        for layer in layers
-    ]
+    parts = product(range(value.mip_level_count), range(value.size[2]))
+    texels = [download(device, value, mip=mip, layer=layer) for mip, layer in parts]
     return [np.ascontiguousarray(one).view(np.uint8).reshape(-1) for one in texels]

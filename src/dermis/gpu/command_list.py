@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
-from typing import Any, Literal, NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -13,12 +13,14 @@ from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recorder import DrawTarget, Groups, Recorder
-from dermis.gpu.types import Bindings, Buffer, Texture, TextureOrView
+from dermis.gpu.types import Bindings, Buffer, Native, Texture, TextureOrView, Untyped
 from dermis.gpu.uniforms import Uniforms
 
 Timed = bool | Literal["whole"]
 """Whether stages are timed, each in a pass of its own, or the frame as it is when nobody asks, as a whole."""
 
+Stamp = dict[str, object]
+"""Where a pass writes its timestamp, as wgpu takes it."""
 _MOST_STEPS = 16  # of a pass: its records lie elsewhere when other passes before it run
 
 
@@ -36,7 +38,7 @@ class CommandList(Recorder):
 
     def __init__(self, device: Device, *, timed: Timed = True, uniforms: Uniforms | None = None) -> None:
         self.device = device
-        self._open: Any = None
+        self._open: Untyped = None
         self._uniforms = uniforms or Uniforms(device)
         self._fetched: list[Fetched] = []
         self.submitted = 0
@@ -171,8 +173,8 @@ class CommandList(Recorder):
         program: RasterProgram | FragmentProgram,
         resources: Bindings,
         targets: Sequence[TextureOrView],
-        depth: dict[str, Any] | None = None,
-    ) -> Any:
+        depth: Mapping[str, object] | None = None,
+    ) -> Untyped:
         """A pass over cleared targets in which `program` is about to draw."""
         cleared = {"load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
         self._end_pass()
@@ -188,7 +190,7 @@ class CommandList(Recorder):
         return one
 
     @property
-    def _encoder(self) -> Any:
+    def _encoder(self) -> Untyped:
         """Takes commands; made for the first one after each submit."""
         if self._open is None:
             self._open = self.device.command_encoder()
@@ -208,7 +210,7 @@ class CommandList(Recorder):
             self._pass.end()
         self._pass = None
 
-    def _begin(self, stage: str) -> dict[str, Any] | None:
+    def _begin(self, stage: str) -> Stamp | None:
         """Enter a stage; returns what its pass writes as timestamps."""
         if self._wall and self._stage not in ("", stage):
             self._finish_stage(self._wall)
@@ -238,14 +240,16 @@ class Step(NamedTuple):
     """
 
     stage: str
-    pipeline: Any
-    bound: Any
+    pipeline: object
+    bound: object
     uniforms: int
-    offsets: Any
+    offsets: object
     groups: Groups
 
 
-def step_of(stage: str, program: ComputeProgram, group: Any, offsets: Sequence[int], groups: Groups) -> Step:
+def step_of(
+    stage: str, program: ComputeProgram, group: Native, offsets: Sequence[int], groups: Groups
+) -> Step:
     """A dispatch of a bind group with the offsets of its uniforms."""
     # as the native library takes them, so that no frame needs to convert them
     kept = program.device.ffi.new("uint32_t[]", offsets)
@@ -259,7 +263,7 @@ class ComputePass:
     what is wrong in a pass until the encoder finishes. It also holds on to what a pass binds.
     """
 
-    def __init__(self, device: Device, encoder: Any, label: str, timestamps: Any) -> None:
+    def __init__(self, device: Device, encoder: Untyped, label: str, timestamps: Stamp | None) -> None:
         self._lib = lib = device.lib
         if timestamps is None:
             begun = lib.wgpuCommandEncoderBeginComputePass(encoder._internal, device.ffi.NULL)
@@ -294,18 +298,18 @@ class Timestamps:
         self._queries, self._resolved = device.timestamp_pool()
         self._stages: list[str] = []
 
-    def begin(self, stage: str) -> dict[str, Any] | None:
+    def begin(self, stage: str) -> Stamp | None:
         """A pass descriptor's `timestamp_writes`; None for no timestamp."""
         full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if full or (self._whole and self._stages):
             return None
         return self._mark(stage)
 
-    def _mark(self, stage: str) -> dict[str, Any]:
+    def _mark(self, stage: str) -> Stamp:
         self._stages.append(stage)
         return {"query_set": self._queries, "beginning_of_pass_write_index": len(self._stages) - 1}
 
-    def end(self, encoder: Any) -> None:
+    def end(self, encoder: Untyped) -> None:
         """Mark the end of the last pass and resolve the timestamps."""
         if self._stages:
             encoder.begin_compute_pass(label="end", timestamp_writes=self._mark("end")).end()

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import count
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from dermis.gpu.types import Bindable, Resource
 
 if TYPE_CHECKING:
+    from dermis.gpu.command_list import Step
     from dermis.gpu.device import Device
 
 R = TypeVar("R", bound=Resource)
@@ -67,7 +68,7 @@ class Access:
     number: int
     reads: tuple[Slot, ...]
     writes: tuple[Slot, ...]
-    steps: dict[Any, tuple[Any, Any]] = field(default_factory=dict)
+    steps: dict[Hashable, tuple[list[Step], object]] = field(default_factory=dict)
 
 
 def new_number() -> int:
@@ -118,7 +119,7 @@ class Dependencies:
             for slot in writes:
                 self._write(slot, index, writers)
 
-    def versions(self, epoch: int, keys: Iterable[Any]) -> list[int]:
+    def versions(self, epoch: int, keys: Iterable[Hashable]) -> list[int]:
         """What each pass leaves.
 
         keys : what that follows from besides the content that it reads

@@ -9,7 +9,7 @@ import weakref
 from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import DermisError
 from dermis.gpu.adapters import Adapter, check_limits, fitting_adapters, limits_within
 from dermis.gpu.memory import allocation, check_software
-from dermis.gpu.types import Bindable, Buffer, Sampler
+from dermis.gpu.types import Bindable, Buffer, Sampler, Untyped
 
 if TYPE_CHECKING:
     from dermis.gpu.dependencies import Slot
@@ -76,7 +76,7 @@ class Device:
         features = [] if bare else list(adapter.features)
         limits = limits_within(adapter.handle.limits, () if bare else _RAISED_LIMITS)
         try:
-            self.handle: Any = adapter.handle.request_device_sync(
+            self.handle: Untyped = adapter.handle.request_device_sync(
                 label="dermis", required_features=features, required_limits=limits
             )
             self._unwritten = self.handle.create_buffer(size=4, usage="COPY_DST")
@@ -90,7 +90,7 @@ class Device:
         self.has_timestamps = "timestamp-query" in features
         self.executor = ThreadPoolExecutor(os.cpu_count())
         weakref.finalize(self, self.executor.shutdown, wait=False, cancel_futures=True)
-        self._timestamps: tuple[Any, Buffer] | None = None
+        self._timestamps: tuple[Untyped, Buffer] | None = None
         self._uniform_chunks: list[Buffer] = []
         self.spare_records: list[bytearray] = []
         self.slots: weakref.WeakKeyDictionary[Bindable, Slot] = weakref.WeakKeyDictionary()
@@ -111,12 +111,12 @@ class Device:
         start = self.ffi.from_buffer(data)
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
 
-    def command_encoder(self) -> Any:
+    def command_encoder(self) -> Untyped:
         """wgpu's encoder, without the description that it would make of no label."""
         made = self.checked.wgpuDeviceCreateCommandEncoder(self.handle._internal, self.ffi.NULL)
         return self._encoder("", made, self.handle)
 
-    def submit(self, encoder: Any) -> int:
+    def submit(self, encoder: Untyped) -> int:
         """Submit what an encoder has recorded; returns the number of the submission, for `wait`.
 
         Raises GPUError, of a device that is lost too: the library would end the process.
@@ -213,7 +213,7 @@ class Device:
         """The options that a sampler was made with."""
         return next(dict(key) for key, made in self._samplers.items() if made is sampler)
 
-    def timestamp_pool(self) -> tuple[Any, Buffer]:
+    def timestamp_pool(self) -> tuple[Untyped, Buffer]:
         """The query set for a frame's timestamps and the buffer that they are resolved into."""
         import wgpu
 

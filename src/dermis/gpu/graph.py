@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar, TypeVarTuple
+from typing import TypeVar, TypeVarTuple
 
 from dermis.gpu.command_list import CommandList, Timed
 from dermis.gpu.dependencies import Access, Declared, Dependencies, Slot, slot_of
@@ -32,7 +32,7 @@ class DeclaredPass:
 
     stages: tuple[str, ...]
     run: Callable[[CommandList], None]
-    key: Any
+    key: Hashable
     declared: Declared
 
 
@@ -191,7 +191,7 @@ class Graph(Recorder):
         access: Access,
         writes: tuple[Slot, ...],
         run: Callable[[CommandList], None],
-        more: tuple[Any, ...] = (),
+        more: tuple[Hashable, ...] = (),
     ) -> None:
         if self.listing is not None:
             self.listing.add(stage, program, resources, size, len(self._passes))

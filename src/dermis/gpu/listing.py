@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+
+import numpy as np
 
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, Program
 from dermis.gpu.recorder import Groups, Recorder
-from dermis.gpu.types import Bindings
+from dermis.gpu.types import Bindable, Bindings, Buffer, is_buffer, is_texture, is_view
 
 
 @dataclass
@@ -63,7 +64,7 @@ class Listing:
         self.passes.append(listed)
         self._indices.append(index)
 
-    def add_write(self, stage: str, buffer: Any, size: int, index: int) -> None:
+    def add_write(self, stage: str, buffer: Buffer, size: int, index: int) -> None:
         """Write down that the host puts `size` bytes into a buffer."""
         self.passes.append(ListedPass(stage, "from the host", {}, {"written": self._bound(buffer)}, (size,)))
         self._indices.append(index)
@@ -73,7 +74,7 @@ class Listing:
         for one, index in zip(self.passes, self._indices, strict=True):
             one.ran = ran[index]
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """The listing as plain data for JSON."""
         return {"resources": self.resources, "passes": [asdict(one) for one in self.passes]}
 
@@ -84,8 +85,8 @@ class Listing:
             mark = "ran " if one.ran else "kept"
             yield f"{mark} {one.stage}: {one.shader} {'x'.join(map(str, one.groups))} {bound}"
 
-    def _bound(self, value: Any) -> int | str:
-        if hasattr(value, "dtype"):
+    def _bound(self, value: Bindable) -> int | str:
+        if isinstance(value, np.ndarray):
             return f"record {value.nbytes}"
         described = _described(value)
         if described == "sampler":
@@ -106,23 +107,16 @@ class ListingRecorder(Recorder):
         self.device, self._listing, self._index = device, listing, index
 
     def dispatch(
-        self,
-        stage: str,
-        program: ComputeProgram,
-        resources: Bindings,
-        groups: Groups,
-        completes: str = "",
+        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
     ) -> None:
         """Add a pass with its number of workgroups along each axis."""
         self._listing.add(stage, program, resources, groups, self._index, recorded=True)
 
 
-def _described(value: Any) -> str:
-    texture = getattr(value, "texture", None)
-    if texture is not None:
-        return f"view of {_described(texture)}"
-    if hasattr(value, "format"):
+def _described(value: Bindable) -> str:
+    if is_view(value):
+        return f"view of {_described(value.texture)}"
+    if is_texture(value):
         width, height, layers = value.size
         return f"{value.format} {width} x {height} x {layers}"
-    size = getattr(value, "size", None)
-    return "sampler" if size is None else f"buffer {size}"
+    return f"buffer {value.size}" if is_buffer(value) else "sampler"

@@ -13,7 +13,7 @@ import numpy as np
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-Role = tuple[Callable[..., Any], str]
+Role = tuple[Callable[..., object], str]
 
 
 @dataclass(eq=False, slots=True)
@@ -24,8 +24,8 @@ class Made:
     roles : its own and those of all its parts
     """
 
-    args: tuple[Any, ...]
-    value: Any = None
+    args: tuple[object, ...]
+    value: Any = None  # of the type that the function returns
     parts: list[tuple[Role, Made]] = field(default_factory=list)
     roles: set[Role] = field(default_factory=set)
 
@@ -108,7 +108,7 @@ class Memo:
         self._kept.clear()
         self._found.clear()
 
-    def _made(self, make: Callable[..., Any], args: tuple[Any, ...], using: tuple[Any, ...]) -> Made:
+    def _made(self, make: Callable[..., object], args: tuple[object, ...], using: tuple[object, ...]) -> Made:
         made = Made(args)
         self._making.append(made)
         try:
@@ -154,8 +154,8 @@ def same(a: Any, b: Any) -> bool:
         return bool(a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes())
     if not is_value(a):
         return False
-    kind: Any = type(a)
-    names = _field_names(kind)
+    kind: Any = type(a)  # mypy takes no type of Any for hashable
+    names = field_names(kind)
     if names is None:
         return bool(a == b)
     for name in names:
@@ -166,12 +166,11 @@ def same(a: Any, b: Any) -> bool:
 
 
 @cache
-def _field_names(kind: Any) -> tuple[str, ...] | None:
+def field_names(kind: type) -> tuple[str, ...] | None:
     """Of a dataclass; kept by kind, as others are slow to say that they are none."""
     return tuple(one.name for one in fields(kind)) if is_dataclass(kind) else None
 
 
-def is_value(thing: Any) -> bool:
+def is_value(thing: object) -> bool:
     """Whether it stands for what it says, and not for itself as textures do."""
-    equality: Any = type(thing).__eq__
-    return equality is not object.__eq__
+    return type(thing).__eq__ is not object.__eq__

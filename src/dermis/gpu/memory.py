@@ -7,9 +7,10 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dermis.base.errors import DermisError, refuse
+from dermis.gpu.types import Buffer
 
 if TYPE_CHECKING:
     from dermis.gpu.device import Device
@@ -104,7 +105,7 @@ def check_memory(
 
 def probed_memory(device: Device, most: float) -> float:
     """Bytes, up to `most`, that a device has room for: found by taking them, and given back."""
-    taken: list[Any] = []
+    taken: list[Buffer] = []
     total, size = 0, min(int(most), device.max_storage_bytes) // 4 * 4
     while size >= _LEAST_PROBED and total < most:
         try:

@@ -7,17 +7,17 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import ClassVar, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
-from dermis.gpu.bind_groups import UNIFORM, ResourceCache, key_of, make_group
+from dermis.gpu.bind_groups import UNIFORM, BindGroup, ResourceCache, key_of, make_group
 from dermis.gpu.dependencies import Access, new_number, slot_of
 from dermis.gpu.device import Device
 from dermis.gpu.shader_types import Binding, bindings, members_read, record_of
-from dermis.gpu.types import Bindable, Bindings, Record
+from dermis.gpu.types import Bindable, Bindings, Native, Record, Untyped
 from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Folder, Source, compose
 
@@ -37,7 +37,12 @@ Constants = tuple[tuple[str, float], ...]
 
 
 class Program:
-    """What compute and raster programs share: the composed text, its bindings and their layouts."""
+    """What compute and raster programs share: the composed text, its bindings and their layouts.
+
+    stages : wgpu's names of the stages that see the bindings
+    """
+
+    stages: ClassVar[tuple[str, ...]]
 
     def __init__(
         self,
@@ -55,7 +60,7 @@ class Program:
         self._others = [b for b in self.bindings if not _is_uniform(b)]
         self._read = _reader([b.name for b in self._others])
         self._numbers_of = [(one.name, members_read(self.source.text, one.name)) for one in self._uniforms]
-        self.kept_groups: ResourceCache[Any] = ResourceCache()
+        self.kept_groups: ResourceCache[BindGroup] = ResourceCache()
         self._accesses: ResourceCache[Access] = ResourceCache()
         self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
@@ -72,7 +77,7 @@ class Program:
         except KeyError as missing:
             raise self._unbound(missing) from None
 
-    def bind_group(self, resources: Bindings, uniforms: Uniforms) -> tuple[Any, list[int]]:
+    def bind_group(self, resources: Bindings, uniforms: Uniforms) -> tuple[BindGroup, list[int]]:
         """A bind group of resources by their name in the shader, and the offsets of its uniforms.
 
         A resource is a buffer, a texture, a texture view, a sampler, or a numpy record, which finds a place
@@ -122,13 +127,13 @@ class Program:
     def _unbound(self, missing: KeyError) -> KeyError:
         return KeyError(f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it")
 
-    def _make_group(self, bound: Sequence[Any], resources: Bindings) -> Any:
+    def _make_group(self, bound: Sequence[Bindable], resources: Bindings) -> BindGroup:
         """The group of what the others are, and then the uniforms' buffers."""
         records = cast("Records", resources)
         sizes = [records[one.name].nbytes for one in self._uniforms]
         return make_group(self.device, self._group_layout, (*self._others, *self._uniforms), bound, sizes)
 
-    def _compile(self, path: Path) -> Any:
+    def _compile(self, path: Path) -> Untyped:
         try:
             return self.device.handle.create_shader_module(code=self.source.text, label=path.name)
         except Exception as error:
@@ -136,23 +141,21 @@ class Program:
                 f"{path.name}: the shader did not compile.\n{self.source.locate(str(error))}"
             ) from error
 
-    def _layout_entries(self) -> list[dict[str, Any]]:
-        offset = {"buffer": {**UNIFORM, "has_dynamic_offset": True}}
+    def _layout_entries(self) -> list[dict[str, object]]:
+        import wgpu
+
+        visibility = sum(int(getattr(wgpu.ShaderStage, stage)) for stage in self.stages)
+        uniform = {"buffer": {**UNIFORM, "has_dynamic_offset": True}}
         return [
-            {
-                "binding": one.index,
-                "visibility": self._visibility(),
-                **(offset if _is_uniform(one) else one.entry),
-            }
+            {"binding": one.index, "visibility": visibility, **(uniform if _is_uniform(one) else one.entry)}
             for one in self.bindings
         ]
-
-    def _visibility(self) -> int:
-        raise NotImplementedError
 
 
 class ComputeProgram(Program):
     """A compute shader with the entry point `main`; `constants` are the shader's `override`s."""
+
+    stages = ("COMPUTE",)
 
     def __init__(
         self,
@@ -168,18 +171,14 @@ class ComputeProgram(Program):
         )
 
     @cached_property
-    def pipeline(self) -> Any:
+    def pipeline(self) -> Native:
         """Compiled from when the program is made, while others load what it is to work on."""
-        return self._compiled.result()
+        pipeline: Native = self._compiled.result()
+        return pipeline
 
     def groups_for(self, size: tuple[int, int], tile: int = 8) -> tuple[int, int]:
         """Workgroups that cover an image of `size` with tiles of `tile` squared."""
         return math.ceil(size[0] / tile), math.ceil(size[1] / tile)
-
-    def _visibility(self) -> int:
-        import wgpu
-
-        return int(wgpu.ShaderStage.COMPUTE)
 
 
 class RasterProgram(Program):
@@ -189,6 +188,8 @@ class RasterProgram(Program):
     depth_compare : wgpu's name ("less", "greater")
     drawn : both
     """
+
+    stages = "VERTEX", "FRAGMENT"
 
     def __init__(
         self,
@@ -215,17 +216,14 @@ class RasterProgram(Program):
             },
         )
 
-    def _visibility(self) -> int:
-        import wgpu
-
-        return int(wgpu.ShaderStage.VERTEX | wgpu.ShaderStage.FRAGMENT)
-
 
 class FragmentProgram(Program):
     """A shader whose `fragment` fills whole targets; its `vertex` makes the one triangle that covers them.
 
     targets : their formats
     """
+
+    stages = ("FRAGMENT",)
 
     def __init__(
         self,
@@ -244,11 +242,6 @@ class FragmentProgram(Program):
             fragment={**stage, "targets": [{"format": texel} for texel in targets]},
             primitive={"topology": "triangle-list"},
         )
-
-    def _visibility(self) -> int:
-        import wgpu
-
-        return int(wgpu.ShaderStage.FRAGMENT)
 
 
 def compiled(device: Device, shader: Hashable, constants: Constants, make: Callable[[], P]) -> P:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ class Fetched:
     def __init__(self, device: Device, size: int) -> None:
         self.device, self._size, self._submitted = device, size, 0
         self._status: int | None = None
-        self._name: Any = None  # what the driver's callback gets
+        self._name: object = None  # what the driver's callback gets
         self.buffer = device.staging(size)
 
     def begin(self, submitted: int) -> None:
@@ -69,12 +68,12 @@ class Fetched:
 
 
 @cache
-def _when_mapped() -> Any:
+def _when_mapped() -> object:
     """The driver's callback, one for all copies: making one takes as long as a stage of a frame."""
     from wgpu.backends.wgpu_native import ffi
 
     @ffi.callback("void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)")  # type: ignore[untyped-decorator]
-    def mapped(status: int, _: Any, fetched: Any, __: Any) -> None:
+    def mapped(status: int, _: object, fetched: object, __: object) -> None:
         ffi.from_handle(fetched).arrive(status)
 
     return mapped

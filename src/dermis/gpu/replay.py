@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import cached_property, partial
 from typing import Any, TypeVar, TypeVarTuple
 
 import numpy as np
 
+from dermis.gpu.bind_groups import BindGroup
 from dermis.gpu.command_list import Step, step_of
 from dermis.gpu.dependencies import Access, Slot, new_number, slot_of
 from dermis.gpu.device import Device
-from dermis.gpu.memo import is_value, same
+from dermis.gpu.memo import field_names, is_value, same
 from dermis.gpu.program import ComputeProgram
 from dermis.gpu.recorder import Groups, Recorder
-from dermis.gpu.types import Bindings
+from dermis.gpu.types import Bindings, Buffer, Native
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
@@ -34,10 +35,10 @@ class Recording(Recorder):
     def __init__(self, device: Device) -> None:
         self.device = device
         self.steps: list[Step] = []
-        self._chunks: list[Any] = []
+        self._chunks: list[Buffer] = []
         self._uniforms: Uniforms | None = Uniforms(device, partial(_chunk, device, self._chunks))
-        self._pipelines: list[Any] = []
-        self._bound: list[weakref.ref[Any]] = []
+        self._pipelines: list[Native] = []
+        self._bound: list[weakref.ref[BindGroup]] = []
         self._reads: dict[Slot, None] = {}
         self._writes: dict[Slot, None] = {}
 
@@ -58,17 +59,12 @@ class Recording(Recorder):
         return len(self.steps) != len(self._pipelines)
 
     def dispatch(
-        self,
-        stage: str,
-        program: ComputeProgram,
-        resources: Bindings,
-        groups: Groups,
-        completes: str = "",
+        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
     ) -> None:
         """Keep a pass, as `Graph.dispatch` declares one."""
         chunks, steps = self._chunks, self.steps  # and not the recording, which would keep itself alive
 
-        def void(_: Any) -> None:
+        def void(_: object) -> None:
             chunks.clear()
             steps.clear()
 
@@ -95,7 +91,7 @@ class Recording(Recorder):
         self._uniforms = None  # it holds on to the buffers
 
 
-def _chunk(device: Device, chunks: list[Any], index: int) -> Any:
+def _chunk(device: Device, chunks: list[Buffer], index: int) -> Buffer:
     if index == len(chunks):
         chunks.append(device.uniform_buffer(CHUNK_BYTES))
     return chunks[index]
@@ -105,7 +101,7 @@ class Recordings:
     """For each function the recordings used last, for who goes back and forth between some."""
 
     def __init__(self) -> None:
-        self._known: dict[Callable[..., Any], list[tuple[Any, Recording, Any]]] = {}
+        self._known: dict[Callable[..., object], list[tuple[object, Recording, Any]]] = {}
 
     def find(
         self, device: Device, record: Callable[[Recorder, *Ts], T], args: tuple[*Ts]
@@ -129,10 +125,10 @@ class _Values:
     """The fields of a dataclass, held weakly."""
 
     kind: type
-    fields: tuple[Any, ...]
+    fields: tuple[object, ...]
 
 
-def _held_weakly(value: Any) -> Any:
+def _held_weakly(value: object) -> object:
     """A value, with references in the place of what it would keep alive."""
     if isinstance(value, tuple):
         return tuple(map(_held_weakly, value))
@@ -146,22 +142,24 @@ def _held_weakly(value: Any) -> Any:
     return _Values(type(value), held) if any(map(_is_weak, held)) else value
 
 
-def _is_weak(held: Any) -> bool:
+def _is_weak(held: object) -> bool:
     return isinstance(held, weakref.ref | _Values) or (isinstance(held, tuple) and any(map(_is_weak, held)))
 
 
-def _fields(value: Any) -> tuple[Any, ...]:
-    return tuple(_held_weakly(getattr(value, one.name)) for one in fields(value))
+def _fields(value: object) -> tuple[object, ...]:
+    kind: Any = type(value)
+    return tuple(_held_weakly(getattr(value, name)) for name in field_names(kind) or ())
 
 
-def _alike(held: Any, value: Any) -> bool:
+def _alike(held: object, value: object) -> bool:
     if isinstance(held, weakref.ref):
         return held() is value
     if isinstance(held, tuple):
         return isinstance(value, tuple) and len(held) == len(value) and all(map(_alike, held, value))
     if isinstance(held, _Values):
-        if type(value) is not held.kind:
+        kind: Any = type(value)
+        if kind is not held.kind:
             return False
-        parts = (getattr(value, one.name) for one in fields(held.kind))
+        parts = (getattr(value, name) for name in field_names(kind) or ())
         return all(map(_alike, held.fields, parts))
     return same(held, value)

@@ -12,13 +12,15 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import groupby
 from operator import itemgetter
-from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from dermis.base.errors import DermisError
 from dermis.gpu.types import Record
 
+Entry = dict[str, str]
+"""Part of wgpu's layout entry for a kind of resource: its type, format or dimensions."""
 _COMMENT = re.compile(r"//[^\n]*")
 _STRUCT = re.compile(r"struct\s+(\w+)\s*\{([^}]*)\}")
 _MEMBER = re.compile(r"(\w+)\s*:\s*(array<\s*\w+\s*,\s*\d+\s*>|\w+(?:<\w+>)?)")
@@ -47,7 +49,7 @@ class Binding:
 
     index: int
     name: str
-    entry: dict[str, Any]
+    entry: dict[str, Entry]
 
     @property
     def holds(self) -> bool:
@@ -116,7 +118,7 @@ def _struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:
     if name not in bodies:
         raise DermisError(f"struct {name}: expected the shader to declare it, but it does not.")
     names: list[str] = []
-    formats: list[Any] = []
+    formats: list[DTypeLike] = []
     offsets: list[int] = []
     end, align = 0, 4
     for member, kind in _MEMBER.findall(bodies[name]):
@@ -131,7 +133,7 @@ def _struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size}), align
 
 
-def _member(bodies: dict[str, str], kind: str) -> tuple[Any, int, int]:
+def _member(bodies: dict[str, str], kind: str) -> tuple[DTypeLike, int, int]:
     if array := re.match(r"array<\s*(\w+)\s*,\s*(\d+)\s*>", kind):
         base, align, size = _member(bodies, array[1])
         count = int(array[2])
@@ -162,7 +164,7 @@ def bindings(text: str) -> tuple[Binding, ...]:
     return tuple(sorted(found, key=lambda b: b.index))
 
 
-def _entry(space: str, kind: str, note: str) -> dict[str, Any]:
+def _entry(space: str, kind: str, note: str) -> dict[str, Entry]:
     if space.startswith("uniform"):
         return {"buffer": {"type": "uniform"}}
     if space.startswith("storage"):
@@ -178,7 +180,7 @@ def _entry(space: str, kind: str, note: str) -> dict[str, Any]:
     return {"texture": _texture_entry(kind, note)}
 
 
-def _texture_entry(kind: str, note: str) -> dict[str, Any]:
+def _texture_entry(kind: str, note: str) -> Entry:
     dimension = "2d-array" if "_array" in kind else "2d"
     if kind.startswith("texture_depth"):
         return {"sample_type": "depth", "view_dimension": dimension}

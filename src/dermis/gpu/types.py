@@ -7,7 +7,7 @@ from each other.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NewType, Protocol
+from typing import Any, NewType, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +79,14 @@ class Sampler(Protocol):
     _internal: SamplerHandle
 
 
+class Native(Protocol):
+    """An object with a handle for calls of the native library: a pipeline, a layout, a bind group."""
+
+    _internal: object
+
+
+Untyped = Any
+"""Objects of wgpu with many methods, for which mypy has no types: devices, encoders, passes, query sets."""
 Record = NDArray[np.void]
 """A struct of a shader in uniform memory: a structured array of no dimensions, as `Program.record` makes."""
 TextureOrView = Texture | TextureView
@@ -91,3 +99,23 @@ Bindings = Mapping[str, Bindable]
 """What a shader is bound to, by the names in its text."""
 MutableBindings = dict[str, Bindable]
 """Bindings that are filled one by one."""
+
+
+def is_texture(value: Bindable) -> TypeGuard[Texture]:
+    """Return whether it is a texture, and no view of one."""
+    return hasattr(value, "mip_level_count")
+
+
+def is_view(value: Bindable) -> TypeGuard[TextureView]:
+    """Return whether it is a view of a texture."""
+    return hasattr(value, "texture")
+
+
+def is_buffer(value: Bindable) -> TypeGuard[Buffer]:
+    """Return whether it is a buffer."""
+    return hasattr(value, "write_mapped")
+
+
+def is_sampler(value: Bindable) -> TypeGuard[Sampler]:
+    """Return whether it is a sampler."""
+    return not (is_texture(value) or is_view(value) or is_buffer(value) or isinstance(value, np.ndarray))

@@ -96,19 +96,22 @@ def compose(path: Path, folders: Sequence[Folder]) -> Source:
     lists = {name: tuple(members()) for folder in shared for name, members in folder.lists.items()}
     numbers = {name: repr(value) for folder in shared for name, value in folder.numbers().items()}
     options = frozenset[str]().union(*(folder.options for folder in shared))
-    found = tuple(Path(folder) for folder in folders), tuple(lists.items()), tuple(numbers.items())
-    return _compose(path, *found, options)
+    meant = _Meaning(tuple(map(Path, folders)), tuple(lists.items()), tuple(numbers.items()), options)
+    return _compose(path, meant)
+
+
+class _Meaning(NamedTuple):
+    """What directives find in folders."""
+
+    folders: tuple[Path, ...]
+    lists: tuple[tuple[str, tuple[Member, ...]], ...]
+    numbers: Words
+    options: frozenset[str]
 
 
 @cache
-def _compose(
-    path: Path,
-    folders: tuple[Path, ...],
-    lists: tuple[tuple[str, tuple[Member, ...]], ...],
-    numbers: Words,
-    options: frozenset[str],
-) -> Source:
-    composed = _Composed(folders, dict(lists), dict(numbers), options)
+def _compose(path: Path, meant: _Meaning) -> Source:
+    composed = _Composed(meant)
     composed.insert(path)
     text, origin = zip(*composed.lines, strict=True) if composed.lines else ((), ())
     return Source("\n".join(text), origin)
@@ -117,14 +120,9 @@ def _compose(
 class _Composed:
     """lines : each with the file and line that it came from"""
 
-    def __init__(
-        self,
-        folders: Sequence[Path],
-        lists: Mapping[str, Sequence[Member]],
-        numbers: Mapping[str, str],
-        options: frozenset[str],
-    ) -> None:
-        self._folders, self._lists, self._numbers, self._options = folders, lists, numbers, options
+    def __init__(self, meant: _Meaning) -> None:
+        self._folders, self._options = meant.folders, meant.options
+        self._lists, self._numbers = dict(meant.lists), dict(meant.numbers)
         self._seen: set[Path] = set()
         self.lines: list[tuple[str, tuple[str, int]]] = []
 
