@@ -13,7 +13,7 @@ import numpy as np
 
 import dermis
 from dermis.apps.gallery.script import draw_script
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 
 BESIDE = (-0.75, 0.1, 1.0)
 EYES = {

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dermis.images.io import write_image
     from dermis.images.movie import MovieWriter
     from dermis.mesh.clip import Clip
-    from dermis.mesh.eyes import EyeLook
+    from dermis.mesh.eye_look import EyeLook
     from dermis.mesh.head import Head
     from dermis.mesh.pose import Pose
     from dermis.optics.profiles import load_profile
@@ -57,7 +57,7 @@ _HOME = {
     "load_head": "scene.heads",
     "Human": "human.person",
     "SkinLook": "human.skin.look",
-    "EyeLook": "mesh.eyes",
+    "EyeLook": "mesh.eye_look",
     "HairLook": "human.hair.look",
     "human_targets": "human.published",
     "with_regions": "human.regions.apply",

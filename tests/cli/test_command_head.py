@@ -15,7 +15,7 @@ from dermis import Human
 from dermis.human.hair.look import HairLook
 from dermis.human.skin.look import SkinLook
 from dermis.images.codecs import encode_png
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.scene.heads import load_head
 

@@ -13,8 +13,8 @@ from dermis import Human
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu.textures import texture_from
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, apex_mm, cornea_centre_mm, iris_mm
-from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.pose import Pose

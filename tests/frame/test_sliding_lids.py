@@ -17,7 +17,7 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, Device
 from dermis.human.model import human_head
 from dermis.human.skin.surface import lid_rings
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.pose import Pose

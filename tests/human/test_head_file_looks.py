@@ -19,8 +19,8 @@ from dermis.frame.features.surface.painting.painted_head import eye_pictures
 from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
 from dermis.human.head_file import write_person
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import LIMBUS_MM, EyePictures, eye_uv, profile_mm
-from dermis.mesh.eyes import EyeLook
 from dermis.mesh.strands import points_of
 
 LOOK = EyeLook(eumelanin=0.1, pupil_mm=2.5, redness=0.0, seed=3)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dermis.base.arrays import Floats, Ints
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Floats, Ints
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.mesh.subdivide import coarse_triangles, subdivide_head
 

@@ -15,7 +15,7 @@ from dermis.base.errors import DermisError
 from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.scene import Environment, Skin
 from dermis.scene.camera import Camera

@@ -26,7 +26,7 @@ from dermis.apps.validation.comparisons.person_paint import paint_of
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.scene.lights import PointLight, RectangleLight, SphereLight
 from dermis.scene.settings import Settings

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import MIN_UV_CROSS, Doubles, components, edges, uv_cross, weld
-from dermis.mesh.mesh import Ints, Mesh
+from dermis.base.arrays import Doubles, Ints
+from dermis.mesh.geometry import MIN_UV_CROSS, components, edges, uv_cross, weld
+from dermis.mesh.mesh import Mesh
 
 
 def charts(mesh: Mesh) -> Ints:

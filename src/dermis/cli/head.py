@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook
     from dermis.human.person import Human
     from dermis.human.skin.look import SkinLook
+    from dermis.mesh.eye_look import EyeLook
     from dermis.mesh.eyeball import EyePictures
-    from dermis.mesh.eyes import EyeLook
     from dermis.mesh.head import Head
 
 L = TypeVar("L", "SkinLook", "EyeLook", "HairLook")

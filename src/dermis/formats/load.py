@@ -1,4 +1,4 @@
-"""Loading of mesh files of any unit, up axis and uv origin, kept on disk by their content."""
+"""Meshes and rigs from files of any unit, up axis and uv origin, kept on disk by their content."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Ints
 from dermis.base.disk import Arrays, stored
 from dermis.base.errors import refuse
 from dermis.base.progress import preparing
 from dermis.base.reading import BROKEN, is_file, read_file, understood
 from dermis.formats.mesh_checks import UV_TOLERANCE, check_arrays, check_mesh, check_rig
-from dermis.formats.parts import Array, Group, Part, default_unit_mm, is_gltf
+from dermis.formats.parts import Group, Part, default_unit_mm, is_gltf
 from dermis.formats.read import Origin, Up, check_options, joined, read_model, taken, upright
 from dermis.formats.rig_from_file import build_rig, part_points
 from dermis.formats.size_limits import MOST_BYTES
@@ -27,6 +28,28 @@ from dermis.mesh.geometry import compacted, weld
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
+
+_FORM = 5  # raise when `load_rigged` gives other results for the same file
+_MESH = [field.name for field in fields(Mesh) if field.name != "materials"]
+_TARGETS = [field.name for field in fields(MorphTargets) if field.name != "names"]
+_SKELETON = [field.name for field in fields(Skeleton) if field.name != "names"]
+_NAMES = [
+    *_MESH,
+    "outline",
+    "told",
+    "control",
+    *(f"target {name}" for name in _TARGETS),
+    *(f"bone {name}" for name in _SKELETON),
+]
+_NONE = np.zeros(0, np.float32)
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_PART = "eyes?|eyeballs?|sclerae?|corneas?|iris|irises|pupils?"
+_EYE = re.compile(rf"(?:l|r|left|right)?(?:{_PART})(?:l|r|left|right)?", re.IGNORECASE)
+_OTHER = re.compile(
+    "(?:(?:eye)?(?:lash|brow|lid|socket|shadow|wear|glass|patch|liner|duct)(?:e?s)?|occlusion|tear|tears"
+    "|tearline|hairs?|skin|caruncle)",
+    re.IGNORECASE,
+)
 
 
 def load_mesh(
@@ -114,13 +137,13 @@ def _loaded(
     return Rigged(mesh, rig)
 
 
-def _company(parts: list[Part]) -> NDArray[np.float32]:
+def _company(parts: list[Part]) -> Floats:
     """(v,) a number for each vertex; those at one place are one point only if they share it."""
     numbers = [number if part.alone else 0 for number, part in enumerate(parts, start=1)]
     return np.repeat(np.array(numbers, np.float32), [len(part.positions) for part in parts])
 
 
-def _v_down(uv: Array, source: Path, v_origin: Origin) -> Array:
+def _v_down(uv: Doubles, source: Path, v_origin: Origin) -> Doubles:
     """`uv` (v, 2) with v = 0 in the top row; what misses [0, 1] by rounding only is put back."""
     from_top = v_origin == "top" or (v_origin == "auto" and is_gltf(source))
     down = uv if from_top else np.column_stack((uv[:, 0], 1 - uv[:, 1]))
@@ -130,7 +153,7 @@ def _v_down(uv: Array, source: Path, v_origin: Origin) -> Array:
 
 def _materials(
     parts: list[Part], opaque: tuple[str, ...], eye_groups: tuple[str, ...], source: Path
-) -> tuple[NDArray[np.int32], tuple[Material, ...]]:
+) -> tuple[Ints, tuple[Material, ...]]:
     """Material of each triangle (f,) and the materials, in the order of the file."""
     groups = [part.group if part.group.names else Group((source.stem,), part.group.colour) for part in parts]
     unwanted = _chosen(groups, opaque, "opaque", source)
@@ -155,21 +178,6 @@ def _chosen(groups: list[Group], names: tuple[str, ...], option: str, source: Pa
         expected = f"{option} to name groups of the file ({known})"
         refuse(source, expected, f"{sorted(unknown)[0]!r} is none", "Check the spelling")
     return [any(name.casefold() in wanted for name in group.names) for group in groups]
-
-
-_FORM = 5  # raise when `load_rigged` gives other results for the same file
-_MESH = [field.name for field in fields(Mesh) if field.name != "materials"]
-_TARGETS = [field.name for field in fields(MorphTargets) if field.name != "names"]
-_SKELETON = [field.name for field in fields(Skeleton) if field.name != "names"]
-_NAMES = [
-    *_MESH,
-    "outline",
-    "told",
-    "control",
-    *(f"target {name}" for name in _TARGETS),
-    *(f"bone {name}" for name in _SKELETON),
-]
-_NONE = np.zeros(0, np.float32)
 
 
 class Rigged(NamedTuple):
@@ -225,16 +233,6 @@ def _unpacked(found: Arrays) -> Rigged:
         return Rigged(mesh, Rig(found["control"], targets))
     skeleton = Skeleton(tuple(told["bones"]), **{name: found[f"bone {name}"] for name in _SKELETON})
     return Rigged(mesh, Rig(found["control"], targets, skeleton))
-
-
-_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
-_PART = "eyes?|eyeballs?|sclerae?|corneas?|iris|irises|pupils?"
-_EYE = re.compile(rf"(?:l|r|left|right)?(?:{_PART})(?:l|r|left|right)?", re.IGNORECASE)
-_OTHER = re.compile(
-    "(?:(?:eye)?(?:lash|brow|lid|socket|shadow|wear|glass|patch|liner|duct)(?:e?s)?|occlusion|tear|tears"
-    "|tearline|hairs?|skin|caruncle)",
-    re.IGNORECASE,
-)
 
 
 def names_eye(names: Sequence[str]) -> bool:

@@ -1,4 +1,4 @@
-"""Pixels of picture files as the numbers that maps hold."""
+"""Maps of a head from picture files."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Bytes, Doubles, Floats
 from dermis.base.errors import refuse
 from dermis.images.codecs import strips
 from dermis.images.colour import decode_srgb_levels
@@ -20,13 +21,16 @@ from dermis.images.io import Picture, read_bytes, read_image, read_size
 from dermis.images.sizes import MOST_PIXELS
 from dermis.mesh.maps import Maps
 
-Floats = NDArray[np.float32]
 PathLike = str | Path | Picture
 
 MOST_SIDE = 8192
 """Texels of a map's side: as many as any device takes."""
 _ALIKE = 2.5 / 255  # JPEG may separate the channels of a grey picture by a level or two
 _MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
+Load = Callable[[PathLike], NDArray[Any]]
+_MOST_AT_ONCE = MOST_PIXELS  # texels of all maps, for maps to be decoded side by side
+_LARGE = 1 << 14  # bytes; maps of larger files are kept on disk, to be read faster than decoded
+_FORM = 1  # increment when the same files give other maps
 
 
 def finite(path: PathLike, values: NDArray[Any]) -> NDArray[Any]:
@@ -85,7 +89,7 @@ def plain_map(path: PathLike, role: str) -> Floats:
     return _within_unit(path, role, _grey(path, role, _read(path, role)))
 
 
-def label_map(path: PathLike) -> NDArray[np.uint8]:
+def label_map(path: PathLike) -> Bytes:
     image = _read(path, "a map of labels")
     if image.dtype != np.uint8 or image.shape[2] != 1:
         refuse(path, "labels in 8-bit grey", f"{image.dtype} x {image.shape[2]} came", "Save it as such")
@@ -112,7 +116,7 @@ def slope_map(path: PathLike, normal_y: str) -> Floats:
     return slopes
 
 
-def _outward(normals: Floats) -> NDArray[np.float64]:
+def _outward(normals: Floats) -> Doubles:
     """How many texels there are, how many are unit vectors that point outwards, and the sums of both's z."""
     length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
     z = normals[..., 2]
@@ -166,18 +170,6 @@ def _within_unit(path: PathLike, role: str, values: Floats) -> Floats:
     return np.clip(values, 0, 1, out=values)
 
 
-Load = Callable[[PathLike], NDArray[Any]]
-
-
-_MOST_AT_ONCE = MOST_PIXELS  # texels of all maps, for maps to be decoded side by side
-
-
-_LARGE = 1 << 14  # bytes; maps of larger files are kept on disk, to be read faster than decoded
-
-
-_FORM = 1  # increment when the same files give other maps
-
-
 def load_maps(
     colour: PathLike | None = None,
     normal: PathLike | None = None,
@@ -221,9 +213,9 @@ def load_maps(
         return Maps(**dict(zip(roles, pool.map(lambda role: _kept(*role), roles.values()), strict=True)))
 
 
-def load_labels(path: PathLike) -> NDArray[np.uint8]:
+def load_labels(path: PathLike) -> Bytes:
     """(H, W) labels of a grey picture of 8 bits."""
-    labels: NDArray[np.uint8] = _kept(path, "labels", label_map)
+    labels: Bytes = _kept(path, "labels", label_map)
     return labels
 
 

@@ -1,4 +1,4 @@
-"""Checks of a mesh that is to be rendered as skin, each refusal with its remedy."""
+"""Checks of meshes and rigs from files, each refusal with its remedy."""
 
 from __future__ import annotations
 

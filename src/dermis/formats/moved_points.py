@@ -1,4 +1,8 @@
-"""What moves a mesh that is written: targets and bones of its control points, carried to finer ones."""
+"""What moves a mesh that is written: morph targets and bones of its control points, carried to finer ones.
+
+Other programs take four bones for each point. For a finer mesh they are chosen so that turns take its points
+where those of its control points take them.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Index
 from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Rig
@@ -19,12 +24,12 @@ from dermis.mesh.skeleton import INFLUENCES, Skeleton
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-Doubles = NDArray[np.float64]
-Floats = NDArray[np.float32]
-Index = NDArray[np.int64]
 
 _LEAST_MM = 1e-3  # a smaller displacement is none
 _LEAST_TURN = 2e-3  # of a normal, a tenth of a degree
+_LEAST = 1e-6  # a share below it is none
+_MOST = 8  # bones among which four are chosen
+_NEAR_MM2 = 1.0  # how much a share is worth that stays as the control points have it
 
 
 class Target(NamedTuple):
@@ -132,11 +137,6 @@ class MovedPoints:
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-
-_LEAST = 1e-6  # a share below it is none
-_MOST = 8  # bones among which four are chosen
-_NEAR_MM2 = 1.0  # how much a share is worth that stays as the control points have it
 
 
 def influences(rig: Rig, finer: csr_array | None) -> tuple[Index, Doubles]:

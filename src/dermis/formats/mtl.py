@@ -1,4 +1,4 @@
-"""Materials of OBJ files: colours and the names of pictures in the .mtl files that they name."""
+"""Materials of OBJ files, from the .mtl files that these name."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ _OPTION = re.compile(
 )
 _WHOLE_NUMBER = re.compile(_NUMBER)
 _LONGEST = 4096  # characters of a line
+_LIBRARY = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -103,9 +104,6 @@ def _texture(key: str, rest: str) -> Texture:
         case [name, last, number] if last.lower() == "-bm" and _WHOLE_NUMBER.fullmatch(number):
             factor, rest = float(number), name  # as some programs write it
     return Texture(key, rest, factor, moved)
-
-
-_LIBRARY = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 
 
 def libraries(text: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Files that a mesh file names: they lie in its own folder, or below it."""
+"""Files that a mesh file names, in its own folder or below it."""
 
 from __future__ import annotations
 

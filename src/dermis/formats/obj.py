@@ -1,4 +1,4 @@
-"""The text of OBJ files: what of it is refused before it is parsed, and its groups by number."""
+"""OBJ files: their text, checked before it is parsed, their groups, and the maps of their materials."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Bytes, Floats, Index
 from dermis.base.errors import DermisError, refuse
 from dermis.base.reading import read_file
-from dermis.formats.maps import Floats, finite, load_maps
+from dermis.formats.maps import finite, load_maps
 from dermis.formats.mtl import MtlMaterial, Texture, read_materials
 from dermis.formats.named_files import beside
 from dermis.formats.parts import GREY, Group, Model, Part, colour_of, find_pairs, trimesh_parts
@@ -23,14 +23,14 @@ from dermis.images.io import read_image, read_size
 from dermis.images.sizes import MOST_TOGETHER
 from dermis.mesh.maps import Maps
 
-Index = NDArray[np.int64]
-
 _COMMENTED = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILINE)
 _NAMED = re.compile(r"^[ \t]*(usemtl|g)(?:[ \t]([^\n]*))?$", re.MULTILINE)
 _FACE_OR_NUMBER = re.compile(r"^(?:usemtl (\d+)|f([ \t].*))$", re.MULTILINE)
 _LONGEST, _LONGEST_VERTEX = 1 << 17, 256  # characters of a line
 _ZERO = re.compile(r"(?<![^ \t/])0+(?![^ \t/])")
 _UNPARSED = re.compile(r"^[ \t]*(usemtl|g|f)(?:[ \t]([^\n]*))?$", re.MULTILINE)
+_RELIEF = ("normal", "height")
+_ENOUGH = 256  # texels a side
 
 
 def read_obj_text(path: Path) -> str:
@@ -53,7 +53,7 @@ def joined_lines(path: Path, text: str) -> str:
     return _COMMENTED.sub(r"\1", text) if commented else text
 
 
-def _check_lines(path: Path, data: NDArray[np.uint8]) -> None:
+def _check_lines(path: Path, data: Bytes) -> None:
     ends = np.flatnonzero(data == ord("\n"))
     starts = np.concatenate([[0], ends + 1])
     long = np.diff(starts, append=len(data) + 1)
@@ -152,10 +152,6 @@ def obj_model(path: Path, text: str) -> Model:
     full, none = [part.group for part in parts], np.empty((0, 3))
     empty = [Part(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
     return Model(parts + empty)
-
-
-_RELIEF = ("normal", "height")
-_ENOUGH = 256  # texels a side
 
 
 def obj_maps(

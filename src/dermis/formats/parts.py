@@ -1,6 +1,6 @@
-"""Mesh files as they lie on disk: groups of triangles in file units, with uv untouched.
+"""Groups of triangles as they are in mesh files: in file units, with uv untouched.
 
-trimesh parses OBJ and PLY; the groups, which it would rename, are numbered in the file's text first.
+trimesh parses OBJ and PLY; the groups, which it would rename, are numbered in the text of the file first.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Index, Ints
+
 Colour = tuple[float, float, float]
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 GREY: Colour = (0.8, 0.8, 0.8)
 
@@ -55,13 +55,13 @@ class Part:
     """
 
     group: Group
-    positions: Array
-    uv: Array | None
-    normals: Array | None
+    positions: Doubles
+    uv: Doubles | None
+    normals: Doubles | None
     triangles: Index
-    targets: Mapping[str, tuple[Index, Array]] = field(default_factory=dict)
+    targets: Mapping[str, tuple[Index, Doubles]] = field(default_factory=dict)
     bone: Index | None = None
-    weight: Array | None = None
+    weight: Doubles | None = None
     quads: Index = field(default_factory=lambda: np.empty((0, 2), np.int64))
     alone: bool = False
 
@@ -74,9 +74,9 @@ class Bones:
     """
 
     names: tuple[str, ...]
-    parent: NDArray[np.int32]
-    local: Array
-    world: Array
+    parent: Ints
+    local: Doubles
+    world: Doubles
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def _part(mesh: Any, group: Group) -> Part:
     )
 
 
-def fractions(values: NDArray[Any]) -> Array:
+def fractions(values: NDArray[Any]) -> Doubles:
     """Numbers of which integers stand for fractions of their type's largest."""
     scale = np.iinfo(values.dtype).max if values.dtype.kind in "iu" else 1
     return np.asarray(values / scale, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The header of a PLY file, judged before its elements are read."""
+"""PLY files, whose header is checked before their elements are read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All parts of a file as one."""
+"""A mesh file of any format as one part, in its own units."""
 
 from __future__ import annotations
 
@@ -11,16 +11,25 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file, understood
 from dermis.formats.gltf.triangles import read_gltf
 from dermis.formats.mesh_checks import check_amount, check_arrays
 from dermis.formats.obj import read_obj
-from dermis.formats.parts import Array, Index, Model, Part
+from dermis.formats.parts import Model, Part
 from dermis.formats.ply import read_ply
 
 FARTHEST_UV = 1e4
 """Beyond this uv are damage, not tiles."""
+Origin = Literal["auto", "top", "bottom"]
+Up = Literal["y", "z"]
+READERS: dict[str, Callable[[Path], Model]] = {
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    ".obj": read_obj,
+    ".ply": read_ply,
+}
 
 
 def joined(parts: list[Part], source: Path) -> Part:
@@ -30,7 +39,7 @@ def joined(parts: list[Part], source: Path) -> Part:
         check_arrays(part.positions, given, part.triangles, source)
     start = np.cumsum([0, *(len(part.positions) for part in parts)])
     faces = np.cumsum([0, *(len(part.triangles) for part in parts)])
-    targets: dict[str, list[tuple[Index, Array]]] = {}
+    targets: dict[str, list[tuple[Index, Doubles]]] = {}
     for part, offset in zip(parts, start, strict=False):
         for name, (vertex, delta) in part.targets.items():
             targets.setdefault(name, []).append((vertex + offset, delta))
@@ -61,12 +70,12 @@ def taken(part: Part, used: Index) -> Part:
 
 
 def _columns(
-    rows: dict[str, list[tuple[Index, Array]]],
-) -> dict[str, tuple[list[Index], list[Array]]]:
+    rows: dict[str, list[tuple[Index, Doubles]]],
+) -> dict[str, tuple[list[Index], list[Doubles]]]:
     return {name: ([one for one, _ in pairs], [two for _, two in pairs]) for name, pairs in rows.items()}
 
 
-def _part_normals(part: Part) -> Array:
+def _part_normals(part: Part) -> Doubles:
     if part.normals is not None and len(part.normals) == len(part.positions):
         return part.normals
     return np.full(part.positions.shape, np.nan)
@@ -81,7 +90,7 @@ def _side_by_side(arrays: list[NDArray[Any] | None]) -> NDArray[Any] | None:
     return np.vstack([np.pad(array, ((0, 0), (0, width - array.shape[1]))) for array in given])
 
 
-def _part_uv(part: Part, source: Path) -> Array:
+def _part_uv(part: Part, source: Path) -> Doubles:
     name = part.group.names[0] if part.group.names else "the mesh"
     if part.uv is None or part.uv.shape != (len(part.positions), 2):
         remedy = "Unwrap it (in Blender: Edit Mode, U > Unwrap) and export with uv"
@@ -90,20 +99,6 @@ def _part_uv(part: Part, source: Path) -> Array:
         came = f"{name!r} has some that are NaN, infinite or beyond {FARTHEST_UV:g}"
         refuse(source, "finite uv", came, "The file is damaged: export it again")
     return part.uv
-
-
-Origin = Literal["auto", "top", "bottom"]
-
-
-Up = Literal["y", "z"]
-
-
-READERS: dict[str, Callable[[Path], Model]] = {
-    ".glb": read_gltf,
-    ".gltf": read_gltf,
-    ".obj": read_obj,
-    ".ply": read_ply,
-}
 
 
 def check_options(source: Path, unit: float, v_origin: str, up: str) -> None:
@@ -138,6 +133,6 @@ def read_model(source: Path) -> Model:
     return replace(model, parts=full)
 
 
-def upright(vectors: Array, up: Up) -> Array:
+def upright(vectors: Doubles, up: Up) -> Doubles:
     """`vectors` (v, 3) with Y up: z-up turns about X, so that -Y, Blender's front, becomes +Z."""
     return vectors if up == "y" else np.column_stack((vectors[:, 0], vectors[:, 2], -vectors[:, 1]))

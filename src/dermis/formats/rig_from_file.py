@@ -1,18 +1,15 @@
-"""From the targets and bones of a file's vertices to a rig of a mesh's points."""
+"""Rigs of the points of a mesh, from the targets and bones of the vertices of a file."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 from dermis.base.errors import refuse
-from dermis.formats.parts import Array, Bones, Index, Part
-from dermis.mesh.mesh import Floats, Ints
+from dermis.formats.parts import Bones, Part
 from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
-
-Mask = NDArray[np.bool_]
 
 PARTED_MM = 0.01
 """Vertices at one place that a target moves this far apart are two points, as of lips that touch."""
@@ -21,7 +18,7 @@ _SAME_SHARE = 0.004  # a step of weights in 8 bits
 _LEAST_MM = 1e-4  # what rounding leaves of vertices that do not move
 
 
-def part_points(point: Ints, part: Part, linear: Array, culprit: object) -> Ints:
+def part_points(point: Ints, part: Part, linear: Doubles, culprit: object) -> Ints:
     """(v,) points of which vertices that move differently are no longer one; in the order they were in.
 
     point : (v,) welded by their places
@@ -44,7 +41,7 @@ def part_points(point: Ints, part: Part, linear: Array, culprit: object) -> Ints
     return np.asarray(parted.reshape(-1), np.int32)
 
 
-def _targets_part(part: Part, one: Index, other: Index, linear: Array) -> Mask:
+def _targets_part(part: Part, one: Index, other: Index, linear: Doubles) -> Mask:
     """Whether some target moves vertices (n,) and others (n,) apart."""
     apart, delta = np.zeros(len(one), bool), np.zeros((len(part.positions), 3))
     for vertex, moved in part.targets.values():
@@ -70,7 +67,7 @@ def build_rig(
     part: Part,
     bones: Bones | None,
     weights: Mapping[str, float],
-    to_head: Array,
+    to_head: Doubles,
     culprit: object,
 ) -> Rig | None:
     """The rig of a mesh's points, None where nothing moves them.
@@ -91,7 +88,7 @@ def build_rig(
 
 
 def _targets(
-    part: Part, point: Ints, first: Index, weights: Mapping[str, float], to_head: Array
+    part: Part, point: Ints, first: Index, weights: Mapping[str, float], to_head: Doubles
 ) -> MorphTargets:
     """The targets of points that move as the `first` of their vertices does."""
     if not part.targets:
@@ -116,7 +113,7 @@ def _targets(
     )
 
 
-def _skeleton(part: Part, bones: Bones, first: Index, to_head: Array, culprit: object) -> Skeleton:
+def _skeleton(part: Part, bones: Bones, first: Index, to_head: Doubles, culprit: object) -> Skeleton:
     """The bones of points that follow them as the `first` of their vertices does."""
     assert part.bone is not None and part.weight is not None
     bone = np.zeros((len(first), INFLUENCES), np.int32)

@@ -1,4 +1,4 @@
-"""How much a mesh file may hold: what heads have, with room to spare, in seconds and two gigabytes."""
+"""How much a mesh file may hold: more than any head has, in seconds and two gigabytes."""
 
 from __future__ import annotations
 

@@ -14,8 +14,9 @@ from dermis.human import globes, lids, teeth
 from dermis.human.lid_targets import conformed_targets
 from dermis.human.movement import expressions, gaze, skeleton
 from dermis.human.published import Points, count, data, places_mm
-from dermis.mesh import eyeball as globe
-from dermis.mesh.eyes import EyeLook, Eyes
+from dermis.mesh import eyeball
+from dermis.mesh.eye_look import EyeLook
+from dermis.mesh.eyes import Eyes
 from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -75,7 +76,7 @@ def human_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
     )
     bones = skeleton(places[count() :], (left_centre, right_centre), len(left))
     moved = replace(expressions(), delta_mm=conformed_targets(places, sockets))
-    apex, back, _ = globe.marks()
+    apex, back, _ = eyeball.marks()
     contact = lids.contact(count(), len(left), apex, back)
     rig = Rig(points.astype(np.float32), moved, bones, turns=gaze(), contact=contact)
     return Head("human", mesh, maps, THANKS, rig, _eyes(eyes))
@@ -105,7 +106,9 @@ def _ball(name: str) -> Index:
 
 def _eyes(look: EyeLook) -> Eyes:
     size = len(globes.globe()[0])
-    apex, back, side = (np.array([count() + mark, count() + size + mark], np.int32) for mark in globe.marks())
+    apex, back, side = (
+        np.array([count() + mark, count() + size + mark], np.int32) for mark in eyeball.marks()
+    )
     material = np.array([list(MATERIALS).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
     return Eyes(apex, back, side, material, look)
 
@@ -140,7 +143,7 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
         uv = np.concatenate([uv, places])
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return (
-        np.concatenate([uv, globe.layout()]),
+        np.concatenate([uv, eyeball.layout()]),
         np.concatenate([points[stays], count() + quads, count() + size + quads]),
         np.concatenate([corner[stays], len(uv) + quads, len(uv) + quads]),
         np.concatenate([material[stays], *eyes]),

@@ -22,7 +22,7 @@ from dermis.human.skin.look import SkinLook
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.usual import Origin, usual_eyes, usual_look
 from dermis.human.template import template
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import levels_of

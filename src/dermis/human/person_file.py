@@ -15,7 +15,7 @@ from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.human.published import check_targets
 from dermis.human.skin.look import SkinLook
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
 

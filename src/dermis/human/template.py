@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.human.hair.rooting import Rooting, eye_middles
 from dermis.human.model import Layout, human_head
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import Refinement, refinement

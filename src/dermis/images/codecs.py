@@ -1,4 +1,4 @@
-"""Pixels from the bytes of picture files and back, by libraries that keep every bit."""
+"""Pixels of PNG, JPEG and TIFF files from their bytes, and PNG files of pixels, with all bits kept."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Bytes, Floats
 from dermis.base.extras import needed
 from dermis.images.sizes import MOST_PIXELS, check_size
 
-Pixels = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
+Pixels = Bytes | NDArray[np.uint16] | Floats
 
 PNG_START = b"\x89PNG\r\n\x1a\n"
 PILLOW_STARTS = (PNG_START, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
@@ -41,6 +42,7 @@ _MODES: dict[str, tuple[str, type[np.generic]]] = {
     "F": ("F", np.float32),
 }
 """What each of Pillow's kinds of pixel becomes."""
+_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG's kinds of colour
 
 
 def decode_with_pillow(data: bytes) -> Pixels:
@@ -172,9 +174,6 @@ def png_size(data: bytes) -> tuple[int, int]:
         pass
     width, height = struct.unpack_from(">II", data, 16)
     return width, height
-
-
-_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG's kinds of colour
 
 
 def decode_rows(data: bytes) -> NDArray[Any] | None:

@@ -1,4 +1,4 @@
-"""The sRGB transfer curve and luminance; every linear colour is Rec. 709."""
+"""Linear Rec. 709 colours: the sRGB curve, luminance, and CIEDE2000."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dermis.base.arrays import Bytes, Doubles, Floats
+
 REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)
+_XYZ_OF_REC709 = np.array(
+    [[0.4123908, 0.3575843, 0.1804808], [0.2126390, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]]
+)
+_WHITE = _XYZ_OF_REC709.sum(axis=1)
+_EDGE = 6.0 / 29.0
 
 
 def encode_srgb(linear: ArrayLike) -> NDArray[np.floating[Any]]:
@@ -32,7 +39,7 @@ def decode_srgb(encoded: ArrayLike) -> NDArray[np.floating[Any]]:
     return np.asarray(np.where(value <= 0.04045, value / 12.92, curve))
 
 
-def encode_srgb8(linear: ArrayLike) -> NDArray[np.uint8]:
+def encode_srgb8(linear: ArrayLike) -> Bytes:
     """Grey levels 0..255 of linear values, rounded to nearest.
 
     linear : any shape; clipped to 0..1, NaN becomes 0
@@ -41,7 +48,7 @@ def encode_srgb8(linear: ArrayLike) -> NDArray[np.uint8]:
     return np.asarray(np.rint(encode_srgb(value) * 255.0).astype(np.uint8))
 
 
-def decode_srgb_levels(levels: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.float32]:
+def decode_srgb_levels(levels: Bytes | NDArray[np.uint16]) -> Floats:
     """Linear values [-] of 8- or 16-bit sRGB grey levels of any shape, read from a table."""
     return _linear_of_level(np.iinfo(levels.dtype).max + 1)[levels]
 
@@ -56,7 +63,7 @@ def luminance(linear: ArrayLike) -> NDArray[np.floating[Any]]:
 
 
 @lru_cache(maxsize=2)
-def _linear_of_level(count: int) -> NDArray[np.float32]:
+def _linear_of_level(count: int) -> Floats:
     table = decode_srgb(np.arange(count) / (count - 1)).astype(np.float32)
     table.flags.writeable = False
     return table
@@ -67,15 +74,7 @@ def _as_float(values: ArrayLike) -> NDArray[np.floating[Any]]:
     return array if array.dtype == np.float32 else array.astype(np.float64)
 
 
-Floats = NDArray[np.float64]
-_XYZ_OF_REC709 = np.array(
-    [[0.4123908, 0.3575843, 0.1804808], [0.2126390, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]]
-)
-_WHITE = _XYZ_OF_REC709.sum(axis=1)
-_EDGE = 6.0 / 29.0
-
-
-def lab(linear: ArrayLike) -> Floats:
+def lab(linear: ArrayLike) -> Doubles:
     """CIE L*a*b* (..., 3) under D65 of linear Rec. 709 colours (..., 3)."""
     t = np.asarray(linear, np.float64) @ _XYZ_OF_REC709.T / _WHITE
     f = np.where(t > _EDGE**3, np.cbrt(t), t / (3.0 * _EDGE**2) + 4.0 / 29.0)
@@ -83,7 +82,7 @@ def lab(linear: ArrayLike) -> Floats:
     return np.stack([116.0 * Y - 16.0, 500.0 * (X - Y), 200.0 * (Y - Z)], axis=-1)
 
 
-def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Floats:
+def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Doubles:
     """CIEDE2000 (...) between linear Rec. 709 colours (..., 3); 1 is just seen side by side.
 
     Source: [Sharma2005].
@@ -107,11 +106,11 @@ def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Floats:
     return np.asarray(np.sqrt(lightness**2 + chroma**2 + tint**2 + rotation * chroma * tint))
 
 
-def _seventh(chroma: Floats) -> Floats:
+def _seventh(chroma: Doubles) -> Doubles:
     return np.asarray(np.sqrt(chroma**7 / (chroma**7 + 25.0**7)))
 
 
-def _hue_weight(hue: Floats) -> Floats:
+def _hue_weight(hue: Doubles) -> Doubles:
     terms = ((-0.17, 1.0, -30.0), (0.24, 2.0, 0.0), (0.32, 3.0, 6.0), (-0.20, 4.0, -63.0))
     return np.asarray(
         1.0 + sum(share * np.cos(np.radians(times * hue + shift)) for share, times, shift in terms)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
+from dermis.base.arrays import Floats, Mask
 
 _STRIP = 16  # rows filtered at a time, which stay in the cache
 
@@ -60,7 +60,7 @@ def without_steps(height: NDArray[np.floating[Any]]) -> Floats:
     return smooth
 
 
-def fill_empty(image: NDArray[np.floating[Any]], known: NDArray[np.bool_]) -> Floats:
+def fill_empty(image: NDArray[np.floating[Any]], known: Mask) -> Floats:
     """The picture with unknown pixels filled with the mean of known ones near by.
 
     image : (H, W, C) with sides that are powers of two

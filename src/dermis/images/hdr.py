@@ -1,4 +1,4 @@
-"""OpenEXR pictures, of which the header is judged before pixels are decoded."""
+"""Pictures of linear light, OpenEXR and Radiance: headers are checked before pixels are decoded."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Bytes, Floats, Index
 from dermis.images.sizes import MOST_PIXELS, TooLargeError, check_size
 
 EXR_START = b"\x76\x2f\x31\x01"
@@ -17,9 +18,15 @@ _CHANNELS = ("RGBA", "RGB", "Y")
 _NAMES = {1: "Y", 3: "RGB"}  # by channels
 _MOST_NUMBERS = 3 * MOST_PIXELS  # in all channels of all parts: the library decodes all of them
 _MOST_CHANNELS = 1024
+RADIANCE_START = b"#?"
+_MOST_HEADER = 1 << 16
+_STRIP = 1 << 18  # pixels decoded at a time
+_LONGEST = 128  # bytes that are not repeated; a larger number is that of a run
+_COUNT = [k if k <= _LONGEST else k - _LONGEST for k in range(256)]
+_STEP = [k + 1 if k <= _LONGEST else 2 for k in range(256)]
 
 
-def decode_exr(data: bytes) -> NDArray[np.float32]:
+def decode_exr(data: bytes) -> Floats:
     """(H, W, 1, 3 or 4) of the channels Y, RGB or RGBA of an OpenEXR file.
 
     data : the whole file
@@ -101,17 +108,7 @@ def encode_exr(picture: NDArray[np.floating[Any]]) -> bytes:
     return file.getvalue()
 
 
-Bytes = NDArray[np.uint8]
-
-RADIANCE_START = b"#?"
-_MOST_HEADER = 1 << 16
-_STRIP = 1 << 18  # pixels decoded at a time
-_LONGEST = 128  # bytes that are not repeated; a larger number is that of a run
-_COUNT = [k if k <= _LONGEST else k - _LONGEST for k in range(256)]
-_STEP = [k + 1 if k <= _LONGEST else 2 for k in range(256)]
-
-
-def decode_radiance(data: bytes) -> NDArray[np.float32]:
+def decode_radiance(data: bytes) -> Floats:
     """Linear radiance (H, W, 3) of the bytes of a .hdr file, divided by its EXPOSURE.
 
     data : the whole file, in the top-down left-to-right order that programs write
@@ -187,7 +184,7 @@ def _coded(data: bytes, at: int, height: int, width: int) -> tuple[Bytes, int]:
     return planes.transpose(0, 2, 1), at
 
 
-def _filled(data: Bytes, starts: NDArray[np.int64]) -> Bytes:
+def _filled(data: Bytes, starts: Index) -> Bytes:
     """The bytes that runs stand for; starts : (n,) where each begins in the data."""
     code = data[starts]
     count = np.array(_COUNT)[code]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base import atomic_write as outputs
+from dermis.base.arrays import Bytes
 from dermis.base.errors import refuse, shown_value
 from dermis.base.extras import needed
 from dermis.base.quantities import numbers, whole_number
@@ -158,7 +159,7 @@ class MovieWriter:
         while len(self._waiting) > _WAITING or (self._waiting and self._waiting[0].done()):
             self._waiting.popleft().result()
 
-    def _encode(self, number: int, picture: NDArray[np.uint8]) -> None:
+    def _encode(self, number: int, picture: Bytes) -> None:
         import av
         from av.video.reformatter import ColorRange, Colorspace
 

@@ -1,4 +1,4 @@
-"""How large pictures may be: asked of their headers, before any pixel is decoded."""
+"""Largest sizes of pictures, checked in their headers before any pixel is decoded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures written on other threads, so that rendering need not wait."""
+"""Numbered pictures written on other threads, and which of them are there already."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from dermis.images.io import OUTPUT_SUFFIXES, check_output, read_bytes, write_ex
 
 _FAST = 1  # effort of compression
 _WAITING_PER_THREAD = 4
+_NUMBER = re.compile(r"%(?:0(\d+))?d")
 
 
 class ImageWriter:
@@ -89,9 +90,6 @@ class ImageWriter:
                 self.finish()
         finally:
             self._pool.shutdown(cancel_futures=True)
-
-
-_NUMBER = re.compile(r"%(?:0(\d+))?d")
 
 
 @dataclass(frozen=True)

@@ -1,32 +1,39 @@
-"""The shape of an eyeball: a ball with a cornea, in mm of a usual eye around the ball's centre."""
+"""The usual eyeball: its shape, its mesh and uv, and lids that slide over it.
+
+Lengths are in mm of a usual eye around the centre of the ball.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Index, Ints
 from dermis.base.summary import Summarised
-
-Doubles = NDArray[np.float64]
 
 SCLERA_MM, CORNEA_MM, LIMBUS_MM = 12.0, 7.8, 5.85
 """Radii of the ball, of the cornea's front, and of the circle where they meet, of an adult [mm]."""
 IRIS_BEHIND_MM = 3.0
 """Depth of the plane of the iris behind the cornea's apex [mm]."""
+SIDE = 10
+"""Quads along each edge of the cube that a ball is made from; an even number, for a point on the axis."""
+RIM = 0.49
+"""Distance from the middle of the layout for half a turn from the axis."""
+FALLING = 0.9
+"""Angle from the axis over which that distance grows less and less [rad]."""
 
 
-def plane_mm(radius_mm: Any) -> Any:
+def plane_mm(radius_mm: float) -> float:
     """How far before the middle of a ball the cornea begins, at the limbus [mm]."""
-    return np.sqrt(radius_mm**2 - LIMBUS_MM**2)
+    return math.sqrt(radius_mm**2 - LIMBUS_MM**2)
 
 
 def cornea_centre_mm() -> float:
     """Where on the axis the centre of the cornea's front lies, from the ball's [mm]."""
-    return float(plane_mm(SCLERA_MM) - plane_mm(CORNEA_MM))
+    return plane_mm(SCLERA_MM) - plane_mm(CORNEA_MM)
 
 
 def apex_mm() -> float:
@@ -57,9 +64,6 @@ def clearance_mm(places: Doubles, axis: Doubles) -> tuple[Doubles, Doubles]:
     return far, profile_mm(np.arccos(np.clip(along, -1.0, 1.0)))
 
 
-Ints = NDArray[np.int32]
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Contact(Summarised):
     """Control points that stay off the eyeballs of a head, cornea included, wherever these look.
@@ -73,7 +77,7 @@ class Contact(Summarised):
 
     point: Ints
     ball: Ints
-    clear_mm: NDArray[np.float32]
+    clear_mm: Floats
     apex: Ints
     back: Ints
     edge: Ints
@@ -90,13 +94,6 @@ class Contact(Summarised):
         found = points_mm.copy()
         found[self.point] = middle + scale * off * out[:, None]
         return found
-
-
-Index = NDArray[np.int64]
-
-SIDE = 10
-"""Quads along each edge of the cube that a ball is made from; an even number, for a point on the axis."""
-_GLOBE_RIM = 0.49  # of the layout, around its middle
 
 
 @cache
@@ -129,7 +126,7 @@ def layout(side: int = SIDE) -> Doubles:
     """(n, 2) uv of an eyeball's points: seen along its axis, by the angle from there; the back is the rim."""
     along = _along(side)
     angle, turn = np.arccos(np.clip(along[:, 2], -1.0, 1.0)), np.arctan2(along[:, 1], along[:, 0])
-    radius = _GLOBE_RIM * angle / np.pi
+    radius = RIM * angle / np.pi
     return 0.5 + np.stack([radius * np.cos(turn), -radius * np.sin(turn)], axis=-1)
 
 
@@ -145,12 +142,6 @@ def _along(side: int) -> Doubles:
     return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
 
 
-RIM = 0.49
-"""Distance from the middle of the layout for half a turn from the axis."""
-FALLING = 0.9
-"""Angle from the axis over which that distance grows less and less [rad]."""
-
-
 @dataclass(frozen=True, eq=False)
 class EyePictures:
     """An eyeball as it is seen along its axis, by the layout, row 0 at v = 0.
@@ -159,11 +150,11 @@ class EyePictures:
     normal : (n, n, 3) unit, of what lies below the film of tears, by the axes of the layout, green up
     """
 
-    colour: NDArray[np.float32]
-    normal: NDArray[np.float32]
+    colour: Floats
+    normal: Floats
 
 
-def eye_uv(places: Doubles) -> NDArray[np.float32]:
+def eye_uv(places: Doubles) -> Floats:
     """(n, 2) uv of places around an eyeball's middle (n, 3), z along its axis."""
     across = np.hypot(places[:, 0], places[:, 1])
     angle = np.arctan2(across, places[:, 2])

@@ -5,34 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.base.quantities import check_numbers
+from dermis.base.arrays import Doubles, Ints
 from dermis.base.summary import Summarised
-from dermis.mesh.eye_look import LIMITS
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm
 from dermis.mesh.rig import Motion, Rig
-
-Doubles = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class EyeLook:
-    """What makes eyes look different.
-
-    eumelanin : of the iris, from none, which leaves it blue, to the darkest brown, 0 to 1 [-]
-    pupil_mm : radius of the pupil, 1 to 4 [mm]
-    redness : of the white of the eye, 0 to 1 [-]
-    seed : which fibres and vessels, any integer from 0
-    """
-
-    eumelanin: float = 0.6
-    pupil_mm: float = 1.9
-    redness: float = 0.2
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, LIMITS, "eyes: ")
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,10 +26,10 @@ class Eyes(Summarised):
     sight : (k, 3) the way each looks in its own space: along the axis, unless lids show it elsewhere
     """
 
-    apex: NDArray[np.int32]
-    back: NDArray[np.int32]
-    side: NDArray[np.int32]
-    material: NDArray[np.int32]
+    apex: Ints
+    back: Ints
+    side: Ints
+    material: Ints
     look: EyeLook
     ball_mm: Doubles = field(default_factory=lambda: np.full(2, SCLERA_MM))
     middle_mm: Doubles = field(default_factory=lambda: np.zeros(2))

@@ -1,4 +1,4 @@
-"""Welding and normals of triangles, and the assembly of a `Mesh` from plain arrays."""
+"""Geometry of triangles as plain arrays: welding, edges, areas, normals and tangents."""
 
 from __future__ import annotations
 
@@ -6,6 +6,12 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from dermis.base.arrays import Doubles, Floats, Index, Ints
+
+MIN_UV_CROSS = 1e-12
+"""Twice the signed uv area below which u and v have no direction on a triangle (1/70 texel at 8192)."""
+T = TypeVar("T", np.float32, np.float64)
 
 
 def weld(rows: ArrayLike) -> Ints:
@@ -23,14 +29,14 @@ def weld(rows: ArrayLike) -> Ints:
     return index
 
 
-def compacted(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def compacted(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
     """Vertices that triangles (f, 3) use (n,), in order, and the triangles by numbers of these."""
     seen = np.zeros(int(triangles.max()) + 1, bool)
     seen[triangles] = True
     return np.flatnonzero(seen).astype(np.int64), (np.cumsum(seen) - 1)[triangles]
 
 
-def edges(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def edges(triangles: NDArray[np.integer]) -> tuple[Index, Index, Index]:
     """Unique edges (e, 2), the edge of each side (3f,) and the number of sides on each edge (e,).
 
     triangles : (f, 3) point indices; sides come as all 0-1, then all 1-2, then all 2-0
@@ -38,7 +44,7 @@ def edges(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np
     return unite_sides(np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])))
 
 
-def unite_sides(sides: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def unite_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
     """Unique edges (e, 2), the edge of each side (n,) and the number of sides on each edge (e,).
 
     sides : (n, 2) point indices, in either order
@@ -76,14 +82,6 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     flat = ~(length > 0)
     length[flat], summed[:, flat] = 1.0, [[0.0], [0.0], [1.0]]
     return np.ascontiguousarray((summed / length).astype(np.float32).take(point, axis=1).T)
-
-
-Doubles = NDArray[np.float64]
-Floats = NDArray[np.float32]
-Ints = NDArray[np.int32]
-
-MIN_UV_CROSS = 1e-12
-"""Twice the signed uv area below which u and v have no direction on a triangle (1/70 texel at 8192)."""
 
 
 def sum_at(index: NDArray[np.integer], values: Doubles, count: int) -> Doubles:
@@ -148,12 +146,9 @@ def _with_length(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[Floats
     return u.astype(np.float32), v.astype(np.float32)
 
 
-def halves(quads: NDArray[np.integer]) -> NDArray[np.int64]:
+def halves(quads: NDArray[np.integer]) -> Index:
     """(2q, 3) triangles (a, b, c) and (c, d, a) of each quad, side by side; quads : (q, 4)."""
     return np.ascontiguousarray(quads[:, [0, 1, 2, 2, 3, 0]], np.int64).reshape(-1, 3)
-
-
-T = TypeVar("T", np.float32, np.float64)
 
 
 def dots(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
@@ -172,9 +167,6 @@ def crosses(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
     return found
 
 
-Index = NDArray[np.int64]
-
-
 def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
     """Component of each of `count` nodes (n,), counted from 0 in the order of their first nodes.
 
@@ -191,7 +183,7 @@ def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> In
             return np.asarray(np.unique(label, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 
-def fibonacci_sphere(count: int) -> NDArray[np.float64]:
+def fibonacci_sphere(count: int) -> Doubles:
     """(count, 3) unit vectors along a golden spiral about +Y, each for an equal share of the sphere.
 
     Source: [Keinert2015].

@@ -7,9 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from dermis.mesh.eyes import EyeLook, Eyes
+from dermis.base.arrays import Floats
+from dermis.mesh.eye_look import EyeLook
+from dermis.mesh.eyes import Eyes
 from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Floats, Mesh
+from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
 from dermis.mesh.strands import Strands
 

@@ -7,13 +7,11 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Bytes, Doubles, Floats
 from dermis.base.summary import Summarised
 
 _MEAN_TEXELS, _MOST_APART = 64, 16  # for means: fewest samples a side, largest stride
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,7 +31,7 @@ class Maps(Summarised):
     height: Floats | None = None
     specular: Floats | None = None
     roughness: Floats | None = None
-    region: NDArray[np.uint8] | None = None
+    region: Bytes | None = None
     painted: ClassVar[bool] = False
     """Whether the device paints those that are None."""
 
@@ -43,7 +41,7 @@ class Maps(Summarised):
         return self.roughness is not None
 
     @cached_property
-    def mean_colour(self) -> NDArray[np.float64] | None:
+    def mean_colour(self) -> Doubles | None:
         """(3,) of the colour map, without the black texels of empty space [-]."""
         if self.colour is None:
             return None

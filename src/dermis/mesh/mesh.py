@@ -8,14 +8,12 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dermis.base.arrays import Floats, Ints
 from dermis.base.summary import Summarised
 from dermis.mesh.geometry import tangents, vertex_normals, weld
 from dermis.mesh.outline import Outline, hull
-
-Floats = NDArray[np.float32]
-Ints = NDArray[np.int32]
 
 _CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
 
@@ -66,7 +64,7 @@ class Mesh(Summarised):
     quads: Ints = field(default_factory=lambda: np.zeros((0, 2), np.int32))
 
     @property
-    def size_mm(self) -> NDArray[np.float32]:
+    def size_mm(self) -> Floats:
         """Extent along x, y and z [mm]."""
         return np.asarray(self.positions.max(axis=0) - self.positions.min(axis=0))
 

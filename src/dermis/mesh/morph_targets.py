@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Floats, Intp, Ints
 from dermis.base.summary import Summarised
-
-Floats = NDArray[np.float32]
-Ints = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,7 +34,7 @@ class MorphTargets(Summarised):
         return {name: index for index, name in enumerate(self.names)}
 
     @cached_property
-    def by_point(self) -> NDArray[np.intp]:
+    def by_point(self) -> Intp:
         """(n,) the displacements in the order of their points, and of targets for each."""
         return np.argsort(self.point, kind="stable")
 
@@ -45,7 +42,7 @@ class MorphTargets(Summarised):
         """Which of the displacements are a target's."""
         return slice(int(self.first[target]), int(self.first[target + 1]))
 
-    def dense(self, points: NDArray[np.intp], count: int) -> Floats:
+    def dense(self, points: Intp, count: int) -> Floats:
         """(t, n, 3) displacements of some points by all targets.
 
         count : of all points

@@ -1,4 +1,9 @@
-"""What lies farthest out of a shape: enough to know its extent along any direction."""
+"""Outermost points of a shape: enough to know its extent along any direction.
+
+Shadow maps and ranges of depth use a few points between which a head lies however it is posed. Which
+these are is found once for a rig: at rest, with each of its targets alone, and in random poses; so a bound
+over them is stable while the head moves, and costs next to nothing.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +15,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Floats, Intp, Mask
 from dermis.base.summary import Summarised
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.morph_targets import MorphTargets
-from dermis.mesh.skeleton import Floats, Skeleton
+from dermis.mesh.skeleton import Skeleton
+
+_DIRECTIONS, _FEW = 512, 256
+_FINER = 64, 512, 2048  # one after the other: points beside one that is taken already are left out
+_CLOSE_MM = 0.5
+_MOST_CORNERS = 512
+_PRODUCT = 80_000  # heights at a time
+_LAYERS = 16  # points beneath the outermost ones that a pose may bring out
+_POSES, _SEED = 128, 0
+_TURN_DEGREES = 60.0
+_MOST_BONES = 4  # that turn at once
+_ACTIVE = 0.3  # share of the targets
+_FOLLOWS = 0.02  # least weight
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,7 +46,7 @@ class Outline(Summarised):
     slack_mm: float = 0.0
 
     @cached_property
-    def columns(self) -> NDArray[np.float32]:
+    def columns(self) -> Floats:
         """(4, n) the places as columns, each with a 1 below, for matrices from its left [mm].
 
         As exact as a mesh's positions, and what comes of it in each frame takes half the memory.
@@ -48,7 +66,7 @@ def hull(positions: NDArray[np.floating]) -> Outline:
     return Outline(points[hull_points(points)])
 
 
-def hull_points(positions: NDArray[np.floating]) -> NDArray[np.intp]:
+def hull_points(positions: NDArray[np.floating]) -> Intp:
     """Numbers of the positions (n, 3) that are corners of the convex hull of all."""
     from scipy.spatial import ConvexHull, QhullError
 
@@ -56,21 +74,6 @@ def hull_points(positions: NDArray[np.floating]) -> NDArray[np.intp]:
         return np.sort(ConvexHull(positions.astype(np.float64)).vertices).astype(np.intp)
     except QhullError:  # it is flat
         return np.arange(len(positions))
-
-
-Index = NDArray[np.intp]
-
-_DIRECTIONS, _FEW = 512, 256
-_FINER = 64, 512, 2048  # one after the other: points beside one that is taken already are left out
-_CLOSE_MM = 0.5
-_MOST_CORNERS = 512
-_PRODUCT = 80_000  # heights at a time
-_LAYERS = 16  # points beneath the outermost ones that a pose may bring out
-_POSES, _SEED = 128, 0
-_TURN_DEGREES = 60.0
-_MOST_BONES = 4  # that turn at once
-_ACTIVE = 0.3  # share of the targets
-_FOLLOWS = 0.02  # least weight
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,7 +89,7 @@ class RigOutline(Summarised):
     rest_mm: Floats
     delta_mm: Floats
     weight: Floats | None
-    bones: Index
+    bones: Intp
 
     def posed(self, weights: Floats, matrices: Floats) -> Floats:
         """(s, 3) where they are [mm].
@@ -106,7 +109,7 @@ class RigOutline(Summarised):
         return np.asarray((blended.reshape(3, 4, -1) * columns).sum(axis=1).T)
 
 
-def outline_of(places: Floats, targets: MorphTargets, skeleton: Skeleton | None, points: Index) -> RigOutline:
+def outline_of(places: Floats, targets: MorphTargets, skeleton: Skeleton | None, points: Intp) -> RigOutline:
     """Some points (s,) of a rig that rests at places (p, 3) [mm]."""
     rest = np.vstack([places[points].T, np.ones(len(points), np.float32)])
     delta = targets.dense(points, len(places)).transpose(0, 2, 1).reshape(-1, 3 * len(points))
@@ -119,18 +122,18 @@ def outline_of(places: Floats, targets: MorphTargets, skeleton: Skeleton | None,
     return RigOutline(rest, delta, shares, bones.astype(np.intp))
 
 
-def corners_of(places: Floats) -> Index:
+def corners_of(places: Floats) -> Intp:
     """Numbers of the corners of the convex hull of points (p, 3): all, or the outermost of too many."""
     corners = hull_points(places)
     return corners if len(corners) <= _MOST_CORNERS else corners[outermost(places[corners], _MOST_CORNERS)]
 
 
-def outermost(places: Floats, count: int = _FEW) -> Index:
+def outermost(places: Floats, count: int = _FEW) -> Intp:
     """Numbers of the points (p, 3) that lie farthest in any of some directions."""
     return np.unique(np.concatenate([height.argmax(axis=1) for height in _heights(places, count)]))
 
 
-def outline_points(places: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Index:
+def outline_points(places: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
     """Numbers of the points of a rig that are outermost at rest, with one target, or in some pose."""
     pool = _pool(places, targets, skeleton)
     outline = outline_of(places, targets, skeleton, pool)
@@ -148,7 +151,7 @@ def outline_points(places: Floats, targets: MorphTargets, skeleton: Skeleton | N
     return pool[taken]
 
 
-def _take(taken: NDArray[np.bool_], places: Floats, count: int = _DIRECTIONS) -> None:
+def _take(taken: Mask, places: Floats, count: int = _DIRECTIONS) -> None:
     """Take the points that lie farther out in one of some directions than those taken before."""
     for height in _heights(places, count):
         top = height.argmax(axis=1)
@@ -172,7 +175,7 @@ def _directions(count: int) -> Floats:
     return np.ascontiguousarray(fibonacci_sphere(count)[:, [0, 2, 1]], np.float32)
 
 
-def _pool(places: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Index:
+def _pool(places: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
     """Numbers of points among which those that are outermost in any pose are looked for."""
     layers = min(_LAYERS, len(places))
     found: list[NDArray[Any]] = [outermost(places, _FINER[-1])]

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dermis.base.arrays import Doubles, Floats
 from dermis.base.errors import DermisError, refuse, shown_value
 from dermis.base.quantities import number, numbers
 from dermis.base.summary import Summarised
@@ -23,8 +24,6 @@ _FORMS = "three angles [degrees] or a (4, 4) matrix"
 _NEAR = 3  # names that are proposed
 _LONGEST_NAME = 80  # letters that are compared
 _FLAT = 1e-9  # determinant over size cubed
-
-Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,7 +40,7 @@ class Pose(Summarised):
 
     weights: Mapping[str, float] = field(default_factory=dict)
     bones: Mapping[str, ArrayLike] = field(default_factory=dict)
-    positions_mm: NDArray[np.float32] | None = None
+    positions_mm: Floats | None = None
 
     def __post_init__(self) -> None:
         for part in ("weights", "bones"):
@@ -70,7 +69,7 @@ class Pose(Summarised):
             self._weights(rig, culprit), self._matrices(rig, culprit), self._positions(rig, culprit)
         )
 
-    def _weights(self, rig: Rig, culprit: object) -> NDArray[np.float32]:
+    def _weights(self, rig: Rig, culprit: object) -> Floats:
         weights = np.zeros(len(rig.targets.names), np.float32)
         if not self.weights:
             return weights
@@ -83,7 +82,7 @@ class Pose(Summarised):
         weights[places] = given if rig.targets.rest is None else given - rig.targets.rest[places]
         return weights
 
-    def _matrices(self, rig: Rig, culprit: object) -> NDArray[np.float32]:
+    def _matrices(self, rig: Rig, culprit: object) -> Floats:
         given = self._turned(rig)
         if not given:
             return rig.rest.matrices
@@ -109,7 +108,7 @@ class Pose(Summarised):
                 found[bone] = [a + self.weights[target] * b for a, b in zip(before, degrees, strict=True)]
         return found
 
-    def _positions(self, rig: Rig, culprit: object) -> NDArray[np.float32]:
+    def _positions(self, rig: Rig, culprit: object) -> Floats:
         if self.positions_mm is None:
             return rig.positions_mm
         try:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from dermis.base.arrays import Ints
 from dermis.base.errors import refuse
-from dermis.mesh.mesh import Ints, Material, Mesh, build_mesh
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 
 SKIN = (Material("skin"),)
 # Faces of a box: corners (x, y, z) in 0..1 from the top left as seen from outside, to the right, down; and

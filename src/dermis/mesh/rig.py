@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Intp, Ints, Mask
 from dermis.base.disk import cached_array
 from dermis.base.summary import Summarised
 from dermis.mesh.eyeball import Contact
@@ -16,10 +17,6 @@ from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.outline import RigOutline, corners_of, outline_of, outline_points
 from dermis.mesh.rotations import rigid_motion
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
-
-Floats = NDArray[np.float32]
-Doubles = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 __all__ = [
     "INFLUENCES",
@@ -164,11 +161,11 @@ class Rig(Summarised):
         return outline
 
     @cached_property
-    def _elsewhere(self) -> tuple[NDArray[np.intp], RigOutline]:
+    def _elsewhere(self) -> tuple[Intp, RigOutline]:
         return self._outline_points, self.outline
 
     @cached_property
-    def _outline_points(self) -> NDArray[np.intp]:
+    def _outline_points(self) -> Intp:
         if self.template is not None:
             return np.union1d(self.template._outline_points, corners_of(self.positions_mm))
         targets, skeleton = self.targets, self.skeleton
@@ -194,7 +191,7 @@ class Rig(Summarised):
         return np.asarray(share @ posed).reshape(*self.contact.edge.shape, 3)
 
     @cached_property
-    def _edges(self) -> tuple[NDArray[np.intp], Doubles, RigOutline]:
+    def _edges(self) -> tuple[Intp, Doubles, RigOutline]:
         """Control points around edges of lids, their shares in these, and what moves them."""
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
@@ -219,7 +216,7 @@ class Rig(Summarised):
         return np.asarray(np.einsum("pk,pkij,pj->pi", weight, matrices, whole))
 
     @cached_property
-    def _moved(self) -> NDArray[np.bool_]:
+    def _moved(self) -> Mask:
         """(p,) whether a target moves a point."""
         moved = np.zeros(len(self.positions_mm), bool)
         moved[self.targets.point] = True

@@ -10,9 +10,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Doubles = NDArray[np.float64]
+from dermis.base.arrays import Doubles
 
 
 def quaternion_matrix(q: Doubles) -> Doubles:

@@ -7,14 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Intp, Ints
 from dermis.base.summary import Summarised
 from dermis.mesh.rotations import angles_matrix
-
-Floats = NDArray[np.float32]
-Doubles = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 INFLUENCES = 4
 """Bones that move a point; of more, those with the largest weights stay."""
@@ -143,7 +139,7 @@ class Skeleton(Summarised):
         return np.asarray(np.linalg.pinv(self.to_head @ self._world(self.local)))
 
     @cached_property
-    def _below(self) -> list[NDArray[np.intp]]:
+    def _below(self) -> list[Intp]:
         """Numbers of each bone and of all below it."""
         below: list[list[int]] = [[] for _ in self.names]
         for bone in range(len(self.names)):
@@ -160,7 +156,7 @@ class Skeleton(Summarised):
         return np.array([own[below].sum() for below in self._below])
 
     @cached_property
-    def _unmoved(self) -> NDArray[np.intp]:
+    def _unmoved(self) -> Intp:
         return np.zeros(len(self.names), np.intp)
 
     @cached_property

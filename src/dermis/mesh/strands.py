@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Ints
 from dermis.base.summary import Summarised
 from dermis.mesh.geometry import crosses, dots
-from dermis.mesh.mesh import Floats, Ints, Mesh
+from dermis.mesh.mesh import Mesh
 
-Doubles = NDArray[np.float64]
 _LEAST = 1e-9
 
 

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Floats, Index, Ints
 from dermis.base.disk import Arrays, cached_arrays
 from dermis.base.errors import refuse, shown_value
 from dermis.base.progress import preparing
 from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Floats, Ints, Mesh, build_mesh
+from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 from dermis.mesh.subdivision_rules import Cage, catmull_clark_limit, refine_catmull_clark, refine_loop
 
@@ -25,6 +26,7 @@ MAX_LEVELS = 3
 _FORM = "subdivision 1"  # raise when weights or corners change for the same mesh
 _MANY = 500_000
 """Finer triangles from which on reading weights from disk saves half a second or more."""
+Corners = NDArray[np.integer]
 
 
 class Subdivided(NamedTuple):
@@ -164,7 +166,7 @@ def _refined(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     }
 
 
-def polygons(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
+def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
     """Corner vertices of all faces (n,), the number of each one's corners (f,) and its material (f,).
 
     Triangles come first, then quads.
@@ -175,9 +177,6 @@ def polygons(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[
     corner = np.concatenate((mesh.triangles[alone].ravel(), quads.ravel())).astype(np.int64)
     sides = np.repeat(np.array([3, 4]), (len(alone), len(quads)))
     return corner, sides, np.concatenate((mesh.material[alone], mesh.material[first]))
-
-
-Corners = NDArray[np.integer]
 
 
 def coarse_triangles(head: Head, least: int, off_mm: float) -> Ints:

@@ -7,16 +7,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Index, Ints, Mask
 from dermis.mesh.geometry import unite_sides
-from dermis.mesh.mesh import Ints
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-Index = NDArray[np.int64]
-Doubles = NDArray[np.float64]
 
 
 class Cage(NamedTuple):
@@ -56,7 +52,7 @@ class _Sides:
     face: Index
     ends: Index
     edge: Index
-    border: NDArray[np.bool_]
+    border: Mask
     cuts: Index
     cut: Index
 

@@ -31,6 +31,7 @@ from dermis.scene.smoothness import SmoothIn
 P = TypeVar("P", bound=Plain)
 _PARTS = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAPS = ("colour", "normal", "height", "specular", "roughness")
+_Weight = Annotated[float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT), Because("faces come apart long before")]
 
 
 def load_lights(name: str | Path) -> tuple[Light, ...]:
@@ -208,9 +209,6 @@ def _made(kind: type[P], culprit: object, part: str, table: Any) -> P:
 
 def _read(name: str | Path, expected: str) -> dict[str, Any]:
     return read_toml(named_path(name, expected), expected)
-
-
-_Weight = Annotated[float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT), Because("faces come apart long before")]
 
 
 class PoseTable(Plain):

@@ -20,7 +20,7 @@ from dermis.formats.obj import obj_maps
 from dermis.formats.parts import is_gltf
 from dermis.formats.samples import SAMPLES, Sample, fetch
 from dermis.human.regions.usual import with_usual_regions
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.fitted_eyes.fit import with_fitted_eyes
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

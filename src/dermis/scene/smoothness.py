@@ -1,4 +1,4 @@
-"""How finely a head is subdivided for a picture."""
+"""How finely a head is subdivided for its silhouette to look smooth in a picture."""
 
 from __future__ import annotations
 
@@ -17,6 +17,17 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.subdivide import MAX_LEVELS
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.head_table import AUTO
+
+Levels = int | Callable[[Head], int]
+Subdivide = Levels | Literal["auto"]
+"""Levels of subdivision, "auto" for a portrait of 1024x1024, or a function of the head as it comes."""
+Doubles = NDArray[np.float64]
+MOST_TRIANGLES = 300_000
+"""Of a mesh that is subdivided for its silhouette's sake."""
+LIMIT_PX = 0.6
+"""How far a silhouette's edges may lie off the smooth curve: corners of less are lost in a pixel's filter."""
+_SHARE = 0.9  # of the silhouette's length that keeps to it; the rest are creases and what is hidden mostly
+_NEAREST_MM = 1.0  # before the eye
 
 
 @dataclass(frozen=True)
@@ -42,11 +53,6 @@ class SmoothIn:
         return smooth_levels(seen.coarseness_px, triangles)
 
 
-Levels = int | Callable[[Head], int]
-Subdivide = Levels | Literal["auto"]
-"""Levels of subdivision, "auto" for a portrait of 1024x1024, or a function of the head as it comes."""
-
-
 def chosen_levels(subdivide: Subdivide) -> Levels:
     """Levels, or the function that finds them.
 
@@ -57,16 +63,6 @@ def chosen_levels(subdivide: Subdivide) -> Levels:
     if isinstance(subdivide, str):
         refuse("subdivide", f"{AUTO} or 0 to {MAX_LEVELS} levels", f"{subdivide!r} came", "Choose one")
     return subdivide
-
-
-Doubles = NDArray[np.float64]
-
-MOST_TRIANGLES = 300_000
-"""Of a mesh that is subdivided for its silhouette's sake."""
-LIMIT_PX = 0.6
-"""How far a silhouette's edges may lie off the smooth curve: corners of less are lost in a pixel's filter."""
-_SHARE = 0.9  # of the silhouette's length that keeps to it; the rest are creases and what is hidden mostly
-_NEAREST_MM = 1.0  # before the eye
 
 
 class Silhouette(NamedTuple):

@@ -19,7 +19,7 @@ from dermis.human.landmarks.sets import SETS
 from dermis.human.person import Human
 from dermis.human.published import human_targets
 from dermis.human.skin.look import SkinLook
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.pose import MOST_WEIGHT
 from dermis.scene.heads import HUMAN
 from dermis.scene.lights import NO_LIGHTS

@@ -1,4 +1,4 @@
-"""Animation clips of a glTF file."""
+"""Animation clips of a glTF file, as curves between keys."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.base.reading import BROKEN, understood
 from dermis.formats.gltf.document import Document, Tree, numbered, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
 from dermis.formats.gltf.rigs import target_names
-from dermis.formats.parts import Array
 from dermis.formats.size_limits import MOST_CHANNELS
 from dermis.mesh.rotations import slerp
 
 _WIDTH = {"translation": 3, "rotation": 4, "scale": 3}
 _KINDS = ("STEP", "LINEAR", "CUBICSPLINE")
 _DAMAGED = "The file is damaged: export it again"
+Interpolation = Literal["STEP", "LINEAR", "CUBICSPLINE"]
+_TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
 
 
 class Track(NamedTuple):
@@ -40,12 +41,12 @@ class Animation:
 
 
 class _Keys(NamedTuple):
-    times_s: Array
-    values: Array
+    times_s: Doubles
+    values: Doubles
     kind: str
 
     @property
-    def plain(self) -> Array:
+    def plain(self) -> Doubles:
         """(k, n) the values without tangents."""
         return self.values[:, 1] if self.kind == "CUBICSPLINE" else self.values
 
@@ -148,11 +149,6 @@ def _keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keys:
         came = f"key {late + 1} at {times[late + 1]:g} s comes after {times[late]:g} s"
         refuse(culprit, "keys in the order of time", came, _DAMAGED)
     return _Keys(times, values.reshape(shape), kind)
-
-
-Doubles = NDArray[np.float64]
-Interpolation = Literal["STEP", "LINEAR", "CUBICSPLINE"]
-_TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
 
 
 @dataclass(frozen=True, eq=False)

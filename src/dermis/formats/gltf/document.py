@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.base.reading import BROKEN, parse_json, read_file, understood
 from dermis.formats.named_files import named_by_uri
-from dermis.formats.parts import Array, fractions
+from dermis.formats.parts import fractions
 from dermis.formats.size_limits import MOST_BYTES, MOST_JSON, MOST_NUMBERS
 
 Tree = dict[str, Any]
@@ -104,7 +105,7 @@ class Document:
             return values
         return self._with_sparse(values, accessor["sparse"])
 
-    def real(self, index: int) -> Array:
+    def real(self, index: int) -> Doubles:
         """(n, k) the values of an accessor; integers that are normalised are fractions of the largest."""
         values = self.numbers(index)
         if not self.one("accessors", index).get("normalized", False):

@@ -1,4 +1,4 @@
-"""The pictures that a glTF file brings with it."""
+"""Maps and eyes that a glTF file holds for this package."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dermis.formats.named_files import named_by_uri
 from dermis.formats.size_limits import MOST_RELIEF_MM
 from dermis.images.io import Picture, read_size
 from dermis.images.sizes import MOST_TOGETHER
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 
 _READABLE = {"image/png", "image/jpeg"}
 ROLES = ("normal", "height", "specular", "roughness", "region")

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Bytes, Floats
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material
 from dermis.specular.hair import ETA
-
-Floats = NDArray[np.float32]
 
 _IOR = {"KHR_materials_ior": {"ior": 1.4}}
 EYE, EYE_NORMAL = "eye", "eye normal"
@@ -151,12 +150,12 @@ def _plain(one: Material, roughness: float) -> dict[str, Any]:
     return {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": round(roughness, 4)}
 
 
-def _normals(slopes: Floats) -> NDArray[np.uint8]:
+def _normals(slopes: Floats) -> Bytes:
     """(h, w, 3) tangent-space normals as colours, green up."""
     normal = np.concatenate([-slopes, np.ones_like(slopes[..., :1])], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     return _bytes(0.5 * normal + 0.5)
 
 
-def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
+def _bytes(values: NDArray[Any]) -> Bytes:
     return np.asarray(np.rint(np.clip(values, 0, 1) * 255), np.uint8)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.formats.gltf.document import Document, Tree, numbered
-from dermis.formats.parts import Array
 from dermis.formats.size_limits import DEEPEST_NODE, MOST_NODES
 from dermis.mesh.rotations import quaternion_matrix
 
@@ -28,8 +28,8 @@ class Nodes:
     names: tuple[str, ...]
     parent: tuple[int, ...]
     order: tuple[int, ...]
-    local: Array
-    world: Array
+    local: Doubles
+    world: Doubles
     shown: tuple[int, ...] | None
 
     def above(self, node: int) -> list[int]:
@@ -114,7 +114,7 @@ def _shown(document: Document, nodes: list[Tree]) -> tuple[int, ...] | None:
     return tuple(found)
 
 
-def _local(node: dict[str, Any]) -> Array:
+def _local(node: dict[str, Any]) -> Doubles:
     """(4, 4) from a node's space to its parent's: its matrix, or translation, rotation and scale."""
     matrix = np.eye(4)
     if "matrix" in node:

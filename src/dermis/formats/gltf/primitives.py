@@ -1,4 +1,4 @@
-"""Primitives of a head that is written: those of its mesh, one for each material, and those of its hairs."""
+"""Primitives of a head that is written: one for each material, and its hairs as thin tubes of three sides."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Index, Intp, Ints
 from dermis.formats.gltf.binary import VERTICES, Binary
 from dermis.formats.moved_points import MovedPoints, Target
 from dermis.mesh.eyeball import eye_uv
@@ -16,11 +17,16 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, Strands, frames, points_of, weights
 
-Doubles = NDArray[np.float64]
-Floats = NDArray[np.float32]
 Tree = dict[str, Any]
 
 _M = 1e-3  # of a millimetre
+COLOURS = 64
+"""That the hairs of a head are sorted into."""
+_SIDES = 3
+_WIDER = 2.0 * np.pi / (_SIDES * np.sqrt(3.0))  # a triangle is as wide as a circle, seen from all around
+_LEAST_MM = 0.01  # a smaller displacement is none
+_ALBEDO = 5.89  # of a fibre of roughness 0.3 among others: [Chiang2016] equation 9
+_TINY = 1e-9
 
 
 class Part(Protocol):
@@ -44,7 +50,7 @@ class Surface:
     """
 
     points: MovedPoints
-    faces: NDArray[np.intp]
+    faces: Intp
     eye: int = -1
 
     @property
@@ -52,7 +58,7 @@ class Surface:
         return self.points.head
 
     @cached_property
-    def vertices(self) -> NDArray[np.int32]:
+    def vertices(self) -> Ints:
         """(v,) of the mesh, in the order of the file."""
         return np.unique(self._head.mesh.triangles[self.faces])
 
@@ -151,17 +157,6 @@ def _bones(binary: Binary, points: MovedPoints, vertex: NDArray[np.integer]) -> 
     }
 
 
-Index = NDArray[np.int64]
-
-COLOURS = 64
-"""That the hairs of a head are sorted into."""
-_SIDES = 3
-_WIDER = 2.0 * np.pi / (_SIDES * np.sqrt(3.0))  # a triangle is as wide as a circle, seen from all around
-_LEAST_MM = 0.01  # a smaller displacement is none
-_ALBEDO = 5.89  # of a fibre of roughness 0.3 among others: [Chiang2016] equation 9
-_TINY = 1e-9
-
-
 @dataclass(frozen=True, eq=False)
 class Fibres:
     """Tubes around hairs; they keep their shape and turn with the quads that they are rooted in.
@@ -204,7 +199,7 @@ class Fibres:
         return self.each * len(self.strands)
 
     @property
-    def vertex(self) -> NDArray[np.intp]:
+    def vertex(self) -> Intp:
         """(n,) the mesh's vertex nearest to each root."""
         nearest = weights(self.strands.roots.place).argmax(axis=1)
         first, second = self.mesh.quads[self.strands.roots.quad].T

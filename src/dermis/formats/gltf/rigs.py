@@ -1,4 +1,4 @@
-"""Bones of a glTF file, and which of them each vertex follows."""
+"""Morph targets and bones of a glTF file, and the bones that each vertex follows."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.formats.gltf.document import Document, Tree, numbered
 from dermis.formats.gltf.nodes import Nodes, node_names
-from dermis.formats.parts import Array, Bones, Index, fractions
+from dermis.formats.parts import Bones, fractions
 from dermis.formats.size_limits import MOST_BONES, MOST_INFLUENCES, MOST_TARGETS
 from dermis.mesh.rig import INFLUENCES
 
@@ -28,7 +29,7 @@ class Followed(NamedTuple):
     """
 
     bone: Index
-    weight: Array
+    weight: Doubles
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def _skin(document: Document, node: int) -> Tree:
 
 def read_followed(
     document: Document, nodes: Nodes, armature: Armature, node: int, primitive: Tree
-) -> tuple[Followed, Array]:
+) -> tuple[Followed, Doubles]:
     """What the vertices of a skinned primitive follow, and where that takes each at rest, (v, 4, 4).
 
     Raises DermisError for weights that are none and joints that there are not.
@@ -128,7 +129,7 @@ def read_followed(
     return Followed(bone[joint], weight), np.asarray(placed)
 
 
-def _check_weights(document: Document, name: str, joint: Index, weight: Array, count: int) -> None:
+def _check_weights(document: Document, name: str, joint: Index, weight: Doubles, count: int) -> None:
     if joint.shape != weight.shape:
         came = f"{name!r} has {joint.shape} of joints and {weight.shape} of weights"
         refuse(document.path, "as many joints as weights", came, _DAMAGED)
@@ -141,7 +142,7 @@ def _check_weights(document: Document, name: str, joint: Index, weight: Array, c
         refuse(document.path, f"joints of a skin from 0 to {count - 1}", came, _DAMAGED)
 
 
-def _strongest(joint: Index, weight: Array) -> tuple[Index, Array]:
+def _strongest(joint: Index, weight: Doubles) -> tuple[Index, Doubles]:
     """(v, 4) the four largest weights of each vertex, adding up to 1, and their joints."""
     if weight.shape[1] > INFLUENCES:
         order = np.argsort(-weight, axis=1, kind="stable")[:, :INFLUENCES]
@@ -160,7 +161,7 @@ class Displaced(NamedTuple):
     """
 
     vertex: Index
-    delta: Array
+    delta: Doubles
 
 
 def target_names(mesh: Tree) -> tuple[str, ...]:
@@ -221,7 +222,7 @@ def resting_weights(document: Document, nodes: Nodes) -> dict[str, float]:
     return {name: weight for name, weight in found.items() if weight}
 
 
-def displaced(positions: Array, targets: Mapping[str, Displaced], weights: Mapping[str, float]) -> Array:
+def displaced(positions: Doubles, targets: Mapping[str, Displaced], weights: Mapping[str, float]) -> Doubles:
     """(v, 3) positions with targets at some weights."""
     moved = positions
     for name, target in targets.items():

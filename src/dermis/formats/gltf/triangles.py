@@ -1,4 +1,4 @@
-"""Triangles of a glTF file's scene, with what moves them."""
+"""Triangles of the scene of a glTF file, with what moves them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.formats.gltf.document import Document, Tree, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
@@ -23,7 +24,7 @@ from dermis.formats.gltf.rigs import (
     resting_weights,
     target_names,
 )
-from dermis.formats.parts import GREY, Array, Group, Index, Model, Part, colour_of, find_pairs, fractions
+from dermis.formats.parts import GREY, Group, Model, Part, colour_of, find_pairs, fractions
 from dermis.formats.size_limits import MOST_DISPLACEMENTS, MOST_GROUPS, MOST_TRIANGLES, MOST_VERTICES
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
@@ -171,7 +172,7 @@ def _told(primitive: Tree) -> Tree:
     return told if isinstance(told, dict) else {}
 
 
-def _placed(part: Part, targets: dict[str, Displaced], matrix: Array) -> Part:
+def _placed(part: Part, targets: dict[str, Displaced], matrix: Doubles) -> Part:
     """A part moved by `matrix` (4, 4); a mirror turns its triangles round."""
     linear = matrix[:3, :3]
     return replace(
@@ -183,7 +184,7 @@ def _placed(part: Part, targets: dict[str, Displaced], matrix: Array) -> Part:
     )
 
 
-def _unscaled(matrix: Array) -> Array:
+def _unscaled(matrix: Doubles) -> Doubles:
     """The nearest rigid matrix where it misses one by rounding alone, as with scales of 1.0000001."""
     missed = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
     if not 1e-13 < missed < 1e-5:
@@ -194,7 +195,7 @@ def _unscaled(matrix: Array) -> Array:
     return rigid
 
 
-def _skinned(part: Part, targets: dict[str, Displaced], followed: Followed, matrices: Array) -> Part:
+def _skinned(part: Part, targets: dict[str, Displaced], followed: Followed, matrices: Doubles) -> Part:
     """A part of which each vertex is moved by its own one of `matrices` (v, 4, 4)."""
     if len(followed.bone) != len(part.positions):
         raise ValueError(f"{len(part.positions)} vertices have {len(followed.bone)} joints")
@@ -216,7 +217,7 @@ def _skinned(part: Part, targets: dict[str, Displaced], followed: Followed, matr
     )
 
 
-def _normal_matrix(linear: Array) -> Array:
+def _normal_matrix(linear: Doubles) -> Doubles:
     """(..., 3, 3) that turns normals as `linear` turns the surface: they keep their length.
 
     Normals turn with the cofactors, for flat transforms too.

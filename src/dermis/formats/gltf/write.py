@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats
 from dermis.formats.gltf.binary import CLAMPED, Binary, glb_bytes, placed
 from dermis.formats.gltf.materials import (
     Added,
@@ -25,7 +25,6 @@ from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 from dermis.mesh.skeleton import Skeleton
 
-Doubles = NDArray[np.float64]
 Tree = dict[str, Any]
 
 BROWS, HAIR = "brows and lashes", "hair"
@@ -40,7 +39,7 @@ def encode_head(
     *,
     roughness: float,
     weights: Mapping[str, float] | None = None,
-    slopes: NDArray[np.float32] | None = None,
+    slopes: Floats | None = None,
     notes: Mapping[str, Any] | None = None,
     eyes: EyePictures | None = None,
     added: Added | None = None,

@@ -1,0 +1,1 @@
+"""Motion from files: animation clips, captures of faces, sequences of meshes."""

@@ -1,4 +1,4 @@
-"""Clips of samples, one a row: weights of targets and angles of bones."""
+"""Captures of faces: samples in rows, the targets that their names mean, and the bones that turn."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
@@ -16,14 +16,36 @@ from dermis.mesh.pose import MOST_WEIGHT, Pose
 from dermis.mesh.rotations import matrix_angles, matrix_quaternion, quaternion_matrix, slerp
 from dermis.mesh.skeleton import Skeleton
 
-Doubles = NDArray[np.float64]
-
 MOST_CLIP = 48 << 20
 """Bytes of a capture's file."""
 MOST_FRAMES, MOST_NAMES = 200_000, 500
 """Rows of a capture, almost an hour at 60 a second, and columns of it."""
 _USUAL_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
 _NEARLY = 0.02
+_SIDE_LETTERS = {"l": "left", "r": "right"}
+_ASIDE = frozenset(
+    (
+        "mixamorig",
+        "cc",
+        "base",
+        "def",
+        "org",
+        "rig",
+        "bip",
+        "bone",
+        "joint",
+        "jnt",
+        "skel",
+        "j",
+        "c",
+        "x",
+        "m",
+    )
+)
+"""Words that programs write around the names of bones."""
+_SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
+_NECKS, _EYES = (["neck"], ["neck", "twist"]), (["eye"], ["eyeball"])
+_HEAD_SHARE = 0.5  # of a turn; the neck's bones share the rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +135,6 @@ def _some(names: Sequence[str]) -> str:
     return f"{shown} and {len(names) - 6} more" if len(names) > 6 else shown
 
 
-_SIDE_LETTERS = {"l": "left", "r": "right"}
-
-
 def matched(names: Iterable[str], targets: Sequence[str]) -> dict[str, str]:
     """By name the target of the head that it means; names that the head lacks are not there.
 
@@ -139,31 +158,6 @@ def _plain(name: str) -> str:
     side = re.fullmatch(r"(.+)[_\-. ]([lrLR])", last)
     whole = f"{side[1]}{_SIDE_LETTERS[side[2].lower()]}" if side else last
     return re.sub(r"[\W_]", "", whole).casefold()
-
-
-_ASIDE = frozenset(
-    (
-        "mixamorig",
-        "cc",
-        "base",
-        "def",
-        "org",
-        "rig",
-        "bip",
-        "bone",
-        "joint",
-        "jnt",
-        "skel",
-        "j",
-        "c",
-        "x",
-        "m",
-    )
-)
-"""Words that programs write around the names of bones."""
-_SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
-_NECKS, _EYES = (["neck"], ["neck", "twist"]), (["eye"], ["eyeball"])
-_HEAD_SHARE = 0.5  # of a turn; the neck's bones share the rest
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.formats.gltf.animations import Curve, Track, read_clip
 from dermis.formats.motion.captures import rate_of, refuse_names
@@ -16,8 +16,6 @@ from dermis.mesh.head import Head
 from dermis.mesh.pose import MOST_WEIGHT, Pose
 from dermis.mesh.rotations import matrix_quaternion, quaternion_matrix
 from dermis.mesh.skeleton import Skeleton
-
-Doubles = NDArray[np.float64]
 
 
 class _Rests(NamedTuple):

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.base.reading import read_text, understood
 from dermis.formats.motion.captures import (
@@ -29,8 +29,6 @@ from dermis.formats.motion.captures import (
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 from dermis.mesh.rotations import angles_matrix, matrix_quaternion
-
-Doubles = NDArray[np.float64]
 
 _TIME, _COUNT = "timecode", "blendshapecount"
 _PARTS = ("head", "lefteye", "righteye")

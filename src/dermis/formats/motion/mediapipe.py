@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.base import quantities
+from dermis.base.arrays import Doubles, Intp
 from dermis.base.errors import refuse, shown_value
 from dermis.base.reading import parse_json, read_text
 from dermis.formats.motion.captures import (
@@ -27,8 +27,6 @@ from dermis.formats.motion.captures import (
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 
-Doubles = NDArray[np.float64]
-
 _SECONDS = {"time": 1.0, "time_s": 1.0, "timestamp_ms": 1e-3}
 _SHAPES = ("blendshapes", "face_blendshapes", "faceBlendshapes")
 _MATRIX = ("matrix", "facial_transformation_matrix", "facialTransformationMatrix")
@@ -43,7 +41,7 @@ class _Row(NamedTuple):
 
     line: int
     seconds: float
-    columns: NDArray[np.intp]
+    columns: Intp
     weights: Doubles
     matrix: Doubles | None
 

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Index, Ints
 from dermis.base.errors import refuse
 from dermis.base.reading import BROKEN, is_file, read_file, understood
 from dermis.formats.mesh_checks import check_arrays
 from dermis.formats.obj import obj_model
-from dermis.formats.parts import Index, default_unit_mm
+from dermis.formats.parts import default_unit_mm
 from dermis.formats.read import Up, check_options, joined, read_model, upright
 from dermis.formats.rig_from_file import PARTED_MM
 from dermis.formats.size_limits import MOST_BYTES
@@ -27,13 +27,13 @@ from dermis.mesh.geometry import compacted
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 
-Floats = NDArray[np.float32]
-
 SUFFIXES = (".obj", ".ply")
 DEFAULT_RATE = 30.0
 _ON_FRAME = 1e-6
 _LIKELY = (0.33, 3.0)
 _NUMBER = re.compile(r"%0?\d*d")
+_PLACE = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[^\n]*\n?", re.MULTILINE)
+_NORMAL = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
 
 
 def is_sequence(path: Path) -> bool:
@@ -167,10 +167,6 @@ def _by_number(file: Path) -> tuple[int, str]:
     return int(numbers[-1]) if numbers else -1, file.name
 
 
-_PLACE = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[^\n]*\n?", re.MULTILINE)
-_NORMAL = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
-
-
 class Vertices(NamedTuple):
     """A file's vertices, in the order in which its `Mesh` has them.
 
@@ -180,7 +176,7 @@ class Vertices(NamedTuple):
     """
 
     positions_mm: Floats
-    triangles: NDArray[np.int32]
+    triangles: Ints
     uv: Floats
 
 
@@ -236,7 +232,7 @@ class FrameReader:
         used, corners = compacted(part.triangles)
         return Vertices(place[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
-    def _in_head(self, places: NDArray[np.float64]) -> Floats:
+    def _in_head(self, places: Doubles) -> Floats:
         with np.errstate(over="ignore"):  # what is infinite then is refused
             return upright(places, self.up).astype(np.float32)
 
@@ -259,7 +255,7 @@ def _pattern(path: Path) -> _Pattern:
     return _Pattern(digest, len(places), part.positions[used, 0].astype(np.int64))
 
 
-def _places(data: bytes, pattern: _Pattern) -> NDArray[np.float64] | None:
+def _places(data: bytes, pattern: _Pattern) -> Doubles | None:
     """(v, 3) places of the vertices in the file's units; None for a file that differs in more than these."""
     rows, digest = _split(data)
     if len(rows) != pattern.lines or digest != pattern.digest:

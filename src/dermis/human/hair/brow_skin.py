@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.mesh.strands import Doubles
+from dermis.base.arrays import Doubles
 
 _CELL_MM = 2.5
 _LOW, _HIGH = (1.0, -2.0), (64.0, 40.0)  # around the left brow and the tips of its hairs [mm]

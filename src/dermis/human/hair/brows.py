@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from dermis.base.arrays import Doubles
 from dermis.human.hair.brow_skin import BrowSkin
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.skin import flattened
-from dermis.mesh.strands import Doubles
 
 KNOTS = 9
 _MOST = 760  # hairs of the bushiest brow

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dermis.base.arrays import Doubles
 from dermis.human.hair.hairy_skin import HEAD_AXIS_Z, above_hairline, smoothstep
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.skin import flattened
-from dermis.mesh.strands import Doubles
 
 # Artist's values on the average person [mm].
 _WHORL = np.array([9.0, 86.0, -131.0])

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dermis.base.arrays import Doubles
 from dermis.human.hair import brows, lashes
 from dermis.human.hair.brow_skin import BrowSkin
 from dermis.human.hair.grown import Ground, Grown, Rooted
@@ -16,7 +17,7 @@ from dermis.human.hair.look import HairLook
 from dermis.human.hair.rooting import SIDES, Rooting, eye_middles
 from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Doubles, Roots, Strands, seen_in
+from dermis.mesh.strands import Roots, Strands, seen_in
 from dermis.specular.hair import absorption_per_mm
 
 _LASHES_DARKER = 1.6

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dermis.base.arrays import Doubles, Floats
 from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Floats, Mesh
-from dermis.mesh.strands import Doubles, Roots, finer_roots, frames, points_of
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import Roots, finer_roots, frames, points_of
 
 
 class Rooted:

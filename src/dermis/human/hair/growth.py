@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats
 from dermis.human.hair.combing import Combed, along_skin
 from dermis.human.hair.grown import Ground, Rooted
 from dermis.human.hair.hairy_skin import told
 from dermis.human.hair.skin import Skin
 from dermis.mesh.geometry import compacted, crosses, dots
-from dermis.mesh.mesh import Floats
-from dermis.mesh.strands import Doubles, Roots, corners, weights
+from dermis.mesh.strands import Roots, corners, weights
 
 _TUFT_MM = 2.2  # between tufts
 _LEAST_OVER_MM = 0.35  # the skin

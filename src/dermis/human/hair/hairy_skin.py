@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats
 from dermis.base.tables import read_rows
 from dermis.human.hair.rooting import Index, Rooting
 from dermis.human.skin.face import AMOUNTS, DEGREES, hairline, zones
 from dermis.human.skin.surface import FIELDS, average
 from dermis.mesh.geometry import crosses, dots
-from dermis.mesh.mesh import Floats, Mesh
-from dermis.mesh.strands import Doubles, Roots, between, corners, points_of
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import Roots, between, corners, points_of
 
 HEAD_AXIS_Z = -72.0
 """Of the axis around which the hairline is told [mm]."""

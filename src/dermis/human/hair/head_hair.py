@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 
+from dermis.base.arrays import Floats
 from dermis.human.hair import hairy_skin
 from dermis.human.hair.combing import combed, combed_beard
 from dermis.human.hair.grown import Ground, Grown, Rooted
 from dermis.human.hair.growth import Roughness, grown
 from dermis.human.hair.look import HairLook
 from dermis.mesh.geometry import dots
-from dermis.mesh.mesh import Floats
 
 MOST_PER_CM2 = 200.0
 """Hairs of the densest heads."""

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles
 from dermis.human.hair.brows import KNOTS
-from dermis.mesh.strands import Doubles
 
 _ALONG = np.array([0.0, 0.15, 0.35, 0.55, 0.75, 0.9, 1.0])
 

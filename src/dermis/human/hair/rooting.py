@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles
 from dermis.human.hair import lashes
 from dermis.human.hair.brow_skin import nodes
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Doubles, Roots, corners
+from dermis.mesh.strands import Roots, corners
 
 Index = NDArray[np.int64]
 SIDES = 1.0, -1.0

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Doubles
 
 _NEAR = 6  # vertices that a place's tangent plane is the mean of
 

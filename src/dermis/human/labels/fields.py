@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Floats
 from dermis.human.labels.classes import class_number
 from dermis.human.labels.of_human import HUMAN_FIELDS, human_fields
 from dermis.human.regions.average import is_human
 from dermis.human.regions.labels import known_landmarks, to_average
 from dermis.mesh.eyeball import LIMBUS_MM
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Floats, Material
+from dermis.mesh.mesh import Material
 from dermis.mesh.strands import points_of
 
 Doubles = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.human.published import OLD, YOUNG
 from dermis.human.skin.look import SkinLook
-from dermis.mesh.eyes import EyeLook
+from dermis.mesh.eye_look import EyeLook
 
 # Artist's values; that melanin differs so much between peoples, and how it is spread, is common knowledge.
 _MELANIN = {"african": 0.19, "asian": 0.024, "caucasian": 0.010}

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Index
 from dermis.mesh.geometry import components, triangle_areas
 from dermis.mesh.mesh import Mesh
-
-Doubles = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 RADIUS_MM = 8.0, 20.0
 """Radii of eyeballs: 12 in truth, and what artists make of them [mm]."""
@@ -22,6 +19,11 @@ _FEWEST = 20  # points
 _COVERED = 0.25  # of the sphere
 _BELONGS = 1.2  # radii from the middle, within which cornea, iris and pupil lie
 _MEETING_MM = 1000.0  # before the eyes, where those that show no other way look
+_STEPS = 12
+_BULGE, _CORNEA = 0.025, 0.045
+"""Of the radius: what stands out more is no roundness of the ball, and how far a cornea does at least."""
+_WIDE = 0.7  # cosine of the angle from its axis within which a cornea lies
+_MISSED = 0.85  # of the area, that is nearer to the sphere than its `miss`
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,13 +131,6 @@ def _looking(mesh: Mesh, left: _Piece, right: _Piece, pieces: list[_Piece]) -> t
         sight = middle + _MEETING_MM * ahead - ball.sphere.middle if shown is None else shown
         found.append(Ball(ball.sphere, sight / np.linalg.norm(sight), shown is not None, points))
     return found[0], found[1]
-
-
-_STEPS = 12
-_BULGE, _CORNEA = 0.025, 0.045
-"""Of the radius: what stands out more is no roundness of the ball, and how far a cornea does at least."""
-_WIDE = 0.7  # cosine of the angle from its axis within which a cornea lies
-_MISSED = 0.85  # of the area, that is nearer to the sphere than its `miss`
 
 
 class Sphere(NamedTuple):

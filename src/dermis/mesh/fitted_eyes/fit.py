@@ -6,12 +6,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Index
 from dermis.base.progress import preparing
-from dermis.mesh import eyeball as globe
-from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, plane_mm
-from dermis.mesh.eyes import EyeLook, Eyes
+from dermis.mesh import eyeball
+from dermis.mesh.eye_look import EyeLook
+from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, globe, plane_mm
+from dermis.mesh.eyes import Eyes
 from dermis.mesh.fitted_eyes.balls import Ball, Sphere, find_balls
 from dermis.mesh.fitted_eyes.globe_rig import Globe, with_globes
 from dermis.mesh.fitted_eyes.lids import axes_along, lids_before
@@ -20,10 +21,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 
-Doubles = NDArray[np.float64]
-Index = NDArray[np.int64]
-
-_SIDE = 2 * globe.SIDE  # as fine as the human's own once it is subdivided
+_SIDE = 2 * eyeball.SIDE  # as fine as the human's own once it is subdivided
 _NAMES = "left eye", "right eye"
 _INWARDS = np.radians(2.5)  # an iris lies nearer to the nose than the middle of what is seen of the white
 
@@ -62,7 +60,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
         return replace(head, note=why)
     those = _of_balls(mesh, control.stencils, found)
     shapes = _shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(those), axis=0), found)
-    points, quads = globe.globe(_SIDE)
+    points, quads = globe(_SIDE)
     places = [_placed(ball.sphere, shape) for ball, shape in zip(found, shapes, strict=True)]
     balls = [Globe(ball.sphere.middle, own, ball.points) for ball, own in zip(found, places, strict=True)]
     corner = mesh.point if control.corner is None else control.corner
@@ -71,7 +69,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     if control.stencils is not None:
         rig = replace(rig, stencils=_with_rows(control.stencils, begin, 2 * count))
     made = _with_meshes(mesh, those, places, quads)
-    apex, back, side = (np.array([begin + k, begin + count + k], np.int32) for k in globe.marks(_SIDE))
+    apex, back, side = (np.array([begin + k, begin + count + k], np.int32) for k in eyeball.marks(_SIDE))
     material = np.arange(-2, 0, dtype=np.int32) + len(made.materials)
     balls_mm, middles_mm = np.array([(shape.ball_mm, shape.middle_mm) for shape in shapes]).T
     sight = np.stack([axes_along(shape.axis) @ ball.sight for ball, shape in zip(found, shapes, strict=True)])
@@ -103,7 +101,7 @@ def _shapes(corners_mm: Doubles, balls: tuple[Ball, Ball]) -> list[_Shape]:
             axis = before.looking(side * outwards, up)
             sunk = before.sunk_mm(axis, scale) / scale
         radius = ball.sphere.radius / scale
-        found.append(_Shape(axis, radius, float(plane_mm(SCLERA_MM) - plane_mm(radius)) + sunk, scale))
+        found.append(_Shape(axis, radius, plane_mm(SCLERA_MM) - plane_mm(radius) + sunk, scale))
     return found
 
 
@@ -114,7 +112,7 @@ def _placed(ball: Sphere, shape: _Shape) -> Doubles:
 
 def _points(shape: _Shape) -> Doubles:
     """(n, 3) points of an eyeball around its middle, of any radius, with a usual cornea [mm]."""
-    points, _ = globe.globe(_SIDE)
+    points, _ = globe(_SIDE)
     along = points / np.linalg.norm(points, axis=1, keepdims=True)
     angle, turn = np.arccos(np.clip(along[:, 2], -1.0, 1.0)), np.arctan2(along[:, 1], along[:, 0])
     centre = cornea_centre_mm() - shape.middle_mm
@@ -169,7 +167,7 @@ def _meshes(places: list[Doubles], quads: Index, materials: tuple[Material, ...]
     count, faces = len(places[0]), len(quads)
     return build_mesh(
         np.concatenate(places),
-        np.tile(globe.layout(_SIDE), (2, 1)),
+        np.tile(eyeball.layout(_SIDE), (2, 1)),
         halves(np.concatenate([quads, count + quads])),
         np.repeat([0, 1], 2 * faces),
         materials,

@@ -7,13 +7,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Index, Ints
 from dermis.mesh.rig import INFLUENCES, Carried, MorphTargets, Rig, Skeleton, Turn
 from dermis.mesh.rotations import matrix_angles, rigid_motion
-
-Doubles = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _ROOT, _NAMES = "scene", ("eye.L", "eye.R")
 _OTHERS = 0.05
@@ -148,7 +145,7 @@ def _shifted(targets: MorphTargets, shifts: dict[int, Doubles], points: Index) -
     """The targets that shift some points more, all of them alike."""
     if not shifts:
         return targets
-    point, delta, count = list[NDArray[np.int32]](), list[NDArray[np.float32]](), [0]
+    point, delta, count = list[Ints](), list[Floats](), [0]
     for number in range(len(targets.names)):
         those = [targets.point[targets.of(number)]]
         moved = [targets.delta_mm[targets.of(number)]]

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Index
 from dermis.mesh.eyeball import CORNEA_MM, plane_mm
 from dermis.mesh.fitted_eyes.balls import Sphere
-
-Doubles = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _CELLS, _REACH = 49, 0.9
 """Rays along each side of what is looked at, and how many radii it reaches from the axis."""

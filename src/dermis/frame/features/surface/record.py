@@ -9,8 +9,8 @@ from dermis.gpu import ComputeProgram, Record
 from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
 from dermis.human import teeth
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
-from dermis.mesh.eyes import EyeLook
 from dermis.mesh.maps import Maps
 from dermis.optics.flesh import medium_of
 from dermis.optics.forward import forward_directions

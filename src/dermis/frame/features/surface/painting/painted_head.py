@@ -13,8 +13,8 @@ from dermis.frame.programs import program
 from dermis.gpu import CommandList, Device, download, make_texture
 from dermis.human.skin.painted import LEAST_SIDE, MOST_SIDE, PaintedMaps
 from dermis.human.skin.surface import painting
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import FALLING, RIM, EyePictures
-from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 
 SIDE = 1024
