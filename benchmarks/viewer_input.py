@@ -13,8 +13,8 @@ import numpy as np
 
 from dermis.apps.validation.benchmarks.cases import pose_at, rigged
 from dermis.apps.viewer.navigation import drag_light, orbit
-from dermis.apps.viewer.pace import Pace
 from dermis.apps.viewer.state import ViewerState, changed
+from dermis.apps.viewer.studio import Pace
 from dermis.apps.viewer.viewer import Viewer
 from dermis.scene.heads import load_head
 from dermis.scene.model import Scene

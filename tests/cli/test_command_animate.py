@@ -14,7 +14,7 @@ import pytest
 from moving_head import CAPTURE, write_moving_head
 
 import dermis
-from dermis.cli import pose_options
+from dermis.cli import head_options
 from dermis.images.io import read_image
 
 Run = Callable[..., Any]
@@ -92,7 +92,7 @@ def test_whole_frames_are_not_drawn_again(animate: Run) -> None:
 def test_an_interruption_leaves_whole_frames_and_no_movie(
     animate: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    laid, left = pose_options.laid_over, [0]
+    laid, left = head_options.laid_over, [0]
 
     def interrupted(*words: Any) -> Any:
         left[0] -= 1

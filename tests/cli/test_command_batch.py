@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from small_set import COUNT, SHARD_SIZE, write_spec
 
-from dermis.cli.rate import Lines, Pace
+from dermis.cli.batch import Lines, Pace
 
 Run = Callable[..., Any]
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from tolerances import RECIPROCAL
 
-from dermis.cli.compare_specular import _lobes
+from dermis.cli.compare import _lobes
 from dermis.images.io import read_image
 from dermis.specular.models import MODELS
 

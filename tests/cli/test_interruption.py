@@ -114,7 +114,7 @@ def test_a_gallery_holds_whole_pictures(folder: Path) -> None:
 
 BODY = """
 import os, signal, sys, time
-from dermis.cli.interruption import Interruption
+from dermis.cli.process import Interruption
 
 with Interruption() as interruption:
     try:
@@ -215,7 +215,7 @@ def test_what_the_caller_ignores_stays_ignored(number: signal.Signals) -> None:
 
 
 def test_afterwards_signals_are_as_before() -> None:
-    from dermis.cli.interruption import Interruption
+    from dermis.cli.process import Interruption
 
     with child_process.default_signals():
         before = [signal.getsignal(number) for number in SIGNALS], sys.unraisablehook

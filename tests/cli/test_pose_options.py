@@ -11,7 +11,7 @@ import pytest
 from moving_head import write_moving_head
 
 import dermis
-from dermis.cli.pose_options import parse_turns, parse_weights
+from dermis.cli.head_options import parse_turns, parse_weights
 from dermis.cli.scene_options import SceneOptions, assemble
 from dermis.images.io import read_image
 from dermis.mesh.pose import Pose

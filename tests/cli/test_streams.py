@@ -84,7 +84,7 @@ def test_a_bar_outlives_its_terminal() -> None:
     code = """
 import sys
 from dermis.base.console import progress, working_on
-from dermis.cli.streams import Streams
+from dermis.cli.process import Streams
 with Streams():
     with working_on("loading"), progress("drawing") as report:
         sys.stdin.readline()
@@ -106,7 +106,7 @@ def test_a_stream_that_is_full_for_a_while_gets_all() -> None:
     os.set_blocking(writing, False)
     code = """
 import sys
-from dermis.cli.streams import Streams
+from dermis.cli.process import Streams
 with Streams() as streams:
     sys.stdout.write("x" * 300_000)
     assert streams.fault() is None

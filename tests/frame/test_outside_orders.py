@@ -18,7 +18,7 @@ CLI = (
     "dermis.cli.cite",
     "dermis.cli.render",
     "dermis.cli.export",
-    "dermis.cli.compare_specular",
+    "dermis.cli.compare",
 )
 
 

@@ -12,7 +12,7 @@ import pytest
 import wgpu
 from offscreen_input import InputDriver
 
-from dermis.apps.viewer.chart import ATLAS
+from dermis.apps.viewer.state import ATLAS
 from dermis.apps.viewer.windows import _raise_failure
 from dermis.base.errors import DermisError
 from dermis.frame import renderer as renderer_module
@@ -27,7 +27,7 @@ FEW_BYTES = 1.02  # of what was held: a picture of another size may have taken t
 @pytest.fixture(autouse=True)
 def steady(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures in motion that are alike, and take the same memory, on quick and on busy machines."""
-    monkeypatch.setattr("dermis.apps.viewer.pace.Pace.note", lambda *_: None)
+    monkeypatch.setattr("dermis.apps.viewer.studio.Pace.note", lambda *_: None)
 
 
 def resized(driver: InputDriver, width: int, height: int) -> None:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from offscreen_input import ADAPTER, InputDriver
 
-from dermis.apps.viewer.chart import ATLAS, Chart
-from dermis.apps.viewer.state import ViewerState
+from dermis.apps.viewer.state import ATLAS, Chart, ViewerState
 from dermis.apps.viewer.studio import Studio
 from dermis.gpu import download
 

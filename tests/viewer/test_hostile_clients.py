@@ -17,7 +17,7 @@ from page_client import PATIENCE_S, Page, difference, visit
 
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 
-from dermis.apps.viewer.browser import connections
+from dermis.apps.viewer.browser import server
 from dermis.apps.viewer.browser.server import HEADERS
 
 RESIZE = '{"type": "resize", "timestamp": 1, "width": 1, "height": 1, "pwidth": 400, "pheight": 300, '
@@ -124,7 +124,7 @@ ASKED = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"
 def test_headers_that_do_not_come_are_not_waited_for(
     shown: Any, said: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "HEADERS_S", 0.3)
+    monkeypatch.setattr(server, "HEADERS_S", 0.3)
     with socket.create_connection(address(shown)) as one:
         one.sendall(said)
         stop = threading.Event()
@@ -146,13 +146,13 @@ def test_headers_that_do_not_come_are_not_waited_for(
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The server's connections, as they are made."""
-    found, usual = list[Any](), connections.LimitedConnection.connection_made
+    found, usual = list[Any](), server.LimitedConnection.connection_made
 
     def connection_made(one: Any, transport: Any) -> None:
         usual(one, transport)
         found.append(one)
 
-    monkeypatch.setattr(connections.LimitedConnection, "connection_made", connection_made)
+    monkeypatch.setattr(server.LimitedConnection, "connection_made", connection_made)
     return found
 
 
@@ -177,7 +177,7 @@ def test_a_page_may_be_silent(shown: Any, made: list[Any]) -> None:
 def test_only_so_many_connections_are_open(
     shown: Any, made: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "MOST_CONNECTIONS", 3)
+    monkeypatch.setattr(server, "MOST_CONNECTIONS", 3)
     with contextlib.ExitStack() as crowd:
         for _ in range(3):
             crowd.enter_context(socket.create_connection(address(shown)))

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from dermis.apps.viewer.browser.messages import checked
+from dermis.apps.viewer.browser.guard import checked
 
 POINTER = {"type": "pointer_move", "x": 1, "y": 2.5, "button": 1, "buttons": [1], "modifiers": ["Shift"]}
 RESIZE = {"type": "resize", "width": 960, "height": 540, "pwidth": 1920, "pheight": 1080, "ratio": 2}

@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 from offscreen_input import SETTINGS, InputDriver
 
-from dermis.apps.viewer.pace import QUALITY_LEVELS
 from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.posing import weight_of
 from dermis.apps.viewer.state import ViewerState
+from dermis.apps.viewer.studio import QUALITY_LEVELS
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.scene import Scene
@@ -25,7 +25,7 @@ PICTURE = np.s_[:380, 205:]
 @pytest.fixture(autouse=True)
 def steady(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures in motion that are alike on quick and on busy machines."""
-    monkeypatch.setattr("dermis.apps.viewer.pace.Pace.note", lambda *_: None)
+    monkeypatch.setattr("dermis.apps.viewer.studio.Pace.note", lambda *_: None)
 
 
 @pytest.fixture(scope="module")

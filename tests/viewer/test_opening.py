@@ -26,7 +26,7 @@ from dermis.base.errors import DermisError, refuse
 
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 
-from dermis.apps.viewer.browser import opening, server
+from dermis.apps.viewer.browser import server
 from dermis.apps.viewer.windows import serve
 
 Start = Callable[[Callable[[], Any]], Any]
@@ -83,14 +83,14 @@ def test_the_page_is_there_while_a_head_is_read_and_hears_each_stage(
     with visit(shown) as one, visit(shown) as other:
         for socket in (one, other):
             told = heard(socket, "stage")
-            assert (told["text"], told["number"], told["of"]) == ("reading the head", 1, len(opening.STAGES))
+            assert (told["text"], told["number"], told["of"]) == ("reading the head", 1, len(server.STAGES))
         one.send('{"type": "pointer_down", "timestamp": 1, "x": 5, "y": 5, "button": 1}')  # harms nothing
         gate.set()
         stages = dict[int, str]()  # some come twice, as a page that comes hears the stage of now
-        while len(opening.STAGES) not in stages:
+        while len(server.STAGES) not in stages:
             told = heard(one, "stage")
             stages[told["number"]] = told["text"]
-        assert list(stages.items()) == list(enumerate(opening.STAGES, 1))
+        assert list(stages.items()) == list(enumerate(server.STAGES, 1))
         page = Page(one)
         page.show()
         assert page.still().max() > 50

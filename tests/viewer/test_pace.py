@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dermis.apps.viewer.pace import QUALITY_LEVELS, Pace
+from dermis.apps.viewer.studio import QUALITY_LEVELS, Pace
 from dermis.scene.settings import Settings
 
 WANTED = Settings(atlas=2048, samples=4, shadow_size=2048)

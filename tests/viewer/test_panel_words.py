@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from offscreen_input import InputDriver
 
-from dermis.apps.viewer.panel import words
+from dermis.apps.viewer.panel import fields
 from dermis.apps.viewer.panel.fields import Style
 from dermis.optics.profiles import preset_names
 from dermis.scene.lights import LIGHTS
@@ -14,9 +14,9 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin, TissueLayer
 
 KINDS = {
-    Skin: words.SURFACE | words.ALBEDO,
-    Settings: words.TECHNIQUE,
-    TissueLayer: words.LAYER,
+    Skin: fields.SURFACE | fields.ALBEDO,
+    Settings: fields.TECHNIQUE,
+    TissueLayer: fields.LAYER,
 }
 
 
@@ -28,9 +28,9 @@ def test_words_are_about_fields_and_choices_that_exist(kind: type[Plain]) -> Non
 
 
 def test_words_are_about_kinds_of_light_that_exist() -> None:
-    assert set(words.LIGHT_KINDS) <= set(LIGHTS)
-    assert all(any(name in kind.model_fields for kind in LIGHTS.values()) for name in words.LIGHT)
-    assert set(words.PROFILES) <= set(preset_names())
+    assert set(fields.LIGHT_KINDS) <= set(LIGHTS)
+    assert all(any(name in kind.model_fields for kind in LIGHTS.values()) for name in fields.LIGHT)
+    assert set(fields.PROFILES) <= set(preset_names())
 
 
 def test_labels_fit_beside_their_controls(driver: InputDriver) -> None:
@@ -40,7 +40,7 @@ def test_labels_fit_beside_their_controls(driver: InputDriver) -> None:
     driver.frame()
     room = driver.viewer.panel.label_width
     styles: list[Style] = [one for table in KINDS.values() for one in table.values()]
-    labels = [style.label.partition("###")[0] for style in (*styles, *words.LIGHT.values())]
+    labels = [style.label.partition("###")[0] for style in (*styles, *fields.LIGHT.values())]
     wide = {label: imgui.calc_text_size(label).x for label in labels}
     driver.canvas.set_logical_size(400, 480)
     assert {label for label, width in wide.items() if width > room} == set()

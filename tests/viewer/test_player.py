@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 from rigged_head import write_take
 
-from dermis.apps.viewer.history import History
 from dermis.apps.viewer.navigation import orbit
 from dermis.apps.viewer.player import MotionFile, Player
 from dermis.apps.viewer.posing import weight_of, with_weight
-from dermis.apps.viewer.state import ViewerState
+from dermis.apps.viewer.state import History, ViewerState
 from dermis.base.errors import DermisError
 
 JAW = 0.0, 0.2, 0.4, 0.6, 0.8, 1.0

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.apps.viewer.history import History
 from dermis.apps.viewer.posing import (
     angles_of,
     at_rest,
@@ -20,7 +19,7 @@ from dermis.apps.viewer.posing import (
     with_moves,
     with_weight,
 )
-from dermis.apps.viewer.state import ViewerState, load_state, same, save_state
+from dermis.apps.viewer.state import History, ViewerState, load_state, same, save_state
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.mesh.rig import Rig

@@ -11,9 +11,8 @@ import pytest
 from offscreen_input import ADAPTER
 
 from dermis.apps.viewer.navigation import orbit
-from dermis.apps.viewer.pace import QUALITY_LEVELS
 from dermis.apps.viewer.state import ViewerState
-from dermis.apps.viewer.studio import Studio
+from dermis.apps.viewer.studio import QUALITY_LEVELS, Studio
 from dermis.gpu.replay import Recording
 from dermis.mesh.pose import Pose
 from dermis.scene.environment import Environment
@@ -213,7 +212,9 @@ def test_shadows_of_another_size_have_light_of_their_own(
 ) -> None:
     """Where frames in motion differ from still ones in nothing else."""
     coarse = replace(QUALITY_LEVELS[2], shadow_size=64)
-    monkeypatch.setattr("dermis.apps.viewer.pace.QUALITY_LEVELS", (QUALITY_LEVELS[0], coarse, coarse, coarse))
+    monkeypatch.setattr(
+        "dermis.apps.viewer.studio.QUALITY_LEVELS", (QUALITY_LEVELS[0], coarse, coarse, coarse)
+    )
     for moving in (True, False):
         stages(studio, turned(state, 0.1), moving)
     for angle, moving in ((0.2, True), (0.2, False), (0.3, True)):
@@ -242,7 +243,7 @@ def test_states_in_motion_and_still_are_recorded_once(
     studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = replace(QUALITY_LEVELS[2], atlas=64)
-    monkeypatch.setattr("dermis.apps.viewer.pace.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
+    monkeypatch.setattr("dermis.apps.viewer.studio.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
     live = state.with_skin(mix=0.9)
     for moving in (True, False):
         both(studio, live, state, moving)

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dermis.apps.viewer.history import History
-from dermis.apps.viewer.state import ViewerState, load_state, same, save_state
+from dermis.apps.viewer.state import History, ViewerState, load_state, same, save_state
 from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.scene import Environment, Scene, load_scene

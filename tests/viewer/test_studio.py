@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 from offscreen_input import ADAPTER, SETTINGS
 
-from dermis.apps.viewer.chart import ATLAS
 from dermis.apps.viewer.navigation import orbit
-from dermis.apps.viewer.pace import QUALITY_LEVELS
-from dermis.apps.viewer.state import ViewerState
-from dermis.apps.viewer.studio import Studio
+from dermis.apps.viewer.state import ATLAS, ViewerState
+from dermis.apps.viewer.studio import QUALITY_LEVELS, Studio
 from dermis.apps.viewer.views import VIEWS
 from dermis.frame.renderer import Renderer
 from dermis.images.io import read_image
@@ -138,7 +136,7 @@ def test_going_back_and_forth_between_two_sizes_lights_each_once(
     studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = replace(QUALITY_LEVELS[2], atlas=64)
-    monkeypatch.setattr("dermis.apps.viewer.pace.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
+    monkeypatch.setattr("dermis.apps.viewer.studio.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
     moving, still = [(turned(state, 0.1 * k), bool(k % 2)) for k in (1, 2)]
     for one, moves in (moving, still):
         image(studio, one, moves)

@@ -13,8 +13,8 @@ from offscreen_input import InputDriver
 from page_client import PATIENCE_S
 from small_head import write_head
 
-from dermis.apps.viewer import heads
-from dermis.apps.viewer.heads import Heads
+from dermis.apps.viewer import session as viewer_session
+from dermis.apps.viewer.session import Heads
 from dermis.apps.viewer.state import ViewerState
 from dermis.mesh.head import Head
 
@@ -30,7 +30,7 @@ def gate(head: Head, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
         assert one.wait(PATIENCE_S)
         return Head(name, head.mesh, head.maps)
 
-    monkeypatch.setattr(heads, "load_head", slowly)
+    monkeypatch.setattr(viewer_session, "load_head", slowly)
     yield one
     one.set()
 

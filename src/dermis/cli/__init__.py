@@ -32,8 +32,7 @@ def main() -> None:
     130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP; 2 also when stdout could not be written to, but
     not when its reader left.
     """
-    from dermis.cli.interruption import Interruption
-    from dermis.cli.streams import Streams
+    from dermis.cli.process import Interruption, Streams
 
     with Streams() as streams, Interruption() as interruption:
         try:

@@ -7,15 +7,21 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from dermis.apps.validation.comparisons.scenes import ModelName
+from dermis.base.atomic_write import refuse_output, replacing
 from dermis.base.console import print_json, print_lines, working_on
 from dermis.base.errors import refuse
-from dermis.cli.eye_options import note_eyes
-from dermis.cli.head_options import ShapeOptions, check_head
+from dermis.base.extras import needed
+from dermis.cli.head_options import ShapeOptions, check_head, note_eyes
 from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, given, option_name, options_of
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
+from dermis.specular.albedo import directional_albedo
+from dermis.specular.cosines import cosines
+from dermis.specular.models import MODELS
 
 _BY_PATHS = ("path-traced", "cycles")
 _SIZES = {"size": (256, 256), "atlas": 1024}
@@ -95,8 +101,6 @@ def compare(
     chosen = words | given(medium=medium, model=model, samples=samples) | sizes | skin | shape
     _check_used(what, chosen)
     if what == "specular":
-        from dermis.cli.compare_specular import compare_specular
-
         check(Skin, skin)
         compare_specular(output, Skin(**skin).roughness, adapter, as_json)
     else:
@@ -186,3 +190,152 @@ def _lines(made: Comparison) -> Sequence[str]:
         name, error, flip, energy, ms = cells(row)
         lines.append(f"{name:18}{error:>20}{flip:>8}{energy:>20}{ms:>9}")
     return lines
+
+
+_DEGREES = (0, 30, 60, 75, 85)
+_INCIDENT = {15: "#2a62b0", 45: "#2e8b57", 75: "#c0392b"}
+_SAME_CURVE = "kelemen-direct"  # as kelemen
+_COLUMNS = 4
+_FARTHEST = 1.8  # root of the intensity over kelemen's peak; on rough skin some models pass it
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def compare_specular(output: Path | None, roughness: float, adapter: str, as_json: bool) -> None:
+    """Print what surface models reflect and cost, and draw their lobes into a folder if there is one."""
+    if output is not None:
+        _draw_lobes_and_albedo(output, roughness)
+    with working_on("measuring"):
+        report = _specular_report(adapter)
+    if as_json:
+        print_json(report)
+    else:
+        print_lines(*_specular_lines(report, roughness))
+
+
+def _specular_report(adapter: str) -> dict[str, Any]:
+    """All findings as one JSON-ready object."""
+    from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
+    from dermis.gpu.failures import on_device
+    from dermis.specular.comparison import albedo_rows, reciprocity_error
+    from dermis.specular.fresnel import FRESNEL, hemispherical_reflectance
+
+    name, cost = on_device(adapter, lambda device: (device.adapter.name, lobe_cost_ns(device)))
+    return {
+        "adapter": name,
+        "hemispherical_fresnel": {name: hemispherical_reflectance(curve) for name, curve in FRESNEL.items()},
+        "models": {
+            name: {
+                "note": model.note,
+                "reciprocal": model.reciprocal,
+                "albedo": albedo_rows(name),
+                "reciprocity_error": reciprocity_error(name),
+                "gpu_ns": cost[name, "schlick"],
+                "gpu_ns_exact_fresnel": cost[name, "exact"],
+            }
+            for name, model in MODELS.items()
+        },
+    }
+
+
+def _specular_lines(report: dict[str, Any], m: float) -> list[str]:
+    from dermis.specular.comparison import peak
+
+    cosine = np.cos(np.radians(_DEGREES))
+    angles = "".join(f"{f'{angle}°':>8}" for angle in _DEGREES)
+    lines = [
+        f"roughness {m:g}, rho_s 1, Schlick's Fresnel; cost of an evaluation on {report['adapter']}",
+        "",
+        f"{'model':24}{'peak':>8}{angles}{'reciprocity':>13}{'cost':>10}{'exact':>10}",
+        f"{'':24}{'1/sr':>8}{'share reflected in all directions':>40}{'error':>13}{'ns':>10}{'ns':>10}",
+    ]
+    for name, found in report["models"].items():
+        rho = "".join(f"{value:8.4f}" for value in directional_albedo(cosine, m, MODELS[name].lobe))
+        costs = "".join(f"{found[key]:10.3g}" for key in ("gpu_ns", "gpu_ns_exact_fresnel"))
+        lines.append(f"{name:24}{peak(name, m):8.4f}{rho}{found['reciprocity_error']:13.0e}{costs}")
+    one_way = [(name, found["note"]) for name, found in report["models"].items() if not found["reciprocal"]]
+    smooth = report["hemispherical_fresnel"]
+    return [
+        *lines,
+        "",
+        *(f"{name}: {note}." for name, note in one_way),
+        f"A smooth surface of index 1.4 reflects {smooth['exact']:.1%} of light from everywhere "
+        f"({smooth['schlick']:.1%} by Schlick's curve); the talk says up to 6 %.",
+    ]
+
+
+def _draw_lobes_and_albedo(folder: Path, m: float) -> None:
+    """Write lobes.png and albedo.png of all models into a folder, made when it is not there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        refuse_output(folder, fault)
+    _save_figure(_lobes(m), folder / "lobes.png")
+    _save_figure(_albedos(m), folder / "albedo.png")
+
+
+def _drawn() -> list[str]:
+    """Names of the models that have a curve of their own."""
+    return [name for name in MODELS if name != _SAME_CURVE]
+
+
+def _lobes(m: float) -> Any:
+    """Intensity under three lights in the plane of incidence: a polar panel for each model."""
+    whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
+    roots = {name: np.sqrt(_intensity(name, m) / whole) for name in _drawn()}
+    farthest = max(_FARTHEST, 1.05 * float(np.max(list(roots.values()))))
+    rows = -(-len(roots) // _COLUMNS)
+    make = needed("matplotlib.figure", "plots").Figure
+    figure = make(figsize=(3.0 * _COLUMNS, 2.4 * rows), dpi=130, layout="constrained")
+    figure.suptitle(f"Intensity over kelemen's peak under the same light, on a root scale; m = {m:g}")
+    panels = figure.subplots(rows, _COLUMNS, subplot_kw={"projection": "polar"}).ravel()
+    for axes in panels[len(roots) :]:
+        axes.remove()
+    for axes, (name, curves) in zip(panels, roots.items(), strict=False):
+        for (degrees, ink), curve in zip(_INCIDENT.items(), curves, strict=True):
+            axes.plot(_view_angles(), curve, color=ink, label=f"light from {degrees}°")
+        axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=farthest)
+        axes.set(
+            rticks=np.sqrt([0.25, 1.0, 2.25]),
+            yticklabels=["", "1", ""],
+            xticks=np.radians(range(-90, 91, 30)),
+        )
+        axes.tick_params(labelsize=7)
+        axes.set_title(name, fontsize=10)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _intensity(name: str, m: float) -> Any:
+    """(3, n) BRDF times both cosines, for each incident angle and view [1/sr]."""
+    angle = _view_angles()
+    view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
+    rows = []
+    for degrees in _INCIDENT:
+        theta = np.radians(degrees)
+        light = np.broadcast_to([-np.sin(theta), 0.0, np.cos(theta)], view.shape)
+        rows.append(MODELS[name].lobe(cosines(_UP, light, view), m) * np.cos(theta) * np.cos(angle))
+    return np.stack(rows)
+
+
+def _view_angles() -> Any:
+    return np.radians(np.linspace(-89.9, 89.9, 1200))
+
+
+def _albedos(m: float) -> Any:
+    """Directional albedo by angle, all models in one panel."""
+    figure = needed("matplotlib.figure", "plots").Figure(figsize=(7.2, 4.6), dpi=130, layout="constrained")
+    axes = figure.subplots()
+    degrees = np.linspace(0.0, 89.0, 180)
+    for name in _drawn():
+        rho = directional_albedo(np.cos(np.radians(degrees)), m, MODELS[name].lobe)
+        axes.plot(degrees, rho, linewidth=1.4, label=name)
+    axes.set(xlabel="angle from the normal [°]", ylabel="share reflected, ρ_s = 1", xlim=(0, 90))
+    axes.set(yscale="log", title=f"Directional albedo, m = {m:g}")
+    axes.grid(which="major", alpha=0.25, linewidth=0.6)
+    axes.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def _save_figure(figure: Any, path: Path) -> None:
+    with replacing(path) as trial:
+        figure.savefig(trial)

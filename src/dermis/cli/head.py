@@ -11,8 +11,8 @@ from cyclopts import Parameter
 
 from dermis.base.console import print_json, print_lines, working_on
 from dermis.base.errors import refuse
+from dermis.cli.head_options import parse_weights
 from dermis.cli.options import Adapter, Json, Whole, given
-from dermis.cli.pose_options import parse_weights
 
 if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook

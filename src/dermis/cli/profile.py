@@ -146,9 +146,9 @@ def profile(
     if output is not None:
         found.save(output)
     if plot is not None:
-        from dermis.cli.profile_plot import draw
+        from dermis.cli.profile_report import draw_plot
 
-        draw(plot, found, counted)
+        draw_plot(plot, found, counted)
     if as_json:
         print_json(found.as_json())
     else:

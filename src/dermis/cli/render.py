@@ -13,9 +13,8 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from dermis.base.console import note, print_json, print_lines, working_on
-from dermis.cli.frame_landmarks import FrameLandmarks, Landmarks
-from dermis.cli.frame_outputs import Format, FrameOutputs, Outputs
 from dermis.cli.options import Adapter, Json
+from dermis.cli.output_options import Format, FrameLandmarks, FrameOutputs, Landmarks, Outputs
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 from dermis.scene.techniques import TECHNIQUES
 

@@ -11,19 +11,23 @@ from cyclopts import Parameter
 
 from dermis.base.console import note
 from dermis.base.errors import refuse
-from dermis.cli.eye_options import EYE, EyeLooks, note_eyes
-from dermis.cli.head_options import HEAD, HeadOptions, check_head
-from dermis.cli.options import check, option_name, options_of, refuse_options
-from dermis.cli.pose_options import (
+from dermis.cli.head_options import (
+    EYE,
+    HEAD,
+    EyeLooks,
+    HeadOptions,
     LookAt,
     Turns,
     Weights,
+    check_head,
     gaze_given,
     laid_over,
+    note_eyes,
     parse_turns,
     parse_weights,
     pose_given,
 )
+from dermis.cli.options import check, option_name, options_of, refuse_options
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, names_regions
 from dermis.scene.settings import PHOTOGRAPHED, Settings

@@ -6,10 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from dermis.apps.viewer.chart import ATLAS, Chart
-from dermis.apps.viewer.history import History
 from dermis.apps.viewer.navigation import dolly, drag_light, focus, orbit, pan, pick
-from dermis.apps.viewer.state import ViewerState
+from dermis.apps.viewer.state import ATLAS, Chart, History, ViewerState
 from dermis.scene.camera import preset
 
 Event = Mapping[str, Any]

@@ -6,8 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from dermis.apps.viewer.history import History
-from dermis.apps.viewer.state import ViewerState
+from dermis.apps.viewer.state import History, ViewerState
 from dermis.base.errors import DermisError
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head

@@ -1,4 +1,4 @@
-"""What the viewer shows, as immutable data: every change makes a new state."""
+"""What the viewer shows, as immutable data, and the undo history: every change makes a new state."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.apps.viewer.chart import Chart
 from dermis.apps.viewer.posing import same_pose, with_moves
 from dermis.base.errors import refuse
 from dermis.human.person import Human
@@ -27,6 +26,42 @@ from dermis.scene.plain import Plain
 from dermis.scene.saving import save_scene
 from dermis.scene.settings import PHOTOGRAPHED, Settings
 from dermis.scene.skin import Pigments
+
+ATLAS = "atlas"
+"""Name of the view of the atlas as a flat picture."""
+_LEAST_SPAN, _MOST_SPAN = 2.0**-10, 2.0
+
+
+@dataclass(frozen=True)
+class Chart:
+    """The part of the atlas that fills the picture.
+
+    layer : one of `views.LAYERS`
+    centre : uv at the middle of the picture, u to the right and v down [-]
+    span : extent of the picture's shorter side, in sides of the atlas [-]
+    """
+
+    layer: str = "irradiance"
+    centre: tuple[float, float] = (0.5, 0.5)
+    span: float = 1.05
+
+    def panned(self, right: float, down: float) -> Chart:
+        """Drag the atlas, in fractions of the picture's shorter side."""
+        u, v = self.centre
+        return self._at(u - self.span * right, v - self.span * down)
+
+    def zoomed(self, factor: float, x: float, y: float) -> Chart:
+        """Zoom in (factor below 1) or out, keeping the point under the cursor fixed.
+
+        x, y : of the cursor from the picture's middle, right and down, in fractions of its shorter side
+        """
+        span = min(_MOST_SPAN, max(_LEAST_SPAN, factor * self.span))
+        (u, v), shrunk = self.centre, self.span - span
+        return replace(self, span=span)._at(u + shrunk * x, v + shrunk * y)
+
+    def _at(self, u: float, v: float) -> Chart:
+        return replace(self, centre=(min(1.0, max(0.0, u)), min(1.0, max(0.0, v))))
+
 
 P = TypeVar("P", bound=Plain)
 PICTURE = "picture"
@@ -205,3 +240,66 @@ def opened(scene: Scene, settings: Settings, head: Mapping[str, Any], rig: str) 
     """The first state of a scene: `Settings.parts` becomes the view."""
     view = settings.parts if settings.parts in PARTS else PICTURE
     return ViewerState(scene, changed(settings, parts="all"), head, view, rig)
+
+
+_MOST_STEPS = 200
+
+
+class History:
+    """Undo history of states.
+
+    A gesture (a drag, a slider held down) changes the state many times and is undone in one step.
+    """
+
+    def __init__(self, state: ViewerState) -> None:
+        self._past = [state]
+        self._undone: list[ViewerState] = []
+        self._gesture = ""
+
+    @property
+    def state(self) -> ViewerState:
+        """The current state."""
+        return self._past[-1]
+
+    @property
+    def states(self) -> list[ViewerState]:
+        """All states, those that were undone included."""
+        return [*self._past, *self._undone]
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an earlier state."""
+        return len(self._past) > 1
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether the last step was an undo."""
+        return bool(self._undone)
+
+    def change(self, state: ViewerState, gesture: str = "") -> None:
+        """Add a state; during one gesture it replaces the last one."""
+        if same(state, self.state):
+            return
+        if gesture and gesture == self._gesture:
+            self._past[-1] = state
+        else:
+            self._past.append(state)
+            del self._past[: -_MOST_STEPS - 1]
+        self._gesture = gesture
+        self._undone.clear()
+
+    def end_gesture(self) -> None:
+        """Make the next change a step of its own."""
+        self._gesture = ""
+
+    def undo(self) -> None:
+        """Go back one step."""
+        self.end_gesture()
+        if self.can_undo:
+            self._undone.append(self._past.pop())
+
+    def redo(self) -> None:
+        """Repeat the step undone last."""
+        self.end_gesture()
+        if self._undone:
+            self._past.append(self._undone.pop())

@@ -1,27 +1,100 @@
-"""From states to images on the device."""
+"""From states to images on the device: pacing of frames in motion, and preparation of other heads."""
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.viewer.chart import ATLAS
-from dermis.apps.viewer.pace import Pace
-from dermis.apps.viewer.state import PARTS, PICTURE, ViewerState, changed, same
+from dermis.apps.viewer.state import ATLAS, PARTS, PICTURE, ViewerState, changed, same
 from dermis.apps.viewer.views import Views
 from dermis.base.errors import refuse
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download, make_texture
 from dermis.images.io import write_image, write_png
+from dermis.mesh.mesh import Mesh
 from dermis.scene.camera import Camera
-from dermis.scene.settings import Settings
+from dermis.scene.settings import MOST_WORK, Settings
+
+_BUDGET_MS = {True: 100.0, False: 33.0}  # of a frame in motion, on a software adapter and on a GPU
+_MOST_MS_OVER, _LEAST_SHARE = 1.25, 0.45
+_PATIENCE = 2  # slow or fast frames in a row before a change: a single one may have lit the atlas again
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Quality limits of a frame in motion; a still one has all that the settings ask for.
+
+    scale : of the image's sides
+    samples, atlas, shadow_size : maxima
+    """
+
+    scale: float
+    samples: int
+    atlas: int
+    shadow_size: int
+
+
+_ALL = 1 << 14
+QUALITY_LEVELS = (
+    Quality(1.0, _ALL, _ALL, _ALL),
+    Quality(1.0, 2, 1024, 1024),
+    Quality(1.0, 1, 512, 512),
+    Quality(0.75, 1, 512, 512),
+    Quality(0.5, 1, 256, 512),
+    Quality(0.35, 1, 256, 256),
+)
+_FIRST_ON_SOFTWARE = 2
+
+
+class Pace:
+    """Chooses the quality of frames in motion from the time that the last ones took.
+
+    software : whether the adapter renders on the CPU
+    """
+
+    def __init__(self, software: bool) -> None:
+        self.software = software
+        self._budget_ms = _BUDGET_MS[software]
+        self._level = self._first = _FIRST_ON_SOFTWARE if software else 0
+        self._streak = 0
+
+    @property
+    def quality(self) -> Quality:
+        """Quality of the next frame in motion."""
+        return QUALITY_LEVELS[self._level]
+
+    def note(self, frame_ms: float) -> None:
+        """Record the time of the last frame in motion, without preparation [ms]."""
+        slow, fast = frame_ms > _MOST_MS_OVER * self._budget_ms, frame_ms < _LEAST_SHARE * self._budget_ms
+        wish = slow - fast
+        self._streak = self._streak + wish if wish * self._streak >= 0 else wish
+        if not wish:
+            self._streak = 0
+        if abs(self._streak) >= _PATIENCE:
+            self._level = max(self._first, min(len(QUALITY_LEVELS) - 1, self._level + wish))
+            self._streak = 0
+
+    def settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
+        """The settings of a frame for a window of that size."""
+        quality = self.quality if moving else QUALITY_LEVELS[0]
+        width, height = (max(1, round(quality.scale * side)) for side in size)
+        return changed(
+            wanted,
+            size=(width, height),
+            samples=min(wanted.samples, quality.samples, max(1, MOST_WORK // (width * height))),
+            atlas=min(wanted.atlas, quality.atlas),
+            shadow_size=min(wanted.shadow_size, quality.shadow_size),
+        )
+
 
 _SIZES = 2  # of everything: for frames in motion and for still ones
 _SMALL = (96, 64)  # a picture that needs all shaders and little time
@@ -200,3 +273,65 @@ def copied(device: Device, image: Any, space: Any = None) -> Any:
     encoder.copy_texture_to_texture({"texture": image}, {"texture": space}, image.size)
     device.handle.queue.submit([encoder.finish()])
     return space
+
+
+T = TypeVar("T")
+
+
+class Preparation:
+    """Prepares heads one after the other; meanwhile a studio draws nothing else.
+
+    wake : called from another thread when the next frame may draw
+    """
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        self._wake = wake
+        self._ready: Mesh | None = None  # with other maps it takes little more than a frame
+        self._coming: Future[None] | None = None
+        self._next: Mesh | None = None
+        self._kept: Any = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a head is being prepared, or a frame is to take it."""
+        return self._coming is not None
+
+    def forget(self) -> None:
+        """Leave what was begun, for another studio."""
+        self._ready = self._coming = self._next = self._kept = None
+
+    def picture(self, studio: Studio, state: ViewerState) -> Any:
+        """The last picture while the head of a state is prepared; None when the state may be drawn.
+
+        Raises what stopped the preparation, once.
+        """
+        if self._coming is not None:
+            if not self._coming.done():
+                return self._kept
+            coming, self._coming, self._kept = self._coming, None, None
+            self._ready = self._next
+            coming.result()
+        mesh = state.scene.head.mesh
+        if studio.last_image is None or mesh is self._ready:
+            self._ready = mesh
+            return None
+        self._kept = copied(studio.renderer.device, studio.last_image)
+        self._next, studio.is_preparing = mesh, True
+        self._coming = begun(lambda: studio.prepare(state))
+        self._coming.add_done_callback(lambda _: self._wake())
+        return self._kept
+
+
+def begun(work: Callable[[], T]) -> Future[T]:
+    """What `work` returns, made in a thread for which an interpreter that ends does not wait."""
+    coming: Future[T] = Future()
+    coming.set_running_or_notify_cancel()
+
+    def run() -> None:
+        try:
+            coming.set_result(work())
+        except Exception as error:
+            coming.set_exception(error)
+
+    threading.Thread(target=run, name="preparing", daemon=True).start()
+    return coming

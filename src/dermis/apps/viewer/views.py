@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.apps.viewer.chart import ATLAS, Chart
-from dermis.apps.viewer.state import PARTS
+from dermis.apps.viewer.state import ATLAS, PARTS, Chart
 from dermis.base.errors import refuse
 from dermis.frame.features.post.meter import read_meter
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency

@@ -85,8 +85,7 @@ def serve(
     _backend("http", ("uvicorn", "websockets"), "viewer")
     from dermis.apps.viewer.browser.canvas import PageCanvas
     from dermis.apps.viewer.browser.guard import is_local
-    from dermis.apps.viewer.browser.opening import shown
-    from dermis.apps.viewer.browser.server import bind, run_until, server
+    from dermis.apps.viewer.browser.server import bind, run_until, server, shown
 
     listener, address = bind(host, port, secret=secret)
     with _tidy_end(), listener, TemporaryDirectory(prefix="dermis-") as folder:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rendercanvas.http import HttpRenderCanvas, asgi
 
-from dermis.apps.viewer.heads import HEAD_FILES
+from dermis.apps.viewer.session import HEAD_FILES
 
 _QUALITY = 88
 _LOSSLESS_AFTER_S = 0.3

@@ -1,4 +1,4 @@
-"""Serves the canvas to web pages, behind a guard."""
+"""Serves the canvas to web pages, behind a guard, while a thread prepares the first picture."""
 
 from __future__ import annotations
 
@@ -9,10 +9,120 @@ from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
 from dermis.apps.viewer.browser.canvas import PageCanvas
 from dermis.apps.viewer.browser.guard import Guard, is_local
 from dermis.apps.viewer.browser.uploads import Uploads
+from dermis.apps.viewer.player import MotionFile
+from dermis.apps.viewer.state import ViewerState
+from dermis.apps.viewer.studio import Studio, begun
+from dermis.apps.viewer.viewer import Viewer
 from dermis.base.errors import refuse
+
+MOST_CONNECTIONS = 64
+"""At the same time, sockets of pages among them."""
+
+HEADERS_S = 10.0
+"""Within which the headers of a request come [s]."""
+
+
+class LimitedConnection(H11Protocol):  # type: ignore[misc]
+    """uvicorn's HTTP protocol with limits that it lacks."""
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        self._deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:
+        """Drop one too many."""
+        super().connection_made(transport)
+        if len(self.connections) > MOST_CONNECTIONS:
+            transport.abort()
+        else:
+            self._expect_headers()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the deadline."""
+        self._expect_nothing()
+        super().connection_lost(exc)
+
+    def handle_events(self) -> None:
+        """Watch the time while headers are on their way."""
+        super().handle_events()
+        if self.conn.their_state is not h11.IDLE or self.timeout_keep_alive_task is not None:
+            self._expect_nothing()
+        elif self._deadline is None:
+            self._expect_headers()
+
+    def handle_websocket_upgrade(self, event: Any) -> None:
+        """Leave a socket to its own protocol, which pings it."""
+        self._expect_nothing()
+        super().handle_websocket_upgrade(event)
+
+    def send_400_response(self, msg: str) -> None:
+        """Close on who does not speak HTTP."""
+        self.transport.abort()
+
+    def _expect_headers(self) -> None:
+        self._deadline = self.loop.call_later(HEADERS_S, self.transport.abort)
+
+    def _expect_nothing(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+
+Load = Callable[[], tuple[ViewerState, MotionFile | None]]
+
+STAGES = (
+    "reading the head",
+    "opening the graphics device",
+    "preparing the atlas and the maps",
+    "compiling shaders",
+    "drawing the first picture",
+)
+"""In this order."""
+
+_LAST_WORDS_S = 0.7  # in which pages hear why there is nothing to see
+
+
+async def shown(pages: Any, canvas: PageCanvas, load: Load, adapter: str) -> Viewer:
+    """The viewer on the canvas, when all is prepared; whatever stops that is told in the pages and ends them.
+
+    pages : the server, which runs
+    load : reads what is shown first, in the thread
+
+    Raises whatever `load` does, and DermisError without a device.
+    """
+    loop, stages = asyncio.get_running_loop(), iter(enumerate(STAGES, 1))
+
+    def go_on() -> None:
+        if pages.should_exit:
+            raise InterruptedError  # nobody waits for it any more
+        number, text = next(stages)
+        loop.call_soon_threadsafe(canvas.tell_stage, text, number, len(STAGES))
+
+    def prepare() -> tuple[ViewerState, Studio, MotionFile | None]:
+        go_on()
+        state, motion = load()
+        go_on()
+        studio = Studio(adapter)
+        go_on()
+        studio.prepare(state, go_on)
+        return state, studio, motion
+
+    try:
+        state, studio, motion = await asyncio.wrap_future(begun(prepare))
+        canvas.tell_stage(STAGES[-1], len(STAGES), len(STAGES))
+        return Viewer(state, canvas, adapter, motion=motion, studio=studio)
+    except Exception as error:
+        canvas.tell_failure(str(error))
+        await asyncio.sleep(_LAST_WORDS_S)
+        pages.should_exit = True
+        raise
+
 
 T = TypeVar("T")
 _TOKEN_BYTES = 18
@@ -78,8 +188,6 @@ def server(address: Address, canvas: PageCanvas, folder: Path) -> Any:
     """
     import uvicorn
     from rendercanvas.http import asgi, resources
-
-    from dermis.apps.viewer.browser.connections import LimitedConnection
 
     own = Path(__file__).parent
     resources["index.html"] = "text/html; charset=utf-8", (own / "page.html").read_text(encoding="utf-8")

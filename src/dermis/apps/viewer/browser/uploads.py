@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from dermis.apps.viewer.browser.guard import App, Message, Receive, Send
-from dermis.apps.viewer.heads import HEAD_FILES
+from dermis.apps.viewer.session import HEAD_FILES
 from dermis.base.errors import DermisError, refuse
 
 MOST_BYTES = 1 << 28

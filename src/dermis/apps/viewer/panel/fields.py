@@ -1,4 +1,4 @@
-"""Controls of the panel, and the one that a field of a model gets: its range and help come from the model."""
+"""Controls of the panel: a field of a model gets one, with the model's range and help and a plain label."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, implot
 
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.state import ViewerState
@@ -24,6 +24,9 @@ _ALL_NAMES = int(imgui.ComboFlags_.height_largest)
 _TOOLTIP_WIDTH = 260.0
 _AS_THEY_ARE: Mapping[str, str] = MappingProxyType({})
 _OWN = "own"
+_PLOT_HEIGHT = 130.0
+_BARE = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
+_PLOT = int(_BARE | implot.Flags_.no_inputs | implot.Flags_.no_legend)
 _MOST_ROWS = 14  # that are seen of many like controls
 
 
@@ -207,6 +210,16 @@ def button(session: Session, label: str) -> bool:
     return bool(pressed)
 
 
+def begin_plot(label: str, axes: tuple[str, str], across: tuple[float, float], highest: float) -> bool:
+    """Begin a plot from 0 to a little above the highest value; returns whether it is visible."""
+    if not implot.begin_plot(f"##{label}", imgui.ImVec2(-1.0, _PLOT_HEIGHT), _PLOT):
+        return False
+    hidden = int(implot.AxisFlags_.no_tick_labels) if axes[0] == "frames" else 0
+    implot.setup_axes(*axes, hidden, 0)
+    implot.setup_axes_limits(*across, 0.0, 1.1 * highest, int(imgui.Cond_.always))
+    return True
+
+
 def record_position(session: Session, label: str) -> None:
     """Record where the item drawn last is: a point in its left part, which is never its label.
 
@@ -229,3 +242,89 @@ def attempt(session: Session, act: Callable[[], None]) -> None:
         session.message = str(error)
     except Exception as error:
         session.tell_fault("This cannot be done", error)
+
+
+SURFACE = {
+    "mix": Style("colour before blur###mix"),
+    "roughness": Style("roughness m###roughness"),
+    "rho_s": Style("specular strength ρ_s###rho_s"),
+    "specular": Style(
+        "specular BRDF###BRDF",
+        called={
+            "kelemen": "Kelemen, Szirmay-Kalos",
+            "torrance-sparrow": "Torrance-Sparrow",
+            "torrance-sparrow-smith": "Torrance-Sparrow, Smith's G",
+            "blinn-phong": "Blinn-Phong",
+            "blinn-phong-plain": "Blinn-Phong, not normalised",
+            "phong": "Phong",
+            "phong-plain": "Phong, not normalised",
+            "two-lobe": "two lobes",
+            "kelemen-direct": "Kelemen, without its table",
+        },
+    ),
+    "fresnel": Style("Fresnel###Fresnel", called={"schlick": "Schlick", "exact": "exact dielectric"}),
+    "specular_colour": Style("reflection colour###reflection", called={"wrong": "albedo (wrong)"}),
+    "energy": Style("energy conserved###energy", called={"none": "no", "published": "as published"}),
+    "direction": Style("exit direction###direction", called={"lambertian": "Lambertian"}),
+}
+"""Of `Skin`, for its surface."""
+
+ALBEDO = {"albedo": Style("colour by###colour from", called={"map": "albedo map", "profile": "profile"})}
+"""Of `Skin`, for its profile."""
+
+TECHNIQUE = {
+    "technique": Style(
+        called={"none": "none (dry skin)", "one-blur": "one Gaussian", "gpu-gems-3": "GPU Gems 3"}
+    ),
+    "stretch": Style(
+        "stretch correction###stretch", called={"full": "stretch and shear", "axes": "along u and v"}
+    ),
+    "seams": Style("uv seams###seams", called={"stitch": "stitched", "none": "left open"}),
+    "transmission": Style("translucency###transmission", called={"thin": "thin parts"}),
+    "occlusion": Style("ambient occlusion###occlusion", called={"baked": "as posed", "rest": "as at rest"}),
+    "strands": Style("hairs###strands"),
+    "tone": Style("tone curve###tone", called={"none": "none (linear)", "neutral": "Khronos neutral"}),
+    "gamma": Style(called={"right": "gamma-correct", "wrong": "not gamma-correct"}),
+}
+"""Of `Settings`."""
+
+LAYER = {
+    "thickness_mm": Style("thickness###thickness"),
+    "absorption_per_mm": Style("absorption σ_a###absorption"),
+    "scattering_per_mm": Style("scattering σ_s'###scattering"),
+}
+"""Of `TissueLayer`."""
+
+LIGHT = {
+    "irradiance": Style("colour###irradiance"),
+    "softness_mm": Style("shadow softness###softness"),
+    "shadows": Style("casts shadows###shadows"),
+    "angle_degrees": Style("angular size###angle"),
+}
+"""Of the lights."""
+
+LIGHT_KINDS = {
+    "point": "point light",
+    "spot": "spotlight",
+    "rectangle": "softbox (rectangle)",
+    "sphere": "globe (sphere)",
+    "directional": "sun (directional)",
+    "stripe": "laser stripe",
+}
+"""Kinds of lights."""
+
+PROFILES = {
+    "gpu-gems-3": "GPU Gems 3",
+    "skin1": "skin 1 (measured)",
+    "skin2": "skin 2 (measured)",
+    "dj3": "three layers of skin",
+    "spectral": "spectral skin",
+    "light": "light skin",
+    "medium": "medium skin",
+    "dark": "dark skin",
+    "skimmilk": "skim milk",
+    "wholemilk": "whole milk",
+    "chicken1": "chicken 1",
+    "chicken2": "chicken 2",
+}
+"""Names of profiles: first those of skin, then some of other media."""

@@ -7,8 +7,16 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from dermis.apps.viewer.panel.fields import Style, attempt, button, combo, draw_fields, slider
-from dermis.apps.viewer.panel.words import LIGHT, LIGHT_KINDS
+from dermis.apps.viewer.panel.fields import (
+    LIGHT,
+    LIGHT_KINDS,
+    Style,
+    attempt,
+    button,
+    combo,
+    draw_fields,
+    slider,
+)
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.state import ViewerState, changed
 from dermis.formats.samples import SAMPLES

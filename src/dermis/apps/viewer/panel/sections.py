@@ -5,26 +5,94 @@ To add a section, write a function that draws it and add it to `SECTIONS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import colorsys
+import random
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from imgui_bundle import imgui
+import numpy as np
+from imgui_bundle import imgui, implot
+from numpy.typing import NDArray
 
-from dermis.apps.viewer.chart import ATLAS
 from dermis.apps.viewer.controls import CAMERAS
-from dermis.apps.viewer.panel.fields import Style, attempt, button, combo, draw_fields, record_position
-from dermis.apps.viewer.panel.heads import draw_head
+from dermis.apps.viewer.panel.fields import (
+    SURFACE,
+    TECHNIQUE,
+    Style,
+    attempt,
+    begin_plot,
+    button,
+    combo,
+    draw_fields,
+    explain,
+    record_position,
+)
 from dermis.apps.viewer.panel.light import draw_lights
 from dermis.apps.viewer.panel.movement import can_move, draw_expressions, draw_motion, has_expressions
-from dermis.apps.viewer.panel.plots import draw_timing
 from dermis.apps.viewer.panel.skin import draw_profile, draw_surface
-from dermis.apps.viewer.panel.words import SURFACE, TECHNIQUE
-from dermis.apps.viewer.session import Session
+from dermis.apps.viewer.session import Session, built_in
+from dermis.apps.viewer.state import ATLAS
 from dermis.apps.viewer.views import LAYERS, VIEWS
+from dermis.scene.heads import HUMAN
 from dermis.scene.plain import choices_of, fields_under
 from dermis.scene.talk import COMPARISONS
+
+Floats = NDArray[np.float64]
+_TOTAL = "total"
+_GOLDEN = 0.618034  # of the circle of hues between two stages, so that neighbours never look alike
+_SEEDS = 10_000
+_ENTERED = int(imgui.InputTextFlags_.enter_returns_true)
+
+
+def draw_head(session: Session) -> None:
+    """Which head is shown, a person drawn by a number, and a file."""
+    _choice(session)
+    seed = _seed_of(session)
+    told, number = imgui.input_int("person###seed", seed, flags=_ENTERED)
+    record_position(session, "seed")
+    explain("A person by a number, the same one each time; Enter draws it.")
+    if told:
+        session.heads.open(f"{HUMAN}:{max(0, number)}")
+    imgui.same_line()
+    if button(session, "dice"):
+        session.heads.open(f"{HUMAN}:{random.randrange(_SEEDS)}")
+    explain("A person by chance.")
+    if session.ask_for_file is None:
+        entered, session.head_file = imgui.input_text_with_hint(
+            "###path", "path of a file", session.head_file, _ENTERED
+        )
+        record_position(session, "path")
+        explain("A mesh (.glb .gltf .obj .ply), a person (.json) or a scene (.toml).")
+        imgui.same_line()
+        if button(session, "open###open file") or entered:
+            session.heads.open(session.head_file)
+    elif button(session, "upload a file"):
+        session.ask_for_file()
+
+
+def _choice(session: Session) -> None:
+    """The heads of the package and recent files."""
+    now = str(session.state.head.get("name", session.state.scene.head.name))
+    names = dict.fromkeys((*built_in(), *session.heads.recent, now))
+    is_open = imgui.begin_combo("head", session.heads.called(now))
+    if not is_open:
+        record_position(session, "head")
+        return
+    for name in names:
+        clicked, _ = imgui.selectable(f"{session.heads.called(name)}###{name}", name == now)
+        record_position(session, f"head/{name}")
+        if clicked and name != now:
+            session.heads.open(name)
+    imgui.end_combo()
+
+
+def _seed_of(session: Session) -> int:
+    """Of the person shown, 0 for another head."""
+    word = str(session.state.head.get("name", "")).removeprefix(f"{HUMAN}:")
+    return int(word) if word.isdecimal() else 0
+
 
 _BUTTONS_PER_ROW = 3
 _SIDES = (256, 512, 1024, 2048, 4096)
@@ -131,6 +199,44 @@ def draw_files(session: Session) -> None:
         imgui.same_line()
         if button(session, "size of the view"):
             session.picture_size = 0, 0
+
+
+def draw_timing(session: Session) -> None:
+    """Plot the stages' times of the last frames, and list those of the last one."""
+    series = stage_series(list(session.studio.times))
+    if not series:
+        imgui.text_disabled("this adapter reports no times")
+        return
+    total = np.sum(list(series.values()), axis=0)
+    colours = [colorsys.hls_to_rgb((_GOLDEN * k) % 1.0, 0.6, 0.5) for k in range(len(series))]
+    _plot_stacked(series, colours, total)
+    for (name, values), colour in zip(series.items(), colours, strict=True):
+        imgui.text_colored(imgui.ImVec4(*colour, 1.0), f"{values[-1]:8.2f} ms")
+        imgui.same_line()
+        imgui.text(f"{name}, mean {values.mean():.2f}")
+    imgui.text(f"{total[-1]:8.2f} ms in total, mean of {len(total)} frames {total.mean():.2f}")
+
+
+def stage_series(frames: Sequence[dict[str, float]]) -> dict[str, Floats]:
+    """(n,) times of each stage over n frames, 0 in frames without it [ms]."""
+    names = dict.fromkeys(name for frame in frames for name in frame if name != _TOTAL)
+    return {name: np.array([frame.get(name, 0.0) for frame in frames], np.float64) for name in names}
+
+
+def _plot_stacked(
+    series: dict[str, Floats], colours: Sequence[tuple[float, float, float]], total: Floats
+) -> None:
+    """Areas stacked on one another, the last frame at the right edge."""
+    last = max(1.0, len(total) - 1.0)
+    if not begin_plot("stages", ("frames", "ms"), (0.0, last), max(float(total.max()), 1e-3)):
+        return
+    x, below = np.arange(len(total), dtype=np.float64), np.zeros(len(total))
+    for (name, values), colour in zip(series.items(), colours, strict=True):
+        spec = implot.Spec()
+        spec.fill_color = imgui.ImVec4(*colour, 1.0)
+        implot.plot_shaded(name, x, below, below + values, spec)
+        below = below + values
+    implot.end_plot()
 
 
 SECTIONS = (

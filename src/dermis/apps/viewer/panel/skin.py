@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from imgui_bundle import imgui
+import numpy as np
+from imgui_bundle import imgui, implot
 
-from dermis.apps.viewer.panel.fields import Style, attempt, button, combo, draw_fields, record_position
-from dermis.apps.viewer.panel.plots import plot_profile
-from dermis.apps.viewer.panel.words import ALBEDO, LAYER, PROFILES, SURFACE
+from dermis.apps.viewer.panel.fields import (
+    ALBEDO,
+    LAYER,
+    PROFILES,
+    SURFACE,
+    Style,
+    attempt,
+    begin_plot,
+    button,
+    combo,
+    draw_fields,
+    record_position,
+)
 from dermis.apps.viewer.session import Session, apply_regions
 from dermis.apps.viewer.state import ViewerState, changed
 from dermis.base.errors import DermisError
@@ -34,6 +45,8 @@ _PIGMENTS = _PERCENT | {
 }
 _SKINS = (PUBLISHED, "skin1", "skin2", "dj3", *SKINS)
 _NEW_MM = 0.2
+_CHANNELS = ((0.9, 0.35, 0.3), (0.35, 0.8, 0.4), (0.4, 0.55, 1.0))
+_RADII_MM = np.geomspace(0.01, 30.0, 160)
 
 
 def draw_profile(session: Session) -> None:
@@ -54,7 +67,7 @@ def draw_profile(session: Session) -> None:
         imgui.text_disabled("a sum of Gaussians, without layers")
     if skin.has_own_tissue and button(session, "reset"):
         session.change(with_skin(pigments=None, layers=()))
-    plot_profile(session)
+    _plot_profile(session)
 
 
 def draw_surface(session: Session) -> None:
@@ -88,6 +101,24 @@ def _pigments(session: Session, skin: Skin) -> None:
     draw_fields(session, values, apply, _PIGMENTS, [name for name in numbers if name not in _DERMIS])
     imgui.separator_text("dermis")
     draw_fields(session, values, apply, _PIGMENTS, _DERMIS)
+
+
+def _plot_profile(session: Session) -> None:
+    """Plot r R(r) of the Gaussians that the frame blurs with, by channel."""
+    try:
+        profile = session.studio.renderer.profile_of(session.state.scene.skin)
+    except DermisError:  # the message over the picture says why
+        return
+    r, values = _RADII_MM, profile.radiant_exitance(_RADII_MM)
+    highest = float((r[:, None] * values).max())
+    if not begin_plot("profile", ("r [mm]", "r R(r) [1/mm]"), (r[0], r[-1]), max(highest, 1e-9)):
+        return
+    implot.setup_axis_scale(int(implot.ImAxis_.x1), int(implot.Scale_.log10))
+    for k, (name, colour) in enumerate(zip(("red", "green", "blue"), _CHANNELS, strict=True)):
+        spec = implot.Spec()
+        spec.line_color, spec.line_weight = imgui.ImVec4(*colour, 1.0), 1.5
+        implot.plot_line(name, r, np.ascontiguousarray(r * values[:, k]), spec)
+    implot.end_plot()
 
 
 @lru_cache(maxsize=16)
