@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from web_page import FLAGS, SOFTWARE, STATE
 
 import dermis
-from dermis.apps.export.targets.web.build import Asked, built
-from dermis.apps.export.targets.web.maps import smaller
+from dermis.apps.export.targets.web.build import PageRequest, page_content
+from dermis.apps.export.targets.web.maps import with_smaller_maps
 from dermis.apps.export.targets.web.page import web_page
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
@@ -46,15 +46,15 @@ LINEAR = """async () => {
 def main(head: str, adapter: str = "auto") -> None:
     """Print a row for each form and size."""
     scene = dermis.Scene(dermis.load_head(head))
-    scene = replace(scene, head=smaller(scene.head, MAP))
+    scene = replace(scene, head=with_smaller_maps(scene.head, MAP))
     settings = dermis.Settings(atlas=ATLAS)
     print_lines("| head | form | size | difference | what maps and hairs lose |", "|---|---|---|---|---|")
     for form, side in SHOWN:
         sized = settings.model_copy(update={"size": (side, side)})
         given = renderer_for(form, adapter).draw(scene, sized).linear()
         wanted = list[NDArray[np.float32]]()
-        made = built(
-            Asked(scene, (), settings, {form: (side,)}, adapter),
+        made = page_content(
+            PageRequest(scene, (), settings, {form: (side,)}, adapter),
             lambda renderer, *_, sized=sized: wanted.append(renderer.draw(scene, sized).linear()),  # noqa: B023
         )
         with tempfile.TemporaryDirectory() as folder:

@@ -15,7 +15,7 @@ import yaml
 
 from dermis.apps.export.fitting import fit_d
 from dermis.apps.export.registry import TARGETS
-from dermis.apps.export.run import export_skin, judged
+from dermis.apps.export.run import assess, export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.unity import Unity, asset_text
@@ -40,7 +40,7 @@ def test_parameters_show_the_fitted_lobe_in_all_versions(name: str, skin1: Subje
 @pytest.mark.parametrize("name", [*LOBES, "arnold"])
 def test_what_is_written_is_better_than_what_is_typed(name: str, dj3: Subject) -> None:
     target = TARGETS[name].with_variant(None)
-    report = judged(dj3, target, target.versions[-1])
+    report = assess(dj3, target, target.versions[-1])
     assert (report.error.cdf < report.naive_error.cdf).all()
     assert (report.error.edge < report.naive_error.edge).all()
     assert "red light" in report.words()[0]

@@ -19,11 +19,11 @@ from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARG
 from dermis.apps.export.targets.gltf.volume import (
     Volume,
     colour_for,
-    fitted,
+    fit_volume,
     multiscatter_of,
     single_scattering,
+    volume_curve,
     volume_of,
-    walked,
 )
 from dermis.human.head_file import write_person
 from dermis.optics.tissue import load_tissue
@@ -83,18 +83,20 @@ def test_a_volume_keeps_its_paths() -> None:
 def test_a_homogeneous_skin_is_shown_as_it_is(name: str) -> None:
     """The fit finds the tissue's own mean free path and albedo again."""
     tissue, subject = load_tissue(name), subject_of(name)
-    volume, layer = fitted(subject.curve), tissue.medium.layers[0]
+    volume, layer = fit_volume(subject.curve), tissue.medium.layers[0]
     np.testing.assert_allclose(volume.mean_free_path_mm, layer.mean_free_path_mm, rtol=0.01)
     np.testing.assert_allclose(single_scattering(volume.multiscatter), layer.alpha_prime, atol=0.003)
-    found = deviation(subject.curve, walked(volume))
+    found = deviation(subject.curve, volume_curve(volume))
     assert found.cdf.max() < 0.003 and found.edge.max() < 0.001 and np.abs(found.energy).max() < 0.005
 
 
 def test_the_colour_itself_would_lose_light() -> None:
     """Under a surface that refracts, half of the red of skin1: the finding in the documentation."""
     subject = subject_of("skin1")
-    volume = fitted(subject.curve)
-    found = deviation(subject.curve, walked(Volume(volume.distance_m, volume.colour, subject.curve.energy)))
+    volume = fit_volume(subject.curve)
+    found = deviation(
+        subject.curve, volume_curve(Volume(volume.distance_m, volume.colour, subject.curve.energy))
+    )
     np.testing.assert_allclose(found.energy, [-0.50, -0.61, -0.64], atol=0.03)
     np.testing.assert_allclose(colour_for(subject.curve.energy), volume.multiscatter, atol=1e-6)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dermis.apps.export.fitting import deviation
-from dermis.apps.export.run import export_skin, judged
+from dermis.apps.export.run import assess, export_skin
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.openpbr.materials import OPEN_PBR
@@ -24,7 +24,7 @@ EDGE = 0.015  # a matched walk against photons under a surface of index 1.4
 
 def test_a_walk_holds_homogeneous_skin_and_published_numbers_do_not() -> None:
     subject = subject_of("skin1")
-    report = judged(subject, TARGET, "1.1.1")
+    report = assess(subject, TARGET, "1.1.1")
     assert report.error.edge.max() < EDGE and report.error.cdf.max() < 0.04
     assert report.naive_error.edge[0] > 0.04
     typed = radii_mm(report.naive_rows, OPEN_PBR)
@@ -44,7 +44,7 @@ def test_radii_grow_with_the_skin() -> None:
     np.testing.assert_allclose(
         radii_mm(TARGET.parameters(subject, "1.1.1"), OPEN_PBR), fitted_mm(subject), rtol=1e-9
     )
-    d = judged(subject, TARGET, "1.1.1").d_mm
+    d = assess(subject, TARGET, "1.1.1").d_mm
     ratio = fitted_mm(subject) / d
     # Walks counted elsewhere: d over the mean free path is 0.434 at a colour of 0.43 and 0.34 at 0.2.
     assert 1.9 < ratio[0] < 2.4 and 2.7 < ratio[1] < 3.2 and ratio[2] > ratio[1]
@@ -53,7 +53,7 @@ def test_radii_grow_with_the_skin() -> None:
 def test_a_profile_is_fitted_where_the_renderer_has_one() -> None:
     subject = subject_of("skin1")
     profile, walk = (TARGET.with_variant(one) for one in ("open-pbr-profile", "open-pbr"))
-    assert judged(subject, profile, "1.1.1").error.edge.max() < EDGE
+    assert assess(subject, profile, "1.1.1").error.edge.max() < EDGE
     radii = walk.parameters(subject, "1.1.1")
     assert deviation(subject.curve, profile.shown(radii, subject, "1.1.1")).edge.max() > 0.08
 

@@ -9,7 +9,7 @@ import pytest
 from pbrt_grammar import Directive, read
 from rigged_head import write_rigged_head
 
-from dermis.apps.export.run import export_skin, judged
+from dermis.apps.export.run import assess, export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.targets.pbrt.target import TARGET
 from dermis.base.errors import DermisWarning
@@ -30,7 +30,7 @@ def one_of(found: list[Directive], word: str, name: str) -> Directive:
 @pytest.mark.parametrize("name", ["skin1", "skin2"])
 def test_homogeneous_skin_is_nearly_its_own_medium(name: str) -> None:
     subject = subject_of(name)
-    report = judged(subject, TARGET, "4")
+    report = assess(subject, TARGET, "4")
     assert report.error.edge.max() < DIFFUSION < report.naive_error.edge.max()
     paths = next(row.value for row in report.rows if row.name == "mfp")
     layer = load_tissue(name).medium.layers[0]

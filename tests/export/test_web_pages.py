@@ -17,7 +17,7 @@ from PIL import Image
 
 from dermis.apps.export.fitting import fit_d, lobe
 from dermis.apps.export.registry import TARGETS
-from dermis.apps.export.run import export_skin, judged
+from dermis.apps.export.run import assess, export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.babylon.target import spiral_curve
@@ -79,7 +79,7 @@ def test_the_page_holds_the_head_in_metres_and_the_parameters(
     assert head is not None and told is not None
     assert base64.b64decode(head[1]).startswith(b"glTF")
     settings = json.loads(told[1])
-    report = judged(skin, TARGETS[target].with_variant(None), TARGETS[target].versions[-1])
+    report = assess(skin, TARGETS[target].with_variant(None), TARGETS[target].versions[-1])
     assert settings["skin"] == json.loads(
         json.dumps({r.name.rpartition(".")[2]: r.value for r in report.rows})
     )
@@ -95,7 +95,7 @@ def test_babylons_two_parameters_undo_both_of_its_slips(name: str) -> None:
     d = fit_d(subject.curve)
     np.testing.assert_allclose(2.0 / (metres * np.array(colour)), d)  # each channel's own width
     np.testing.assert_allclose(2.0 * max(colour) / metres, d.max())  # and the widest is drawn from
-    report = judged(subject, babylon, babylon.versions[-1])
+    report = assess(subject, babylon, babylon.versions[-1])
     # the lobes' own error, and half a step of the fortieth that samples make
     own = np.abs(lobe(d, subject.curve.energy).share - subject.curve.share).max(axis=0)
     assert (report.error.edge <= 0.5 * own + 0.025).all()
@@ -111,7 +111,7 @@ def test_a_white_profile_is_a_lobe_and_a_grey_one_is_wider_not_narrower() -> Non
 
 
 def test_three_spreads_nothing_and_says_so(skin: Subject) -> None:
-    report = judged(skin, TARGETS["three"].with_variant(None), "0.187.0")
+    report = assess(skin, TARGETS["three"].with_variant(None), "0.187.0")
     assert (report.error.edge > 0.45).all() and "Nothing spreads" in report.wrong
 
 

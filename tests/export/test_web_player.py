@@ -22,7 +22,7 @@ from small_head import write_head
 import dermis
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.targets.pages.html import hash_of
-from dermis.apps.export.targets.web.build import Asked, Built, built
+from dermis.apps.export.targets.web.build import PageContent, PageRequest, page_content
 from dermis.apps.export.targets.web.dials import Dial, dials_of
 from dermis.apps.export.targets.web.page import MODULES, player, web_page
 from dermis.frame.renderer import Renderer
@@ -87,7 +87,7 @@ def browser() -> Iterator[Any]:
 class Taken(NamedTuple):
     """What a page holds, and the renderer that it was taken down with."""
 
-    made: Built
+    made: PageContent
     scene: dermis.Scene
     renderer: Renderer
     dials: tuple[Dial, ...]
@@ -95,8 +95,8 @@ class Taken(NamedTuple):
 
 def taken(scene: dermis.Scene, form: str, dials: tuple[Dial, ...]) -> Taken:
     renderers: list[Renderer] = []
-    asked = Asked(scene, dials, SETTINGS, {form: (SIDE,)}, os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
-    made = built(asked, lambda renderer, *_: renderers.append(renderer))
+    asked = PageRequest(scene, dials, SETTINGS, {form: (SIDE,)}, os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+    made = page_content(asked, lambda renderer, *_: renderers.append(renderer))
     return Taken(made, scene, renderers[0], dials)
 
 

@@ -62,7 +62,7 @@ def export_skin(
         refuse(given[0], "a subject that is still to be made", "it came with one", "Leave it out")
     if target.needs_maps:
         subject = subject.painted(side, adapter)
-    report = judged(subject, target, known)
+    report = assess(subject, target, known)
     with _staged(place) as inside:
         home = inside.parent if place.suffix else inside
         files = target.write(subject, report.rows, inside, known)
@@ -71,7 +71,7 @@ def export_skin(
     return replace(report, files=tuple(ends / file.relative_to(home) for file in files))
 
 
-def judged(subject: Subject, target: Target, version: str) -> Report:
+def assess(subject: Subject, target: Target, version: str) -> Report:
     """Return the report of an export, before anything is written."""
     rows, naive = target.parameters(subject, version), target.naive(subject, version)
     errors = [deviation(subject.curve, target.shown(one, subject, version)) for one in (rows, naive)]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.apps.export.fitting import deviation
-from dermis.apps.export.run import export_skin, judged
+from dermis.apps.export.run import assess, export_skin
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.openpbr import target as openpbr_target
@@ -31,8 +31,8 @@ def figures() -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in SKINS:
         subject = subject_of(name)
-        walk = judged(subject, openpbr_target.TARGET, "1.1.1")
-        beam = judged(subject, pbrt_target.TARGET, "4")
+        walk = assess(subject, openpbr_target.TARGET, "1.1.1")
+        beam = assess(subject, pbrt_target.TARGET, "4")
         misread = deviation(subject.curve, profile_of_specification(fitted_mm(subject), subject))
         found[name] = {
             "model": subject.model,

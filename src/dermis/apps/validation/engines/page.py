@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from dermis.apps.export.registry import TARGETS
-from dermis.apps.export.run import judged
+from dermis.apps.export.run import assess
 from dermis.apps.export.subject import subject_of
 from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_figures, write_page
 from dermis.base.console import print_lines
@@ -51,7 +51,7 @@ def predicted() -> str:
         for variant in TARGETS[name].variants or (None,):
             target = TARGETS[name].with_variant(variant)
             for subject in subjects:
-                made = judged(subject, target, target.versions[-1])
+                made = assess(subject, target, target.versions[-1])
                 errors = made.error.cdf, made.error.edge, made.error.energy, made.naive_error.edge
                 cells = [three(one.round(3).tolist()) for one in errors]
                 lines.append([target.title, made.version, made.variant or "-", subject.name, *cells])

@@ -10,7 +10,7 @@ from dermis.apps.export.fitting import fit_d
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Row, Rows, Target, Value, floats, numbers_of
 from dermis.apps.export.targets.gltf.file import encoded
-from dermis.apps.export.targets.gltf.volume import Volume, fitted, walked
+from dermis.apps.export.targets.gltf.volume import Volume, fit_volume, volume_curve
 from dermis.optics.curve import Curve
 from dermis.optics.media import SKIN_ETA, Floats
 
@@ -48,7 +48,7 @@ class Gltf(Target):
         """The volume whose walk comes nearest, or what an ear lets through."""
         if self.variant == DIFFUSE:
             return _diffuse(subject, *_through(subject))
-        return _scatter(fitted(subject.curve, subject.albedo))
+        return _scatter(fit_volume(subject.curve, subject.albedo))
 
     def naive(self, subject: Subject, version: str) -> Rows:
         """The skin's colour for every colour, and the mean radius of the light for the distance."""
@@ -63,7 +63,7 @@ class Gltf(Target):
         if self.variant == DIFFUSE:
             back = (1.0 - numbers_of(rows, _FACTOR)[0]) * subject.curve.energy
             return Curve.of(lambda r: np.repeat((r > 0.0)[:, None], 3, axis=1), back)
-        return subject.scaled(walked(_volume(rows)))
+        return subject.scaled(volume_curve(_volume(rows)))
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """One .glb file; the skin's material has the extensions, none of which is required."""

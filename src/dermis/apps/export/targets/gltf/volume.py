@@ -61,12 +61,12 @@ def colour_for(energy: ArrayLike) -> Floats:
     return multiscatter_of(albedo_of("skin", energy))
 
 
-def walked(volume: Volume) -> Curve:
+def volume_curve(volume: Volume) -> Curve:
     """The curve of light that walks through such a volume."""
     return half_space("skin", single_scattering(volume.multiscatter), volume.mean_free_path_mm)
 
 
-def fitted(curve: Curve, energy: Floats | None = None) -> Volume:
+def fit_volume(curve: Curve, energy: Floats | None = None) -> Volume:
     """The volume whose walk gives back a curve's energy, and is nearest to it cumulatively.
 
     energy : (3,) that it gives back instead, a colour map's [-]

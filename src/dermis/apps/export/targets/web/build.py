@@ -1,4 +1,4 @@
-"""What hands move on the page: the camera and the lights."""
+"""Content of the page: frames of a scene in two forms, at several sizes, before and after light spreads."""
 
 from __future__ import annotations
 
@@ -9,30 +9,189 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.targets.web.described import Named, described
+from dermis.apps.export.target import floats
+from dermis.apps.export.targets.web.description import MapOfPictures, Mapped, NamedFrame, description
 from dermis.apps.export.targets.web.dials import Dial, changes, node_inputs
-from dermis.apps.export.targets.web.maps import Pictured, picture_of, shorten, texels_of
+from dermis.apps.export.targets.web.maps import MapPictures, PictureKey, picture_of, round_hairs, texels_of
 from dermis.apps.export.targets.web.packing import Packer
 from dermis.frame.capture import FORMS, renderer_for, sparser, taken
 from dermis.frame.features.shading.view import pinhole
 from dermis.frame.inputs import Inputs
 from dermis.frame.renderer import Renderer
 from dermis.gpu.capture import FrameCapture
-from dermis.mesh.outline import Outline
-from dermis.scene.lights import SpotLight
+from dermis.scene.lights import Light, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Json = dict[str, Any]
+TECHNIQUES = ("texture-space", "none")
+SIZES = {"gpu": (512, 1024, 1600), "software": (512,)}
+"""Sides of the square pictures of each form [pixel]."""
+MOVING = {"software": (256, 1, 2)}
+"""Of forms that draw less while hands move: side [pixel], samples, and how many coarse hairs become one."""
 
 
-def hands_of(scene: Scene, inputs: Inputs) -> Json:
-    """The camera, the lights that can be dragged, and the outline that shadow maps are fitted to."""
-    settings: Settings = inputs.settings
-    camera, seen = scene.camera, pinhole(scene.camera, scene.head, settings)
-    outline: Outline = scene.head.mesh.outline
+@dataclass
+class PageContent:
+    """Content of the page.
+
+    forms : the description of each form's frames
+    pictures : maps as WebP
+    placed : number of a picture, number of the run of its curves, how many of its channels are colours;
+        by role, mip and layer
+    """
+
+    forms: dict[str, Json] = field(default_factory=dict)
+    packer: Packer = field(default_factory=Packer)
+    maps: MapPictures = field(default_factory=MapPictures)
+    pictures: list[bytes] = field(default_factory=list)
+    placed: dict[PictureKey, tuple[int, int, int]] = field(default_factory=dict)
+    poster: NDArray[np.uint8] | None = None
+
+    def place(self, key: PictureKey) -> tuple[int, int, int]:
+        """Add a picture and its curves once; return its entry of `placed`."""
+        if key not in self.placed:
+            one = self.maps.pictures[key]
+            curves = self.packer.add(np.ascontiguousarray(one.curves).view(np.uint8).reshape(-1))
+            self.placed[key] = len(self.pictures), curves, 3 if key[0] == "colour_map" else 0
+            self.pictures.append(one.data)
+        return self.placed[key]
+
+
+@dataclass(frozen=True)
+class PageRequest:
+    """Request for the content of a page.
+
+    settings : of all frames, but for size and technique
+    sizes : sides of the pictures of each form, see `SIZES`; forms that are left out are not built
+    moving : what is drawn while hands move, see `MOVING`; forms that are left out draw all
+    """
+
+    scene: Scene
+    dials: tuple[Dial, ...]
+    settings: Settings
+    sizes: dict[str, tuple[int, ...]]
+    adapter: str = "auto"
+    moving: dict[str, tuple[int, int, int]] = field(default_factory=dict)
+
+    def frames(self, form: str) -> Iterator[tuple[Settings, int]]:
+        """Yield a form's frames: settings, and how many coarse hairs become one, 0 for frames at rest."""
+        for technique in TECHNIQUES:
+            for side in self.sizes[form]:
+                yield self.sized(side, technique), 0
+            if form in self.moving:
+                side, samples, fewer = self.moving[form]
+                yield self.sized(side, technique).model_copy(update={"samples": samples}), fewer
+
+    def sized(self, side: int, technique: str = TECHNIQUES[0]) -> Settings:
+        """Return the settings of a frame; before light spreads it does not pass between surfaces either.
+
+        Every layout has links of its own: those of a second one would be 0.6 MB of the page.
+        """
+        spreads = {"technique": technique, "interreflection": technique == TECHNIQUES[0]}
+        return self.settings.model_copy(update={"size": (side, side), **spreads})
+
+
+def page_content(
+    request: PageRequest, look: Callable[[Renderer, Scene, Settings], None] | None = None
+) -> PageContent:
+    """Return the scene for the page.
+
+    look : called with each form's renderer, whose maps are then those that the page decodes
+    """
+    made = PageContent()
+    for form in (one for one in FORMS if request.sizes.get(one)):
+        renderer = renderer_for(form, request.adapter)
+        made.forms[form] = _form(made, renderer, request, form)
+        settings = request.sized(request.sizes[form][0])
+        if look is not None:
+            look(renderer, request.scene, settings)
+        if made.poster is None:
+            made.poster = renderer.draw(request.scene, settings).srgb8()
+    return made
+
+
+def _form(made: PageContent, renderer: Renderer, request: PageRequest, form: str) -> Json:
+    tape, frames, changed = FrameCapture(renderer.device), list[NamedFrame](), list[Json]()
+    base: Inputs | None = None
+    for settings, fewer in request.frames(form):
+        inputs = renderer.prepare(request.scene, settings)
+        base, picture = base or inputs, inputs.resources.picture
+        take = sparser(taken(tape, inputs), fewer)
+        frames.append(NamedFrame(settings.technique, take, picture, settings.size, fewer))
+        changed.append(_dial_changes(made.packer, renderer, request, settings, inputs, frames[-1]))
+    takes = [one.take for one in frames]
+    mapped, steps = made.maps.put(renderer, tape, takes), round_hairs(renderer, tape, takes)
+    found = description(tape, frames, mapped, steps, made.packer)
+    for one, dials in zip(found["frames"], changed, strict=True):
+        one["dials"] = dials
+    found["maps"] = {str(number): _mips(made, one) for number, one in mapped.items()}
+    assert base is not None
+    found["hands"] = _controls(request.scene, base)
+    found["colours"] = _colours(made, renderer, request, mapped)
+    return found
+
+
+def _dial_changes(
+    packer: Packer,
+    renderer: Renderer,
+    request: PageRequest,
+    settings: Settings,
+    base: Inputs,
+    one: NamedFrame,
+) -> Json:
+    """Return the changes of a frame at each dial's nodes."""
+    found, beside = {}, FrameCapture(renderer.device)
+    for dial in request.dials:
+        nodes = node_inputs(dial, lambda scene: renderer.prepare(scene, settings), base)
+        found[dial.name] = [
+            None if inputs is None else changes(one.take, sparser(taken(beside, inputs), one.fewer), packer)
+            for inputs in nodes
+        ]
+    return found
+
+
+def _mips(made: PageContent, one: MapOfPictures) -> list[list[tuple[int, int, int]]]:
+    """Return the pictures and curves of the layers of a map's mips."""
+    layers = 1 + max(layer for role, _, layer in made.maps.pictures if role == one.role)
+    return [[made.place((one.role, mip, k)) for k in range(layers)] for mip in range(one.mips)]
+
+
+def _colours(made: PageContent, renderer: Renderer, request: PageRequest, mapped: Mapped) -> Json:
+    """Return the number of the colour map, and its picture and curves at nodes of dials that change it."""
+    number = next((k for k, one in mapped.items() if one.role == "colour_map"), None)
+    if number is None:
+        return {}
+    settings, found = request.sized(min(map(min, request.sizes.values()))), {}
+    for dial in (one for one in request.dials if not one.moves):
+        scenes = enumerate(dial.scenes)
+        nodes = [_colour(made, renderer, one, settings, f"{dial.name} {k}") for k, one in scenes]
+        if any(nodes):
+            found[dial.name] = nodes
+    return {"map": number, "dials": found} if found else {}
+
+
+def _colour(
+    made: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, name: str
+) -> tuple[int, int, int] | None:
+    """Return the picture of a node's colour map, None where it is the same as at rest."""
+    if scene is None:
+        return None
+    if (name, 0, 0) not in made.maps.pictures:
+        tape, texture = FrameCapture(renderer.device), renderer.prepare(scene, settings).lit["colour_map"]
+        texels = texels_of(tape, tape.resource(texture), 0)[0]
+        if made.maps.same("colour_map", texels):
+            return None
+        made.maps.pictures[name, 0, 0] = picture_of(texels, True)
+    return *made.place((name, 0, 0))[:2], 3
+
+
+def _controls(scene: Scene, inputs: Inputs) -> Json:
+    """Return the camera, the lights that can be dragged, and the outline that shadow maps are fitted to."""
+    camera, settings = scene.camera, inputs.settings
+    seen, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
     return {
-        "centre": [float(x) for x in scene.head.centre_mm],
+        "centre": [*floats(scene.head.centre_mm)],
         "camera": {
             "position": list(camera.position),
             "target": list(camera.target),
@@ -49,171 +208,8 @@ def hands_of(scene: Scene, inputs: Inputs) -> Json:
     }
 
 
-def _light(light: Any) -> Json | None:
-    """A light that stands somewhere and has one shadow map; None for others, which stay where they are."""
+def _light(light: Light) -> Json | None:
+    """Return a light that has a position and one shadow map; None for others, which cannot be moved."""
     if not isinstance(light, SpotLight) or not light.shadows:
         return None
     return {"position": list(light.position), "target": list(light.target), "softness": light.softness_mm}
-
-
-TECHNIQUES = ("texture-space", "none")
-SIZES = {"gpu": (512, 1024, 1600), "software": (512,)}
-"""Sides of the square pictures of each form [pixel]."""
-MOVING = {"software": (256, 1, 2)}
-"""Of forms that draw less while hands move: side [pixel], samples, and how many coarse hairs become one."""
-
-
-@dataclass
-class Built:
-    """What the page holds.
-
-    forms : the description of each form's frames
-    pictures : maps as WebP
-    """
-
-    forms: dict[str, Json] = field(default_factory=dict)
-    packer: Packer = field(default_factory=Packer)
-    maps: Pictured = field(default_factory=Pictured)
-    pictures: list[bytes] = field(default_factory=list)
-    poster: NDArray[np.uint8] | None = None
-
-    def picture(self, data: bytes) -> int:
-        """The number of a picture."""
-        self.pictures.append(data)
-        return len(self.pictures) - 1
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What is to be built.
-
-    settings : of all frames, but for size and technique
-    sizes : sides of the pictures of each form, see `SIZES`; forms that are left out are not built
-    moving : what is drawn while hands move, see `MOVING`; forms that are left out draw all
-    """
-
-    scene: Scene
-    dials: tuple[Dial, ...]
-    settings: Settings
-    sizes: dict[str, tuple[int, ...]]
-    adapter: str = "auto"
-    moving: dict[str, tuple[int, int, int]] = field(default_factory=dict)
-
-    def frames(self, form: str) -> Iterator[tuple[Settings, int]]:
-        """Of a form's frames the settings, and how many coarse hairs become one, 0 for those that rest."""
-        for technique in TECHNIQUES:
-            for side in self.sizes[form]:
-                yield self.sized(side, technique), 0
-            if form in self.moving:
-                side, samples, fewer = self.moving[form]
-                yield self.sized(side, technique).model_copy(update={"samples": samples}), fewer
-
-    def sized(self, side: int, technique: str = TECHNIQUES[0]) -> Settings:
-        """The settings of a frame; before light spreads it does not pass between surfaces either.
-
-        Every layout has links of its own: those of a second one would be 0.6 MB of the page.
-        """
-        spreads = {"technique": technique, "interreflection": technique == TECHNIQUES[0]}
-        return self.settings.model_copy(update={"size": (side, side), **spreads})
-
-
-def built(asked: Asked, look: Callable[[Renderer, Scene, Settings], None] | None = None) -> Built:
-    """The scene for the page.
-
-    look : given each form's renderer, whose maps are then those that the page decodes
-    """
-    made = Built()
-    for form in (one for one in FORMS if asked.sizes.get(one)):
-        renderer = renderer_for(form, asked.adapter)
-        made.forms[form] = _form(made, renderer, asked, form)
-        settings = asked.sized(asked.sizes[form][0])
-        if look is not None:
-            look(renderer, asked.scene, settings)
-        if made.poster is None:
-            made.poster = renderer.draw(asked.scene, settings).srgb8()
-    return made
-
-
-def _form(made: Built, renderer: Renderer, asked: Asked, form: str) -> Json:
-    tape, frames, turned = FrameCapture(renderer.device), list[Named](), list[Json]()
-    base: Inputs | None = None
-    for settings, fewer in asked.frames(form):
-        inputs = renderer.prepare(asked.scene, settings)
-        base, picture = base or inputs, inputs.resources.post.picture
-        take = sparser(taken(tape, inputs), fewer)
-        frames.append(Named(settings.technique, take, picture, settings.size, fewer))
-        turned.append(_turned(made.packer, renderer, asked, settings, inputs, frames[-1]))
-    mapped = made.maps.put(renderer, tape, [one.take for one in frames])
-    steps = shorten(renderer, tape, [one.take for one in frames])
-    found = described(tape, frames, mapped, steps, made.packer)
-    for one, dials in zip(found["frames"], turned, strict=True):
-        one["dials"] = dials
-    found["maps"] = _pictured(made, mapped)
-    assert base is not None
-    found["hands"] = hands_of(asked.scene, base)
-    found["colours"] = _colours(made, renderer, asked, mapped)
-    return found
-
-
-def _turned(
-    packer: Packer, renderer: Renderer, asked: Asked, settings: Settings, base: Inputs, one: Named
-) -> Json:
-    """What each dial's nodes change in a frame."""
-    found, beside = {}, FrameCapture(renderer.device)
-    for dial in asked.dials:
-        nodes = node_inputs(dial, lambda scene: renderer.prepare(scene, settings), base)
-        found[dial.name] = [
-            None if inputs is None else changes(one.take, sparser(taken(beside, inputs), one.fewer), packer)
-            for inputs in nodes
-        ]
-    return found
-
-
-def _pictured(made: Built, mapped: dict[int, Any]) -> Json:
-    """Of each map the pictures and curves of its mips' layers."""
-    found: Json = {}
-    for number, (role, mips, _) in mapped.items():
-        layers = 1 + max(layer for name, _, layer in made.maps.pictures if name == role)
-        found[str(number)] = [[_placed(made, (role, mip, k)) for k in range(layers)] for mip in range(mips)]
-    return found
-
-
-def _placed(made: Built, key: tuple[str, int, int]) -> list[Any]:
-    """A picture's number, the blob of its curves, and how many of its channels are colours."""
-    one = made.maps.pictures[key]
-    if key not in made.maps.placed:
-        curves = made.packer.add(np.ascontiguousarray(one.curves).view(np.uint8).reshape(-1))
-        made.maps.placed[key] = [made.picture(one.data), curves, 3 if key[0] == "colour_map" else 0]
-    return made.maps.placed[key]
-
-
-def _colours(made: Built, renderer: Renderer, asked: Asked, mapped: dict[int, Any]) -> Json:
-    """Of dials that change the colour map: its number, and at each node its picture and curves."""
-    number = next((k for k, (role, *_) in mapped.items() if role == "colour_map"), None)
-    found: Json = {}
-    if number is None:
-        return found
-    settings = asked.sized(min(map(min, asked.sizes.values())))
-    for dial in (one for one in asked.dials if not one.moves):
-        nodes = [
-            _colour(made, renderer, scene, settings, dial.name, k) for k, scene in enumerate(dial.scenes)
-        ]
-        if any(nodes):
-            found[dial.name] = nodes
-    return {"map": number, "dials": found} if found else {}
-
-
-def _colour(
-    made: Built, renderer: Renderer, scene: Scene | None, settings: Settings, dial: str, node: int
-) -> list[Any] | None:
-    """The picture of a node's colour map, None where it is that at rest."""
-    if scene is None:
-        return None
-    key = f"{dial} {node}", 0, 0
-    if key not in made.maps.pictures:
-        tape, texture = FrameCapture(renderer.device), renderer.prepare(scene, settings).lit["colour_map"]
-        texels = texels_of(tape, tape.resource(texture), 0)[0]
-        if made.maps.same("colour_map", texels):
-            return None
-        made.maps.pictures[key] = picture_of(texels, True)
-    return [*_placed(made, key)[:2], 3]

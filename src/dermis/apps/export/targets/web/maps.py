@@ -1,4 +1,4 @@
-"""Maps as pictures: eight bits a channel, along a curve of each channel's own."""
+"""Maps of captured frames as pictures: eight bits a channel, along a curve of each channel's own."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.targets.web.described import bound
+from dermis.apps.export.targets.web.description import MapOfPictures, Mapped, bound_as
 from dermis.apps.export.targets.web.packing import stepped
 from dermis.frame.capture import halving, refill
 from dermis.frame.renderer import Renderer
@@ -19,6 +19,8 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
 Halves = NDArray[np.float16]
+PictureKey = tuple[str, int, int]
+"""Role, mip and layer."""
 LEAST = 64
 """Side of the smallest map that becomes a picture [texels]."""
 _QUALITY = 88  # of WebP
@@ -28,11 +30,11 @@ _COLOURS = 3
 
 @dataclass(frozen=True)
 class Picture:
-    """A map's layer.
+    """Layer of a map.
 
     data : WebP; of maps that are no colours grey, one channel below the other
-    curves : (c, 256) what each of a channel's steps stands for
-    texels : (h, w, c) what it is decoded to
+    curves : (c, 256) value of each of a channel's steps
+    texels : (h, w, c) decoded picture
     """
 
     data: bytes
@@ -41,7 +43,7 @@ class Picture:
 
 
 def picture_of(texels: Halves, colours: bool) -> Picture:
-    """A map as a picture.
+    """Return a map as a picture.
 
     texels : (h, w, c)
     colours : whether the first three channels are seen as a colour; those after it are one number each
@@ -61,21 +63,14 @@ def picture_of(texels: Halves, colours: bool) -> Picture:
 
 
 def _curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(256,) values from the least to the largest, closer together near 0 as eyes and slopes are."""
-    low, high = _bent(float(values.min())), _bent(float(values.max()))
-    return _straight(np.linspace(low, high, _STEPS))
-
-
-def _bent(value: float) -> float:
-    return float(np.sign(value) * np.sqrt(abs(value)))
-
-
-def _straight(bent: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.sign(bent) * bent * bent)
+    """Return values (256,) from the least to the largest, closer together near 0."""
+    ends = np.array([values.min(), values.max()])
+    root = np.linspace(*np.sign(ends) * np.sqrt(np.abs(ends)), _STEPS)
+    return np.asarray(np.sign(root) * root * root)
 
 
 def _steps(values: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """The nearest step of the curve to each value."""
+    """Return the nearest step of the curve to each value."""
     middles = 0.5 * (curve[1:] + curve[:-1])
     return np.searchsorted(middles, values.astype(np.float64)).astype(np.uint8)
 
@@ -102,38 +97,35 @@ _ROLES = (_COLOUR, "relief_map", "slope_map", "specular_map", "roughness_map", "
 
 
 @dataclass
-class Pictured:
-    """Pictures by role, mip and layer; and of each tape, which resource has them.
+class MapPictures:
+    """Pictures of maps.
 
     A texture whose mips the device can halve comes with the first alone.
     """
 
-    pictures: dict[tuple[str, int, int], Picture] = field(default_factory=dict)
-    placed: dict[tuple[str, int, int], list[Any]] = field(default_factory=dict)
+    pictures: dict[PictureKey, Picture] = field(default_factory=dict)
     _given: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def same(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Whether a map is that which its picture was made of."""
+        """Return whether a map is the one of its picture."""
         return bool(np.array_equal(self._given[role], texels))
 
-    def put(
-        self, renderer: Renderer, tape: FrameCapture, takes: list[CapturedFrame]
-    ) -> dict[int, tuple[str, int, CapturedFrame | None]]:
-        """Encode what is not yet encoded, and decode it into a tape's textures.
-
-        Of each of these its role, how many mips come as pictures, and the passes that fill the others.
-        """
+    def put(self, renderer: Renderer, tape: FrameCapture, takes: list[CapturedFrame]) -> Mapped:
+        """Encode new maps and decode them into the captured textures; return these by number."""
         found = {}
         for number, role in _mapped(tape, takes).items():
             texture, described = tape.object(number), tape.resources[number]
-            mips = 1 if described["usage"] & _STORABLE else _large(described)
-            small = [self._layers(tape, number, role, mip) for mip in range(mips)]
-            refill(renderer, texture, small if mips == 1 else small + _rest(tape, number, mips))
-            found[number] = role, mips, halving(tape, texture) if described["usage"] & _STORABLE else None
+            side, storable = min(described["size"][:2]), described["usage"] & _STORABLE
+            mips = 1 if storable else sum(side >> mip >= LEAST for mip in range(described["mips"]))
+            levels = [self._layers(tape, number, role, mip) for mip in range(mips)]
+            rest = range(mips, described["mips"] if mips > 1 else 0)
+            refill(renderer, texture, levels + [texels_of(tape, number, mip) for mip in rest])
+            fills = halving(tape, texture) if storable else None
+            found[number] = MapOfPictures(role, mips, fills)
         return found
 
     def _layers(self, tape: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
-        """(l, h, w, c) a mip as it is decoded."""
+        """Return a mip (l, h, w, c) as it is decoded."""
         layers = texels_of(tape, number, mip)
         for layer, texels in enumerate(layers):
             if (role, mip, layer) not in self.pictures:
@@ -142,8 +134,8 @@ class Pictured:
         return np.stack([self.pictures[role, mip, layer].texels for layer in range(len(layers))])
 
 
-def smaller(head: Head, most: int) -> Head:
-    """The head with its maps of files halved until none has a longer side [texels]."""
+def with_smaller_maps(head: Head, most: int) -> Head:
+    """Return the head with its maps of files halved until none has a longer side [texels]."""
     maps = head.maps
     if not isinstance(maps, Maps):
         return head
@@ -157,12 +149,12 @@ def _halved(values: NDArray[np.float32], most: int) -> NDArray[np.float32]:
     return np.asarray(mip_chain(values)[times], np.float32)
 
 
-def shorten(
+def round_hairs(
     renderer: Renderer, tape: FrameCapture, takes: list[CapturedFrame]
 ) -> dict[int, tuple[float, ...]]:
     """Round the places of hairs on a device; of each buffer of them the steps of its columns."""
     found: dict[int, tuple[float, ...]] = {}
-    for number in bound(tape, takes, ("knots",)):
+    for number in bound_as(tape, takes, ("knots",)):
         data = stepped(tape.content(number)[0].view(np.float32).reshape(-1, len(_KNOT_MM)), _KNOT_MM)
         renderer.device.write(tape.object(number), data.tobytes(), data.nbytes)
         found[number] = _KNOT_MM
@@ -170,28 +162,18 @@ def shorten(
 
 
 def texels_of(tape: FrameCapture, number: int, mip: int) -> NDArray[np.float16]:
-    """(l, h, w, c) what a texture of halves holds."""
+    """Return the texels (l, h, w, c) of a texture of halves."""
     width, height, layers = tape.resources[number]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
     parts = tape.content(number)[mip * layers : (mip + 1) * layers]
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 
-def _rest(tape: FrameCapture, number: int, mips: int) -> list[NDArray[np.float16]]:
-    return [texels_of(tape, number, mip) for mip in range(mips, tape.resources[number]["mips"])]
-
-
-def _large(described: dict[str, Any]) -> int:
-    """How many mips are large enough for pictures."""
-    side = min(described["size"][:2])
-    return sum(side >> mip >= LEAST for mip in range(described["mips"]))
-
-
 def _mapped(tape: FrameCapture, takes: list[CapturedFrame]) -> dict[int, str]:
-    """Textures of halves bound as maps, large enough for pictures, with their roles."""
+    """Return textures of halves bound as maps, large enough for pictures, with their roles."""
     return {
         number: role
-        for number, role in bound(tape, takes, _ROLES).items()
+        for number, role in bound_as(tape, takes, _ROLES).items()
         if tape.resources[number].get("format", "").endswith("16float")
         and min(tape.resources[number]["size"][:2]) >= LEAST
     }

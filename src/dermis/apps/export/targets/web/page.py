@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.targets.pages.html import inline, page
-from dermis.apps.export.targets.web.build import Built
+from dermis.apps.export.targets.web.build import PageContent
 from dermis.apps.export.targets.web.dials import Dial
 from dermis.apps.export.targets.web.packing import seven_bits
 
@@ -36,7 +36,7 @@ _IMPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 
 
-def web_page(built: Built, dials: tuple[Dial, ...], title: str, note: str) -> str:
+def web_page(built: PageContent, dials: tuple[Dial, ...], title: str, note: str) -> str:
     """Return the text of the page.
 
     title, note : any text, which is escaped

@@ -59,9 +59,9 @@ class Web(Target):
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """The page."""
-        from dermis.apps.export.targets.web.build import MOVING, SIZES, Asked, built
+        from dermis.apps.export.targets.web.build import MOVING, SIZES, PageRequest, page_content
         from dermis.apps.export.targets.web.dials import dials_of
-        from dermis.apps.export.targets.web.maps import smaller
+        from dermis.apps.export.targets.web.maps import with_smaller_maps
         from dermis.apps.export.targets.web.page import web_page
         from dermis.scene.settings import Settings
 
@@ -70,9 +70,9 @@ class Web(Target):
             refuse(
                 "subject", "a head, which the page renders", f"the skin {subject.name} came", "Name a head"
             )
-        scene = replace(scene, head=smaller(scene.head, min(self.side, _MAP)))
+        scene = replace(scene, head=with_smaller_maps(scene.head, min(self.side, _MAP)))
         dials = dials_of(scene)
-        made = built(Asked(scene, dials, Settings(atlas=_ATLAS), SIZES, self.adapter, MOVING))
+        made = page_content(PageRequest(scene, dials, Settings(atlas=_ATLAS), SIZES, self.adapter, MOVING))
         place.write_text(web_page(made, dials, subject.name, self.wrong), encoding="utf-8")
         return [place]
 

@@ -1,0 +1,220 @@
+"""Description of captured frames as the player reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dermis.apps.export.targets.web.packing import Packer
+from dermis.frame.features.post.picture import Picture
+from dermis.gpu.capture import CapturedFrame, CapturedPass, FrameCapture
+
+Json = dict[str, Any]
+_TABLES = "triangle_table", "triangle_buffer"
+
+
+@dataclass(frozen=True)
+class NamedFrame:
+    """A captured frame with its name and picture.
+
+    picture : what it fills
+    fewer : of a frame that is drawn while hands move, how many coarse hairs became one; else 0
+    """
+
+    name: str
+    take: CapturedFrame
+    picture: Picture
+    size: tuple[int, int]
+    fewer: int = 0
+
+
+class MapOfPictures(NamedTuple):
+    """A map whose first mips come as pictures.
+
+    halving : passes that fill the other mips; None where these come as texels
+    """
+
+    role: str
+    mips: int
+    halving: CapturedFrame | None
+
+
+Mapped = dict[int, MapOfPictures]
+Stepped = dict[int, tuple[float, ...]]
+"""Buffers of floats that are multiples of steps."""
+
+
+def description(
+    tape: FrameCapture, frames: list[NamedFrame], mapped: Mapped, steps: Stepped, packer: Packer
+) -> Json:
+    """Return the description of frames; the bytes that it names by number are in the packer.
+
+    Resources of zeros, which new ones are, have no content.
+    """
+    pictures = [[tape.resource(one.picture.bytes), tape.resource(one.picture.exposed)] for one in frames]
+    contents, tables = {}, set(bound_as(tape, [one.take for one in frames], _TABLES))
+    for number in read_before_written(tape, [one.take for one in frames]):
+        if number in steps:
+            floats = tape.content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
+            contents[number] = [packer.add_floats(floats, steps[number])]
+            continue
+        _, pictured, halving = mapped.get(number, MapOfPictures("", 0, None))
+        mips = [] if halving else _mips(tape, number)[pictured:]
+        if any(one.any() for one in mips):
+            add = packer.add if number not in tables else _in_parts(packer)
+            contents[number] = [-1] * pictured + [add(one) for one in mips]
+    return {
+        "shaders": tape.shaders,
+        "programs": [_program(one) for one in tape.programs],
+        "resources": [_camel(one) for one in tape.resources],
+        "structs": {name: _struct(dtype) for name, dtype in tape.structs.items()},
+        "contents": contents,
+        "frames": [_frame(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
+        "halved": {
+            number: [_pass(each, packer) for each in one.halving.passes]
+            for number, one in mapped.items()
+            if one.halving
+        },
+    }
+
+
+def _in_parts(packer: Packer) -> Callable[[Any], int]:
+    """Return a function that packs each of three columns, one below the other, its own way."""
+    return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
+
+
+def _mips(tape: FrameCapture, number: int) -> list[Any]:
+    """Return a buffer's bytes, or a texture's mip by mip, each with all its layers."""
+    parts, layers = tape.content(number), tape.resources[number].get("size")
+    count = layers[2] if isinstance(layers, list) else 1
+    return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
+
+
+def _frame(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
+    records = [
+        (struct, packer.add(np.frombuffer(record.tobytes(), np.uint8))) for struct, record in one.take.records
+    ]
+    return {
+        "name": one.name,
+        "size": one.size,
+        "moving": one.fewer > 0,
+        "picture": picture[0],
+        "linear": picture[1],
+        "views": {stage: _views(one.take, stage) for stage in ("visibility", "shadows")},
+        "passes": [_pass(each, packer) for each in one.take.passes],
+        "records": records,
+    }
+
+
+def _views(take: CapturedFrame, stage: str) -> int:
+    """Return the record by which a stage's passes see the head, -1 for none."""
+    views = [k for k, (struct, _) in enumerate(take.records) if struct == "Views"]
+    records = (-1 - k for one in take.passes if one.stage == stage for k in one.bound if k < 0)
+    return next((k for k in records if k in views), -1)
+
+
+def _pass(one: CapturedPass, packer: Packer) -> Json:
+    written = None if one.written is None else (one.written[0], packer.add(one.written[1]))
+    return {
+        "stage": one.stage,
+        "program": one.program,
+        "bound": one.bound,
+        "groups": one.groups,
+        "completes": one.completes,
+        "raster": one.raster,
+        "written": written,
+        "unit": one.unit,
+    }
+
+
+def _program(one: Json) -> Json:
+    return {**one, "bindings": [(index, name, _camel(entry)) for index, name, entry in one["bindings"]]}
+
+
+def _struct(dtype: np.dtype[Any]) -> Json:
+    """Return its size, and of each member the offset and the number of floats [4 bytes]."""
+    members = {name: _member(kind, offset) for name, (kind, offset, *_) in (dtype.fields or {}).items()}
+    return {"size": dtype.itemsize, "members": members}
+
+
+def _member(kind: np.dtype[Any], offset: int) -> Any:
+    base = kind.base
+    if base.fields is None:
+        return [offset // 4, kind.itemsize // 4]
+    return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct(base)["members"]}
+
+
+def _camel(value: Any) -> Any:
+    """Return a description with names of members as WebGPU spells them."""
+    if isinstance(value, dict):
+        return {_spelt(name): _camel(one) for name, one in value.items()}
+    return value
+
+
+def _spelt(name: str) -> str:
+    first, *others = name.split("_")
+    return first + "".join(word.title() for word in others)
+
+
+def read_before_written(tape: FrameCapture, takes: list[CapturedFrame]) -> list[int]:
+    """Return the numbers of textures and buffers that some pass reads before any writes it, in order."""
+    found: set[int] = set()
+    for take in takes:
+        written: set[int] = set()
+        for one in take.passes:
+            found |= {whole(tape, k) for k in read_by(tape, one) if not _is_written(tape, k, written)}
+            written |= set(written_by(tape, one))
+    return sorted(found)
+
+
+def bound_as(tape: FrameCapture, takes: list[CapturedFrame], names: tuple[str, ...]) -> dict[int, str]:
+    """Return the resources that are bound by some names."""
+    found: dict[int, str] = {}
+    for take in takes:
+        for one in (each for each in take.passes if each.program is not None):
+            known = [name for _, name, _ in tape.programs[one.program or 0]["bindings"]]
+            found |= {k: name for k, name in zip(one.bound, known, strict=True) if name in names and k >= 0}
+    return found
+
+
+def whole(tape: FrameCapture, number: int) -> int:
+    """Return the texture of a view; other resources themselves."""
+    return int(tape.resources[number].get("of", number))
+
+
+def read_by(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
+    """Yield the resources that a pass may read."""
+    yield from (k for k, entry in _entries(tape, one) if _reads(entry))
+    if one.raster and one.raster["indices"] >= 0:
+        yield int(one.raster["indices"])
+
+
+def written_by(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
+    """Yield the resources that a pass writes."""
+    if one.written:
+        yield one.written[0]
+    yield from (k for k, entry in _entries(tape, one) if _writes(entry))
+    if one.raster:
+        yield from (int(one.raster[name]) for name in ("depth", "target") if one.raster[name] >= 0)
+
+
+def _entries(tape: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, dict[str, Any]]]:
+    if one.program is not None:
+        bindings = tape.programs[one.program]["bindings"]
+        yield from ((k, entry) for k, (_, _, entry) in zip(one.bound, bindings, strict=True) if k >= 0)
+
+
+def _reads(entry: dict[str, Any]) -> bool:
+    return "sampler" not in entry and entry.get("storage_texture", {}).get("access") != "write-only"
+
+
+def _writes(entry: dict[str, Any]) -> bool:
+    return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}
+
+
+def _is_written(tape: FrameCapture, number: int, written: set[int]) -> bool:
+    """Return whether a pass has written a resource, or any part of it."""
+    return any(whole(tape, k) == whole(tape, number) for k in written)
