@@ -18,7 +18,7 @@ from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import assess, export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.unity import Unity, asset_text
+from dermis.apps.export.targets.unity.target import Unity, asset_text
 from dermis.base.errors import DermisError
 
 LOBES = ["unity", "unreal", "renderman"]

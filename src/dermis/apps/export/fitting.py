@@ -49,6 +49,20 @@ def fit_d(curve: Curve) -> Floats:
     )
 
 
+def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Curve:
+    """Return the curve of a sum of Gaussians.
+
+    variance_mm2, weight : (n,) [mm^2], (n, 3) [-]
+    """
+    share = weight / weight.sum(axis=0)
+
+    def within(radius_mm: Floats) -> Floats:
+        with np.errstate(under="ignore"):
+            return np.asarray(1.0 - np.exp(-0.5 * radius_mm[:, None] ** 2 / variance_mm2) @ share)
+
+    return Curve.of(within, energy)
+
+
 def resized(unit: Curve, size_mm: ArrayLike) -> Curve:
     """Return a curve whose lengths are in a unit, with a unit (3,) for each channel."""
     size = np.maximum(np.asarray(size_mm, np.float64), _THINNEST_MM)

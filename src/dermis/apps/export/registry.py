@@ -23,7 +23,7 @@ TARGETS: Registry[Target] = Registry(
         "pbrt": f"{_HOME}.pbrt.target:TARGET",
         "renderman": f"{_HOME}.renderman:TARGET",
         "three": f"{_HOME}.three.target:TARGET",
-        "unity": f"{_HOME}.unity:TARGET",
+        "unity": f"{_HOME}.unity.target:TARGET",
         "unreal": f"{_HOME}.unreal.target:TARGET",
         "usd": f"{_HOME}.usd.target:TARGET",
         "web": f"{_HOME}.web.target:TARGET",

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from dermis.apps.export.fitting import gaussian_curve
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Row, Rows, Target, value_of, with_values, write_files
 from dermis.apps.export.targets.maps.files import SIDES, NormalY, baked_maps, check_side, map_files
 from dermis.base.errors import refuse
 from dermis.frame.features.diffusion.profiles import SkinProfiles
 from dermis.optics.curve import Curve
-from dermis.optics.media import Floats
 from dermis.scene.settings import Settings
 
 _SPREAD = "scattered"
@@ -51,14 +51,7 @@ class MapFolder(Target):
         if not value_of(rows, _SPREAD) or subject.scene is None:
             return Curve.of(lambda r: np.repeat(np.where(r > 0.0, 1.0, 0.0)[:, None], 3, axis=1), energy)
         profile = SkinProfiles().of(subject.scene.skin)
-        share = profile.weight / profile.weight.sum(axis=0)
-
-        def within(radius_mm: Floats) -> Floats:
-            with np.errstate(under="ignore"):
-                left = np.exp(-0.5 * radius_mm[:, None] ** 2 / profile.variance_mm2) @ share
-            return np.asarray(1.0 - left)
-
-        return Curve.of(within, energy)
+        return gaussian_curve(profile.variance_mm2, profile.weight, energy)
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """Write all maps of the scene."""

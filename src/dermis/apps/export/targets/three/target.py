@@ -12,28 +12,9 @@ from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Row, Rows, with_values
 from dermis.apps.export.targets.pages.html import hash_of
 from dermis.apps.export.targets.pages.library_page import LibraryPage, Script, module_url, surface_rows
+from dermis.base.tables import read_rows
 from dermis.optics.curve import Curve
 
-_HASHES = {
-    "three": ("build/three.module.js", "T/E3B9AvPtLn5PKD7aTSFqizQcA4kHDfU0lub7u0fvM4w9BMGcSb3yI7r5LqMAMn"),
-    "three/core": ("build/three.core.js", "drH6BueSlcvoXCwAqWkNJvXwu2Ax3mnGOmZnIXaomedIw+uXSP9Bf/XIUINgLUW+"),
-    "three/orbit": (
-        "examples/jsm/controls/OrbitControls.js",
-        "ZVBN/wmVxgX0mUGjFJXakzzdZrAF4g4aHfKyusbjoF0WsVXSoGpeM/qRaVnXtaFo",
-    ),
-    "three/gltf": (
-        "examples/jsm/loaders/GLTFLoader.js",
-        "WH6tljjFikpYMGa2JMqlbJlM1lEMkd/Y6Sqnuog1rX87eShphltUQI5NKByEo4CP",
-    ),
-    "three/buffers": (
-        "examples/jsm/utils/BufferGeometryUtils.js",
-        "NArny884Zj3HwjLRjeY1kbfLZnAHIElzho3N71FW0eMGxxBT+QuLEiSnSgpSaBXh",
-    ),
-    "three/skeletons": (
-        "examples/jsm/utils/SkeletonUtils.js",
-        "Pozn8j5+YFr3ak8Pm90ayqDrGYn/DV7vVs/YIIqzJhzeJT0LQksoS1fZQ5lfsYlw",
-    ),
-}
 _IMPORTS = {
     "./three.core.js": "three/core",
     "../utils/BufferGeometryUtils.js": "three/buffers",
@@ -56,7 +37,7 @@ class Three(LibraryPage):
         "skin and is left at 0. Lights are parallel here."
     )
     scripts: ClassVar = {
-        "0.187.0": tuple(Script("three", "0.187.0", *file, name) for name, file in _HASHES.items())
+        "0.187.0": tuple(Script("three", "0.187.0", **row) for row in read_rows(__package__, "scripts"))
     }
 
     def parameters(self, subject: Subject, version: str) -> Rows:

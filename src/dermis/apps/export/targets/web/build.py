@@ -116,7 +116,7 @@ def _form(made: PageContent, renderer: Renderer, request: PageRequest, form: str
     base: Inputs | None = None
     for settings, fewer in request.frames(form):
         inputs = renderer.prepare(request.scene, settings)
-        base, picture = base or inputs, inputs.resources.picture
+        base, picture = base or inputs, inputs.resources.post.picture
         take = sparser(taken(tape, inputs), fewer)
         frames.append(NamedFrame(settings.technique, take, picture, settings.size, fewer))
         changed.append(_dial_changes(made.packer, renderer, request, settings, inputs, frames[-1]))

@@ -13,6 +13,7 @@ from dermis.apps.export.targets.web.packing import Packer
 from dermis.base.errors import refuse
 from dermis.frame.inputs import Inputs
 from dermis.gpu.capture import CapturedFrame, CapturedPass
+from dermis.gpu.types import Record
 from dermis.human.expressions import expression
 from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.pose import Pose
@@ -44,7 +45,7 @@ class Dial:
 
 
 def node_inputs(dial: Dial, prepare: Callable[[Scene], Inputs], base: Inputs) -> Iterator[Inputs | None]:
-    """What a frame reads at each node, None at rest."""
+    """Yield what a frame reads at each node, None at rest."""
     for scene in dial.scenes:
         if scene is None:
             yield None
@@ -56,7 +57,7 @@ def node_inputs(dial: Dial, prepare: Callable[[Scene], Inputs], base: Inputs) ->
 
 
 def changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
-    """What a node changes: of records and of what the host writes, first word and differences as floats.
+    """Return the changes of a node in records and buffers: first word, and differences as floats.
 
     Whole numbers stay those of the base, as do the pairs of places that light passes between.
 
@@ -72,15 +73,15 @@ def changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
     return {"records": _parts(records, packer), "written": _parts(written, packer)}
 
 
-def _floats(record: Any) -> Floats:
-    """A record as floats, 0 where it has whole numbers."""
+def _floats(record: Record) -> Floats:
+    """Return a record as floats, 0 where it has whole numbers."""
     found = np.frombuffer(record.tobytes(), "<f4").copy()
     found[~_is_float(record.dtype)] = 0.0
     return found
 
 
 def _is_float(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
-    """Which words of a record are floats."""
+    """Return which words of a record are floats."""
     found = np.zeros(dtype.itemsize // 4, np.bool_)
     for kind, offset, *_ in (dtype.fields or {}).values():
         words = slice(offset // 4, (offset + kind.itemsize) // 4)
@@ -110,7 +111,7 @@ def _parts(pairs: list[tuple[int, tuple[Floats, Floats]]], packer: Packer) -> li
 
 
 def dials_of(scene: Scene) -> tuple[Dial, ...]:
-    """The dials of a scene: expressions where the head has them, pigments where skin is painted."""
+    """Return a scene's dials: expressions where the head has them, pigments where skin is painted."""
     return (*_pigments(scene), _roughness(scene), *_expressions(scene))
 
 
@@ -132,7 +133,7 @@ def _expressions(scene: Scene) -> list[Dial]:
 
 
 def _pigments(scene: Scene) -> list[Dial]:
-    """Melanin and blood: how far light spreads, and the colour that is painted with them."""
+    """Return the dials of melanin and blood, which change the spread of light and the painted colour."""
     pigments, maps = scene.skin.pigments, scene.head.maps
     if pigments is None or not isinstance(maps, PaintedMaps) or scene.skin.albedo != "map":
         return []

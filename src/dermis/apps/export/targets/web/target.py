@@ -2,32 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
+from dermis.apps.export.fitting import gaussian_curve
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, numbers_of
+from dermis.apps.export.target import Row, Rows, Target, floats, numbers_of
 from dermis.base.errors import refuse
 from dermis.optics.curve import Curve
-from dermis.optics.media import Floats
+from dermis.optics.gaussians import GaussianSum
 
 _ATLAS = 512
 _MAP = 1024  # texels a side, most
-_TITLE = "WebGPU"
 
 
-@dataclass(frozen=True)
 class Web(Target):
-    """A page that needs no library, no server and no network."""
+    """Page that needs no library, no server and no network."""
 
-    name: ClassVar[str] = "web"
-    title: ClassVar[str] = _TITLE
-    versions: ClassVar[tuple[str, ...]] = ("1",)
-    suffixes: ClassVar[tuple[str, ...]] = (".html",)
-    wrong: ClassVar[str] = (
+    name = "web"
+    title = "WebGPU"
+    versions = ("1",)
+    suffixes = (".html",)
+    wrong = (
         "The page draws square pictures with an atlas of 512 texels; maps have at most 1024 texels a side, "
         "8 bits a channel, and lose what WebP loses. Expressions move the skin, but their folds and flushes "
         "are not painted; between the nodes of a dial, numbers are interpolated. Hairs keep the thickness of "
@@ -35,30 +33,28 @@ class Web(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Rows:
-        """The Gaussians that light is spread by."""
+        """Return the Gaussians that spread light."""
         profile = self._profile(subject)
         return (
             Row("atlas", _ATLAS, "texel", "side of the atlas that light spreads on"),
-            Row("variance", tuple(float(x) for x in profile.variance_mm2), "mm2", "of each Gaussian"),
+            Row("variance", floats(profile.variance_mm2), "mm2", "of each Gaussian"),
             *(
-                Row(
-                    f"weight.{colour}", tuple(float(x) for x in profile.weight[:, k]), "-", "of each Gaussian"
-                )
+                Row(f"weight.{colour}", floats(profile.weight[:, k]), "-", "of each Gaussian")
                 for k, colour in enumerate(("red", "green", "blue"))
             ),
         )
 
     def naive(self, subject: Subject, version: str) -> Rows:
-        """The same: there is nothing to type."""
+        """Return the same: there is nothing to type."""
         return self.parameters(subject, version)
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
-        """The sum of Gaussians."""
-        _, (_, *variance), *weight = [(0.0, *numbers_of(rows, row.name)) for row in rows]
-        return _curve(np.array(variance), np.array([one[1:] for one in weight]).T, subject.curve.energy)
+        """Return the curve of the sum of Gaussians."""
+        _, variance, *weight = (np.array(numbers_of(rows, row.name)) for row in rows)
+        return gaussian_curve(variance, np.stack(weight, axis=1), subject.curve.energy)
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
-        """The page."""
+        """Write the page."""
         from dermis.apps.export.targets.web.build import MOVING, SIZES, PageRequest, page_content
         from dermis.apps.export.targets.web.dials import dials_of
         from dermis.apps.export.targets.web.maps import with_smaller_maps
@@ -67,9 +63,8 @@ class Web(Target):
 
         scene = subject.scene
         if scene is None:
-            refuse(
-                "subject", "a head, which the page renders", f"the skin {subject.name} came", "Name a head"
-            )
+            came = f"the skin {subject.name} came"
+            refuse("subject", "a head, which the page renders", came, "Name a head")
         scene = replace(scene, head=with_smaller_maps(scene.head, min(self.side, _MAP)))
         dials = dials_of(scene)
         made = page_content(PageRequest(scene, dials, Settings(atlas=_ATLAS), SIZES, self.adapter, MOVING))
@@ -77,22 +72,12 @@ class Web(Target):
         return [place]
 
     @staticmethod
-    def _profile(subject: Subject):  # type: ignore[no-untyped-def]
+    def _profile(subject: Subject) -> GaussianSum:
         from dermis.frame.features.diffusion.profiles import SkinProfiles
         from dermis.optics.profiles import load_profile
 
         scene = subject.scene
         return SkinProfiles().of(scene.skin) if scene else load_profile(subject.name)
-
-
-def _curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Curve:
-    """What leaves within each radius of a sum of Gaussians."""
-    total = weight.sum(axis=0)
-
-    def within(r: Floats) -> Floats:
-        return np.asarray(-np.expm1(-0.5 * r[:, None] ** 2 / variance_mm2) @ weight / total)
-
-    return Curve.of(within, energy)
 
 
 TARGET = Web()

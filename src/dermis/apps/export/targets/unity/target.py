@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from string import Template
 
 import numpy as np
 
@@ -41,7 +42,7 @@ class Unity(Target):
     not_run = True
 
     def parameters(self, subject: Subject, version: str) -> Rows:
-        """Colour and multiplier of the fitted lobes."""
+        """Return the colour and multiplier of the fitted lobes."""
         d = fit_d(subject.curve)
         return (
             *_distances(d, version),
@@ -52,18 +53,18 @@ class Unity(Target):
         )
 
     def naive(self, subject: Subject, version: str) -> Rows:
-        """The skin's colour as the scattering colour, as the inspector advises, and a multiplier of 1."""
+        """Return the skin's colour as the scattering colour, as the inspector advises, and multiplier 1."""
         typed: dict[str, Value] = {_COLOUR: floats(subject.colour()), _MULTIPLIER: _TYPED_MM}
         return with_values(self.parameters(subject, version), typed)
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
-        """The lobe that the engine computes from its parameters."""
+        """Return the lobe that the engine computes from its parameters."""
         colour, scale = np.array(numbers_of(rows, _COLOUR)), numbers_of(rows, _SCALE)[0]
         multiplier = 1.0 if version == _BEFORE_14 else numbers_of(rows, _MULTIPLIER)[0]
         return lobe(colour * multiplier / scale, subject.curve.energy)
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
-        """The asset, and beside it the maps."""
+        """Write the asset, and beside it the maps."""
         asset = self.file_in(place, subject)
         asset.write_text(asset_text(asset.stem, rows, version), encoding="utf-8")
         maps = ((f"{asset.stem}_{role}.png", data) for role, data in subject.map_pictures().items())
@@ -71,51 +72,34 @@ class Unity(Target):
 
 
 def _distances(d_mm: Floats, version: str) -> Rows:
-    """The lobes' widths, in the one colour of before HDRP 14 or in colour and multiplier."""
+    """Return the lobes' widths, as one colour before HDRP 14 and as colour and multiplier since."""
     if version == _BEFORE_14:
         return (Row(_COLOUR, floats(d_mm), "mm", "d, plain numbers in an HDR colour, no gamma"),)
-    told = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
+    typed = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
     return (
-        Row(_COLOUR, told.scattering_colour, "-", "d by its largest channel, plain numbers, no gamma"),
-        Row(_MULTIPLIER, told.multiplier_mm, "mm", "d of the widest channel"),
+        Row(_COLOUR, typed.scattering_colour, "-", "d by its largest channel, plain numbers, no gamma"),
+        Row(_MULTIPLIER, typed.multiplier_mm, "mm", "d of the widest channel"),
     )
 
 
 def asset_text(name: str, rows: Rows, version: str) -> str:
-    """The asset as the editor itself writes one; the editor gives it a hash when it is first opened."""
+    """Return the asset as the editor writes one; the editor gives it a hash when it is first opened."""
     known = {row.name: row.value for row in rows}
     colour, tint = (_rgba(numbers_of(rows, key)) for key in (_COLOUR, _TINT))
     low, high = numbers_of(rows, _DEPTHS)
     multiplier = f"    {_MULTIPLIER}: {known[_MULTIPLIER]:.6g}\n" if _MULTIPLIER in known else ""
-    return f"""\
-%YAML 1.1
-%TAG !u! tag:unity3d.com,2011:
---- !u!114 &11400000
-MonoBehaviour:
-  m_ObjectHideFlags: 0
-  m_CorrespondingSourceObject: {{fileID: 0}}
-  m_PrefabInstance: {{fileID: 0}}
-  m_PrefabAsset: {{fileID: 0}}
-  m_GameObject: {{fileID: 0}}
-  m_Enabled: 1
-  m_EditorHideFlags: 0
-  m_Script: {{fileID: 11500000, guid: b2686e09ec7aef44bad2843e4416f057, type: 3}}
-  m_Name: {json.dumps(name)}
-  m_EditorClassIdentifier:
-  profile:
-    scatteringDistance: {colour}
-{multiplier}    transmissionTint: {tint}
-    texturingMode: 0
-    smoothnessMultipliers: {{x: 1, y: 1}}
-    lobeMix: 0.5
-    diffuseShadingPower: 1
-    transmissionMode: 0
-    thicknessRemap: {{x: {low:.6g}, y: {high:.6g}}}
-    worldScale: {known[_SCALE]:.6g}
-    ior: {known[_IOR]:.6g}
-    hash: 0
-  m_Version: {_FORMS[version]}
-"""
+    template = Template(Path(__file__).with_name("profile.asset").read_text("utf-8"))
+    return template.substitute(
+        name=json.dumps(name),
+        colour=colour,
+        multiplier=multiplier,
+        tint=tint,
+        low=f"{low:.6g}",
+        high=f"{high:.6g}",
+        scale=f"{known[_SCALE]:.6g}",
+        ior=f"{known[_IOR]:.6g}",
+        form=_FORMS[version],
+    )
 
 
 def _rgba(colour: tuple[float, ...]) -> str:
