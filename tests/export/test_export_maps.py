@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import subject_of
-from dermis.apps.export.targets.maps.files import check_side, resampled, with_green
+from dermis.apps.export.targets.maps import check_side, resampled, with_green
 from dermis.base.errors import DermisError
 from dermis.frame.baking import Baked, bake
 from dermis.frame.renderer import Renderer

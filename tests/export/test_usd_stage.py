@@ -16,7 +16,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 
 from dermis.apps.export.targets.openpbr.document import library
 from dermis.apps.export.targets.openpbr.materials import Look, skin_look
-from dermis.apps.export.targets.usd.motion import valid_names
+from dermis.apps.export.targets.usd.geometry import valid_names
 from dermis.apps.export.targets.usd.stage import stage_of
 from dermis.human.person import Human
 from dermis.mesh.head import Head

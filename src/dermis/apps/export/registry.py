@@ -17,7 +17,7 @@ TARGETS: Registry[Target] = Registry(
         "babylon": f"{_HOME}.babylon.target:TARGET",
         "blender": f"{_HOME}.blender.target:TARGET",
         "gltf": f"{_HOME}.gltf.target:TARGET",
-        "maps": f"{_HOME}.maps.target:TARGET",
+        "maps": f"{_HOME}.maps:TARGET",
         "mitsuba": f"{_HOME}.mitsuba.target:TARGET",
         "openpbr": f"{_HOME}.openpbr.target:TARGET",
         "pbrt": f"{_HOME}.pbrt.target:TARGET",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,28 +11,20 @@ from numpy.typing import NDArray
 from dermis.apps.export.scene_parts import ply
 from dermis.apps.export.targets.mitsuba.xml import Words
 from dermis.apps.truths.mitsuba_scene import gap_of
-from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
+from dermis.apps.truths.mitsuba_solid import inwards, skin_solid
 from dermis.frame.baking import baked_colours
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 
-
-class Surfaces(NamedTuple):
-    """Files of triangles by the names of their shapes.
-
-    skin, caps : with normals and uv, and what shuts its openings
-    upper, upper_caps : the same a little outside, for a matched surface, which is there twice
-    """
-
-    skin: bytes
-    caps: bytes | None
-    upper: bytes
-    upper_caps: bytes | None
+_FINER = 4  # times, along a side
 
 
-def surfaces(words: Words, head: Head) -> Surfaces:
-    """Return the surfaces of the head about its centre [mm].
+def surfaces(words: Words, head: Head) -> dict[str, bytes]:
+    """Return PLY files of the skin about the head's centre [mm], by the names of their shapes.
+
+    "skin" has normals and uv, "caps" shut its openings; "upper" and "upper_caps" are a little outside,
+    for a matched surface, which is there twice.
 
     Raises DermisError when the skin encloses no volume.
     """
@@ -46,27 +37,13 @@ def surfaces(words: Words, head: Head) -> Surfaces:
     of_solid = np.unique(mesh.point[used], return_inverse=True)[1]  # as the solid's points are numbered
     given = mesh.normals[used], mesh.uv[used]
     count = int(skin.sum())
-    sheets = [ply(corners.reshape(-1, 3), one.positions[of_solid], *given) for one in (solid, outer)]
-    caps = [_caps(one, count) for one in (solid, outer)]
-    return Surfaces(sheets[0], caps[0], sheets[1], caps[1])
-
-
-def files_of(made: Surfaces) -> Iterator[tuple[str, bytes]]:
-    """Return names and contents."""
-    for name, content in made._asdict().items():
-        if content is not None:
-            yield f"meshes/{name}.ply", content
-
-
-def _caps(solid: Solid, first: int) -> bytes | None:
-    """Return a file of the triangles from one on, None for none."""
-    if len(solid.triangles) == first:
-        return None
-    used, corners = np.unique(solid.triangles[first:], return_inverse=True)
-    return ply(corners.reshape(-1, 3), solid.positions[used])
-
-
-_FINER = 4  # times, along a side
+    files = {}
+    for name, one, caps in (("skin", solid, "caps"), ("upper", outer, "upper_caps")):
+        files[name] = ply(corners.reshape(-1, 3), one.positions[of_solid], *given)
+        if len(one.triangles) > count:
+            shut, ends = np.unique(one.triangles[count:], return_inverse=True)
+            files[caps] = ply(ends.reshape(-1, 3), one.positions[shut])
+    return files
 
 
 class Divided(NamedTuple):

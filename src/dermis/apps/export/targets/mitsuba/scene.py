@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.scene_parts import known_lights
-from dermis.apps.export.targets.maps.files import exr
-from dermis.apps.export.targets.mitsuba.meshes import Surfaces, files_of, surfaces
+from dermis.apps.export.targets.maps import exr
+from dermis.apps.export.targets.mitsuba.meshes import surfaces
 from dermis.apps.export.targets.mitsuba.xml import (
     Given,
     Ref,
@@ -80,7 +80,7 @@ def scene_files(
     yield "scene.xml", document(_frame(words, scene, looks, boundary, (*size, samples)))
     for each in BOUNDARIES:
         yield f"boundary_{each}.xml", document(_skin(words, each, looks, made))
-    yield from files_of(made)
+    yield from ((f"meshes/{name}.ply", content) for name, content in made.items())
     for index, content in looks.opaque.items():
         yield _opaque_file(index), content
     if looks.passing is not None and looks.held_back is not None:
@@ -140,12 +140,8 @@ def _frame(
 
     picture : width, height [pixel], samples of each
     """
-    defaults = {
-        "boundary": boundary,
-        **dict(zip(("width", "height", "samples"), map(str, picture), strict=True)),
-    }
-    size = picture[:2]
-    sensor = sensor_of(words, scene.camera, size)
+    sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
+    sensor = sensor_of(words, scene.camera, picture[:2])
     sensor["film"] |= {"width": Given("integer", "width"), "height": Given("integer", "height")}
     sensor["sampler"]["sample_count"] = Given("integer", "samples")
     # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
@@ -161,10 +157,10 @@ def _frame(
         parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": plain})
     described = [element(part, "", words) for part in parts]
     skin = include("boundary_$boundary.xml")
-    return [*(default(name, value) for name, value in defaults.items()), *described, skin]
+    return [*(default(*one) for one in (("boundary", boundary), *sizes)), *described, skin]
 
 
-def _skin(words: Words, boundary: Boundary, looks: Looks, made: Surfaces) -> list[ET.Element]:
+def _skin(words: Words, boundary: Boundary, looks: Looks, made: Mapping[str, bytes]) -> list[ET.Element]:
     """Return the skin under a surface."""
     roughness = looks.roughness if isinstance(looks.roughness, float) else _texture("roughness")
     passing = None if looks.passing is None else _texture("passing")
@@ -173,16 +169,11 @@ def _skin(words: Words, boundary: Boundary, looks: Looks, made: Surfaces) -> lis
     if boundary == "matched":
         # Rays inwards meet the upper one and step over the lower one, rays outwards the other way round.
         parts.append(_below(passing is not None))
-        shapes = {
-            "upper": "skin_surface",
-            "upper_caps": "skin_surface",
-            "skin": "skin_below",
-            "caps": "skin_below",
-        }
-    for name, surface in shapes.items():
-        if getattr(made, name) is not None:
-            shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": Ref(surface)}
-            parts.append({**shape, "interior": Ref("skin_medium")})
+        shapes = dict.fromkeys(("upper", "upper_caps"), "skin_surface")
+        shapes |= dict.fromkeys(("skin", "caps"), "skin_below")
+    for name in (one for one in shapes if one in made):
+        shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": Ref(shapes[name])}
+        parts.append({**shape, "interior": Ref("skin_medium")})
     return [element(part, "", words) for part in parts]
 
 

@@ -1,20 +1,26 @@
-"""A head's geometry in a USD stage: one mesh with a subset for each material, and hairs as curves; metres."""
+"""Geometry of a head in a USD stage in metres, and what moves it.
+
+One mesh with a subset for each material, hairs as curves, blend shapes and a skeleton (UsdSkel).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Usd, UsdGeom, Vt
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
-from dermis.formats.moved_points import MovedPoints
+from dermis.formats.moved_points import MovedPoints, influences
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.skeleton import Skeleton
 from dermis.mesh.strands import Strands, points_of
 
 Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
 METRES = 1e-3
 """Of a millimetre."""
@@ -34,7 +40,7 @@ class Faces(NamedTuple):
 
 
 def faces_of(mesh: Mesh) -> Faces:
-    """The polygons of a mesh whose quads are in halves."""
+    """Return the polygons of a mesh whose quads are in halves."""
     halves, triangles = mesh.quads, mesh.triangles
     alone = np.delete(np.arange(len(triangles)), halves.ravel())
     quads = np.column_stack([triangles[halves[:, 0]], triangles[halves[:, 1]][:, 1]])
@@ -46,12 +52,12 @@ def faces_of(mesh: Mesh) -> Faces:
 
 
 def corner_of_point(mesh: Mesh) -> NDArray[np.intp]:
-    """(p,) a vertex of each point."""
+    """Return a vertex of each point (p,)."""
     return np.unique(mesh.point, return_index=True)[1]
 
 
 def add_mesh(stage: Usd.Stage, path: Sdf.Path, head: Head, moved: MovedPoints) -> dict[int, UsdGeom.Subset]:
-    """Write the mesh at rest; the subset's prim of each material that is used.
+    """Write the mesh at rest; return the subset of each material that is used.
 
     moved : the head's vertices with all morph targets at 0
     """
@@ -78,7 +84,7 @@ def add_mesh(stage: Usd.Stage, path: Sdf.Path, head: Head, moved: MovedPoints) -
 
 
 def texture_coordinates(head: Head) -> Floats:
-    """(v, 2) of the vertices, v downwards: eyes of true shape by the layout of their picture."""
+    """Return texture coordinates (v, 2) with v downwards, those of eyes by the layout of their picture."""
     mesh, found = head.mesh, head.mesh.uv.copy()
     if head.eyes is not None:
         frames = head.eyes.frames(head.control, head.control.rest)
@@ -89,7 +95,7 @@ def texture_coordinates(head: Head) -> Floats:
 
 
 def _add_uv(made: UsdGeom.Mesh, uv: Floats, faces: Faces) -> None:
-    """Texture coordinates (v, 2) with v upwards, one for each vertex of ours."""
+    """Write texture coordinates (v, 2) with v upwards, one for each vertex of ours."""
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
     primvar = UsdGeom.PrimvarsAPI(made).CreatePrimvar(
         "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
@@ -115,5 +121,99 @@ def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) ->
 
 
 def metres(places_mm: NDArray[np.floating]) -> Floats:
-    """Of places in mm."""
+    """Return places in metres."""
     return np.ascontiguousarray(METRES * places_mm.astype(np.float64), np.float32)
+
+
+def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, moved: MovedPoints) -> None:
+    """Write blend shapes and bones beside a mesh, and how both rest.
+
+    root : path of the UsdSkelRoot
+    mesh : the prim that they move
+    """
+    path = root.AppendChild("skeleton")
+    made = UsdSkel.Skeleton.Define(stage, path)
+    skeleton = moved.rig.skeleton
+    joints = _add_joints(made, skeleton)
+    rest = UsdSkel.Animation.Define(stage, path.AppendChild("rest"))
+    binding = UsdSkel.BindingAPI.Apply(mesh)
+    binding.CreateSkeletonRel().SetTargets([path])
+    UsdSkel.BindingAPI.Apply(made.GetPrim()).CreateAnimationSourceRel().SetTargets([rest.GetPath()])
+    _bind_joints(binding, moved)
+    rest.CreateJointsAttr(joints)
+    rest.SetTransforms(made.GetRestTransformsAttr().Get())
+    names = valid_names(moved.rig.targets.names)
+    if names:
+        _add_shapes(stage, mesh, moved, names)
+        binding.CreateBlendShapesAttr(names)
+        shapes = [mesh.GetPath().AppendChild(name) for name in names]
+        binding.CreateBlendShapeTargetsRel().SetTargets([Sdf.Path(str(shape)) for shape in shapes])
+        weights = moved.rig.targets.rest
+        rest.CreateBlendShapesAttr(names)
+        rest.CreateBlendShapeWeightsAttr([0.0] * len(names) if weights is None else weights.tolist())
+
+
+def valid_names(names: Sequence[str]) -> list[str]:
+    """Return names that a stage can have, each once: letters, digits and underscores."""
+    found: list[str] = []
+    for name in names:
+        plain = Tf.MakeValidIdentifier(name)
+        number = sum(one == plain or one.startswith(f"{plain}_again") for one in found)
+        found.append(f"{plain}_again{number}" if number else plain)
+    return found
+
+
+def _add_joints(made: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
+    """Write bones and return their paths; a head without bones has one, as blend shapes need a skeleton."""
+    joints, local, bound = ["root"], np.eye(4)[None], np.eye(4)[None]
+    if skeleton is not None:
+        joints = []
+        for name, parent in zip(valid_names(skeleton.names), skeleton.parent.tolist(), strict=True):
+            joints.append(f"{joints[parent]}/{name}" if parent >= 0 else name)
+        local, bound = _places(skeleton)
+    made.CreateJointsAttr(joints)
+    for attribute, matrices in (
+        (made.CreateRestTransformsAttr, local),
+        (made.CreateBindTransformsAttr, bound),
+    ):
+        attribute(Vt.Matrix4dArray([Gf.Matrix4d(matrix.T) for matrix in matrices]))
+    return joints
+
+
+def _places(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
+    """Return matrices (b, 4, 4) from bones to their parents at rest, and to the head when bound [m]."""
+    to_file = np.diag([METRES, METRES, METRES, 1.0]) @ skeleton.to_head
+    size = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
+    grown, shrunk = (np.diag([one, one, one, 1.0]) for one in (size, 1.0 / size))
+    above = np.where((skeleton.parent < 0)[:, None, None], to_file, grown)
+    bound = np.linalg.inv(grown @ skeleton.inverse_bind @ np.linalg.inv(to_file))
+    return np.asarray(above @ skeleton.local @ shrunk), np.asarray(bound)
+
+
+def _bind_joints(binding: UsdSkel.BindingAPI, moved: MovedPoints) -> None:
+    count = int(moved.head.mesh.point.max()) + 1
+    still = np.zeros((count, 1), np.int64), np.ones((count, 1))
+    bone, share = still if moved.rig.skeleton is None else influences(moved.rig, moved.finer)
+    bones = Vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
+    shares = Vt.FloatArray.FromNumpy(np.ascontiguousarray(share, np.float32).ravel())
+    binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(bones)
+    binding.CreateJointWeightsPrimvar(False, bone.shape[1]).Set(shares)
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
+
+
+def _add_shapes(stage: Usd.Stage, mesh: Usd.Prim, moved: MovedPoints, names: Sequence[str]) -> None:
+    one = corner_of_point(moved.head.mesh)
+    point = np.full(len(moved.head.mesh.positions), -1, np.int32)
+    point[one] = np.arange(len(one))
+    own_names = moved.rig.targets.names
+    for name, own_name, target in zip(names, own_names, moved.targets(), strict=True):
+        shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(name))
+        kept = point[target.vertex] >= 0
+        order = np.argsort(point[target.vertex][kept])
+        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(metres(target.delta_mm[kept][order])))
+        shape.CreateNormalOffsetsAttr(
+            Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(target.normal[kept][order]))
+        )
+        shape.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(point[target.vertex][kept][order]))
+        if name != own_name:
+            shape.GetPrim().SetDisplayName(own_name)

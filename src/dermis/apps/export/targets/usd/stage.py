@@ -11,8 +11,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdSkel
 
 from dermis.apps.export.targets.openpbr.materials import MAPS, Look, Value, hair_look
-from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh
-from dermis.apps.export.targets.usd.motion import add_motion, valid_names
+from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh, add_motion, valid_names
 from dermis.formats.moved_points import MovedPoints
 from dermis.mesh.head import Head
 
