@@ -55,10 +55,10 @@ def export_skin(
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     target = target if library is None else target.with_library(library)
     known, place = target.known_version(version), _checked_place(target, output)
-    told = {"model": model, "profile": profile, **head}
+    options = {"model": model, "profile": profile, **head}
     if not isinstance(subject, Subject):
-        subject = subject_of(subject, **told)
-    elif given := [name for name, value in told.items() if value is not None]:
+        subject = subject_of(subject, **options)
+    elif given := [name for name, value in options.items() if value is not None]:
         refuse(given[0], "a subject that is still to be made", "it came with one", "Leave it out")
     if target.needs_maps:
         subject = subject.painted(side, adapter)
@@ -126,10 +126,10 @@ def _move(part: Path, end: Path) -> None:
 
 
 def _write_report(report: Report, inside: Path) -> list[Path]:
-    """The page and the numbers, in the folder or beside the file."""
+    """Write the page and the numbers in the folder or beside the file; return their paths."""
     single = bool(inside.suffix)
     page = inside.with_name(f"{inside.name}.md") if single else inside / _PAGE
-    told = inside.with_name(f"{inside.name}.json") if single else inside / REPORT
+    numbers = inside.with_name(f"{inside.name}.json") if single else inside / REPORT
     page.write_text(report.markdown(), encoding="utf-8")
-    told.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
-    return [page, told]
+    numbers.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+    return [page, numbers]

@@ -74,9 +74,8 @@ class Blender(Target):
         """Return the radius whose curve is nearest to the true one, by the method's own use of it."""
         units = self._units(subject, version)
         fitted = np.array([fit_length(subject.curve, channel, unit) for channel, unit in enumerate(units)])
-        return self._rows(
-            tuple(round(float(x), 5) for x in fitted / self._lengths(subject, version)), version
-        )
+        radius = fitted / self._lengths(subject, version)
+        return self._rows(tuple(round(float(x), 5) for x in radius), version)
 
     def naive(self, subject: Subject, version: str) -> Rows:
         """Return published diffuse mean free paths of skin as the radius."""
@@ -131,7 +130,7 @@ class Blender(Target):
         }[self.variant]
 
     def _lengths(self, subject: Subject, version: str) -> Floats:
-        """(3,) the curve's length, d or a mean free path, in a radius of 1."""
+        """Return the curve's lengths (3,), d or mean free paths, at a radius of 1."""
         if self.variant == "random-walk":
             return np.full(3, 1.0 if _is_mfp(version) else 1.0 / _PI4)
         if self.variant == "random-walk-skin":
@@ -144,13 +143,13 @@ class Blender(Target):
         return [Walk(float(one), "straight" if plain else "skin") for one in found]
 
     def _units(self, subject: Subject, version: str) -> list[Within]:
-        """The curve of each channel at a length of 1."""
+        """Return the curve of each channel at a length of 1."""
         if self.variant in ("burley", "eevee"):
             return [burley_within] * 3
         return [walk.within for walk in self._walks(subject, version)]
 
     def _returned(self, subject: Subject, version: str) -> Floats:
-        """(3,) what leaves along the normal over what the base colour says."""
+        """Return the light (3,) that leaves along the normal over the base colour."""
         if self.variant in ("burley", "eevee"):
             return np.ones(3)
         total = np.array([walk.total for walk in self._walks(subject, version)])
@@ -158,7 +157,7 @@ class Blender(Target):
 
 
 def _is_mfp(version: str) -> bool:
-    """Whether the radius of a random walk is a mean free path there."""
+    """Return whether the radius of a random walk is a mean free path there."""
     return tuple(map(int, version.split("."))) >= _MFP
 
 

@@ -22,10 +22,10 @@ _STEPS = 1024
 
 
 def encoded(subject: Subject, extensions: Extensions, draft: str) -> bytes:
-    """The head, or the ball, with its eyes, hairs, targets and bones.
+    """Return the bytes of the head, or the ball, with its eyes, hairs, targets and bones.
 
     extensions : of the skin's material, by name
-    draft : what is no settled extension, "" for a file without
+    draft : name of an extension that is not ratified, "" for a file without
     """
     head = subject.shape
     notes: dict[str, object] = {"draft": draft} if draft else {}
@@ -44,7 +44,7 @@ def encoded(subject: Subject, extensions: Extensions, draft: str) -> bytes:
 
 
 def _added(subject: Subject, head: Head, extensions: Extensions, draft: str) -> Added:
-    """Of a colour map the scattered colours become a map too; what is white lets all light in."""
+    """Return additions to the skin's material; a colour map gives a map of scattered colours too."""
     if not draft:
         plain = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
         return Added({} if head.maps.colour is not None else plain, extensions)

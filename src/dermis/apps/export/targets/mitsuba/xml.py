@@ -38,7 +38,7 @@ class Transform:
     def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
         """From +Z towards the target, Y upwards."""
         ahead = _unit(np.subtract(target, origin))
-        left = _unit(np.cross(up, ahead))
+        left = _unit(np.cross(np.asarray(up, np.float64), ahead))
         matrix = np.eye(4)
         matrix[:3] = np.column_stack([left, np.cross(ahead, left), ahead, origin])
         return Transform(self.matrix @ matrix)

@@ -11,12 +11,12 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar, TypedDict
+from typing import ClassVar
 
 import numpy as np
 
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, Value, floats
+from dermis.apps.export.target import Row, Rows, Target, floats
 from dermis.apps.export.targets.gltf.file import encoded
 from dermis.apps.export.targets.pages.html import inline, page
 from dermis.base.errors import refuse
@@ -25,6 +25,7 @@ from dermis.optics.media import SKIN_ETA
 from dermis.scene.lights import DirectionalLight, Light
 from dermis.scene.model import Scene
 
+Json = dict[str, object]
 _CDN = "https://cdn.jsdelivr.net/npm"
 _MOST = 32 << 20  # bytes of a script
 _M = 1e-3  # of a millimetre
@@ -78,34 +79,6 @@ class Script:
         return data.decode("utf-8")
 
 
-class CameraSettings(TypedDict):
-    """Camera in the head's file [m]; vertical angle of view [rad]."""
-
-    position: Sequence[float]
-    target: Sequence[float]
-    up: Sequence[float]
-    fov: float
-
-
-class LightSettings(TypedDict):
-    """Parallel light."""
-
-    direction: Sequence[float]
-    irradiance: Sequence[float]
-
-
-class Settings(TypedDict):
-    """Settings that the page's script reads."""
-
-    camera: CameraSettings
-    lights: list[LightSettings]
-    skin: dict[str, Value]
-    shadow_side: int
-    warm_frames: int
-    smooth: bool
-    no_library: str
-
-
 @dataclass(frozen=True)
 class LibraryPage(Target):
     """A page that draws a head with a library.
@@ -150,7 +123,7 @@ class LibraryPage(Target):
     def loaded(self, version: str) -> tuple[str, list[str]]:
         """Return elements that load or hold the library, and the allowed sources of scripts."""
 
-    def _settings(self, subject: Subject, rows: Rows, version: str) -> Settings:
+    def _settings(self, subject: Subject, rows: Rows, version: str) -> Json:
         scene = subject.scene or Scene(subject.shape)
         where = self.scripts[version][0].url
         middle = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # a ball's own
@@ -165,7 +138,7 @@ class LibraryPage(Target):
         }
 
 
-def json_text(value: Mapping[str, object]) -> str:
+def json_text(value: Json) -> str:
     """Return JSON in which no element of HTML begins or ends."""
     text = json.dumps(value, ensure_ascii=True)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
@@ -189,8 +162,8 @@ def surface_rows(subject: Subject) -> Rows:
     )
 
 
-def camera_of(scene: Scene, middle_mm: Sequence[float]) -> CameraSettings:
-    """Return the scene's camera.
+def camera_of(scene: Scene, middle_mm: Sequence[float]) -> Json:
+    """Return the scene's camera in the head's file: places [m], vertical angle of view [rad].
 
     middle_mm : about which cameras are placed
     """
@@ -200,7 +173,7 @@ def camera_of(scene: Scene, middle_mm: Sequence[float]) -> CameraSettings:
     return {"position": floats(position), "target": floats(target), "up": floats(camera.up), "fov": fov}
 
 
-def light_of(light: Light) -> LightSettings:
+def light_of(light: Light) -> Json:
     """Return a light as parallel light with its irradiance at the head."""
     if isinstance(light, DirectionalLight):
         way = np.asarray(light.direction, np.float64)
