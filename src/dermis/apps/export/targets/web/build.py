@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.target import floats
-from dermis.apps.export.targets.web.description import MapOfPictures, Mapped, NamedFrame, description
+from dermis.apps.export.targets.web.description import Json, MapOfPictures, Mapped, NamedFrame, description
 from dermis.apps.export.targets.web.dials import Dial, changes, node_inputs
 from dermis.apps.export.targets.web.maps import MapPictures, PictureKey, picture_of, round_hairs, texels_of
 from dermis.apps.export.targets.web.packing import Packer
@@ -23,7 +22,6 @@ from dermis.scene.lights import Light, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-Json = dict[str, Any]
 TECHNIQUES = ("texture-space", "none")
 SIZES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures of each form [pixel]."""

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dermis.apps.export.targets.web.packing import Packer
+from dermis.apps.export.targets.web.packing import Bytes, Packer
 from dermis.frame.features.post.picture import Picture
 from dermis.gpu.capture import CapturedFrame, CapturedPass, FrameCapture
 
@@ -73,20 +73,16 @@ def description(
         "structs": {name: _struct(dtype) for name, dtype in tape.structs.items()},
         "contents": contents,
         "frames": [_frame(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
-        "halved": {
-            number: [_pass(each, packer) for each in one.halving.passes]
-            for number, one in mapped.items()
-            if one.halving
-        },
+        "halved": {k: _passes(one.halving, packer) for k, one in mapped.items() if one.halving},
     }
 
 
-def _in_parts(packer: Packer) -> Callable[[Any], int]:
+def _in_parts(packer: Packer) -> Callable[[Bytes], int]:
     """Return a function that packs each of three columns, one below the other, its own way."""
     return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mips(tape: FrameCapture, number: int) -> list[Any]:
+def _mips(tape: FrameCapture, number: int) -> list[Bytes]:
     """Return a buffer's bytes, or a texture's mip by mip, each with all its layers."""
     parts, layers = tape.content(number), tape.resources[number].get("size")
     count = layers[2] if isinstance(layers, list) else 1
@@ -94,9 +90,7 @@ def _mips(tape: FrameCapture, number: int) -> list[Any]:
 
 
 def _frame(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
-    records = [
-        (struct, packer.add(np.frombuffer(record.tobytes(), np.uint8))) for struct, record in one.take.records
-    ]
+    records = [(struct, packer.add(record.tobytes())) for struct, record in one.take.records]
     return {
         "name": one.name,
         "size": one.size,
@@ -104,7 +98,7 @@ def _frame(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
         "picture": picture[0],
         "linear": picture[1],
         "views": {stage: _views(one.take, stage) for stage in ("visibility", "shadows")},
-        "passes": [_pass(each, packer) for each in one.take.passes],
+        "passes": _passes(one.take, packer),
         "records": records,
     }
 
@@ -116,18 +110,10 @@ def _views(take: CapturedFrame, stage: str) -> int:
     return next((k for k in records if k in views), -1)
 
 
-def _pass(one: CapturedPass, packer: Packer) -> Json:
-    written = None if one.written is None else (one.written[0], packer.add(one.written[1]))
-    return {
-        "stage": one.stage,
-        "program": one.program,
-        "bound": one.bound,
-        "groups": one.groups,
-        "completes": one.completes,
-        "raster": one.raster,
-        "written": written,
-        "unit": one.unit,
-    }
+def _passes(take: CapturedFrame, packer: Packer) -> list[Json]:
+    """Return a frame's passes; a write of the host has its buffer and the number of its bytes."""
+    hosts = ((one, one.written) for one in take.passes)
+    return [{**vars(one), "written": host and (host[0], packer.add(host[1]))} for one, host in hosts]
 
 
 def _program(one: Json) -> Json:
@@ -140,14 +126,14 @@ def _struct(dtype: np.dtype[Any]) -> Json:
     return {"size": dtype.itemsize, "members": members}
 
 
-def _member(kind: np.dtype[Any], offset: int) -> Any:
+def _member(kind: np.dtype[Any], offset: int) -> list[int] | Json:
     base = kind.base
     if base.fields is None:
         return [offset // 4, kind.itemsize // 4]
     return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct(base)["members"]}
 
 
-def _camel(value: Any) -> Any:
+def _camel(value: object) -> object:
     """Return a description with names of members as WebGPU spells them."""
     if isinstance(value, dict):
         return {_spelt(name): _camel(one) for name, one in value.items()}
@@ -201,17 +187,17 @@ def written_by(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
         yield from (int(one.raster[name]) for name in ("depth", "target") if one.raster[name] >= 0)
 
 
-def _entries(tape: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, dict[str, Any]]]:
+def _entries(tape: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, Json]]:
     if one.program is not None:
         bindings = tape.programs[one.program]["bindings"]
         yield from ((k, entry) for k, (_, _, entry) in zip(one.bound, bindings, strict=True) if k >= 0)
 
 
-def _reads(entry: dict[str, Any]) -> bool:
+def _reads(entry: Json) -> bool:
     return "sampler" not in entry and entry.get("storage_texture", {}).get("access") != "write-only"
 
 
-def _writes(entry: dict[str, Any]) -> bool:
+def _writes(entry: Json) -> bool:
     return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.export.targets.web.description import Json
 from dermis.apps.export.targets.web.packing import Packer
 from dermis.base.errors import refuse
 from dermis.frame.inputs import Inputs
@@ -19,7 +20,6 @@ from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.pose import Pose
 from dermis.scene.model import Scene
 
-Json = dict[str, Any]
 Floats = NDArray[np.float32]
 _EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown": "full-frown"}
 """Expressions at a dial's end, by the dial's name."""
