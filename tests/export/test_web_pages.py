@@ -7,11 +7,11 @@ import io
 import json
 import os
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from chromium_input import CHROMIUM
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -141,7 +141,7 @@ def drawn(page: Path) -> NDArray[np.float64]:
 
     faults: list[str] = []
     with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         one = browser.new_page(viewport={"width": 240, "height": 240}, offline=True)
         one.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
         one.goto(page.as_uri())
@@ -153,7 +153,7 @@ def drawn(page: Path) -> NDArray[np.float64]:
     return picture
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium here")
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
 def test_a_browser_draws_the_ball_without_network(skin: Subject, target: str, tmp_path: Path) -> None:
     library = os.environ.get(NODE[target])
     if library is None:

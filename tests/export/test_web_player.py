@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from chromium_input import CHROMIUM
 from numpy.typing import NDArray
 from rigged_head import write_rigged_head
 from small_head import write_head
@@ -75,11 +76,10 @@ class Shown(NamedTuple):
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     sync = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    chromium = shutil.which("chromium")
-    if chromium is None:
+    if CHROMIUM is None:
         pytest.skip("there is no Chromium here")
     with sync.sync_playwright() as play:
-        one = play.chromium.launch(executable_path=chromium, args=FLAGS)
+        one = play.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield one
         one.close()
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import child_process
 import numpy as np
 import pytest
 from chromium_input import (
@@ -39,35 +40,14 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium h
 def url(head_file: Path) -> Iterator[str]:
     """Of a page that `dermis view --browser --token` serves."""
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
-    words = [
-        "view",
-        str(head_file),
-        "--browser",
-        "--token",
-        "--port",
-        "0",
-        "--size",
-        "400x480",
-        "--adapter",
-        ADAPTER,
-    ]
-    command = [
-        sys.executable,
-        "-m",
-        "dermis",
-        *words,
-        "--atlas",
-        "128",
-        "--samples",
-        "1",
-        "--background",
-        "#000000",
-    ]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    options = "--browser --token --port 0 --size 400x480 --atlas 128 --samples 1 --background #000000"
+    command = [sys.executable, "-m", "dermis", "view", str(head_file), *options.split(), "--adapter", ADAPTER]
+    pipe = subprocess.PIPE
+    server = child_process.start(command, stdout=pipe, stderr=pipe, text=True)
     assert server.stdout is not None
     yield server.stdout.readline().split()[0]
     server.terminate()
-    _, errors = server.communicate(timeout=20)
+    _, errors = server.communicate(timeout=PATIENCE_S)
     assert "Traceback" not in errors and "rror" not in errors, errors
 
 
@@ -108,7 +88,7 @@ def test_the_panel_alters_the_picture(page: Any, places: dict[str, tuple[float, 
 def test_a_lost_connection_comes_back_by_itself(page: Any) -> None:
     before = still(page, shows_head)
     page.evaluate("window.websocket.close()")
-    page.wait_for_function("() => window.websocket.readyState === WebSocket.OPEN", timeout=20000)
+    page.wait_for_function("() => window.websocket.readyState === WebSocket.OPEN")
     page.wait_for_timeout(500)  # until the server has noticed that the other connection is gone
     drag(page, (320, 240), (260, 200))
     still(page, differs_from(before))

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import child_process
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -26,13 +27,13 @@ def display() -> Iterator[str]:
     """A screen in memory."""
     read, write = os.pipe()
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
-    server = subprocess.Popen(command, pass_fds=(write,), stderr=subprocess.DEVNULL)
+    server = child_process.start(command, pass_fds=(write,), stderr=subprocess.DEVNULL)
     os.close(write)
     with os.fdopen(read) as numbers:
         number = numbers.readline().strip()
     yield f":{number}"
     server.terminate()
-    server.wait(10)
+    server.wait(_PATIENCE_S)
 
 
 @pytest.fixture(scope="module")
@@ -43,11 +44,11 @@ def window(display: str, head_file: Path) -> Iterator[subprocess.Popen[str]]:
     environment = os.environ | {"DISPLAY": display}
     environment.pop("WAYLAND_DISPLAY", None)
     pipe = subprocess.PIPE
-    one = subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe, text=True)
+    one = child_process.start(command, env=environment, stdout=pipe, stderr=pipe, text=True)
     yield one
     if one.poll() is None:
         one.terminate()
-        one.communicate(timeout=20)
+        one.communicate(timeout=_PATIENCE_S)
 
 
 def tool(display: str, *words: str) -> str:
