@@ -10,14 +10,14 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.blender_process import PYTHON_VARIABLE as PYTHON_VARIABLE
 from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
-from dermis.apps.truths.described import UNIT_MM, check_lens, cycles_looking, world
+from dermis.apps.truths.described import UNIT_MM, Described, check_lens, cycles_looking, world
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.lights import lamp
 from dermis.apps.truths.mitsuba_scene import Lambertian
@@ -30,6 +30,7 @@ from dermis.scene.settings import Settings
 from dermis.specular.fresnel import SKIN_ETA
 
 Floats = NDArray[np.float32]
+Numbers = NDArray[np.generic]
 Method = Literal["random-walk", "burley"]
 _PASSES = 4
 _ERRAND = Errand("Cycles", "to render the scene", "Try bpy 5.0, which this was made with")
@@ -146,7 +147,7 @@ def _check_samples(samples: int) -> None:
         refuse("samples", "a whole number from 1", f"{samples} came", "Correct it")
 
 
-def _write_scene(folder: Path, described: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+def _write_scene(folder: Path, described: Described, arrays: Mapping[str, Numbers]) -> None:
     (folder / "scene.json").write_text(json.dumps(described), encoding="utf-8")
     np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its last parameter is no array
 
@@ -224,7 +225,7 @@ FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 
 def describe(
     scene: Scene, medium: Below, method: str, size: tuple[int, int]
-) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+) -> tuple[Described, dict[str, Numbers]]:
     """What goes into scene.json, less the passes, and the arrays beside it."""
     around, panorama = world(scene.environment)
     described = {
@@ -236,7 +237,7 @@ def describe(
         "direct": isinstance(medium, Lambertian | Facets),
     }
     mesh = scene.head.mesh
-    arrays: dict[str, NDArray[Any]] = {
+    arrays: dict[str, Numbers] = {
         "positions": ((mesh.positions - np.array(scene.head.centre_mm)) / UNIT_MM).astype(np.float32),
         "normals": mesh.normals,
         "triangles": mesh.triangles,
@@ -256,7 +257,7 @@ def _normal_map(slopes: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(0.5 + 0.5 * normal, np.float32)
 
 
-def _materials(head: Head, medium: Below, method: str) -> list[dict[str, Any]]:
+def _materials(head: Head, medium: Below, method: str) -> list[Described]:
     skin = _skin(medium, method)
     return [
         {"name": material.name, **(skin if material.kind == "skin" else _diffuse(material.colour))}
@@ -264,11 +265,11 @@ def _materials(head: Head, medium: Below, method: str) -> list[dict[str, Any]]:
     ]
 
 
-def _diffuse(colour: Any) -> dict[str, Any]:
+def _diffuse(colour: Sequence[float]) -> Described:
     return {"method": "DIFFUSE", "colour": [float(part) for part in colour]}
 
 
-def _skin(medium: Below, method: str) -> dict[str, Any]:
+def _skin(medium: Below, method: str) -> Described:
     """Colour: what a half-space of the medium reflects of diffuse light. Radius: 4 pi mean free paths.
 
     Cycles divides radii by 4 pi, and finds the walk's albedo from the colour by a fit whose inverse is
@@ -298,7 +299,7 @@ def _skin(medium: Below, method: str) -> dict[str, Any]:
     return {"method": FALLOFFS[method], "colour": colour, "radius": walk.tolist()}
 
 
-def camera_of(scene: Scene) -> dict[str, Any]:
+def camera_of(scene: Scene) -> Described:
     """The camera in Cycles' units.
 
     Raises DermisError for lenses that Cycles has not.

@@ -1,7 +1,8 @@
-"""Places, colours, shapes and surroundings in the words of Mitsuba and of Cycles."""
+"""Places, colours, shapes and environments as Mitsuba and Cycles describe them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,13 @@ from dermis.scene.environment import Environment
 
 Floats = NDArray[np.float64]
 Described = dict[str, Any]
+"""What Mitsuba loads or JSON holds: numbers, words, lists, Mitsuba's objects and further dictionaries."""
+Mitsuba = Any
+"""The module mitsuba with a variant set, which ships no types; or the exporter that writes XML instead."""
+MitsubaObject = Any
+"""An object of Mitsuba, which ships no types: a scene, a mesh, a transform, a material or a medium."""
+Vector = Sequence[float] | Floats
+"""Three numbers."""
 UNIT_MM = 100.0
 """Cycles' unit: a head is a few of them, as its sampling expects."""
 
@@ -28,21 +36,23 @@ def check_lens(camera: Camera, who: str) -> None:
         refuse("camera", expected, came, "Render with such a camera, and crop or resample the picture")
 
 
-def rgb(values: Any) -> Described:
-    """Three numbers, linear Rec. 709, as Mitsuba reads them."""
+def rgb(values: Iterable[float]) -> Described:
+    """Return three numbers, linear Rec. 709, as Mitsuba reads them."""
     return {"type": "rgb", "value": [float(value) for value in values]}
 
 
-def mitsuba_looking(mi: Any, origin: Any, target: Any, up: Any = (0.0, 1.0, 0.0)) -> Any:
-    """To world, with +Z from the origin to the target and Y upwards."""
+def mitsuba_looking(
+    mi: Mitsuba, origin: Vector, target: Vector, up: Vector = (0.0, 1.0, 0.0)
+) -> MitsubaObject:
+    """Return the transform to world space, with +Z from the origin to the target and Y upwards."""
     forward = np.subtract(target, origin)
     if np.linalg.norm(np.cross(forward, up)) < 1e-6 * np.linalg.norm(forward) * np.linalg.norm(up):
         up = (1.0, 0.0, 0.0)
     return mi.ScalarTransform4f().look_at(*([float(c) for c in v] for v in (origin, target, up)))
 
 
-def mitsuba_shape(kind: str, radiance: Any, **shape: Any) -> Described:
-    """A shape that shines and is not there otherwise: it neither shadows nor reflects other light."""
+def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> Described:
+    """Return a shape that emits light, and neither shadows nor reflects other light."""
     return {
         "type": kind,
         **shape,
@@ -52,9 +62,9 @@ def mitsuba_shape(kind: str, radiance: Any, **shape: Any) -> Described:
 
 
 def mitsuba_projector(
-    mi: Any, intensity: Floats, cosine: Floats, to_world: Any, half_tangent: float
+    mi: Mitsuba, intensity: Floats, cosine: Floats, to_world: MitsubaObject, half_tangent: float
 ) -> Described:
-    """What has an intensity (h, w, 3) through each texel of a slide [irradiance mm2].
+    """Return a projector with an intensity (h, w, 3) through each texel of a slide [irradiance mm2].
 
     cosine : (h, w) of the angle from the axis
     half_tangent : of half the angle that the slide spans in x
@@ -76,15 +86,16 @@ def mitsuba_projector(
     }
 
 
-def cycles_looking(place: Any, forward: Any, up: Any = (0.0, 1.0, 0.0)) -> list[list[float]]:
-    """To world in Cycles' units, for what looks along -Z with Y upwards."""
+def cycles_looking(place: Vector, forward: Vector, up: Vector = (0.0, 1.0, 0.0)) -> list[list[float]]:
+    """Return the matrix to world in Cycles' units of an object that looks along -Z with Y upwards."""
     right, above, ahead = cycles_axes(forward, up)
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([right, above, -ahead, np.asarray(place, np.float64) / UNIT_MM])
     return [[float(value) for value in row] for row in matrix]
 
 
-def cycles_axes(forward: Any, up: Any) -> tuple[Floats, Floats, Floats]:
+def cycles_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
+    """Return unit vectors to the right, upwards and ahead."""
     ahead = np.asarray(forward, np.float64) / np.linalg.norm(forward)
     right = np.cross(ahead, up)
     if np.linalg.norm(right) < 1e-6 * np.linalg.norm(up):
@@ -94,8 +105,9 @@ def cycles_axes(forward: Any, up: Any) -> tuple[Floats, Floats, Floats]:
 
 
 def cycles_light(
-    kind: str, irradiance: Any, factor: float, place: Any, forward: Any, **given: Any
+    kind: str, irradiance: Vector, factor: float, place: Vector, forward: Vector, **given: float | str
 ) -> Described:
+    """Return a light of Cycles whose energy is the irradiance times a factor."""
     strength = float(max(irradiance))
     colour = [float(part) / strength for part in irradiance] if strength > 0.0 else [0.0, 0.0, 0.0]
     fields = {"color": colour, "energy": strength * float(factor), **given}
@@ -105,8 +117,8 @@ def cycles_light(
     return {"type": kind, "set": fields, "to_world": cycles_looking(place, forward)}
 
 
-def surroundings(mi: Any, environment: Environment) -> Described:
-    """Mitsuba's description of light from all around."""
+def surroundings(mi: Mitsuba, environment: Environment) -> Described:
+    """Return Mitsuba's description of light from all around."""
     if environment.name == UNIFORM:
         return {"type": "constant", "radiance": rgb(np.full(3, environment.exposure))}
     panorama = environment.exposure * load_panorama(environment.name)
@@ -120,11 +132,11 @@ def surroundings(mi: Any, environment: Environment) -> Described:
     }
 
 
-def world(environment: Environment | None) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Cycles' description, and the panorama that goes with it."""
+def world(environment: Environment | None) -> tuple[Described, dict[str, NDArray[np.float32]]]:
+    """Return Cycles' description of an environment, and the panorama that goes with it."""
     if environment is None:
         return {"strength": 0.0}, {}
-    described: dict[str, Any] = {"strength": environment.exposure}
+    described: Described = {"strength": environment.exposure}
     if environment.name == UNIFORM:
         return described, {}
     # Cycles' panoramas have their middle at +X and their top at +Z; ours at -Z and +Y.

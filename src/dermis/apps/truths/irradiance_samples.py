@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,7 @@ class Places:
     face: Index
     barycentric: Floats
 
-    def interpolate(self, mesh: Mesh, values: NDArray[Any]) -> Floats:
+    def interpolate(self, mesh: Mesh, values: NDArray[np.floating]) -> Floats:
         """(n, k) values at the points, interpolated from values (v, k) at the mesh's vertices."""
         return _interpolate(values[mesh.triangles[self.face]], self.barycentric)
 
@@ -115,7 +114,7 @@ class _Pieces:
         return int(self.corners.max()) + 1
 
 
-def _interpolate(corners: NDArray[Any], barycentric: Floats) -> Floats:
+def _interpolate(corners: NDArray[np.floating], barycentric: Floats) -> Floats:
     at: Floats = np.einsum("nc,nck->nk", barycentric, corners.astype(np.float64))
     return at
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dermis.apps.truths.described import (
     UNIT_MM,
     Described,
+    Mitsuba,
     cycles_axes,
     cycles_light,
     mitsuba_looking,
@@ -40,7 +41,7 @@ _STRIPE_TEXELS = 40, 64  # least across a width and along the length
 _MOST_STRIPE_TEXELS = 2**23
 
 
-def emitter(mi: Any, light: Light, number: int) -> Described:
+def emitter(mi: Mitsuba, light: Light, number: int) -> Described:
     """Mitsuba's description of a light.
 
     mi : the module, with a variant set
@@ -65,13 +66,13 @@ def _check_shadows(light: Light, number: int, judge: str) -> None:
         refuse(f"light {number}", f"a light with shadows, for {judge}", "it has shadows = false", remedy)
 
 
-def mitsuba_point(mi: Any, light: PointLight, called: str) -> Described:
+def mitsuba_point(mi: Mitsuba, light: PointLight, called: str) -> Described:
     """One of Mitsuba's."""
     intensity = np.multiply(light.irradiance, _distance(light) ** 2)
     return {"type": "point", "position": list(light.position), "intensity": rgb(intensity)}
 
 
-def mitsuba_spot(mi: Any, light: SpotLight, called: str) -> Described:
+def mitsuba_spot(mi: Mitsuba, light: SpotLight, called: str) -> Described:
     """A slide projector: Mitsuba's own spot fades evenly in the angle, ours smoothly in its cosine."""
     steepest = np.tan(np.radians(light.outer_degrees))
     along = steepest * ((np.arange(_SPOT_SIDE) + 0.5) / _SPOT_SIDE * 2.0 - 1.0)
@@ -82,7 +83,7 @@ def mitsuba_spot(mi: Any, light: SpotLight, called: str) -> Described:
     return mitsuba_projector(mi, slide, cosine, mitsuba_looking(mi, light.position, light.target), steepest)
 
 
-def mitsuba_rectangle(mi: Any, light: RectangleLight, called: str) -> Described:
+def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, called: str) -> Described:
     """An even one."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
     to_world = mitsuba_looking(mi, light.position, light.target).scale(sides)
@@ -90,7 +91,7 @@ def mitsuba_rectangle(mi: Any, light: RectangleLight, called: str) -> Described:
     return mitsuba_shape("rectangle", np.divide(light.irradiance, given), to_world=to_world)
 
 
-def mitsuba_sphere(mi: Any, light: SphereLight, called: str) -> Described:
+def mitsuba_sphere(mi: Mitsuba, light: SphereLight, called: str) -> Described:
     """An even one."""
     given = np.pi * (light.radius_mm / _distance(light)) ** 2
     return mitsuba_shape(
@@ -101,7 +102,7 @@ def mitsuba_sphere(mi: Any, light: SphereLight, called: str) -> Described:
     )
 
 
-def mitsuba_directional(mi: Any, light: DirectionalLight, called: str) -> Described:
+def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, called: str) -> Described:
     """One of Mitsuba's, or of a sun a far disc."""
     if light.angle_degrees == 0:
         return {
@@ -115,7 +116,7 @@ def mitsuba_directional(mi: Any, light: DirectionalLight, called: str) -> Descri
     return mitsuba_shape("disk", np.divide(light.irradiance, np.pi * np.sin(half) ** 2), to_world=to_world)
 
 
-def mitsuba_stripe(mi: Any, light: StripeLight, called: str) -> Described:
+def mitsuba_stripe(mi: Mitsuba, light: StripeLight, called: str) -> Described:
     """A far slide projector with the stripe as its slide."""
     width, length = light.width_mm, light.length_mm
     size = np.array([2.0 * _STRIPE_REACH * width, length])
@@ -159,7 +160,7 @@ def cycles_rectangle(light: RectangleLight) -> Described:
     width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
     given = facing_irradiance(light.width_mm, light.height_mm, _distance(light)) / (np.pi * width * height)
     path = np.subtract(light.target, light.position)
-    shape = {"shape": "RECTANGLE", "size": width, "size_y": height}
+    shape: dict[str, float | str] = {"shape": "RECTANGLE", "size": width, "size_y": height}
     return cycles_light("AREA", light.irradiance, 1.0 / given, light.position, path, **shape)
 
 
@@ -183,7 +184,7 @@ def cycles_stripe(light: StripeLight) -> Described:
     return described | {"stripe": {**axes, "distance": _FAR_MM}}
 
 
-def _lamp(kind: str, light: PointLight, *, radius_mm: float = 0.0, **given: Any) -> Described:
+def _lamp(kind: str, light: PointLight, *, radius_mm: float = 0.0, **given: float) -> Described:
     power = 4.0 * np.pi * (_distance(light) / UNIT_MM) ** 2
     path = np.subtract(light.target, light.position)
     round_light = {"shadow_soft_size": radius_mm / UNIT_MM, "use_soft_falloff": False}
@@ -209,7 +210,8 @@ def _smoothstep(t: Floats) -> Floats:
     return x * x * (3.0 - 2.0 * x)
 
 
-MITSUBA: Registry[Callable[[Any, Any, str], Described]] = Registry(
+# Any: each function takes its own kind of light.
+MITSUBA: Registry[Callable[[Mitsuba, Any, str], Described]] = Registry(
     "light of Mitsuba",
     {
         "point": mitsuba_point,

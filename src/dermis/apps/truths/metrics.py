@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -157,7 +157,9 @@ def flip(
     return Flip(float(error[counted].mean(dtype=np.float64)), error, float(pixels_per_degree))
 
 
-def _shown(picture: ArrayLike, high_dynamic_range: bool, shape: tuple[int, ...] | None = None) -> Any:
+def _shown(
+    picture: ArrayLike, high_dynamic_range: bool, shape: tuple[int, ...] | None = None
+) -> NDArray[np.float32]:
     values = np.asarray(picture, np.float32)
     if values.ndim != 3 or values.shape[2] != 3 or (shape is not None and values.shape != shape):
         refuse("flip", f"two pictures of {shape or '(h, w, 3)'}", f"{values.shape} came", "Align them")

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dermis.apps.truths.described import check_lens, rgb, surroundings
+from dermis.apps.truths.described import Described, Mitsuba, MitsubaObject, check_lens, rgb, surroundings
 from dermis.apps.truths.lights import emitter
 from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.base.errors import refuse
@@ -20,6 +20,8 @@ from dermis.optics.media import Layer, Medium
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 
+Doubles = NDArray[np.float64]
+Numbers = NDArray[np.generic]
 ROULETTE_DEPTH = 100
 """Scatterings before Russian roulette. Earlier, it leaves few paths that carry much: red on skin2 then has
 nearly twice the variance in the same time, and with few samples its mean is 1 % low."""
@@ -42,8 +44,8 @@ class Lambertian:
     albedo: tuple[float, float, float]
 
 
-def load_mitsuba() -> Any:
-    """The module `mitsuba` with no variant set.
+def load_mitsuba() -> Mitsuba:
+    """Return the module `mitsuba` with no variant set.
 
     Raises DermisError when it is not installed.
     """
@@ -51,7 +53,7 @@ def load_mitsuba() -> Any:
 
 
 @contextmanager
-def variant_of(mi: Any, name: str) -> Iterator[None]:
+def variant_of(mi: Mitsuba, name: str) -> Iterator[None]:
     """Set a variant of Mitsuba; afterwards the caller's own is set again, if there was one."""
     before = mi.variant()
     mi.set_variant(name)
@@ -72,8 +74,10 @@ def check_traceable(medium: Medium | Lambertian) -> None:
         refuse(medium.name, "three channels, for path tracing", came, "Give red, green and blue")
 
 
-def radiance_scene(mi: Any, scene: Scene, medium: Medium | Lambertian, size: tuple[int, int]) -> Any:
-    """Mitsuba's scene whose image is the radiance, and notes on what was done to the head."""
+def radiance_scene(
+    mi: Mitsuba, scene: Scene, medium: Medium | Lambertian, size: tuple[int, int]
+) -> tuple[MitsubaObject, tuple[str, ...]]:
+    """Return Mitsuba's scene whose image is the radiance, and notes on changes to the head."""
     shapes, notes = _head_shapes(mi, scene.head, medium)
     direct = {"max_depth": _DIRECT_DEPTH} if isinstance(medium, Lambertian) else {}
     # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
@@ -82,9 +86,9 @@ def radiance_scene(mi: Any, scene: Scene, medium: Medium | Lambertian, size: tup
 
 
 def lit_scene(
-    mi: Any, scene: Scene, integrator: dict[str, Any], shapes: dict[str, Any], size: tuple[int, int]
-) -> Any:
-    """Mitsuba's scene of some shapes, in the lights and surroundings of ours and before its camera."""
+    mi: Mitsuba, scene: Scene, integrator: Described, shapes: Described, size: tuple[int, int]
+) -> MitsubaObject:
+    """Return Mitsuba's scene of some shapes, in the lights and surroundings of ours and before its camera."""
     lights = {f"light_{k}": emitter(mi, light, k) for k, light in enumerate(scene.lights, start=1)}
     if scene.environment is not None:
         lights["environment"] = surroundings(mi, scene.environment)
@@ -92,8 +96,8 @@ def lit_scene(
     return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes, **lights})
 
 
-def mask_scene(mi: Any, scene: Scene, size: tuple[int, int]) -> Any:
-    """Mitsuba's scene whose image is the share of each pixel that skin fills."""
+def mask_scene(mi: Mitsuba, scene: Scene, size: tuple[int, int]) -> MitsubaObject:
+    """Return Mitsuba's scene whose image is the share of each pixel that skin fills."""
     return mi.load_dict(
         {
             "type": "scene",
@@ -104,8 +108,8 @@ def mask_scene(mi: Any, scene: Scene, size: tuple[int, int]) -> Any:
     )
 
 
-def sensor_of(mi: Any, camera: Camera, size: tuple[int, int], sampler: str = "independent") -> dict[str, Any]:
-    """Mitsuba's description of a camera whose pixels are even squares."""
+def sensor_of(mi: Mitsuba, camera: Camera, size: tuple[int, int], sampler: str = "independent") -> Described:
+    """Return Mitsuba's description of a camera whose pixels are even squares."""
     width, height = size
     check_lens(camera, "Mitsuba")
     view = ([float(c) for c in v] for v in (camera.position, camera.target, camera.up))
@@ -122,8 +126,8 @@ def sensor_of(mi: Any, camera: Camera, size: tuple[int, int], sampler: str = "in
     }
 
 
-def _head_shapes(mi: Any, head: Head, medium: Medium | Lambertian) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Skin and opaque materials of a head, about its centre, by name, and notes on them."""
+def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[Described, tuple[str, ...]]:
+    """Return skin and opaque materials of a head, about its centre, by name, and notes on them."""
     opaque = {}
     for k in _materials(head, "opaque"):
         colour = rgb(head.mesh.materials[k].colour)
@@ -136,8 +140,8 @@ def _head_shapes(mi: Any, head: Head, medium: Medium | Lambertian) -> tuple[dict
     return {**bodies, **opaque}, notes
 
 
-def _mask_shapes(mi: Any, head: Head) -> dict[str, Any]:
-    """The head with skin that shines with radiance 1 and everything else black."""
+def _mask_shapes(mi: Mitsuba, head: Head) -> Described:
+    """Return the head with skin that shines with radiance 1 and everything else black."""
     shapes = {}
     for k, material in enumerate(head.mesh.materials):
         given = {"bsdf": _diffuse(mi, 0.0)}
@@ -153,25 +157,25 @@ def _materials(head: Head, kind: str) -> list[int]:
     return [k for k in np.unique(head.mesh.material).tolist() if kinds[k] == kind]
 
 
-def _diffuse(mi: Any, reflectance: Any) -> Any:
+def _diffuse(mi: Mitsuba, reflectance: Described | float) -> MitsubaObject:
     return mi.load_dict({"type": "diffuse", "reflectance": reflectance})
 
 
-def _sheet(mi: Any, head: Head, index: int, **given: Any) -> Any:
-    """The triangles of a material with the head's own normals."""
+def _sheet(mi: Mitsuba, head: Head, index: int, **given: MitsubaObject) -> MitsubaObject:
+    """Return the triangles of a material with the head's own normals."""
     mesh = head.mesh
     used, corners = np.unique(mesh.triangles[mesh.material == index], return_inverse=True)
     places = mesh.positions[used] - np.array(head.centre_mm)
     return mesh_shape(mi, places, corners.reshape(-1, 3), mesh.normals[used], **given)
 
 
-def _bodies(mi: Any, head: Head, medium: Medium) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Surfaces around the skin and around what lies below each interface between its layers."""
+def _bodies(mi: Mitsuba, head: Head, medium: Medium) -> tuple[Described, tuple[str, ...]]:
+    """Return surfaces around the skin and around what lies below each interface between its layers."""
     skin = skin_solid(head.mesh, head.name)
     skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
     notes = [f"{skin.caps} openings shut, {skin.cap_area:.0f} mm2"] if skin.caps else []
     gap = gap_of(mi, skin)
-    media: list[Any] = [None, *(mi.load_dict(_homogeneous(layer)) for layer in medium.layers), None]
+    media: list[MitsubaObject] = [None, *(mi.load_dict(_homogeneous(layer)) for layer in medium.layers), None]
     shapes = {}
     depth = -gap
     for k, (above, below) in enumerate(pairwise(media)):
@@ -187,12 +191,12 @@ def _bodies(mi: Any, head: Head, medium: Medium) -> tuple[dict[str, Any], tuple[
     return shapes, tuple(notes)
 
 
-def gap_of(mi: Any, skin: Solid) -> Any:
-    """(p,) distance between the two surfaces that stand for a face of a solid about the origin [mm]."""
-    return _GAP * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon
+def gap_of(mi: Mitsuba, skin: Solid) -> Doubles:
+    """Return the (p,) distance between the two surfaces of a face of a solid about the origin [mm]."""
+    return np.asarray(_GAP * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
 
 
-def _homogeneous(layer: Layer) -> dict[str, Any]:
+def _homogeneous(layer: Layer) -> Described:
     extinction = layer.sigma_t_prime
     # Textures hold at most 1, so the largest extinction goes into the scale.
     return {
@@ -204,8 +208,8 @@ def _homogeneous(layer: Layer) -> dict[str, Any]:
     }
 
 
-def shell(mi: Any, solid: Solid, media: dict[str, Any]) -> Any:
-    """A surface that is there only to part media: exterior and interior, None for none."""
+def shell(mi: Mitsuba, solid: Solid, media: Described) -> MitsubaObject:
+    """Return a surface that only separates media: exterior and interior, None for none."""
     filled = {side: medium for side, medium in media.items() if medium is not None}
     return mesh_shape(
         mi, solid.positions, solid.triangles, None, bsdf=mi.load_dict({"type": "null"}), **filled
@@ -213,9 +217,14 @@ def shell(mi: Any, solid: Solid, media: dict[str, Any]) -> Any:
 
 
 def mesh_shape(
-    mi: Any, places: Any, triangles: Any, normals: Any = None, uv: Any = None, **given: Any
-) -> Any:
-    """Triangles as Mitsuba has them.
+    mi: Mitsuba,
+    places: Numbers,
+    triangles: Numbers,
+    normals: Numbers | None = None,
+    uv: Numbers | None = None,
+    **given: MitsubaObject,
+) -> MitsubaObject:
+    """Return triangles as Mitsuba has them.
 
     places, normals, uv : (v, 3), (v, 3), (v, 2); None for facets, and for no pictures on them
     given : BSDF, emitter and media
@@ -235,5 +244,5 @@ def mesh_shape(
     return mesh
 
 
-def _flat(values: Sequence[Any], kind: Any) -> Any:
+def _flat(values: Numbers, kind: type[np.generic]) -> Numbers:
     return np.ascontiguousarray(values, dtype=kind).ravel()

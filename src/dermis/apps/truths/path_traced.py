@@ -6,11 +6,12 @@ import hashlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.truths.described import Mitsuba, MitsubaObject
 from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     Lambertian,
@@ -126,13 +127,13 @@ def passes_for(samples: int) -> int:
     return max(_LEAST_PASSES, -(-samples // SAMPLES_PER_PASS))
 
 
-def _mask(mi: Any, scene: Scene, size: tuple[int, int]) -> Floats:
+def _mask(mi: Mitsuba, scene: Scene, size: tuple[int, int]) -> Floats:
     share = np.array(mi.render(mask_scene(mi, scene, size), spp=_MASK_SAMPLES), np.float32)[..., 0]
     return np.clip(share, 0.0, 1.0)
 
 
 def add_passes(
-    mi: Any, built: Any, passes: Passes, wanted: int, key: str | None, report: Report | None
+    mi: Mitsuba, built: MitsubaObject, passes: Passes, wanted: int, key: str | None, report: Report | None
 ) -> None:
     """Add passes of Mitsuba's scene up to the number wanted; with a key those done are stored in any case."""
     stored = time.perf_counter()
@@ -175,7 +176,7 @@ class Passes:
     seconds: float = 0.0
 
     @classmethod
-    def none(cls, size: tuple[int, int], mask: Any, notes: tuple[str, ...]) -> Passes:
+    def none(cls, size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]) -> Passes:
         """No pass yet of an image (width, height)."""
         shape = (size[1], size[0], 3)
         return cls(np.zeros(shape), np.zeros(shape), np.asarray(mask, np.float32), notes)
@@ -194,7 +195,7 @@ class Passes:
         self.spread = self.spread + before * (image - self.mean)
 
 
-def digest_surroundings(digest: Any, scene: Scene) -> None:
+def digest_surroundings(digest: hashlib._Hash, scene: Scene) -> None:
     """Add camera, lights and environment of a scene to a hash."""
     for part in (scene.camera, *scene.lights, *filter(None, [scene.environment])):
         digest.update(f"{type(part).__name__} {part.model_dump_json()}".encode())

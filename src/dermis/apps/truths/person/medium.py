@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.truths.described import rgb
+from dermis.apps.truths.described import Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.person.subject import Person
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
@@ -64,7 +63,7 @@ def _mean_distance(albedo: float) -> float:
     return float((found * 0.5 * (edges[1:] + edges[:-1])).sum() / found.sum())
 
 
-def medium_of(mi: Any, person: Person, camera: Camera, mean_free_path_mm: Doubles) -> Any:
+def medium_of(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: Doubles) -> MitsubaObject:
     """Mitsuba's medium below the skin, exact in colour where the camera looks."""
     extinction = 1.0 / mean_free_path_mm
     low, high = _box(person, camera)

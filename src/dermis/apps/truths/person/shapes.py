@@ -5,12 +5,11 @@ from __future__ import annotations
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.described import rgb
+from dermis.apps.truths.described import Described, Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.mitsuba_scene import gap_of, mesh_shape, shell
 from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.apps.truths.person.medium import INDEX, PASSED
@@ -24,13 +23,13 @@ from dermis.mesh.eyeball import (
 )
 
 
-def picture(mi: Any, values: Any) -> dict[str, Any]:
-    """A picture (h, w) or (h, w, 3) of plain numbers as Mitsuba's texture."""
+def picture(mi: Mitsuba, values: NDArray[np.floating]) -> Described:
+    """Return a picture (h, w) or (h, w, 3) of plain numbers as Mitsuba's texture."""
     bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))
     return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"}
 
 
-def coat(mi: Any, paint: Paint) -> Any:
+def coat(mi: Mitsuba, paint: Paint) -> MitsubaObject:
     """The surface: what a dielectric of skin's index reflects, roughened as painted, over a hole.
 
     Through a refracting surface no ray to a light finds its way. So light passes this one unbent, but for a
@@ -49,7 +48,7 @@ def coat(mi: Any, paint: Paint) -> Any:
     return mi.load_dict({"type": "mask", "opacity": share, "bsdf": raised})
 
 
-def skin_shapes(mi: Any, person: Person, medium: Any) -> tuple[dict[str, Any], tuple[str, ...]]:
+def skin_shapes(mi: Mitsuba, person: Person, medium: MitsubaObject) -> tuple[Described, tuple[str, ...]]:
     """Two surfaces around the medium, as `mitsuba_scene` has them, the upper one coated; and notes."""
     solid = skin_solid(person.mesh, person.name)
     notes = (f"{solid.caps} openings shut, {solid.cap_area:.0f} mm2",) if solid.caps else ()
@@ -65,12 +64,12 @@ def skin_shapes(mi: Any, person: Person, medium: Any) -> tuple[dict[str, Any], t
     return shapes, notes
 
 
-def _skin(person: Person) -> Any:
+def _skin(person: Person) -> NDArray[np.bool_]:
     mesh = person.mesh
-    return np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
+    return np.asarray(np.array([material.kind == "skin" for material in mesh.materials])[mesh.material])
 
 
-def _coated(mi: Any, person: Person, upper: Solid, medium: Any) -> Any:
+def _coated(mi: Mitsuba, person: Person, upper: Solid, medium: MitsubaObject) -> MitsubaObject:
     """The outer surface with the mesh's own normals and uv."""
     mesh, triangles = person.mesh, person.mesh.triangles[_skin(person)]
     vertices, corners = np.unique(triangles, return_inverse=True)
@@ -145,7 +144,7 @@ def disc() -> tuple[Doubles, Index, float]:
     return np.concatenate([rim, [[0.0, 0.0, iris_mm()]]]), triangles, radius
 
 
-def materials(mi: Any, paint: Paint) -> tuple[Any, Any]:
+def materials(mi: Mitsuba, paint: Paint) -> tuple[MitsubaObject, MitsubaObject]:
     """Of the ball and of the iris."""
     white = {
         "type": "roughplastic",
@@ -165,7 +164,7 @@ def materials(mi: Any, paint: Paint) -> tuple[Any, Any]:
     return mi.load_dict(both), mi.load_dict({"type": "twosided", "bsdf": iris})
 
 
-def eye_shapes(mi: Any, person: Person) -> dict[str, Any]:
+def eye_shapes(mi: Mitsuba, person: Person) -> Described:
     """All eyes of a person, from the head's centre."""
     covered, iris = materials(mi, person.paint)
     places, triangles, normals, uv = ball()
@@ -195,7 +194,7 @@ COLOURS = 12
 _LEAST_MM = 1e-3
 
 
-def hair_shapes(mi: Any, hairs: Hairs, name: str = "hairs") -> dict[str, Any]:
+def hair_shapes(mi: Mitsuba, hairs: Hairs, name: str = "hairs") -> Described:
     """The hairs in groups of nearly the same absorption, each a shape of that name and a number."""
     shapes = {}
     depth = hairs.absorption * hairs.radius_mm.max(axis=1, keepdims=True)  # Mitsuba's unit is the radius

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.described import rgb
+from dermis.apps.truths.described import Described, Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     lit_scene,
@@ -33,6 +32,7 @@ from dermis.apps.truths.person.medium import PASSED, VOXELS, mean_free_paths, me
 from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, picture, skin_shapes
 from dermis.apps.truths.person.subject import Paint as Paint
 from dermis.apps.truths.person.subject import Person, person_of
+from dermis.mesh.mesh import Material
 from dermis.scene.model import Scene
 
 _FORM = "person 1"  # raise when the same person is traced in another way
@@ -80,8 +80,12 @@ def trace_person(
 
 
 def person_scene(
-    mi: Any, scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], size: tuple[int, int]
-) -> tuple[Any, tuple[str, ...]]:
+    mi: Mitsuba,
+    scene: Scene,
+    person: Person,
+    mean_free_path_mm: NDArray[np.float64],
+    size: tuple[int, int],
+) -> tuple[MitsubaObject, tuple[str, ...]]:
     """Mitsuba's scene whose image is the radiance, and notes on what was done to the head."""
     medium = medium_of(mi, person, scene.camera, mean_free_path_mm)
     shapes, notes = skin_shapes(mi, person, medium)
@@ -92,7 +96,7 @@ def person_scene(
     return lit_scene(mi, scene, integrator, shapes, size), notes
 
 
-def _opaque_shapes(mi: Any, person: Person) -> dict[str, Any]:
+def _opaque_shapes(mi: Mitsuba, person: Person) -> Described:
     """What is neither skin nor an eye: teeth and tongue under saliva, all else matte."""
     shapes = {}
     mesh = person.mesh
@@ -107,7 +111,7 @@ def _opaque_shapes(mi: Any, person: Person) -> dict[str, Any]:
     return shapes
 
 
-def _wet(mi: Any, person: Person, material: Any) -> dict[str, Any]:
+def _wet(mi: Mitsuba, person: Person, material: Material) -> Described:
     if material.part is None:
         return {"type": "diffuse", "reflectance": rgb(material.colour)}
     tongue = material.part == "tongue"
@@ -124,7 +128,7 @@ def _wet(mi: Any, person: Person, material: Any) -> dict[str, Any]:
     }
 
 
-def _covered(mi: Any, scene: Scene, person: Person, size: tuple[int, int]) -> NDArray[np.float32]:
+def _covered(mi: Mitsuba, scene: Scene, person: Person, size: tuple[int, int]) -> NDArray[np.float32]:
     """(h, w) share of each pixel that the head fills, hairs aside."""
     mesh = person.mesh
     glow = mi.load_dict({"type": "area", "radiance": 1.0})
