@@ -89,7 +89,7 @@ def test_ball_returns_its_colour(method: Method, tolerance: float) -> None:
     scene = ball_scene(environment=Environment(name="uniform"))
     lit = cycles_render(scene, SKIN1, 64, Settings(size=(32, 32)), method=method)
     colour = [diffuse_albedo(float(a)) for a in SKIN1.layers[0].alpha_prime]
-    mean = lit.image[lit.coverage > 0.999].mean(axis=0)
+    mean = lit.image[lit.mask > 0.999].mean(axis=0)
     assert mean == pytest.approx(colour, rel=tolerance)
     assert lit.samples == 64 and lit.seconds > 0.0
 

@@ -10,7 +10,8 @@ import pytest
 from lit_balls import LIGHTS, ball_scene
 
 from dermis.apps.truths import cycles
-from dermis.apps.truths.cycles import CyclesRendered, cycles_render, read_passes
+from dermis.apps.truths.cycles import cycles_render, read_passes
+from dermis.apps.truths.path_traced import PathTraced
 from dermis.base.errors import DermisError
 from dermis.images.io import write_image
 from dermis.optics.media import media
@@ -24,7 +25,7 @@ def python(tmp_path: Path) -> Path:
     return tmp_path / "python"
 
 
-def render(python: Path, script: str) -> CyclesRendered:
+def render(python: Path, script: str) -> PathTraced:
     """With a shell script for Blender's Python; `$3` is the folder that it works in."""
     python.write_text(f"#!/bin/sh\n{script}\n")
     python.chmod(0o755)

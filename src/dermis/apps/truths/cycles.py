@@ -21,6 +21,7 @@ from dermis.apps.truths.described import UNIT_MM, Described, check_lens, cycles_
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.lights import lamp
 from dermis.apps.truths.mitsuba_scene import Lambertian
+from dermis.apps.truths.path_traced import PathTraced
 from dermis.base.errors import DermisError, refuse
 from dermis.images.io import read_image
 from dermis.mesh.head import Head
@@ -36,24 +37,6 @@ _PASSES = 4
 _ERRAND = Errand("Cycles", "to render the scene", "Try bpy 5.0, which this was made with")
 _START_S, _PATH_S = 300.0, 5e-4
 """Time limits for the start and for each path: a hundred times what two cores took."""
-
-
-@dataclass(frozen=True, eq=False)
-class CyclesRendered:
-    """An image by Cycles, black where there is no head.
-
-    image : (h, w, 3) radiance, linear Rec. 709
-    variance : (h, w, 3) of each value of the image, from passes with different seeds
-    coverage : (h, w) share of the pixel that the head fills
-    samples : paths through each pixel
-    seconds : that Cycles took, building the scene and the acceleration structure included
-    """
-
-    image: Floats
-    variance: Floats
-    coverage: Floats
-    samples: int
-    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +67,8 @@ def cycles_render(
     *,
     method: Method = "random-walk",
     python: str | Path | None = None,
-) -> CyclesRendered:
-    """The scene by Cycles on the CPU, as the mean of 4 passes; arguments and errors as of `cycles_passes`.
+) -> PathTraced:
+    """Return the scene by Cycles on the CPU, as the mean of 4 passes; arguments as of `cycles_passes`.
 
     samples : at least this many paths through each pixel
     """
@@ -94,7 +77,7 @@ def cycles_render(
     passes = cycles_passes(scene, medium, [each] * _PASSES, settings, method=method, python=python)
     images = np.stack([one.image for one in passes]).astype(np.float64)
     coverage = np.stack([one.coverage for one in passes]).astype(np.float64)
-    return CyclesRendered(
+    return PathTraced(
         images.mean(axis=0).astype(np.float32),
         (images.var(axis=0, ddof=1) / _PASSES).astype(np.float32),
         coverage.mean(axis=0).astype(np.float32),

@@ -96,15 +96,11 @@ def lit_scene(
     return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes, **lights})
 
 
-def mask_scene(mi: Mitsuba, scene: Scene, size: tuple[int, int]) -> MitsubaObject:
-    """Return Mitsuba's scene whose image is the share of each pixel that skin fills."""
+def share_scene(mi: Mitsuba, camera: Camera, size: tuple[int, int], shapes: Described) -> MitsubaObject:
+    """Return Mitsuba's scene whose image is the share of each pixel that shapes of radiance 1 fill."""
+    sensor = sensor_of(mi, camera, size, sampler="multijitter")
     return mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "path", "max_depth": 1},
-            "sensor": sensor_of(mi, scene.camera, size, sampler="multijitter"),
-            **_mask_shapes(mi, scene.head),
-        }
+        {"type": "scene", "integrator": {"type": "path", "max_depth": 1}, "sensor": sensor, **shapes}
     )
 
 
@@ -140,7 +136,7 @@ def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[
     return {**bodies, **opaque}, notes
 
 
-def _mask_shapes(mi: Mitsuba, head: Head) -> Described:
+def glowing_skin(mi: Mitsuba, head: Head) -> Described:
     """Return the head with skin that shines with radiance 1 and everything else black."""
     shapes = {}
     for k, material in enumerate(head.mesh.materials):

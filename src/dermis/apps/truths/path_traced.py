@@ -16,9 +16,10 @@ from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     Lambertian,
     check_traceable,
+    glowing_skin,
     load_mitsuba,
-    mask_scene,
     radiance_scene,
+    share_scene,
     variant_of,
 )
 from dermis.base.disk import find, keep
@@ -58,7 +59,7 @@ class PathTraced:
     mask: Floats
     samples: int
     seconds: float
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def path_trace(
@@ -71,7 +72,7 @@ def path_trace(
     keep: bool = True,
     report: Report | None = None,
 ) -> PathTraced:
-    """The scene with its skin filled by a medium; its maps, profile and surface reflection are ignored.
+    """Return the scene with its skin filled by a medium; maps, profile and surface reflection are ignored.
 
     medium : index-matched (eta 1), isotropic, with three channels; layers become nested bodies, each face the
         skin moved inwards by its depth. Or a `Lambertian`, for directly lit skin without scattering
@@ -96,17 +97,41 @@ def path_trace(
     mi, size = load_mitsuba(), (settings or Settings()).size
     form = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH}"
     key = scene_key(scene, medium, size, form) if keep else None
+    return mean_of_passes(
+        mi,
+        variant,
+        wanted,
+        size,
+        key,
+        lambda: radiance_scene(mi, scene, medium, size),
+        lambda: share_scene(mi, scene.camera, size, glowing_skin(mi, scene.head)),
+        report,
+    )
+
+
+def mean_of_passes(
+    mi: Mitsuba,
+    variant: Variant,
+    wanted: int,
+    size: tuple[int, int],
+    key: str | None,
+    radiance: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
+    share: Callable[[], MitsubaObject],
+    report: Report | None,
+) -> PathTraced:
+    """Return the mean of as many passes as wanted, those that are kept on disk included.
+
+    key : name of the kept passes; None to keep none
+    radiance, share : make the scenes of the radiance, with notes, and of the share of skin in each pixel
+    """
     passes = kept_passes(key, size) if key else None
     if passes is None or passes.count < wanted:
         with variant_of(mi, variant):
-            built, notes = radiance_scene(mi, scene, medium, size)
-            passes = passes or Passes.none(size, _mask(mi, scene, size), notes)
+            built, notes = radiance()
+            if passes is None:
+                mask = np.array(mi.render(share(), spp=_MASK_SAMPLES), np.float32)[..., 0]
+                passes = Passes.none(size, np.clip(mask, 0.0, 1.0), notes)
             add_passes(mi, built, passes, wanted, key, report)
-    return traced(passes)
-
-
-def traced(passes: Passes) -> PathTraced:
-    """The mean of some passes, as an image."""
     return PathTraced(
         passes.mean.astype(np.float32),
         passes.variance.astype(np.float32),
@@ -118,18 +143,13 @@ def traced(passes: Passes) -> PathTraced:
 
 
 def passes_for(samples: int) -> int:
-    """How many passes have at least so many samples.
+    """Return the number of passes for at least so many samples.
 
     Raises DermisError for none and for too many.
     """
     if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MOST_SAMPLES):
         refuse("samples", f"a whole number from 1 to {_MOST_SAMPLES}", f"{samples} came", "Correct it")
     return max(_LEAST_PASSES, -(-samples // SAMPLES_PER_PASS))
-
-
-def _mask(mi: Mitsuba, scene: Scene, size: tuple[int, int]) -> Floats:
-    share = np.array(mi.render(mask_scene(mi, scene, size), spp=_MASK_SAMPLES), np.float32)[..., 0]
-    return np.clip(share, 0.0, 1.0)
 
 
 def add_passes(

@@ -13,20 +13,16 @@ from dermis.apps.truths.mitsuba_scene import (
     lit_scene,
     load_mitsuba,
     mesh_shape,
-    sensor_of,
-    variant_of,
+    share_scene,
 )
 from dermis.apps.truths.path_traced import (
     SAMPLES_PER_PASS,
-    Passes,
     PathTraced,
     Report,
     Variant,
-    add_passes,
     digest_surroundings,
-    kept_passes,
+    mean_of_passes,
     passes_for,
-    traced,
 )
 from dermis.apps.truths.person.medium import PASSED, VOXELS, mean_free_paths, medium_of
 from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, picture, skin_shapes
@@ -36,7 +32,6 @@ from dermis.mesh.mesh import Material
 from dermis.scene.model import Scene
 
 _FORM = "person 1"  # raise when the same person is traced in another way
-_MASK_SAMPLES = 64
 _SALIVA, _TONGUE = 0.12, 0.25
 _WET_INDEX = 1.4
 
@@ -53,7 +48,7 @@ def trace_person(
     keep: bool = True,
     report: Report | None = None,
 ) -> PathTraced:
-    """The person of a scene as painted, its skin's profile and surface lobe aside.
+    """Return the person of a scene as painted, its skin's profile and surface lobe aside.
 
     paint : pictures of skin, eyes and teeth
     distance_mm : (3,) from where light enters skin of the mean colour (3,) to where it leaves, in the mean
@@ -70,13 +65,16 @@ def trace_person(
     person, path = person_of(scene, paint), mean_free_paths(colour, distance_mm)
     form = f"{_FORM} {mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH} {PASSED} {VOXELS} {size}"
     key = person_key(scene, person, path, form) if keep else None
-    passes = kept_passes(key, size) if key else None
-    if passes is None or passes.count < wanted:
-        with variant_of(mi, variant):
-            built, notes = person_scene(mi, scene, person, path, size)
-            passes = passes or Passes.none(size, _covered(mi, scene, person, size), notes)
-            add_passes(mi, built, passes, wanted, key, report)
-    return traced(passes)
+    return mean_of_passes(
+        mi,
+        variant,
+        wanted,
+        size,
+        key,
+        lambda: person_scene(mi, scene, person, path, size),
+        lambda: share_scene(mi, scene.camera, size, _glowing(mi, person)),
+        report,
+    )
 
 
 def person_scene(
@@ -128,19 +126,10 @@ def _wet(mi: Mitsuba, person: Person, material: Material) -> Described:
     }
 
 
-def _covered(mi: Mitsuba, scene: Scene, person: Person, size: tuple[int, int]) -> NDArray[np.float32]:
-    """(h, w) share of each pixel that the head fills, hairs aside."""
-    mesh = person.mesh
-    glow = mi.load_dict({"type": "area", "radiance": 1.0})
-    head = mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=glow)
-    described = {
-        "type": "scene",
-        "integrator": {"type": "path", "max_depth": 1},
-        "sensor": sensor_of(mi, scene.camera, size, sampler="multijitter"),
-        "head": head,
-    }
-    share = np.array(mi.render(mi.load_dict(described), spp=_MASK_SAMPLES), np.float32)[..., 0]
-    return np.clip(share, 0.0, 1.0)
+def _glowing(mi: Mitsuba, person: Person) -> Described:
+    """Return the head with radiance 1 and without hairs."""
+    glow, mesh = mi.load_dict({"type": "area", "radiance": 1.0}), person.mesh
+    return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=glow)}
 
 
 def person_key(scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], form: str) -> str:

@@ -20,7 +20,6 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import DirectionName
 
 if TYPE_CHECKING:
-    from dermis.apps.truths.cycles import CyclesRendered
     from dermis.apps.truths.irradiance_samples import IrradianceSamples
     from dermis.apps.truths.path_traced import PathTraced
 
@@ -146,7 +145,7 @@ def path_traced(subject: Subject, samples: int) -> Truth:
     from dermis.apps.truths.path_traced import path_trace
 
     made = path_trace(subject.scene, subject.medium, samples, subject.settings)
-    truth = _rendered(made, made.mask, f"{made.samples} paths a pixel", *made.notes)
+    truth = _rendered(made, f"{made.samples} paths a pixel")
     return replace(truth, direction="half-space")
 
 
@@ -158,7 +157,7 @@ def cycles(subject: Subject, samples: int) -> Truth:
     from dermis.apps.truths.cycles import cycles_render
 
     made = cycles_render(subject.scene, subject.medium, samples, subject.settings)
-    return _rendered(made, made.coverage, f"{made.samples} paths a pixel, random walk")
+    return _rendered(made, f"{made.samples} paths a pixel, random walk")
 
 
 TRUTHS: dict[str, Callable[[Subject, int], Truth]] = {
@@ -169,9 +168,9 @@ TRUTHS: dict[str, Callable[[Subject, int], Truth]] = {
 }
 
 
-def _rendered(made: PathTraced | CyclesRendered, coverage: NDArray[np.float32], *notes: str) -> Truth:
+def _rendered(made: PathTraced, *notes: str) -> Truth:
     image, variance = made.image.astype(np.float64), made.variance.astype(np.float64)
-    return Truth(image, variance, coverage > _COVERED, SUBPIXELS, made.seconds, notes)
+    return Truth(image, variance, made.mask > _COVERED, SUBPIXELS, made.seconds, (*notes, *made.notes))
 
 
 def _entered(subject: Subject, triangle: NDArray[np.int64], barycentric: Floats) -> Floats:
