@@ -38,6 +38,8 @@ class Patch(NamedTuple):
 class Blit(Program):
     """Draws byte images into targets of one format."""
 
+    stages = "VERTEX", "FRAGMENT"
+
     def __init__(self, device: Device, target: str) -> None:
         super().__init__(device, Path(__file__).parent / "blit.wgsl")
         fragment = {
@@ -71,11 +73,6 @@ class Blit(Program):
             render_pass.draw(3)
         render_pass.end()
         self.device.handle.queue.submit([encoder.finish()])
-
-    def _visibility(self) -> int:
-        import wgpu
-
-        return int(wgpu.ShaderStage.VERTEX | wgpu.ShaderStage.FRAGMENT)
 
 
 _QUIET_S = 0.25  # without a change, after which the picture is refined
