@@ -7,8 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dermis.apps.batch.expressions import mixed, mixture, performed
-from dermis.apps.batch.sampling import uniform
+from dermis.apps.batch.sampling import mixed, mixture, performed, uniform
 from dermis.human.expressions import EXPRESSIONS, targets_of
 from dermis.human.person import Human
 

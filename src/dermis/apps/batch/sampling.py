@@ -5,16 +5,19 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
+from math import exp
 
 from scipy.special import ndtr, ndtri
 
 from dermis.apps.batch.distributions import Constant, Distribution
-from dermis.apps.batch.expressions import mixed, mixture, performed
 from dermis.apps.batch.spec_tables import ANGLES, MIXTURE, NONE, RIG, table_of
-from dermis.human.expressions import Weights, targets_of
+from dermis.base.tables import read_rows
+from dermis.human.expressions import SIDES, Weights, sided, targets_of
 
 Parameters = dict[str, float | int | str]
+_JAW = "jawOpen"
+_SCARCE = 1.5  # power of a uniform number that a weight at random is
 _BITS = 52  # which a double holds with half a step more
 _PERSON = "person."
 _SEEDS = 2**32
@@ -50,6 +53,73 @@ def uniform(seed: int, number: int, name: str) -> float:
 def rounded(value: float) -> float:
     """Round to six significant digits: the last ones of logarithms and roots differ between machines."""
     return float(f"{value:.6g}") + 0.0  # no -0.0
+
+
+@dataclass(frozen=True)
+class Movement:
+    """Movement of a part of the face: a row of mixture.csv.
+
+    chance : probability of this movement in its part
+    most : greatest weight of its targets
+    shuts : share by which it keeps the jaw from opening
+    """
+
+    chance: float
+    most: float
+    moves: Weights
+    shuts: float
+
+
+@cache
+def mixture() -> Mapping[str, tuple[Movement, ...]]:
+    """Return the movements by part of the face."""
+    found: dict[str, tuple[Movement, ...]] = {}
+    for row in read_rows(str(__package__), "mixture"):
+        words = row["moves"].split()
+        weights = {name: float(share) for name, share in zip(words[::2], words[1::2], strict=True)}
+        made = Movement(float(row["chance"]), float(row["most"]), weights, float(row["shuts"]))
+        found[row["part"]] = (*found.get(row["part"], ()), made)
+    return found
+
+
+def mixed(share: Callable[[str], float]) -> dict[str, float]:
+    """Return random weights, with one movement or none in each part of the face.
+
+    share : uniform number in (0, 1) for a name
+    """
+    found: dict[str, float] = {}
+    opening = 1.0
+    for part, movements in mixture().items():
+        left, amount = share(f"{part}.which"), share(f"{part}.weight") ** _SCARCE
+        for one in movements:
+            if 0 <= left < one.chance:
+                found |= {name: one.most * amount * much for name, much in one.moves.items()}
+                opening *= 1.0 - one.shuts * amount
+            left -= one.chance
+    if _JAW in found:
+        found[_JAW] *= opening
+    return found
+
+
+def performed(
+    weights: Weights, intensity: float, asymmetry: float, variation: float, normal: Callable[[str], float]
+) -> dict[str, float]:
+    """Return the weights of targets, 0 to 1, of an expression varied for one face; see `ExpressionTable`.
+
+    normal : standard normal number for a name
+    """
+    found = {}
+    for name, weight in weights.items():
+        much = weight * intensity * exp(variation * normal(name)) if weight else 0.0
+        for target in sided(name):
+            side = 0.0 if target == name and not _is_side(name) else 1.0 - 2.0 * target.endswith("Right")
+            found[target] = min(max(much * (1.0 + asymmetry * side), 0.0), 1.0)
+    return found
+
+
+def _is_side(name: str) -> bool:
+    """Return whether it is one of a pair, which mouthLeft and jawRight are not."""
+    return name.endswith(SIDES) and not name.startswith(("jaw", "mouthLeft", "mouthRight"))
 
 
 @dataclass(frozen=True)
