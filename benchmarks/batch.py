@@ -31,7 +31,7 @@ from dermis.apps.batch.scenes import SceneMaker
 from dermis.apps.batch.spec import Spec, example_text, spec_of
 from dermis.apps.batch.worker import Work
 from dermis.apps.batch.worker_pool import Processes, SlotRequest, available_cores
-from dermis.apps.validation.pages import write_figures
+from dermis.apps.validation.pages import Figures, write_figures
 from dermis.base.atomic_write import check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import note, print_lines
@@ -68,7 +68,7 @@ class Plan:
 
 def spec_for(plan: Plan, images: int, shards: int, *, moving: bool = False) -> Spec:
     """The example's people, faces, light and cameras; or one person, moving in one light."""
-    tables: dict[str, Any] = tomllib.loads(example_text())
+    tables: Figures = tomllib.loads(example_text())
     tables |= {"count": images, "size": list(plan.size), "shard_size": max(1, images // shards)}
     tables |= {"outputs": list(OUTPUTS), "landmarks": list(LANDMARKS)}
     tables["render"] = {**tables["render"], "atlas": plan.atlas, "shadow_size": plan.atlas}
@@ -107,7 +107,7 @@ class Clock:
         return (last - first) / (ended - began) if ended > began else 0.0
 
 
-def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int, count: int = 1) -> dict[str, Any]:
+def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int, count: int = 1) -> Figures:
     """Images/s of a run, bytes of an image, and memory of a worker at its begin and end [byte]."""
     clock, began = Clock(workers=count), time.monotonic()
     with _folder(plan) as out:
@@ -123,7 +123,7 @@ def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int, count: int =
     }
 
 
-def workers(plan: Plan, count: int, *, moving: bool = False) -> dict[str, Any]:
+def workers(plan: Plan, count: int, *, moving: bool = False) -> Figures:
     """Plain processes, so many of them."""
     slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
     spec = spec_for(plan, plan.images * count, 2 * count, moving=moving)
@@ -131,7 +131,7 @@ def workers(plan: Plan, count: int, *, moving: bool = False) -> dict[str, Any]:
     return {"workers": count, "encoders": encoders, "adapters": len({one.adapter for one in slots}), **found}
 
 
-def dask(plan: Plan, count: int) -> dict[str, Any]:
+def dask(plan: Plan, count: int) -> Figures:
     """The same work by plain processes and by as many workers of dask, each timed by whole shards."""
     distributed = needed("distributed", "the comparison with dask")
     slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
@@ -155,7 +155,7 @@ def dask(plan: Plan, count: int) -> dict[str, Any]:
     return {"workers": count, "plain": rates[0], "dask": rates[1], "dask_over_plain": rates[1] / rates[0]}
 
 
-def steps(plan: Plan) -> dict[str, Any]:
+def steps(plan: Plan) -> Figures:
     """Milliseconds of each step of an image by itself, in one process: medians."""
     spec = spec_for(plan, min(_MOST_STEPS, plan.images), 1)
     maker, renderer = SceneMaker(spec), Renderer(plan.adapter, rounds=16)
@@ -172,7 +172,7 @@ def steps(plan: Plan) -> dict[str, Any]:
     return {name: median(times[2:]) for name, times in told.items()}  # the first ones fill caches
 
 
-def disk(plan: Plan) -> dict[str, Any]:
+def disk(plan: Plan) -> Figures:
     """Bytes/s that a file takes, to the disk itself."""
     block = os.urandom(1 << 24)
     with _folder(plan) as out:
@@ -184,7 +184,7 @@ def disk(plan: Plan) -> dict[str, Any]:
         return {"bytes_per_s": _DISK_BYTES / (time.perf_counter() - began)}
 
 
-def machine_of(plan: Plan) -> dict[str, Any]:
+def machine_of(plan: Plan) -> Figures:
     """What all of it is measured on."""
     adapters = SlotRequest(plan.adapter).adapters()
     return {
@@ -281,11 +281,9 @@ def main(
     return 0
 
 
-def measure(
-    plan: Plan, counts: list[int], parts: list[str], keep: Callable[[dict[str, Any]], None]
-) -> dict[str, Any]:
+def measure(plan: Plan, counts: list[int], parts: list[str], keep: Callable[[Figures], None]) -> Figures:
     """All figures; `keep` gets those known so far after each part."""
-    told: dict[str, Any] = {"machine": machine_of(plan), **_about()}
+    told: Figures = {"machine": machine_of(plan), **_about()}
     jobs: dict[str, Callable[[], Any]] = {
         "steps": lambda: steps(plan),
         "new": lambda: [workers(plan, count) for count in counts],
@@ -302,7 +300,7 @@ def measure(
     return told
 
 
-def table(told: dict[str, Any]) -> list[str]:
+def table(told: Figures) -> list[str]:
     """Lines for people."""
     machine = told["machine"]
     lines = [
@@ -325,7 +323,7 @@ def table(told: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _about() -> dict[str, Any]:
+def _about() -> Figures:
     load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     versions = {name: version(name) for name in ("dermis", "wgpu", "numpy")}
     return {

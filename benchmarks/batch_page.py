@@ -8,8 +8,8 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+from dermis.apps.validation.pages import Figures
 from dermis.base.atomic_write import replacing
 from dermis.base.command_line import run_script
 
@@ -21,8 +21,6 @@ _SHARD = 1000  # images
 _KINDS = {"new": "new people", "moving": "one person, moving"}
 _HEADS = "what", "workers", "adapters", "encoders of each", "images/s", "over the first", "memory of one [MB]"
 
-Told = dict[str, Any]
-
 
 def main() -> None:
     """Write the page."""
@@ -31,12 +29,12 @@ def main() -> None:
         trial.write_text(page(measured), encoding="utf-8")
 
 
-def page(machines: Sequence[Told]) -> str:
+def page(machines: Sequence[Figures]) -> str:
     """The page's text."""
     return "\n".join([_HEAD, *map(_machine, machines)])
 
 
-def _machine(told: Told) -> str:
+def _machine(told: Figures) -> str:
     machine, versions = told["machine"], told["versions"]
     width, height = machine["size"]
     parts = [
@@ -54,12 +52,12 @@ def _machine(told: Told) -> str:
     return "\n".join(parts)
 
 
-def _noted(told: Told) -> str:
+def _noted(told: Figures) -> str:
     """What is to be said of the machine's figures besides, after a sentence."""
     return f" {told['note']}" if "note" in told else ""
 
 
-def _memory(told: Told) -> str:
+def _memory(told: Figures) -> str:
     """How much a worker holds after so many images, where that was read."""
     rows = [
         (_KINDS[name], one["workers"], mark, f"{size / 1e6:.0f}")
@@ -71,7 +69,7 @@ def _memory(told: Told) -> str:
     return f"\n{_table(heads, rows)}" if rows else ""
 
 
-def _rates(told: Told) -> str:
+def _rates(told: Figures) -> str:
     rows = []
     for name, words in _KINDS.items():
         runs = told.get(name, [])
@@ -89,7 +87,7 @@ def _rates(told: Told) -> str:
     return text
 
 
-def paper(told: Told) -> list[tuple[str, str]]:
+def paper(told: Figures) -> list[tuple[str, str]]:
     """What so many images take where the fastest measured run goes on like that."""
     best = max(told["new"], key=lambda one: float(one["images_per_s"]))
     rate, size = best["images_per_s"], best["bytes_per_image"]
@@ -107,7 +105,7 @@ def paper(told: Told) -> list[tuple[str, str]]:
     return rows
 
 
-def ceilings(told: Told, run: Told) -> dict[str, float]:
+def ceilings(told: Figures, run: Figures) -> dict[str, float]:
     """Images/s that each part could do if the others took no time, of those that were measured."""
     found, encoders = {}, run["workers"] * run["encoders"]
     if steps := told.get("steps"):

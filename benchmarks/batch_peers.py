@@ -20,12 +20,12 @@ from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 from statistics import mean
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from dermis.apps.truths.blender_process import blender_python
-from dermis.apps.validation.pages import write_figures
+from dermis.apps.validation.pages import Figures, write_figures
 from dermis.apps.validation.peers.report import cpu_model
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
@@ -83,21 +83,19 @@ def main(
     return 0
 
 
-def table(report: dict[str, Any]) -> str:
+def table(report: Figures) -> str:
     """The rows as Markdown."""
     head = "| renderer | setting | s an image, by the clock | of all cores | noise |\n|---|---|---|---|---|"
     return "\n".join([head, *map(_line, report["rows"])])
 
 
-def _line(row: dict[str, Any]) -> str:
+def _line(row: Figures) -> str:
     noise = f"{row['noise']:.1%}" if row["noise"] else "none"
     times = f"{row['seconds']:.3g} | {row['core_seconds']:.3g}"
     return f"| {row['renderer']} | {row['setting']} | {times} | {noise} |"
 
 
-def _cycles(
-    python: Path, folder: Path, people: int, side: int, settings: list[dict[str, Any]]
-) -> list[dict[str, Any]]:
+def _cycles(python: Path, folder: Path, people: int, side: int, settings: list[Figures]) -> list[Figures]:
     """A row for each setting, reading a person and building its scene included."""
     for seed in range(people):
         _run([*_DERMIS, "head", "--seed", str(seed), "--size", "1024", "-o", str(folder / f"{seed}.glb")])
@@ -115,7 +113,7 @@ def _cycles(
     return rows
 
 
-def _ours(folder: Path, images: int, side: int, adapter: str) -> dict[str, Any]:
+def _ours(folder: Path, images: int, side: int, adapter: str) -> Figures:
     """A row: what a run takes with its start, less what one of a single image takes."""
     spec = folder / "spec.toml"
     spec.write_text(_run([*_DERMIS, "batch", "--example"]), encoding="utf-8")
@@ -132,7 +130,7 @@ def _batch(spec: Path, out: Path, count: int, side: int, adapter: str) -> tuple[
     return time.perf_counter() - began, _cores_s() - worked
 
 
-def _row(renderer: str, setting: str, clock: float, cores: float, noise: float) -> dict[str, Any]:
+def _row(renderer: str, setting: str, clock: float, cores: float, noise: float) -> Figures:
     return {
         "renderer": renderer,
         "setting": setting,

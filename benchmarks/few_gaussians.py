@@ -7,13 +7,14 @@ import tempfile
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
 
 from dermis.apps.validation.benchmarks.cases import Case, scenes_of, settings_of
 from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, stage_ms
+from dermis.apps.validation.pages import Figures
 from dermis.base.atomic_write import check_output, replacing
 from dermis.base.command_line import run_script
 from dermis.base.console import print_json
@@ -71,9 +72,9 @@ def main(
     return 0
 
 
-def measured(renderer: Renderer, head: Head, case: Case, effort: Effort) -> dict[str, Any]:
+def measured(renderer: Renderer, head: Head, case: Case, effort: Effort) -> Figures:
     """Device time in steps and at once [ms], and how far the pictures are apart (relative RMSE)."""
-    row: dict[str, Any] = {"gaussians": case.gaussians}
+    row: Figures = {"gaussians": case.gaussians}
     pictures = []
     with tempfile.TemporaryDirectory() as folder, TECHNIQUES.including(_AT_ONCE, AtOnce()):
         scenes = scenes_of(case, head, Path(folder), 8)

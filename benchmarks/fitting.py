@@ -10,7 +10,7 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import gettempdir
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -22,7 +22,7 @@ from dermis.apps.truths.half_space import diffuse_albedo, reflected_radiance
 from dermis.apps.truths.path_traced import PathTraced, Variant
 from dermis.apps.validation.comparisons.person import traced
 from dermis.apps.validation.comparisons.person_paint import paint_of
-from dermis.apps.validation.pages import write_figures
+from dermis.apps.validation.pages import Figures, write_figures
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.environment.panorama import directions, solid_angles
@@ -174,7 +174,7 @@ def main(
         Trace the pictures that are not kept on disk yet, and fit none.
     """
     renderer = Renderer(adapter)
-    told: dict[str, Any] = {"side": side, "samples": samples}
+    told: Figures = {"side": side, "samples": samples}
     told |= {"adapter": renderer.device.adapter.name, "traced": [], "own": []}
     for number in range(scenes):
         one, began = case(number), time.perf_counter()
@@ -190,7 +190,7 @@ def main(
         write_figures(output, told, 4)
 
 
-def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> dict[str, Any]:
+def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> Figures:
     """What is found of a case, beside what is true; nothing of the true skin is given but its eumelanin, its
     oxygen and the kind of its surface.
     """
@@ -208,8 +208,8 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> dict[str, Any
     }
 
 
-def _against(one: Case, found: FitResult) -> dict[str, Any]:
-    told: dict[str, Any] = {}
+def _against(one: Case, found: FitResult) -> Figures:
+    told: Figures = {}
     for name in ("melanin", "blood", "roughness"):
         true = float(getattr(one, name))
         told[name] = {"true": true, "found": found.values[name], "relative_sd": found.certainty.sd[name]}

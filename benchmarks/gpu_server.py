@@ -24,9 +24,11 @@ from functools import partial
 from importlib.metadata import version
 from itertools import cycle
 from pathlib import Path
-from typing import IO, Annotated, Any
+from typing import IO, Annotated
 
+import numpy as np
 from cyclopts import Parameter
+from numpy.typing import NDArray
 
 import dermis
 from dermis.apps.validation.benchmarks.cases import FRAGMENTS, PRESETS, Case, scenes_of
@@ -34,7 +36,7 @@ from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
 from dermis.apps.validation.benchmarks.measure import Effort, row_ms, stage_ms
 from dermis.apps.validation.benchmarks.report import as_json
 from dermis.apps.validation.benchmarks.run import run as run_benchmark
-from dermis.apps.validation.pages import write_figures
+from dermis.apps.validation.pages import Figures, write_figures
 from dermis.base.atomic_write import check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import note
@@ -91,7 +93,7 @@ ENVIRONMENTS: dict[str, tuple[bool, str | None]] = {
     "royal_esplanade": (False, "royal_esplanade"),
 }
 """Whether the studio's lights are on, and the panorama."""
-OPTIONS: dict[str, dict[str, Any]] = {
+OPTIONS: dict[str, Figures] = {
     "usual": {},
     "seams alpha": {"seams": "alpha"},
     "seams alpha, stretch axes, transmission none": {
@@ -123,7 +125,7 @@ class Plan:
     film: list[Case]
     effort: Effort
     images: int
-    image: dict[str, Any]
+    image: Figures
     viewer: tuple[str, ...] = ()
 
 
@@ -151,17 +153,17 @@ def quick_plan(adapter: str, head: str) -> Plan:
     return Plan(adapter, head, usual, cases, cases[:1], effort, 4, image, small)
 
 
-def bench(plan: Plan, head: Head, renderer: Renderer) -> Any:
+def bench(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     """`dermis bench`: all sizes and the passes of 2007."""
     return as_json(run_benchmark(plan.cases, plan.head, plan.adapter))
 
 
-def film(plan: Plan, head: Head, renderer: Renderer) -> Any:
+def film(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     """Frames for film: the usual one, by the fragments of 2007, and with most triangles."""
     return as_json(run_benchmark(plan.film, plan.head, plan.adapter))
 
 
-def lights(plan: Plan, head: Head, renderer: Renderer) -> Any:
+def lights(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     """Device time of each stage [ms] under lamps, in a room, and in the sun."""
     settings, found = _settings(plan.usual), {}
     for name, (lamps, panorama) in ENVIRONMENTS.items():
@@ -174,7 +176,7 @@ def lights(plan: Plan, head: Head, renderer: Renderer) -> Any:
     return found
 
 
-def options(plan: Plan, head: Head, renderer: Renderer) -> Any:
+def options(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     """Device time of each stage [ms] by technique and remedy."""
     scenes, found = _scenes(plan.usual, head, plan.effort.row), {}
     for name, chosen in OPTIONS.items():
@@ -183,14 +185,14 @@ def options(plan: Plan, head: Head, renderer: Renderer) -> Any:
     return found
 
 
-def sequences(plan: Plan, head: Head, renderer: Renderer) -> Any:
+def sequences(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     """Images per second, each with its own camera and lights: as arrays, PNG files and EXR files."""
     scenes = _scenes(replace(plan.usual, lights=1), head, plan.images)
 
-    def bytes_of() -> Iterable[Any]:
+    def bytes_of() -> Iterable[NDArray[np.generic]]:
         return renderer.render_many(scenes, **plan.image)
 
-    def floats_of() -> Iterable[Any]:
+    def floats_of() -> Iterable[NDArray[np.generic]]:
         return renderer.render_many(scenes, linear=True, **plan.image)
 
     ways = {"bytes": (bytes_of, ""), "floats": (floats_of, ""), "png": (bytes_of, ".png")}
@@ -201,12 +203,12 @@ def sequences(plan: Plan, head: Head, renderer: Renderer) -> Any:
     return {"images": plan.images, **plan.image, "threads": os.cpu_count(), "per_second": rates}
 
 
-def lobes(plan: Plan, head: Head, renderer: Renderer) -> Any:
+def lobes(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     """An evaluation of each surface lobe [ns]."""
     return {", ".join(names): ns for names, ns in lobe_cost_ns(renderer.device).items()}
 
 
-def start(plan: Plan, head: Head, renderer: Renderer) -> Any:
+def start(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     """Time of a process that renders one image [s]; the second one finds everything in the disk cache."""
     size = "x".join(map(str, plan.image["size"]))
     with tempfile.TemporaryDirectory() as folder:
@@ -216,7 +218,7 @@ def start(plan: Plan, head: Head, renderer: Renderer) -> Any:
         return {name: lasted_s([sys.executable, "-m", "dermis", *words]) for name in ("first", "second")}
 
 
-def viewer(plan: Plan, head: Head, renderer: Renderer) -> Any:
+def viewer(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     """`benchmarks/viewer.py` without its long memory test; partial results when it ends early."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "viewer.json"
@@ -231,7 +233,8 @@ def viewer(plan: Plan, head: Head, renderer: Renderer) -> Any:
                 raise
             note(str(fault))
             reason = {"ended": str(fault)}
-        return json.loads(told.read_text(encoding="utf-8")) | reason
+        figures: Figures = json.loads(told.read_text(encoding="utf-8"))
+        return figures | reason
 
 
 def _settings(case: Case) -> Settings:
@@ -251,7 +254,7 @@ def _stages(renderer: Renderer, scenes: list[Scene], settings: Settings, effort:
     return stage_ms(renderer, moving, settings, effort)
 
 
-def _or_reason(measured: Callable[[], Any]) -> Any:
+def _or_reason(measured: Callable[[], Figures | float]) -> Figures | float:
     """The measurements, or why there are none."""
     try:
         return measured()
@@ -259,7 +262,7 @@ def _or_reason(measured: Callable[[], Any]) -> Any:
         return {"left_out": str(fault)}
 
 
-def _drained(images: Iterable[Any], suffix: str) -> float:
+def _drained(images: Iterable[NDArray[np.generic]], suffix: str) -> float:
     """Time to consume all images, and to write them where there is a suffix [s]."""
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder, ImageWriter() as writer:
@@ -308,9 +311,7 @@ def main(
     measure(plan, _chosen(parts), minutes, lambda told: write_figures(target, told, _DIGITS))
 
 
-def measure(
-    plan: Plan, parts: list[str], minutes: float, keep: Callable[[dict[str, Any]], None]
-) -> dict[str, Any]:
+def measure(plan: Plan, parts: list[str], minutes: float, keep: Callable[[Figures], None]) -> Figures:
     """All figures; `keep` gets those known so far after each part."""
     began = time.perf_counter()
     head, renderer = dermis.load_head(plan.head, subdivide=0), dermis.Renderer(plan.adapter)
@@ -325,12 +326,13 @@ def measure(
     return told
 
 
-def _measured(part: str, plan: Plan, head: Any, renderer: Any, left: float) -> Any:
+def _measured(part: str, plan: Plan, head: Head, renderer: Renderer, left: float) -> Figures:
     """A part's figures, or why there are none."""
     if left < _NEEDED_S.get(part, 20):
         return {"left_out": f"{left:.0f} s were left"}
     try:
-        return globals()[part](plan, head, renderer)
+        figures: Figures = globals()[part](plan, head, renderer)
+        return figures
     except DermisError as fault:
         note(f"left out: {fault}")
         return {"left_out": str(fault)}
@@ -338,7 +340,7 @@ def _measured(part: str, plan: Plan, head: Any, renderer: Any, left: float) -> A
         renderer.forget()  # the next part may need all of the memory
 
 
-def _about(plan: Plan, renderer: Any) -> dict[str, Any]:
+def _about(plan: Plan, renderer: Renderer) -> Figures:
     device = renderer.device
     return {
         "head": plan.head,

@@ -13,13 +13,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import count, cycle
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
 
 from dermis.apps.validation.benchmarks.cases import Case, pose_at, rigged, scenes_of, settings_of
 from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, row_ms, stage_ms
+from dermis.apps.validation.pages import Figures
 from dermis.base.atomic_write import check_output, replacing
 from dermis.base.command_line import run_script
 from dermis.base.console import print_json
@@ -66,7 +67,7 @@ def main(
     software = renderer.device.adapter.kind == "CPU"
     case, effort = (_ON_CPU, ON_CPU) if software else (_ON_GPU, Effort())
     with tempfile.TemporaryDirectory() as folder:
-        found: dict[str, Any] = {"adapter": renderer.device.adapter.name, "head": head}
+        found: Figures = {"adapter": renderer.device.adapter.name, "head": head}
         settings = settings_of(case).model_copy(update={"interreflection": interreflection})
         found |= moving(renderer, case, settings, loaded, Path(folder), effort)
         found |= {"another_person_ms": people(renderer, case, loaded)}
@@ -83,9 +84,9 @@ def main(
 
 def moving(
     renderer: Renderer, case: Case, settings: Settings, head: Head, folder: Path, effort: Effort
-) -> dict[str, Any]:
+) -> Figures:
     """Frames that each have another skin, other lights and another camera; at rest, and with a new shape."""
-    found = dict[str, Any]()
+    found = Figures()
     scenes = {
         "still": scenes_of(case, head, folder, _MOMENTS),
         "moving": scenes_of(replace(case, targets=_TARGETS), head, folder, _MOMENTS),
@@ -146,7 +147,7 @@ def resident_mb() -> float:
     return pages * 4096 / 1e6
 
 
-def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int) -> dict[str, Any]:
+def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int) -> Figures:
     """Memory of the process and of the device over frames of a motion that never repeats [MB]."""
     scene, settings = scenes_of(case, head, folder, 1)[0], settings_of(case)
     moving, taken = rigged(head, case.targets), list[tuple[int, float, float]]()

@@ -11,7 +11,7 @@ import time
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -22,7 +22,7 @@ from dermis.apps.inverse.unmixing.device_unmixer import Unmixer
 from dermis.apps.inverse.unmixing.skin_model import SkinModel, Third, skin_model, solve, weights_of
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.truths.slab_mc import counted_profile
-from dermis.apps.validation.pages import write_figures
+from dermis.apps.validation.pages import Figures, write_figures
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.gpu import CommandList, Device, open_device
@@ -96,7 +96,7 @@ def colour_of(skin: SkinParameters) -> Floats:
     return np.asarray((1.0 - normal_reflectance(1.4)) * total @ rgb_weights(WAVELENGTHS_NM).T)
 
 
-def known(skin: SkinParameters) -> list[dict[str, Any]]:
+def known(skin: SkinParameters) -> list[Figures]:
     """Errors on skins of the model itself, by bands of melanin, without noise and with it."""
     m, b = skins()
     colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
@@ -137,7 +137,7 @@ def bound(model: SkinModel, m: Floats, b: Floats, colours: Floats) -> Floats:
     return np.asarray(2.0 * np.sqrt(np.linalg.inv(weighed)[:, 1, 1] / b))
 
 
-def mistaken() -> dict[str, Any]:
+def mistaken() -> Figures:
     """What melanin and blood come out as when the skin is not quite the one that was believed."""
     cases: dict[str, dict[str, float]] = {
         "oxygen 0.6 for 0.75": {"oxygen": 0.6},
@@ -162,7 +162,7 @@ def _off(third: Third, colours: Floats, m: Floats, b: Floats) -> dict[str, float
     return {name: float(np.median(one)) for name, one in ratios.items()} | {"delta_e": float(np.median(left))}
 
 
-def counted() -> list[dict[str, Any]]:
+def counted() -> list[Figures]:
     """Skins whose colour was counted photon by photon: what diffusion itself is off by is in it."""
     told = []
     for m, b in _COUNTED:
@@ -184,7 +184,7 @@ def counted() -> list[dict[str, Any]]:
     return told
 
 
-def supplied(folder: Path) -> list[dict[str, Any]]:
+def supplied(folder: Path) -> list[Figures]:
     """Skins whose colour another program computed, by bands of melanin: medians."""
     table = np.genfromtxt(
         folder / "spectral_srgb_diffusion.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
@@ -211,7 +211,7 @@ def supplied(folder: Path) -> list[dict[str, Any]]:
     return told
 
 
-def shading(adapter: str) -> dict[str, Any]:
+def shading(adapter: str) -> Figures:
     """A made-up map under light that is not even: what is taken out, and what melanin and blood gain."""
     random = np.random.default_rng(SEED)
     fields = [gaussian_filter(random.standard_normal((_SIDE, _SIDE)), s, mode="wrap") for s in (3, 4, 40)]
@@ -220,7 +220,7 @@ def shading(adapter: str) -> dict[str, Any]:
     colours = skin_model().colours(m.ravel(), b.ravel()).reshape(_SIDE, _SIDE, 3) * light[..., None]
     colours *= 1.0 + NOISE * random.standard_normal(colours.shape)
     colours = np.clip(colours, 0.0, 1.0)
-    told: dict[str, Any] = {"light": float(np.log(light).std())}
+    told: Figures = {"light": float(np.log(light).std())}
     for name, taken in (("kept", False), ("divided", True)):
         found = unmix(colours, shading=taken, adapter=adapter)
         told[name] = {

@@ -7,8 +7,8 @@ import math
 import statistics
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
+from dermis.apps.validation.pages import Figures
 from dermis.base.atomic_write import replacing
 from dermis.base.command_line import run_script
 
@@ -21,8 +21,6 @@ FITTED = ROOT / "benchmarks" / "results" / "fitting.json"
 
 _TRUE_STRENGTH = 1.0  # of the surface of all faces that are fitted, as fitting.py has them
 
-Told = dict[str, Any]
-
 
 def main() -> None:
     """Write the page."""
@@ -30,13 +28,13 @@ def main() -> None:
         trial.write_text(page(*figures()), encoding="utf-8")
 
 
-def figures() -> tuple[Told, Told]:
+def figures() -> tuple[Figures, Figures]:
     """What was measured of unmixing, and of widths."""
     told, widths = (json.loads(path.read_text("utf-8")) for path in (RESULTS, WIDTHS))
     return told, widths
 
 
-def page(told: Told, widths: Told) -> str:
+def page(told: Figures, widths: Figures) -> str:
     """The page's text."""
     text = TEXT.read_text("utf-8")
     tables = {"known": _known(told), "mistaken": _mistaken(told), "counted": _counted(told)}
@@ -51,7 +49,7 @@ def page(told: Told, widths: Told) -> str:
     return text
 
 
-def _known(told: Told) -> str:
+def _known(told: Figures) -> str:
     heads = (
         "epidermis [mm]",
         "melanin",
@@ -74,7 +72,7 @@ def _known(told: Told) -> str:
     return _table(heads, rows)
 
 
-def _mistaken(told: Told) -> str:
+def _mistaken(told: Figures) -> str:
     heads = "the skin is", "oxygen", "melanin found over true", "blood found over true", "CIEDE2000 left"
     words = {"none": "held", "oxygen": "found too"}
     rows = [
@@ -85,7 +83,7 @@ def _mistaken(told: Told) -> str:
     return _table(heads, rows)
 
 
-def _counted(told: Told) -> str:
+def _counted(told: Figures) -> str:
     heads = "melanin", "found", "blood", "found", "CIEDE2000 left", "of the true skin's colour by diffusion"
     rows = [
         (
@@ -101,7 +99,7 @@ def _counted(told: Told) -> str:
     return _table(heads, rows)
 
 
-def _shading(told: Told) -> str:
+def _shading(told: Figures) -> str:
     rows = [
         (words, _percent(told[key]["melanin"]), _percent(told[key]["blood"]))
         for key, words in (("kept", "left in the colours"), ("divided", "found and divided by"))
@@ -112,7 +110,7 @@ def _shading(told: Told) -> str:
     return _table(("light", "melanin off by (median)", "blood"), rows) + "\n" + light
 
 
-def _supplied(told: Sequence[Told]) -> str:
+def _supplied(told: Sequence[Figures]) -> str:
     heads = "melanin", "skins", "CIEDE2000 of the colour", "left when found", "melanin off by", "blood"
     rows = [
         (
@@ -128,7 +126,7 @@ def _supplied(told: Sequence[Told]) -> str:
     return _table(heads, rows)
 
 
-def _borders(told: Told) -> str:
+def _borders(told: Figures) -> str:
     heads = "media", "weights of", "mean error", "worst", "light in all", "white skin's light"
     rows = [
         (name, rule, *(_percent(one[key]) for key in ("rms", "worst", "energy", "white")))
@@ -138,13 +136,13 @@ def _borders(told: Told) -> str:
     return _table(heads, rows)
 
 
-def _grid(told: Told) -> str:
+def _grid(told: Figures) -> str:
     words = {"one_profile": "one profile, at the middle", "mixed": "three, mixed by the map"}
     rows = [(words[key], *map(_percent, told["grid"][key])) for key in words]
     return _table(("", "red", "green", "blue"), rows)
 
 
-def _speed(*machines: Told) -> str:
+def _speed(*machines: Figures) -> str:
     rows = [
         (f"{side} x {side}", *(f"{told[side]:.3g}" for told in machines))
         for side in machines[0]
@@ -153,7 +151,7 @@ def _speed(*machines: Told) -> str:
     return _table(("texels", *(f"{told['adapter']} [ms]" for told in machines)), rows)
 
 
-def _fitting(told: Told) -> str:
+def _fitting(told: Figures) -> str:
     heads = "pictures", "number", "median error", "90 %", "worst", "bias (median)"
     rows = [
         row
@@ -167,7 +165,7 @@ def _fitting(told: Told) -> str:
     return _table(heads, rows) + f"\n{size}, fitted at 128 across. {took}.\n\n{_stated(told['traced'])}"
 
 
-def _errors(cases: Sequence[Told], words: str) -> list[tuple[str, ...]]:
+def _errors(cases: Sequence[Figures], words: str) -> list[tuple[str, ...]]:
     """Rows of the errors of each number."""
     rows = []
     for name in ("melanin", "blood", "roughness", "rho_s"):
@@ -180,11 +178,11 @@ def _errors(cases: Sequence[Told], words: str) -> list[tuple[str, ...]]:
     return [*rows, (words, "direction of the sun", *_spread(turns, lambda x: f"{x:.1f} degrees"), "")]
 
 
-def _pair(one: Told) -> tuple[float, float]:
+def _pair(one: Figures) -> tuple[float, float]:
     return one["found"], one["true"]
 
 
-def _stated(cases: Sequence[Told]) -> str:
+def _stated(cases: Sequence[Figures]) -> str:
     """How far off pigments are over the deviations that the fits state."""
     words = []
     for name in ("melanin", "blood"):

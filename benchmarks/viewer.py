@@ -23,6 +23,7 @@ from viewer_input import Clock, Plan, offscreen, slider_position, speeds
 from viewer_memory import delays, endured
 from viewer_page import through_the_page
 
+from dermis.apps.validation.pages import Figures
 from dermis.base.atomic_write import check_output, replacing
 from dermis.base.command_line import run_script
 from dermis.base.console import note, print_lines
@@ -32,7 +33,7 @@ from dermis.gpu import Device, open_device
 _SECTIONS = ("speed", "delay", "page", "memory")
 
 
-def tables(found: dict[str, Any]) -> str:
+def tables(found: Figures) -> str:
     """All of it that there is."""
     parts = [_title(found), _speed(found), _delay(found)]
     if "samples" in found.get("memory", {}):
@@ -43,19 +44,19 @@ def tables(found: dict[str, Any]) -> str:
     return "\n\n".join([*parts, *ended])
 
 
-def _figures(found: dict[str, Any], section: str) -> dict[str, Any]:
+def _figures(found: Figures, section: str) -> Figures:
     """A section's, without the reason why it ended."""
     return {name: one for name, one in found.get(section, {}).items() if name != "ended"}
 
 
-def _title(found: dict[str, Any]) -> str:
+def _title(found: Figures) -> str:
     plan = found["plan"]
     size = " x ".join(map(str, plan["size"]))
     what = f"{plan['head']}, {size}, atlas {plan['atlas']}, samples {plan['samples']}"
     return f"{found['adapter']}, {what}, {found['date'][:10]}"
 
 
-def _speed(found: dict[str, Any]) -> str:
+def _speed(found: Figures) -> str:
     rows = [
         "| motion | frames/s | frame [ms] | 95 % within, longest [ms] | processor time [ms] | stages |",
         "|---|---|---|---|---|---|",
@@ -76,7 +77,7 @@ def _late(one: dict[str, float]) -> str:
     return f"{one['late_frame_ms']:.1f}, {one['longest_frame_ms']:.1f}"
 
 
-def _delay(found: dict[str, Any]) -> str:
+def _delay(found: Figures) -> str:
     rows = ["| latency from a move to the picture | median [ms] | 95 % within [ms] |", "|---|---|---|"]
     page, several = _figures(found, "page"), _figures(found, "delay")
     if "delay" in page:
@@ -91,7 +92,7 @@ def _delay(found: dict[str, Any]) -> str:
     return "\n".join(rows)
 
 
-def _memory(memory: dict[str, Any]) -> str:
+def _memory(memory: Figures) -> str:
     taken = memory["samples"]
     size = " x ".join(map(str, memory["plan"]["size"]))
     rows = [
@@ -190,13 +191,13 @@ class Found:
     ended : sections that ended early; the reason is among their figures
     """
 
-    def __init__(self, told: dict[str, Any], output: Path, clock: Clock) -> None:
+    def __init__(self, told: Figures, output: Path, clock: Clock) -> None:
         self.told, self.ended = told, list[str]()
         self._output, self._clock = output, clock
 
     def take(self, section: str, measured: Callable[[Clock], Iterable[tuple[str, Any]]]) -> None:
         """The figures of a section; a fault ends it and leaves what came before."""
-        figures = self.told[section] = dict[str, Any]()
+        figures = self.told[section] = Figures()
         self._say(section)
         try:
             for name, figure in measured(self._clock.share(_SHARES.get(section, 1.0))):
@@ -223,7 +224,7 @@ def _halved(plan: Plan) -> Plan:
     return replace(plan, size=(width // 2, height // 2), atlas=max(64, plan.atlas // 2))
 
 
-def _about(device: Device, plan: Plan) -> dict[str, Any]:
+def _about(device: Device, plan: Plan) -> Figures:
     """What was measured on what."""
     return {
         "adapter": device.adapter.name,

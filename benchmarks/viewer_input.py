@@ -10,8 +10,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.apps.validation.benchmarks.cases import pose_at, rigged
+from dermis.apps.validation.pages import Figures
 from dermis.apps.viewer.navigation import drag_light, orbit
 from dermis.apps.viewer.state import ViewerState, changed
 from dermis.apps.viewer.studio import Pace
@@ -110,7 +112,7 @@ class InputDriver:
             self._fault = fault
             raise
 
-    def frame(self) -> np.ndarray[Any, Any]:
+    def frame(self) -> NDArray[np.generic]:
         """The next picture, after what has happened since the last one.
 
         Raises what went wrong, for the canvas would show its last picture for ever.
@@ -199,13 +201,13 @@ MOTIONS: dict[str, Motion] = {
 }
 
 
-def speeds(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, dict[str, Any]]]:
+def speeds(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, Figures]]:
     """Of each kind of motion, one after the other."""
     for done, (name, motion) in enumerate(MOTIONS.items()):
         yield name, _speed(driver, motion, plan.frames, clock.share(1.0 / (len(MOTIONS) - done)))
 
 
-def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> dict[str, Any]:
+def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> Figures:
     session = driver.viewer.session
     driver.go_on(motion.start(driver.first))
     for k in range(_SETTLING):

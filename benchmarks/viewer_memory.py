@@ -12,6 +12,7 @@ import numpy as np
 from viewer_input import FEWEST, MOTIONS, STEP, Clock, InputDriver, Plan, counted, spread
 from viewer_page import resident_mb
 
+from dermis.apps.validation.pages import Figures
 from dermis.apps.viewer.controls import CAMERAS
 from dermis.apps.viewer.navigation import dolly, drag_light, orbit, pan
 from dermis.apps.viewer.state import ViewerState
@@ -128,7 +129,7 @@ KINDS: dict[str, Kind] = {
 """Changes of a state; what cannot be rendered together leaves the last picture, as it does for a user."""
 
 
-def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> dict[str, Any]:
+def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> Figures:
     """The memory over at least so many minutes and changes; each change is drawn."""
     chance, session = random.Random(11), driver.viewer.session
     done, taken = 0, list[dict[str, float]]()
@@ -176,7 +177,7 @@ def _change(driver: InputDriver, kind: str, chance: random.Random, plan: Plan) -
         session.change(driver.first)
 
 
-def growth(taken: Sequence[dict[str, float]]) -> dict[str, Any]:
+def growth(taken: Sequence[dict[str, float]]) -> Figures:
     """Slopes of the second half of the samples [MB per 1000 changes]."""
     late = taken[len(taken) // 2 :]
     x = [one["changes"] / 1e3 for one in late]

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from viewer_input import PIGMENTED, Clock, Plan, spread
 
 from dermis.apps.viewer.browser.canvas import encoded
@@ -256,7 +257,7 @@ def _slide(page: Page, place: Place) -> dict[str, float]:
     return found
 
 
-def _pixels(picture: Picture) -> np.ndarray[Any, Any]:
+def _pixels(picture: Picture) -> NDArray[np.uint8]:
     from PIL import Image
 
     return np.array(Image.open(io.BytesIO(picture.data)).convert("RGBA"))

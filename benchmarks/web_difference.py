@@ -7,11 +7,9 @@ those of a renderer whose maps are the ones that the page decodes, and these aga
 from __future__ import annotations
 
 import base64
-import shutil
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +19,9 @@ import dermis
 from dermis.apps.export.targets.web.build import PageRequest, page_content
 from dermis.apps.export.targets.web.maps import with_smaller_maps
 from dermis.apps.export.targets.web.page import web_page
+from dermis.apps.validation.chromium import chromium_page
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
-from dermis.base.extras import needed
 from dermis.frame.capture import renderer_for
 
 ATLAS, MAP = 512, 1024  # as exported
@@ -67,14 +65,10 @@ def main(head: str, adapter: str = "auto") -> None:
 
 def drawn(file: Path, side: int) -> NDArray[np.float32]:
     """(h, w, 3) linear, what a browser draws of a page."""
-    playwright = needed("playwright.sync_api", "a page in Chromium")
-    with playwright.sync_playwright() as play:
-        one: Any = play.chromium.launch(executable_path=shutil.which("chromium"), args=[*FLAGS, *SOFTWARE])
-        page = one.new_page(viewport={"width": side, "height": side}, offline=True)
+    with chromium_page(side, [*FLAGS, *SOFTWARE]) as page:
         page.goto(file.as_uri())
         page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=120_000)
         raw = base64.b64decode(page.evaluate(LINEAR))
-        one.close()
     return np.frombuffer(raw, np.float32).reshape(side, side, 4)[..., :3]
 
 

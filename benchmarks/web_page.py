@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import time
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from dermis.apps.validation.chromium import chromium_page
 from dermis.base.command_line import run_script
-from dermis.base.extras import needed
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 SOFTWARE = ["--use-webgpu-adapter=swiftshader"]
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--js-flags=--expose-gc", "--enable-precise-memory-info"]
@@ -37,7 +39,7 @@ def processor_s() -> float:
     return ticks / os.sysconf("SC_CLK_TCK")
 
 
-def timed(page: Any, script: str, count: int) -> tuple[float, float]:
+def timed(page: Page, script: str, count: int) -> tuple[float, float]:
     """Seconds by the clock and of the processor for each of some calls."""
     began, used = time.perf_counter(), processor_s()
     for _ in range(count):
@@ -58,7 +60,7 @@ def resident_mb() -> float:
     return total / 1e3
 
 
-def turned(page: Any, minutes: float) -> None:
+def turned(page: Page, minutes: float) -> None:
     """Turn the head for so long, and tell what is held each minute."""
     began, frames, told = time.monotonic(), 0, 0
     while told <= minutes:
@@ -97,18 +99,13 @@ def main(
     minutes:
         Turn the head for so long instead, and print the memory of page and browser each minute.
     """
-    playwright = needed("playwright.sync_api", "a page in Chromium")
-    flags = FLAGS + (HARDWARE if gpu else SOFTWARE)
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
-        page = browser.new_page(viewport={"width": side, "height": side}, offline=True)
+    with chromium_page(side, FLAGS + (HARDWARE if gpu else SOFTWARE)) as page:
         began, used = time.perf_counter(), processor_s()
         page.goto(file.resolve().as_uri() + (f"#form={form}" if form else ""))
         page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=300_000)
         first = time.perf_counter() - began, processor_s() - used
         if minutes:
             turned(page, minutes)
-            browser.close()
             return
         rows = {"first picture": first, "frame at rest, camera turned": timed(page, STILL, FRAMES)}
         rows["frame in motion"] = timed(page, MOVE, FRAMES)
@@ -118,7 +115,6 @@ def main(
         sys.stdout.write(
             f"{file.stat().st_size / 1e6:.1f} MB, picture {size}, load {os.getloadavg()[0]:.1f}\n"
         )
-        browser.close()
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -22,7 +22,7 @@ from dermis.apps.inverse.unmixing.profile_widths import widths_of
 from dermis.apps.inverse.unmixing.skin_model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.truths.two_media import exchange
-from dermis.apps.validation.pages import write_figures
+from dermis.apps.validation.pages import Figures, write_figures
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer
@@ -69,7 +69,7 @@ def main(
     return 0
 
 
-def border(sigma_a: tuple[float, float], sigma_s: tuple[float, float]) -> dict[str, Any]:
+def border(sigma_a: tuple[float, float], sigma_s: tuple[float, float]) -> Figures:
     """Errors of each rule at the border of two media: root mean square over the true maximum, and energy."""
     edges = np.linspace(-HALF_MM, HALF_MM, STRIPS + 1)
     a, s = np.array(sigma_a), np.array(sigma_s)
@@ -130,18 +130,18 @@ def errors(light: Floats, kernel: Floats, tint: Floats, true: Floats) -> tuple[f
     return float(off), float(energy), float((near @ kernel[_JUDGED]).sum() / near.sum() - 1.0)
 
 
-def grid(adapter: str) -> dict[str, Any]:
+def grid(adapter: str) -> Figures:
     """What three profiles leave of the widths of skins with 1 to 15 % of melanin and 0.2 to 6 % of blood."""
     m, b = np.meshgrid(np.geomspace(0.01, 0.15, 64), np.geomspace(0.002, 0.06, 64))
     colours = skin_model().colours(m.ravel(), b.ravel()).reshape(64, 64, 3)
     return widths_of(unmix(colours, adapter=adapter)).summary()
 
 
-def cost(adapter: str, atlas: int) -> dict[str, Any]:
+def cost(adapter: str, atlas: int) -> Figures:
     """Median milliseconds of a human's frames by how many profiles its skin has, lit anew each time."""
     renderer, head = Renderer(adapter), dermis.load_head("human")
     settings = dermis.Settings(size=(1920, 1080), atlas=atlas)
-    told: dict[str, Any] = {"adapter": renderer.device.adapter.name, "atlas": atlas}
+    told: Figures = {"adapter": renderer.device.adapter.name, "atlas": atlas}
     with TemporaryDirectory() as folder:
         mask = Path(folder) / "mask.png"
         write_png(mask, np.random.default_rng(SEED).integers(0, 127, (64, 64, 3)).astype(np.uint8))

@@ -14,6 +14,8 @@ from dermis.base.atomic_write import replacing
 from dermis.base.console import print_lines
 from dermis.base.errors import refuse
 
+Figures = dict[str, Any]
+"""A JSON object: numbers, words, lists and further objects."""
 CHECKOUT = Path(str(files("dermis"))).resolve().parents[1]
 DOCS, RESULTS = CHECKOUT / "docs", CHECKOUT / "benchmarks" / "results"
 _REMEDY = "Install the package from a clone of the project (make setup) and run this there"

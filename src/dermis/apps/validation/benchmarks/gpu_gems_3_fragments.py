@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,6 +24,8 @@ from dermis.gpu import (
     Graph,
     MutableBindings,
     Recorder,
+    Texture,
+    TextureOrView,
     compiled,
     make_texture,
 )
@@ -44,11 +45,11 @@ class Fragments(GpuGems3):
         first, second = (texture.create_view() for texture in stretch)
         return StretchedLevels((stack,), (0,), scratch, side, HALVES, stretch=(first, second))
 
-    def make_sum(self, device: Device, side: int) -> Any:
-        """Space for the sum."""
+    def make_sum(self, device: Device, side: int) -> Texture:
+        """Return space for the sum."""
         return make_texture(device, (side, side), FLOATS, use="raster")
 
-    def scatter(self, graph: Graph, inputs: Inputs) -> Any:
+    def scatter(self, graph: Graph, inputs: Inputs) -> Texture:
         """Light the atlas, let the light spread, and add it up."""
         made = inputs.resources
         for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
@@ -83,7 +84,9 @@ class Fragments(GpuGems3):
         assert isinstance(graph, Graph) and isinstance(shader, FragmentProgram)
         graph.fill("diffuse", shader, bound, into)
 
-    def _light(self, graph: Graph, layout: LitAtlas, constants: Constants, into: Any, scale: float) -> None:
+    def _light(
+        self, graph: Graph, layout: LitAtlas, constants: Constants, into: TextureOrView, scale: float
+    ) -> None:
         shader = _program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALVES])
         bound = {
             **layout.lit,
@@ -92,13 +95,21 @@ class Fragments(GpuGems3):
         }
         graph.fill("irradiance", shader, bound, [into])
 
-    def _add_up(self, graph: Graph, levels: Levels, blur: Blur, into: Any, through: Any, lost: Any) -> None:
+    def _add_up(
+        self,
+        graph: Graph,
+        levels: Levels,
+        blur: Blur,
+        into: Texture,
+        through: Texture | None,
+        lost: Texture | None,
+    ) -> None:
         shader = _program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOATS])
         padded = np.zeros((MOST_GAUSSIANS, 4), np.float32)
         padded[: len(blur.weight), :3] = blur.weight / blur.scale
         padded[0, 3] = 1.0
         counts = {"count": len(blur.weight), "through": through is not None}
-        bound = {
+        bound: MutableBindings = {
             "weights": shader.record("Weights", weight=padded, **counts),
             "levels": levels.stacks[0],
             "transmitted": nothing(graph.device) if through is None else through,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import statistics
 import time
 from pathlib import Path
-from typing import Any
 
+from dermis.apps.validation.pages import Figures
 from dermis.frame.features.surface.record import surface_constants
 from dermis.frame.programs import shader_folders
 from dermis.gpu import CommandList, ComputeProgram, Device, make_texture
@@ -56,7 +56,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     }
 
 
-def _pass_ms(device: Device, program: ComputeProgram, bound: dict[str, Any], side: int) -> float:
+def _pass_ms(device: Device, program: ComputeProgram, bound: Figures, side: int) -> float:
     """Time of one pass by the device's clock, or by the wall's without timestamps [ms]."""
     frame = CommandList(device)
     started = time.perf_counter()

@@ -9,16 +9,22 @@ from importlib import resources
 from io import StringIO
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING
 
 from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3, Case
 from dermis.apps.validation.benchmarks.measure import Row
 from dermis.apps.validation.benchmarks.run import Benchmark
+from dermis.apps.validation.pages import Figures
 from dermis.base.atomic_write import replacing
 from dermis.base.extras import needed
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
-def as_json(made: Benchmark) -> dict[str, Any]:
+
+def as_json(made: Benchmark) -> Figures:
     """The benchmark as one JSON-ready object; times in ms."""
     return {
         "head": made.head,
@@ -35,11 +41,11 @@ def as_json(made: Benchmark) -> dict[str, Any]:
     }
 
 
-def _case(case: Case) -> dict[str, Any]:
+def _case(case: Case) -> Figures:
     return asdict(case) | {"image": list(case.image)}
 
 
-def _row(row: Row) -> dict[str, Any]:
+def _row(row: Row) -> Figures:
     told = {**_case(row.case), **asdict(row), "floor_ratio": row.floor_ratio}
     del told["case"]
     return told
@@ -190,7 +196,7 @@ def stage_bars(row: Row) -> str:
     return _svg(figure)
 
 
-def _figure(width: float, height: float, columns: int) -> tuple[Any, list[Any]]:
+def _figure(width: float, height: float, columns: int) -> tuple[Figure, list[Axes]]:
     figure = needed("matplotlib.figure", "plots").Figure(figsize=(width, height), layout="constrained")
     figure.patch.set_alpha(0.0)
     panels = list(figure.subplots(1, columns, squeeze=False)[0])
@@ -205,7 +211,7 @@ def _figure(width: float, height: float, columns: int) -> tuple[Any, list[Any]]:
     return figure, panels
 
 
-def _marks(axis: Any, places: list[float] | None) -> None:
+def _marks(axis: Axis, places: list[float] | None) -> None:
     """Plain numbers at the measured places, or at round ones."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
@@ -214,7 +220,7 @@ def _marks(axis: Any, places: list[float] | None) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
 
 
-def _svg(figure: Any) -> str:
+def _svg(figure: Figure) -> str:
     from matplotlib import rc_context
 
     drawn = StringIO()

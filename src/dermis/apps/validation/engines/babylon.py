@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import base64
 import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +17,9 @@ from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.babylon.target import TOO_WIDE, spiral
-from dermis.apps.validation.pages import RESULTS, write_figures
+from dermis.apps.validation.chromium import chromium_page
+from dermis.apps.validation.pages import RESULTS, Figures, write_figures
 from dermis.base.errors import refuse
-from dermis.base.extras import needed
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -30,7 +29,6 @@ FIGURES = RESULTS / "engines_babylon.json"
 LIBRARY = "DERMIS_BABYLON"
 SIDE, PIXELS, LEVEL = 640, 14.0, 0.9  # of the canvas; in the widest d; radiance of what is lit
 TURNS = 5
-FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 Floats = NDArray[np.floating]
 
 
@@ -49,14 +47,10 @@ def babylon_library() -> Path:
 @contextmanager
 def opened(library: Path) -> Iterator[Page]:
     """Open the page with the library loaded."""
-    playwright = needed("playwright.sync_api", "a page in Chromium")
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=list(FLAGS))
-        one = browser.new_page(viewport={"width": SIDE, "height": SIDE})
-        one.goto(PAGE.as_uri())
-        one.add_script_tag(path=str(library / "babylonjs" / "babylon.js"))
-        yield one
-        browser.close()
+    with chromium_page(SIDE) as page:
+        page.goto(PAGE.as_uri())
+        page.add_script_tag(path=str(library / "babylonjs" / "babylon.js"))
+        yield page
 
 
 def radiance(page: Page, colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
@@ -93,7 +87,7 @@ def along(picture: Floats, pixel: float, turn: float, at_mm: Floats, half_mm: fl
     return np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
 
 
-def measured(page: Page, colour: Floats, metres: float, shown_d: Floats) -> dict[str, Any]:
+def measured(page: Page, colour: Floats, metres: float, shown_d: Floats) -> Figures:
     """Return edge responses over all turns: measured, by the samples, and of true lobes of widths d.
 
     metres : metersPerUnit of a scene in mm
@@ -137,7 +131,7 @@ def fitted_widths(at: Floats, edge: Floats) -> list[float]:
     return [round(float(x), 4) for x in tried[off.argmin(axis=0)]]
 
 
-def exported(page: Page, name: str) -> dict[str, Any]:
+def exported(page: Page, name: str) -> Figures:
     """Return the figures of a skin with its exported parameters, also against its profile."""
     subject, target = subject_of(name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.known_version(None))

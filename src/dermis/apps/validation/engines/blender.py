@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from PIL import Image
@@ -17,7 +17,7 @@ from dermis.apps.export.subject import subject_of
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
 from dermis.apps.validation.engines.heads import TEXELS, Floats, compared, drawn, rendered
-from dermis.apps.validation.pages import DOCS, RESULTS, read_figures, write_figures
+from dermis.apps.validation.pages import DOCS, RESULTS, Figures, read_figures, write_figures
 from dermis.base.console import print_lines
 from dermis.images.colour import encode_srgb
 from dermis.optics.curve import Curve
@@ -52,7 +52,7 @@ def blender(python_45: Path, python_52: Path, *parts: Part) -> None:
     """
     pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
     parts = parts or get_args(Part)
-    found: dict[str, Any] = read_figures(FIGURES) if FIGURES.exists() else {}
+    found: Figures = read_figures(FIGURES) if FIGURES.exists() else {}
     found["columns_in_d"] = columns().reshape(BINS, EACH).mean(axis=1).tolist()
     if "edges" in parts:
         found["edges"] = list(edges(pythons))
@@ -64,7 +64,7 @@ def blender(python_45: Path, python_52: Path, *parts: Part) -> None:
         picture(pythons)
 
 
-def edges(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
+def edges(pythons: dict[str, Path]) -> Iterator[Figures]:
     """Yield the edge response of each skin by each method in each version."""
     for version, python in pythons.items():
         for method in METHODS:
@@ -78,7 +78,7 @@ def columns() -> Floats:
     return 12.0 * (np.arange(BINS * EACH) + 0.5) / (BINS * EACH) - 6.0
 
 
-def edge(python: Path, version: str, method: str, name: str) -> dict[str, Any]:
+def edge(python: Path, version: str, method: str, name: str) -> Figures:
     """Return the figures of one skin: measured, predicted and true."""
     subject, target = subject_of(name), TARGET.with_variant(method)
     rows, d = target.parameters(subject, version), fit_d(subject.curve)
@@ -125,7 +125,7 @@ def binned(curve: Curve, d_mm: Floats) -> Floats:
     return np.array(each)
 
 
-def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
+def heads(pythons: dict[str, Path]) -> Iterator[Figures]:
     """Yield outlines and colours of the head without hair, which both draw differently, by each method."""
     subject = subject_of("human").painted(TEXELS, "auto")
     assert subject.scene is not None

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dermis.apps.export.fitting import deviation
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARGET
 from dermis.apps.export.targets.gltf.volume import fit_volume, volume_curve
-from dermis.apps.validation.pages import RESULTS, write_figures
+from dermis.apps.validation.pages import RESULTS, Figures, write_figures
 
 FIGURES = RESULTS / "engines_gltf.json"
 SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"
 VERSION = TARGET.versions[-1]
 
 
-def figures_of(name: str) -> dict[str, Any]:
+def figures_of(name: str) -> Figures:
     """Return a skin's fitted parameters and their errors, also of values typed in, and of A as the colour."""
     subject = subject_of(name)
     volume = fit_volume(subject.curve, subject.albedo)
     coloured = volume_curve(volume._replace(multiscatter=subject.curve.energy))
-    found: dict[str, Any] = {
+    found: Figures = {
         "albedo": [round(float(x), 4) for x in subject.curve.energy],
         "multiscatter": [round(float(x), 4) for x in volume.multiscatter],
         "mean_free_path_mm": [round(float(x), 4) for x in volume.mean_free_path_mm],

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import io
 import os
-import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +22,10 @@ from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.truths.metrics import relative_rmse
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
-from dermis.apps.validation.engines.babylon import FLAGS, LIBRARY, babylon_library
-from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, write_figures
+from dermis.apps.validation.chromium import chromium_page
+from dermis.apps.validation.engines.babylon import LIBRARY, babylon_library
+from dermis.apps.validation.pages import DOCS, RESULTS, Figures, in_checkout, write_figures
 from dermis.base.console import print_lines
-from dermis.base.extras import needed
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import decode_srgb, encode_srgb
 from dermis.images.io import read_image
@@ -88,17 +86,13 @@ def programs(subject: Subject, ours: Floats) -> dict[str, Callable[[], list[Floa
 
 def in_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
     """Return the exported page's canvas in Chromium as linear light, with the alpha of ours."""
-    playwright = needed("playwright.sync_api", "a page in Chromium")
-    with TemporaryDirectory() as place, playwright.sync_playwright() as play:
+    with TemporaryDirectory() as place, chromium_page(SIDE) as page:
         file = Path(place) / "head.html"
         export_skin(subject, "babylon", file, library=library)
-        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=list(FLAGS))
-        page = browser.new_page(viewport={"width": SIDE, "height": SIDE}, offline=True)
         page.goto(file.as_uri())
         page.wait_for_selector("html[data-state]", state="attached", timeout=240_000)
         page.evaluate("document.querySelectorAll('body > :not(canvas)').forEach((one) => one.remove())")
         seen = Image.open(io.BytesIO(page.locator("canvas").screenshot())).convert("RGB")
-        browser.close()
     light = decode_srgb(np.asarray(seen) / 255.0)
     return np.dstack([light, np.where(light.any(axis=-1), ours[..., 3], 0.0)])
 
@@ -146,7 +140,7 @@ def rendered(
     return found
 
 
-def compared(ours: Floats, theirs: Floats) -> dict[str, Any]:
+def compared(ours: Floats, theirs: Floats) -> Figures:
     """Return outline, colours and errors of another program's pictures.
 
     theirs : (seeds, h, w, 4)

@@ -17,9 +17,9 @@ from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.mitsuba.scene import BOUNDARIES, Boundary, Walked, medium_words, surface_words
 from dermis.apps.export.targets.mitsuba.target import TARGET
-from dermis.apps.truths.described import rgb
+from dermis.apps.truths.described import Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
-from dermis.apps.validation.pages import RESULTS, write_figures
+from dermis.apps.validation.pages import RESULTS, Figures, write_figures
 from dermis.optics.curve import Curve
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,9 @@ _PLANE_D = 500.0
 _BLACK = 1e-9
 
 
-def plane(mi: Any, medium: Walked, boundary: Boundary, d_mm: float, *, black: bool = False) -> Any:
+def plane(
+    mi: Mitsuba, medium: Walked, boundary: Boundary, d_mm: float, *, black: bool = False
+) -> MitsubaObject:
     """Return the plane z = 0, lit where x > 0, seen along the normal within `_REACH` d of the edge.
 
     The camera looks from under the surface where that sends light on along the normal anyway.
@@ -73,7 +75,7 @@ def plane(mi: Any, medium: Walked, boundary: Boundary, d_mm: float, *, black: bo
 
 
 def measured(
-    mi: Any, medium: Walked, boundary: Boundary, d_mm: float, samples: int
+    mi: Mitsuba, medium: Walked, boundary: Boundary, d_mm: float, samples: int
 ) -> tuple[Floats, Floats, float]:
     """Return the edge response at the pixels, its standard errors, and what leaves far inside the light."""
     built = plane(mi, medium, boundary, d_mm)
@@ -97,7 +99,7 @@ def over_pixels(curve: Curve, channel: int, d_mm: float) -> Floats:
     return np.asarray(curve.edge(at)[..., channel].mean(axis=1))
 
 
-def one(mi: Any, subject: Subject, boundary: Boundary, samples: int) -> dict[str, Any]:
+def one(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> Figures:
     """Return the figures of a skin under a surface: differences in red, green and blue."""
     target = TARGET.with_variant(boundary)
     version = target.known_version(None)

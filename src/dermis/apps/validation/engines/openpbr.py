@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +16,7 @@ from dermis.apps.export.targets.openpbr import target as openpbr_target
 from dermis.apps.export.targets.openpbr.materials import OPEN_PBR
 from dermis.apps.export.targets.openpbr.target import fitted_mm, profile_of_specification
 from dermis.apps.export.targets.pbrt import target as pbrt_target
-from dermis.apps.validation.pages import RESULTS, read_figures, write_figures
+from dermis.apps.validation.pages import RESULTS, Figures, read_figures, write_figures
 from dermis.base.console import print_lines
 from dermis.base.extras import needed
 
@@ -26,9 +25,9 @@ SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"
 _NODES_OF_MATERIALX = "MissingShaderIdInRegistry"  # of a plug-in that usd-core comes without
 
 
-def figures() -> dict[str, Any]:
+def figures() -> Figures:
     """Return by skin: radii, and errors as meant, as typed in, and read as a profile."""
-    found: dict[str, Any] = {}
+    found: Figures = {}
     for name in SKINS:
         subject = subject_of(name)
         walk = assess(subject, openpbr_target.TARGET, "1.1.1")
@@ -52,7 +51,7 @@ def figures() -> dict[str, Any]:
     return found
 
 
-def checked() -> dict[str, Any]:
+def checked() -> Figures:
     """Return what the libraries find in documents and stages, and their versions."""
     MaterialX = needed("MaterialX", "checking its files")
     needed("pxr", "checking USD")
@@ -83,7 +82,7 @@ def numbers(values: ArrayLike) -> list[float]:
     return [float(one) for one in np.ravel(values)]
 
 
-def table(found: dict[str, Any]) -> list[str]:
+def table(found: Figures) -> list[str]:
     """Return a table of the largest error of an edge for each reading."""
     lines = [
         "| skin | radius [mm] | OpenPBR's walk | dmfp typed in | read as a profile | pbrt | dmfp typed in |",

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import assess
 from dermis.apps.export.subject import subject_of
-from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_figures, write_page
+from dermis.apps.validation.pages import DOCS, RESULTS, Figures, in_checkout, read_figures, write_page
 from dermis.base.console import print_lines
 
 PAGE = DOCS / "engines.md"
@@ -75,7 +74,7 @@ def mitsuba() -> str:
     return rows_of(heads, ([one["skin"], one["boundary"], *map(three, _differences(one))] for one in edges))
 
 
-def _differences(one: dict[str, Any]) -> tuple[Sequence[float], ...]:
+def _differences(one: Figures) -> tuple[Sequence[float], ...]:
     return one["predicted"], one["noise"], one["exported"]
 
 
@@ -106,7 +105,7 @@ def heads() -> str:
     return rows_of(titles, map(_head, read_figures(RESULTS / "engines_heads.json")["heads"]))
 
 
-def _head(one: dict[str, Any]) -> list[str]:
+def _head(one: Figures) -> list[str]:
     outline = "ours" if one["pixels_apart"] == 0 else f"{one['outline_px']:.1f}"
     return [
         one["program"],
@@ -125,7 +124,7 @@ def blender_tables() -> str:
     )
 
 
-def _blender_edges(edges: list[dict[str, Any]]) -> list[str]:
+def _blender_edges(edges: list[Figures]) -> list[str]:
     by = {(one["version"][:3], one["method"], one["skin"]): one for one in edges}
     lines = []
     for (version, method, skin), new in by.items():
@@ -138,7 +137,7 @@ def _blender_edges(edges: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _blender_heads(heads: list[dict[str, Any]]) -> list[str]:
+def _blender_heads(heads: list[Figures]) -> list[str]:
     return [
         f"| {one['version']} | {one['method']} | {one['outline_px']:.1f} | {three(one['lit_colour'])} |"
         f" {one['relative_rmse']:.3f} | {one['without_highlights']:.3f} |"

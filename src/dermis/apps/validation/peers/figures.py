@@ -5,7 +5,6 @@ from __future__ import annotations
 import statistics
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from dermis.apps.truths.cycles import CyclesPass
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import PathTraced
+from dermis.apps.validation.pages import Figures
 from dermis.apps.validation.peers.rendering import OF_2007, OURS, Frames, Measured
 
 Floats = NDArray[np.float64]
@@ -51,7 +51,7 @@ class Mean:
     variance: Floats
 
 
-def figures(measured: Measured) -> dict[str, Any]:
+def figures(measured: Measured) -> Figures:
     """Return the figures of one scene, ready for JSON."""
     mask = seen(measured)
     means = {method: converged(turns) for method, turns in measured.cycles.items()}
@@ -60,7 +60,7 @@ def figures(measured: Measured) -> dict[str, Any]:
     rows = [*ours, *of_2007, _truth_row(measured, mask)]
     for method, mean in means.items():
         rows += _cycles_rows(measured, method, mean, mask)
-    scene: dict[str, Any] = {
+    scene: Figures = {
         "light": measured.light,
         "region": measured.region,
         "pixels": int(mask.sum()),
@@ -163,7 +163,7 @@ def _cycles_rows(measured: Measured, method: str, mean: Mean, mask: Mask) -> lis
     return [*rows, Row(NAMES[method], "noise taken off", None, None, 0.0, *error, *energy)]
 
 
-def _as_near(measured: Measured, mean: Mean, ours: Row, mask: Mask) -> dict[str, Any]:
+def _as_near(measured: Measured, mean: Mean, ours: Row, mask: Mask) -> Figures:
     """Return what the random walk needs for our total error, and for a nearly clean image."""
     truth, levels = measured.truth, list(zip(*measured.cycles["random-walk"], strict=True))
     bias = relative_rmse(mean.image, truth.image, mask, truth.variance, mean.variance).value

@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -16,7 +16,7 @@ import dermis
 from dermis.apps.truths.blender_process import blender_python
 from dermis.apps.truths.mitsuba_scene import load_mitsuba
 from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
-from dermis.apps.validation.pages import DOCS, RESULTS, fill_page, write_figures
+from dermis.apps.validation.pages import DOCS, RESULTS, Figures, fill_page, write_figures
 from dermis.apps.validation.peers.figures import figures
 from dermis.apps.validation.peers.rendering import METHODS, Measured, Plan, measure
 from dermis.base.atomic_write import check_output
@@ -71,7 +71,7 @@ def peers(
     print_lines(place, "", scenes)
 
 
-def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> dict[str, Any]:
+def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> Figures:
     """Return the whole report, ready for JSON; without Cycles its rows are left out.
 
     Raises DermisError for unknown lights, and without Mitsuba, which gives the truth.
@@ -129,21 +129,21 @@ def cpu_model() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
-def scenes_text(report: dict[str, Any]) -> str:
+def scenes_text(report: Figures) -> str:
     """Return a section for each light."""
     return "\n\n".join(
         f"## {scene['light'].capitalize()}\n\n{scene_text(scene)}" for scene in report["scenes"]
     )
 
 
-def scene_text(scene: dict[str, Any]) -> str:
+def scene_text(scene: Figures) -> str:
     """Return the table of one scene and the sentences that follow from it."""
     head = f"| {' | '.join(_COLUMNS)} |\n|{'---|' * len(_COLUMNS)}"
     table = [head, *(_line(row) for row in scene["rows"])]
     return "\n".join([*table, "", *(f"- {sentence}" for sentence in _sentences(scene))])
 
 
-def place_text(report: dict[str, Any]) -> str:
+def place_text(report: Figures) -> str:
     """Return the date, the machine and the versions of a measurement, in one line."""
     versions = ", ".join(f"{name} {version}" for name, version in report["versions"].items())
     side = report["plan"]["side"]
@@ -151,7 +151,7 @@ def place_text(report: dict[str, Any]) -> str:
     return f"{report['date']}, {side}x{side}, {where}; {versions}"
 
 
-def _line(row: dict[str, Any]) -> str:
+def _line(row: Figures) -> str:
     seconds = "-" if row["seconds"] is None else f"{row['seconds']:.3g}"
     noise = f"{row['noise']:.1%}" if row["noise"] > 0 else "-"
     cells = (
@@ -165,11 +165,11 @@ def _line(row: dict[str, Any]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _value(row: dict[str, Any], name: str) -> str:
+def _value(row: Figures, name: str) -> str:
     return "-" if row[name] is None else f"{row[name]:.4f} ± {row[name + '_se']:.4f}"
 
 
-def _sentences(scene: dict[str, Any]) -> list[str]:
+def _sentences(scene: Figures) -> list[str]:
     said = [_longer(setting, found) for setting, found in scene.get("as_near", {}).items()]
     right = "; ".join(f"{name} {error:.3f}" for name, error in scene["ours_energy_put_right"].items())
     said.append(f"Ours, each channel scaled to the truth's energy: {right}.")
@@ -206,7 +206,7 @@ def _short(ratio: float) -> str:
     return f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.1f}"
 
 
-def _burley(scene: dict[str, Any]) -> str:
+def _burley(scene: Figures) -> str:
     """Return the distance of Burley's profile from the random walk, and of ours from path tracing."""
     theirs, error = scene["burley_against_random_walk"]
     ours = {
