@@ -9,7 +9,7 @@ import weakref
 from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,8 +94,8 @@ class Device:
         self._uniform_chunks: list[Buffer] = []
         self.spare_records: list[bytearray] = []
         self.slots: weakref.WeakKeyDictionary[Bindable, Slot] = weakref.WeakKeyDictionary()
-        self.programs: dict[Hashable, object] = {}
-        self._shared: dict[str, object] = {}
+        self.programs: dict[Hashable, Any] = {}  # as many types as there are kinds of programs
+        self._shared: dict[str, Any] = {}  # of the types that their makers return
         self._staging: dict[int, list[Buffer]] = {}
         self.fetching: set[Fetched] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Sampler] = {}
@@ -104,7 +104,8 @@ class Device:
         """A small object by its name, made on first use and kept as long as the device."""
         if name not in self._shared:
             self._shared[name] = make()
-        return cast(T, self._shared[name])
+        found: T = self._shared[name]
+        return found
 
     def write(self, buffer: Buffer, data: bytearray | bytes, size: int) -> None:
         """Put the first `size` bytes of the data into a buffer before the next submit."""

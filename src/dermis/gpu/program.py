@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
-from typing import ClassVar, TypeVar, cast
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +71,7 @@ class Program:
 
     def places(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
         """Where the records are among the uniforms."""
-        records = cast("Records", resources)
+        records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
             return tuple([uniforms.place(records[name]) for name, _ in self._numbers_of])
         except KeyError as missing:
@@ -108,7 +108,7 @@ class Program:
     def numbers(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
         """What the shader reads of the records; all of large ones, whose hash several passes share."""
         found: list[Hashable] = []
-        records = cast("Records", resources)
+        records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
             for name, read in self._numbers_of:
                 raw = uniforms.bytes_of(records[name])
@@ -129,7 +129,7 @@ class Program:
 
     def _make_group(self, bound: Sequence[Bindable], resources: Bindings) -> BindGroup:
         """The group of what the others are, and then the uniforms' buffers."""
-        records = cast("Records", resources)
+        records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]
         return make_group(self.device, self._group_layout, (*self._others, *self._uniforms), bound, sizes)
 
@@ -249,7 +249,7 @@ def compiled(device: Device, shader: Hashable, constants: Constants, make: Calla
 
     shader : what tells it from others
     """
-    variants = cast(dict[Constants, P], device.programs.setdefault(shader, {}))
+    variants: dict[Constants, P] = device.programs.setdefault(shader, {})
     found = variants.pop(constants, None)
     if found is None:
         found = make()
