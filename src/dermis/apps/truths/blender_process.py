@@ -31,7 +31,7 @@ class Errand(NamedTuple):
 
 
 def blender_python(python: str | Path | None = None) -> Path:
-    """The Python that has bpy: the one given, or the one that DERMIS_BLENDER_PYTHON names.
+    """Return the Python that has bpy: the one given, or the one that DERMIS_BLENDER_PYTHON names.
 
     Raises DermisError when there is no such file.
     """

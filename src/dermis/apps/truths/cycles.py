@@ -96,7 +96,7 @@ def cycles_passes(
     seed: int = 0,
     python: str | Path | None = None,
 ) -> list[CyclesPass]:
-    """The scene by Cycles on the CPU, once for each number of samples, in one process.
+    """Render the scene by Cycles on the CPU, once for each number of samples, in one process.
 
     There is no clamping, denoising or surface reflection.
 
@@ -145,7 +145,7 @@ def _run_cycles(python: Path, folder: Path, paths: int) -> None:
 
 
 def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> list[CyclesPass]:
-    """The passes that Cycles left in a folder.
+    """Return the passes that Cycles left in a folder.
 
     samples : of each pass
     size : width and height [pixel]
@@ -209,7 +209,7 @@ FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 def describe(
     scene: Scene, medium: Below, method: str, size: tuple[int, int]
 ) -> tuple[Described, dict[str, Numbers]]:
-    """What goes into scene.json, less the passes, and the arrays beside it."""
+    """Return the contents of scene.json without the passes, and the arrays beside it."""
     around, panorama = world(scene.environment)
     described = {
         "materials": _materials(scene.head, medium, method),
@@ -234,7 +234,7 @@ def describe(
 
 
 def _normal_map(slopes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(h, w, 3) normals in tangent space as colours, of slopes (h, w, 2)."""
+    """Return (h, w, 3) normals in tangent space as colours, of slopes (h, w, 2)."""
     normal = np.dstack([-slopes, np.ones(slopes.shape[:2], np.float32)])
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     return np.asarray(0.5 + 0.5 * normal, np.float32)
@@ -253,7 +253,7 @@ def _diffuse(colour: Sequence[float]) -> Described:
 
 
 def _skin(medium: Below, method: str) -> Described:
-    """Colour: what a half-space of the medium reflects of diffuse light. Radius: 4 pi mean free paths.
+    """Return skin with the diffuse reflectance of a half-space as colour, 4 pi mean free paths as radius.
 
     Cycles divides radii by 4 pi, and finds the walk's albedo from the colour by a fit whose inverse is
     `diffuse_albedo` within 1 %, so that its random walk is through this medium; but it enters and leaves as
@@ -283,7 +283,7 @@ def _skin(medium: Below, method: str) -> Described:
 
 
 def camera_of(scene: Scene) -> Described:
-    """The camera in Cycles' units.
+    """Return the camera in Cycles' units.
 
     Raises DermisError for lenses that Cycles has not.
     """

@@ -115,7 +115,7 @@ def add_normals(nodes: Any, links: Any, maps: dict[str, Any], shader: Any) -> No
 
 
 def packed_image(name: str, rows: Any) -> Any:
-    """Linear numbers (h, w, 3), the highest row first, as a picture in the file."""
+    """Return linear numbers (h, w, 3), the highest row first, as a picture in the file."""
     height, width, _ = rows.shape
     image = bpy.data.images.new(name, width, height, float_buffer=True)
     image.colorspace_settings.name = "Non-Color"
@@ -135,7 +135,7 @@ def add_light(described: dict[str, Any]) -> None:
 
 
 def paint_stripe(light: Any, stripe: dict[str, Any]) -> None:
-    """Makes a far point of light a sheet: a Gaussian across, an even line along, by the ray's direction."""
+    """Turn a far point of light into a sheet, a Gaussian across and even along, by the ray's direction."""
     light.use_nodes = True
     nodes, links = light.node_tree.nodes, light.node_tree.links
 
@@ -225,7 +225,7 @@ def set_render(described: dict[str, Any]) -> None:
 
 
 def render(path: Path, samples: int, seed: int) -> tuple[float, float]:
-    """Seconds on the clock, and of all cores together."""
+    """Render, and return the seconds by the clock and of all cores together."""
     cycles = bpy.context.scene.cycles
     cycles.samples, cycles.seed = samples, seed
     bpy.context.scene.render.filepath = str(path)

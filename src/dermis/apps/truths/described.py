@@ -151,6 +151,6 @@ def _turn(environment: Environment) -> Floats:
 
 
 def _with_poles(panorama: Floats) -> Floats:
-    """(h + 1, w, 3) at the edges of the rows: Mitsuba has its first and its last row at the poles."""
+    """Return (h + 1, w, 3) at the edges of the rows: Mitsuba has its first and its last row at the poles."""
     inside = 0.5 * (panorama[1:] + panorama[:-1])
     return np.concatenate((panorama[:1], inside, panorama[-1:]))

@@ -13,7 +13,7 @@ _ROUNDS = 500
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
-    """Chandrasekhar's H at cosines to the normal, of their shape [-].
+    """Return Chandrasekhar's H at cosines to the normal, of their shape [-].
 
     albedo : of single scattering, below 1 [-]
 
@@ -31,18 +31,18 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
 
 
 def directional_albedo(cosine: ArrayLike, albedo: float) -> Floats:
-    """Share of the light from a direction that is reflected, by the cosine of that direction [-]."""
+    """Return share of the light from a direction that is reflected, by the cosine of that direction [-]."""
     return np.asarray(1.0 - np.sqrt(1.0 - albedo) * h_function(cosine, albedo))
 
 
 def diffuse_albedo(albedo: float) -> float:
-    """Share of uniform light from all directions that is reflected [-]."""
+    """Return the share of uniform light from all directions that is reflected [-]."""
     mu, weight = _nodes()
     return float((2.0 * weight * mu * directional_albedo(mu, albedo)).sum())
 
 
 def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
-    """Radiance over the irradiance of parallel light, by the cosines of light and view [1/sr].
+    """Return the radiance over the irradiance of parallel light, by the cosines of light and view [1/sr].
 
     Source: [Chandrasekhar1960] section 33: S / (4 pi cos_in cos_out).
     """
@@ -52,6 +52,6 @@ def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: floa
 
 
 def _nodes() -> tuple[Floats, Floats]:
-    """Nodes and weights on [0, 1]."""
+    """Return nodes and weights on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     return 0.5 * (nodes + 1.0), 0.5 * weights

@@ -27,7 +27,7 @@ class Places:
     barycentric: Floats
 
     def interpolate(self, mesh: Mesh, values: NDArray[np.floating]) -> Floats:
-        """(n, k) values at the points, interpolated from values (v, k) at the mesh's vertices."""
+        """Return (n, k) values at the points, interpolated from values (v, k) at the mesh's vertices."""
         return _interpolate(values[mesh.triangles[self.face]], self.barycentric)
 
 
@@ -63,7 +63,7 @@ class IrradianceSamples:
 def sample_irradiance(
     mesh: Mesh, light: Light, spacing_mm: float, finest_mm: float | None = None, contrast: float = 0.05
 ) -> IrradianceSamples:
-    """Samples on the skin of a mesh, whose flat triangles are subdivided, not smoothed.
+    """Return samples on the skin of a mesh, whose flat triangles are subdivided, not smoothed.
 
     light : irradiance (n, 3) at places; called again for new places only
     spacing_mm : longest side of a small triangle [mm]
@@ -142,7 +142,7 @@ def _sides(pieces: _Pieces) -> tuple[Index, Index, Floats]:
 
 
 def _with_longest(side: Index, length: Floats, cut: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The edges to halve, and the longest side of each triangle they belong to, lest it turn thin."""
+    """Return the edges to halve and the longest side of each of their triangles, which keeps them compact."""
     longest = np.take_along_axis(side, length[side].argmax(axis=1)[:, None], axis=1)[:, 0]
     cut = cut.copy()
     while (wanted := cut[side].any(axis=1) & ~cut[longest]).any():
@@ -151,14 +151,14 @@ def _with_longest(side: Index, length: Floats, cut: NDArray[np.bool_]) -> NDArra
 
 
 def _bisected(pieces: _Pieces, side: Index, cut: NDArray[np.bool_]) -> _Pieces:
-    """The pieces with these edges (e,) halved, alike for both triangles on an edge."""
+    """Return the pieces with these edges (e,) halved, alike for both triangles on an edge."""
     number = pieces.count + np.cumsum(cut) - 1
     corners, source, barycentric = divide(pieces.corners, pieces.barycentric, np.where(cut, number, -1)[side])
     return _Pieces(pieces.mesh, corners, pieces.face[source], barycentric)
 
 
 def _places(pieces: _Pieces, first: int = 0) -> Places:
-    """The samples from index `first` on."""
+    """Return the samples from index `first` on."""
     count = pieces.count
     face, barycentric = np.empty(count, np.int64), np.empty((count, 3))
     face[pieces.corners] = pieces.face[:, None]

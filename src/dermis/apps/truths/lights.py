@@ -42,7 +42,7 @@ _MOST_STRIPE_TEXELS = 2**23
 
 
 def emitter(mi: Mitsuba, light: Light, number: int) -> Described:
-    """Mitsuba's description of a light.
+    """Return Mitsuba's description of a light.
 
     mi : the module, with a variant set
     number : the light's place in the scene, for messages
@@ -55,7 +55,7 @@ def emitter(mi: Mitsuba, light: Light, number: int) -> Described:
 
 
 def lamp(light: Light, number: int) -> Described:
-    """The same for Cycles, in its units."""
+    """Return Cycles' description of a light, in its units."""
     _check_shadows(light, number, "Cycles")
     return CYCLES[light.kind](light)
 
@@ -67,13 +67,13 @@ def _check_shadows(light: Light, number: int, judge: str) -> None:
 
 
 def mitsuba_point(mi: Mitsuba, light: PointLight, called: str) -> Described:
-    """One of Mitsuba's."""
+    """Return Mitsuba's point light."""
     intensity = np.multiply(light.irradiance, _distance(light) ** 2)
     return {"type": "point", "position": list(light.position), "intensity": rgb(intensity)}
 
 
 def mitsuba_spot(mi: Mitsuba, light: SpotLight, called: str) -> Described:
-    """A slide projector: Mitsuba's own spot fades evenly in the angle, ours smoothly in its cosine."""
+    """Return a projector: Mitsuba's own spot fades evenly in the angle, ours smoothly in its cosine."""
     steepest = np.tan(np.radians(light.outer_degrees))
     along = steepest * ((np.arange(_SPOT_SIDE) + 0.5) / _SPOT_SIDE * 2.0 - 1.0)
     cosine = 1.0 / np.sqrt(1.0 + along[:, None] ** 2 + along[None, :] ** 2)
@@ -84,7 +84,7 @@ def mitsuba_spot(mi: Mitsuba, light: SpotLight, called: str) -> Described:
 
 
 def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, called: str) -> Described:
-    """An even one."""
+    """Return an area light of even radiance."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
     to_world = mitsuba_looking(mi, light.position, light.target).scale(sides)
     given = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
@@ -92,7 +92,7 @@ def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, called: str) -> Descri
 
 
 def mitsuba_sphere(mi: Mitsuba, light: SphereLight, called: str) -> Described:
-    """An even one."""
+    """Return an area light of even radiance."""
     given = np.pi * (light.radius_mm / _distance(light)) ** 2
     return mitsuba_shape(
         "sphere",
@@ -103,7 +103,7 @@ def mitsuba_sphere(mi: Mitsuba, light: SphereLight, called: str) -> Described:
 
 
 def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, called: str) -> Described:
-    """One of Mitsuba's, or of a sun a far disc."""
+    """Return Mitsuba's directional light, or a far disc for a sun of some width."""
     if light.angle_degrees == 0:
         return {
             "type": "directional",
@@ -117,7 +117,7 @@ def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, called: str) -> De
 
 
 def mitsuba_stripe(mi: Mitsuba, light: StripeLight, called: str) -> Described:
-    """A far slide projector with the stripe as its slide."""
+    """Return a far slide projector with the stripe as its slide."""
     width, length = light.width_mm, light.length_mm
     size = np.array([2.0 * _STRIPE_REACH * width, length])
     texel = min(width / _STRIPE_TEXELS[0], length / _STRIPE_TEXELS[1])
@@ -139,24 +139,24 @@ def mitsuba_stripe(mi: Mitsuba, light: StripeLight, called: str) -> Described:
 
 
 def cycles_point(light: PointLight) -> Described:
-    """Its power P gives the irradiance P / 4 pi d^2."""
+    """Return a point light, whose power P gives the irradiance P / 4 pi d^2."""
     return _lamp("POINT", light)
 
 
 def cycles_spot(light: SpotLight) -> Described:
-    """A point light's cone fades in its cosine, as ours."""
+    """Return a spot light, whose cone fades in its cosine, as ours."""
     inner, outer = (float(np.cos(np.radians(a))) for a in (light.inner_degrees, light.outer_degrees))
     size, blend = 2.0 * np.radians(light.outer_degrees), (inner - outer) / (1.0 - outer)
     return _lamp("SPOT", light, spot_size=size, spot_blend=blend)
 
 
 def cycles_sphere(light: SphereLight) -> Described:
-    """A point light with a radius."""
+    """Return a point light with a radius."""
     return _lamp("POINT", light, radius_mm=light.radius_mm)
 
 
 def cycles_rectangle(light: RectangleLight) -> Described:
-    """Its power P gives a surface A the radiance P / pi A."""
+    """Return an area light, whose power P gives a surface A the radiance P / pi A."""
     width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
     given = facing_irradiance(light.width_mm, light.height_mm, _distance(light)) / (np.pi * width * height)
     path = np.subtract(light.target, light.position)
@@ -165,13 +165,13 @@ def cycles_rectangle(light: RectangleLight) -> Described:
 
 
 def cycles_directional(light: DirectionalLight) -> Described:
-    """A sun, as wide as the light's source."""
+    """Return a sun, as wide as the light's source."""
     angle = float(np.radians(light.angle_degrees))
     return cycles_light("SUN", light.irradiance, 1.0, (0, 0, 0), light.direction, angle=angle)
 
 
 def cycles_stripe(light: StripeLight) -> Described:
-    """A far point, on whose light the script paints the stripe."""
+    """Return a far point, on whose light the script paints the stripe."""
     across, along, forward = cycles_axes(light.direction, light.up)
     power = 4.0 * np.pi * (_FAR_MM / UNIT_MM) ** 2
     place = light.position - _FAR_MM * forward
@@ -192,7 +192,7 @@ def _lamp(kind: str, light: PointLight, *, radius_mm: float = 0.0, **given: floa
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
-    """Irradiance from a rectangle of radiance 1 on a surface opposite its middle [-].
+    """Return the irradiance from a rectangle of radiance 1 on a surface opposite its middle [-].
 
     Source: the view factor of a corner, [Baum1989].
     """

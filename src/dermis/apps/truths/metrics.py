@@ -49,7 +49,7 @@ def relative_rmse(
     variance: ArrayLike | None = None,
     image_variance: ArrayLike | None = None,
 ) -> Estimate:
-    """Root of (sum of squared differences over sum of the truth's squares), free of the truth's noise [-].
+    """Return the root of squared differences over the truth's squares, free of the truth's noise [-].
 
     image, truth : (h, w) or (h, w, c) linear; the channels count together
     mask : (h, w) pixels that count
@@ -85,7 +85,7 @@ def relative_rmse(
 def energy_ratio(
     image: ArrayLike, truth: ArrayLike, mask: Mask | None = None, variance: ArrayLike | None = None
 ) -> Estimate:
-    """Sum of the image over sum of the truth [-]; arguments as of `relative_rmse`.
+    """Return the sum of the image over sum of the truth [-]; arguments as of `relative_rmse`.
 
     The ratio's relative error is that of the truth's sum, whose variance is the sum of the variances;
     channels may share paths, so their deviations are added.
@@ -99,14 +99,14 @@ def energy_ratio(
 
 
 def _added(variance: Floats) -> float:
-    """Upper bound of the deviation of a sum of independent pixels (n, c), whatever ties the channels."""
+    """Return an upper bound of the deviation of a sum of pixels (n, c) with correlated channels."""
     return float(np.sqrt(np.maximum(variance.sum(axis=0), 0)).sum())
 
 
 def _pixels(
     image: ArrayLike, truth: ArrayLike, mask: Mask | None, variance: ArrayLike | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Image, truth and variance of the pixels that count, each (n, c)."""
+    """Return image, truth and variance of the pixels that count, each (n, c)."""
     I, T = np.asarray(image, np.float64), np.asarray(truth, np.float64)
     s2 = np.zeros_like(T) if variance is None else np.asarray(variance, np.float64)
     if I.shape != T.shape or s2.shape != T.shape or I.ndim not in (2, 3):
@@ -172,7 +172,7 @@ def _shown(
 
 
 def signed_difference(image: ArrayLike, truth: ArrayLike, gain: float = 4.0) -> Floats:
-    """sRGB picture (h, w, 3) of image minus truth: mid-grey is none, redder is too red, lighter too light.
+    """Return an sRGB picture (h, w, 3) of image minus truth, with mid-grey for no difference.
 
     image, truth : (h, w, 3) linear Rec. 709 of 0 or more; 1 is white
     gain : of the difference of sRGB values, whose steps look about even

@@ -34,7 +34,7 @@ class Solid:
 
 
 def skin_solid(mesh: Mesh, culprit: str) -> Solid:
-    """The welded skin of a mesh, each opening shut by a fan of triangles around its middle.
+    """Return the welded skin of a mesh, each opening shut by a fan of triangles around its middle.
 
     culprit : the head's name, for messages
 
@@ -56,7 +56,7 @@ def skin_solid(mesh: Mesh, culprit: str) -> Solid:
 
 
 def inwards(solid: Solid, depth_mm: Doubles, culprit: str) -> tuple[Solid, float]:
-    """The surface moved inwards so that the faces around each point move by its depth, and the folded share.
+    """Move a surface inwards by a depth at each point; return it and the share that folds over.
 
     depth_mm : (p,) negative for outwards
 
@@ -77,7 +77,7 @@ def inwards(solid: Solid, depth_mm: Doubles, culprit: str) -> tuple[Solid, float
 
 
 def _mitres(solid: Solid) -> Doubles:
-    """(p, 3) steps outwards that move the faces around a point by 1; at most 2 long."""
+    """Return (p, 3) steps outwards that move the faces around a point by 1; at most 2 long."""
     points = np.arange(len(solid.positions), dtype=np.int32)
     normals = vertex_normals(solid.positions, points, solid.triangles).astype(np.float64)
     face = _cross(solid.positions[solid.triangles])
@@ -105,7 +105,7 @@ def _shut(positions: Floats, triangles: Index) -> Solid:
 
 
 def _open_sides(triangles: Index, count: int) -> NDArray[np.int64]:
-    """(n, 2) directed sides that no triangle traverses the other way, as often as they lack one."""
+    """Return (n, 2) directed sides that no triangle traverses the other way, as often as they lack one."""
     sides = np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])).astype(np.int64)
     low, high = sides.min(axis=1), sides.max(axis=1)
     edge, of_side = np.unique(low * count + high, return_inverse=True)
@@ -116,7 +116,7 @@ def _open_sides(triangles: Index, count: int) -> NDArray[np.int64]:
 
 
 def _connected(sides: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n,) the connected component of each side, as a number."""
+    """Return (n,) the connected component of each side, as a number."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -128,12 +128,12 @@ def _connected(sides: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _cross(corners: Floats) -> Doubles:
-    """Twice the area of each triangle along its normal; corners : (f, 3, 3)."""
+    """Return twice the area of each triangle along its normal; corners : (f, 3, 3)."""
     places = corners.astype(np.float64)
     return np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
 
 
 def _volume(corners: Doubles) -> float:
-    """Enclosed volume [mm3]; negative when inside out."""
+    """Return the enclosed volume [mm3]; negative when inside out."""
     about = corners - corners.mean(axis=(0, 1))
     return float((about[:, 0] * np.cross(about[:, 1], about[:, 2])).sum() / 6.0)

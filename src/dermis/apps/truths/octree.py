@@ -49,7 +49,7 @@ class Tree(NamedTuple):
 
 
 def build_tree(samples: IrradianceSamples) -> Tree:
-    """The octree of the samples' triangles.
+    """Return the octree of the samples' triangles.
 
     Source: [JensenBuhler2002], with three points for each node and bounds that say when to open it.
     """
@@ -80,7 +80,7 @@ def build_tree(samples: IrradianceSamples) -> Tree:
 
 
 def _keys(places: Floats) -> Index:
-    """(m,) which half along z, y and x, then which half of that, and so on: the path down the tree."""
+    """Return (m,) paths down the tree: the half along z, y and x, then the half of that, and so on."""
     low = places.min(axis=0)
     size = max(float((places.max(axis=0) - low).max()), 1e-9)
     cell = np.minimum((places - low) / size * 2**_LEVELS, 2**_LEVELS - 1).astype(np.int64)
@@ -92,7 +92,7 @@ def _keys(places: Floats) -> Index:
 
 
 def _nodes(keys: Index) -> tuple[Index, Index, Index]:
-    """First triangle, end and skip of each node, for sorted keys."""
+    """Return the first triangle, end and skip of each node, for sorted keys."""
     starts, ends = [np.array([0])], [np.array([len(keys)])]
     for level in range(_LEVELS - 1, -1, -1):
         bounds = np.flatnonzero(np.diff(keys >> (3 * level), prepend=-1, append=-1))
@@ -109,7 +109,7 @@ def _nodes(keys: Index) -> tuple[Index, Index, Index]:
 
 
 def _radius(corners: Floats, centre: Floats, first: Index, end: Index) -> Floats:
-    """Distance from the centre to the furthest corner of the box around each node."""
+    """Return the distance from the centre to the furthest corner of the box around each node."""
     low = _reduce_inside(np.minimum, corners.min(axis=1), first, end)
     high = _reduce_inside(np.maximum, corners.max(axis=1), first, end)
     radius: Floats = np.linalg.norm(np.maximum(centre - low, high - centre), axis=1)
@@ -119,7 +119,7 @@ def _radius(corners: Floats, centre: Floats, first: Index, end: Index) -> Floats
 def _three_points(
     corners: Floats, light: Floats, area: Floats, first: Index, end: Index
 ) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
-    """Centre, places, flux, spread, mismatch and offset of the nodes, as in `Tree`.
+    """Return centre, places, flux, spread, mismatch and offset of the nodes, as in `Tree`.
 
     corners : about an origin in the middle of all triangles
 
@@ -152,7 +152,7 @@ _CIRCLE = np.sqrt(2) * np.column_stack((np.sin(_ANGLE), np.cos(_ANGLE)))
 def _central(
     corners: Floats, light: Floats, area: Floats, first: Index, end: Index
 ) -> tuple[Floats, list[Floats], list[Floats]]:
-    """Moments of the light in each node: of order 0, 1 and 2, by channel.
+    """Return moments of the light in each node: of order 0, 1 and 2, by channel.
 
     Flux (n, 3); first moments about the centre (n, 3) of each channel, then the centre itself; second moments
     about the centre (n, 3, 3) of each channel.
@@ -173,7 +173,7 @@ def _central(
 
 
 def _triangle_moments(corners: Floats, light: Floats, area: Floats) -> tuple[Floats, Floats, Floats]:
-    """Integrals over triangles of light (m, 3), of light times position, and times its outer product.
+    """Return integrals over triangles of light (m, 3), of light times position, and times its outer product.
 
     From the integrals of products of three barycentric weights: 1/10, 1/30 or 1/60 of the area when three,
     two or none of them are the same; of two, 1/6 or 1/12.
@@ -189,7 +189,7 @@ def _triangle_moments(corners: Floats, light: Floats, area: Floats) -> tuple[Flo
 
 
 def _shared(flux: Floats, mean: list[Floats], lengths: Floats, axes: Floats) -> Floats:
-    """(n, 3, 3) flux of each point and channel, such that each channel's centre is right in the plane."""
+    """Return (n, 3, 3) flux of each point and channel that keeps each channel's centre in the plane."""
     moment = np.einsum("cna,naj->ncj", np.array(mean), axes)
     tilt = np.divide(moment, lengths[:, None], where=lengths[:, None] > 1e-9, out=np.zeros_like(moment))
     parts: Floats = (flux[:, None] + np.einsum("kj,ncj->nkc", _CIRCLE, tilt)) / 3
@@ -197,7 +197,7 @@ def _shared(flux: Floats, mean: list[Floats], lengths: Floats, axes: Floats) -> 
 
 
 def _reduce_inside(operation: np.ufunc, values: Floats, first: Index, end: Index) -> Floats:
-    """The operation over rows first to end - 1 of each node."""
+    """Return the operation over rows first to end - 1 of each node."""
     # reduceat reduces between neighbouring indices, so every other result is a node; it also needs a row
     # after the last.
     padded = np.concatenate((values, values[-1:]))

@@ -197,7 +197,7 @@ class Passes:
 
     @classmethod
     def none(cls, size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]) -> Passes:
-        """No pass yet of an image (width, height)."""
+        """Return the start of the passes of an image (width, height)."""
         shape = (size[1], size[0], 3)
         return cls(np.zeros(shape), np.zeros(shape), np.asarray(mask, np.float32), notes)
 
@@ -207,7 +207,7 @@ class Passes:
         return self.spread / (self.count * (self.count - 1))
 
     def add(self, image: Doubles, seconds: float) -> None:
-        """Another pass (h, w, 3). Source: [Welford1962]."""
+        """Add a pass (h, w, 3). Source: [Welford1962]."""
         self.count += 1
         self.seconds += seconds
         before = image - self.mean
@@ -224,7 +224,7 @@ def digest_surroundings(digest: hashlib._Hash, scene: Scene) -> None:
 
 
 def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], form: str) -> str:
-    """A hash of all that the image depends on.
+    """Return a hash of all that the image depends on.
 
     form : versions, and how it is traced
     """
@@ -244,7 +244,7 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
 
 
 def kept_passes(key: str, size: tuple[int, int]) -> Passes | None:
-    """The passes of that name, or None when there are none that can be read."""
+    """Return the passes of that name, or None when there are none that can be read."""
     found = find(_FOLDER, key, ("mean", "spread", "mask", "notes", "count", "seconds"))
     if found is None or found["mean"].shape != (size[1], size[0], 3):
         return None

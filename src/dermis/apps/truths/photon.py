@@ -49,7 +49,7 @@ class Tally(NamedTuple):
 
 @compiled
 def next_word(rng: Words) -> np.uint64:
-    """64 random bits by xoshiro256++; advances the state rng (4,).
+    """Return 64 random bits by xoshiro256++; advances the state rng (4,).
 
     Source: [BlackmanVigna2021].
     """
@@ -67,13 +67,13 @@ def next_word(rng: Words) -> np.uint64:
 
 @compiled
 def uniform(rng: Words) -> float:
-    """A number strictly between 0 and 1, so that its logarithm is finite and not 0."""
+    """Return a number strictly between 0 and 1, so that its logarithm is finite and not 0."""
     return ((next_word(rng) >> np.uint64(12)) + 0.5) * 2.0**-52
 
 
 @compiled
 def refract(cosine: float, eta: float) -> tuple[float, float]:
-    """Reflectance of unpolarised light, and the cosine beyond the face, 0 for total reflection [-].
+    """Return reflectance of unpolarised light, and the cosine beyond the face, 0 for total reflection [-].
 
     eta : index of refraction on the near side over that on the far side
 
@@ -92,7 +92,7 @@ def refract(cosine: float, eta: float) -> tuple[float, float]:
 
 @compiled
 def deflect(x: float, y: float, z: float, g: float, rng: Words) -> tuple[float, float, float]:
-    """The unit direction (x, y, z) after scattering by Henyey and Greenstein's phase function.
+    """Return the unit direction (x, y, z) after scattering by Henyey and Greenstein's phase function.
 
     g : mean cosine of the deflection [-]
 
@@ -119,7 +119,7 @@ def deflect(x: float, y: float, z: float, g: float, rng: Words) -> tuple[float, 
 
 @compiled
 def _ring(x: float, y: float, edges2: Floats) -> int:
-    """The ring between squared edges (n + 1,) that contains a point; n beyond the last edge."""
+    """Return the ring between squared edges (n + 1,) that contains a point; n beyond the last edge."""
     return int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
 
 
@@ -135,7 +135,7 @@ def _leave(x: float, y: float, upward: bool, scatterings: int, edges2: Floats, t
 
 @compiled
 def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
-    """One photon that has entered straight down on the axis, followed until it leaves or is absorbed."""
+    """Follow one photon that entered straight down on the axis until it leaves or is absorbed."""
     x = y = z = ux = uy = 0.0
     uz = 1.0
     layer, bottom = 1, len(stack.eta) - 2

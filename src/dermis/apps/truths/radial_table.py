@@ -44,7 +44,7 @@ class GaussianSum:
         return float(np.sqrt(-2 * np.log(_TAIL) * np.max(self.variance_mm2)))
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
-        """R, dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
+        """Return R, dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
         r, v = radius_mm[:, None], np.asarray(self.variance_mm2)
         gaussian = np.exp(-(r**2) / (2 * v)) / (2 * np.pi * v)
         weight = np.asarray(self.weight)
@@ -77,7 +77,7 @@ class RadialTable:
         return float(self.radius_mm[-1])
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
-        """R, dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
+        """Return R, dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
         from scipy.interpolate import PchipInterpolator
 
         r, R = np.asarray(self.radius_mm, np.float64), np.asarray(self.reflectance, np.float64)
@@ -108,7 +108,7 @@ class Table(NamedTuple):
 
 
 def tabulate(profile: Profile) -> Table:
-    """The table of a profile.
+    """Return the table of a profile.
 
     A patch of second moment m about its centre, replaced by a point there, errs by up to m times the
     curvature. The fewest patches for a given sum of such errors have m proportional to 1 / sqrt(curvature)
@@ -132,7 +132,7 @@ def tabulate(profile: Profile) -> Table:
 
 
 def _bound(values: Floats, energy: Floats, lit: NDArray[np.bool_]) -> Floats:
-    """(rows,) the largest value of any channel from each radius on; 0 in the last row."""
+    """Return (rows,) the largest value of any channel from each radius on; 0 in the last row."""
     largest = np.max(values[:, lit] / energy[lit], axis=1)
     bound: Floats = np.maximum.accumulate(largest[::-1])[::-1].copy()
     bound[-1] = 0.0
@@ -149,7 +149,7 @@ def _share(curvature: Floats, r: Floats) -> Floats:
 
 
 def _plane_integral(values: Floats, r: Floats) -> Floats:
-    """Integral of 2 pi r values dr, for each column of values (rows, k)."""
+    """Return the integral of 2 pi r values dr, for each column of values (rows, k)."""
     rings = np.pi * np.diff(r**2)[:, None]
     integral: Floats = (0.5 * (values[1:] + values[:-1]) * rings).sum(axis=0)
     return integral

@@ -37,12 +37,12 @@ class Patch:
     radius_mm: float
 
     def holds(self, positions: Floats) -> NDArray[np.bool_]:
-        """Which positions (m, 3) [mm] lie within the radius of the centre."""
+        """Return which positions (m, 3) [mm] lie within the radius of the centre."""
         inside: NDArray[np.bool_] = np.linalg.norm(positions - self.centre_mm, axis=1) <= self.radius_mm
         return inside
 
     def vertex_places(self) -> tuple[Index, Floats]:
-        """A coarse triangle (n,) and the weights in it (n, 3) for each vertex, to read maps with."""
+        """Return a coarse triangle (n,) and the weights in it (n, 3) for each vertex, to read maps with."""
         triangle, weights = np.zeros(len(self.positions), np.int64), np.zeros((len(self.positions), 3))
         triangle[self.triangles] = self.parent[:, None]
         # A vertex shared by several parents must get the weights in the parent it was assigned.
@@ -51,7 +51,7 @@ class Patch:
         return triangle, weights
 
     def find(self, triangle: Index, barycentric: Floats) -> tuple[Index, Floats]:
-        """The fine triangle (m,) at each point, -1 off the patch, and the weights in it (m, 3).
+        """Return the fine triangle (m,) at each point, -1 off the patch, and the weights in it (m, 3).
 
         triangle : (m,) coarse triangles
         barycentric : (m, 3) weights in them
@@ -82,7 +82,7 @@ class Patch:
 def patch_of(
     mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2: Sequence[float] | Floats
 ) -> Patch:
-    """The patch of a mesh, its uv seams welded, on which light of these variances can be diffused.
+    """Return the patch of a mesh, its uv seams welded, on which light of these variances can be diffused.
 
     centre_mm, radius_mm : the ball to judge in; an infinite radius takes the whole mesh [mm]
     variances_mm2 : (k,) rising; the smallest step between them sets the edges, the widest the margin [mm2]
@@ -101,7 +101,7 @@ def refine_patch(
     edge_mm: float,
     margin_mm: float,
 ) -> Patch:
-    """What lies within radius and margin of a centre, in triangles with edges of at most `edge_mm`.
+    """Return the surface within radius and margin of a centre, with edges of at most `edge_mm`.
 
     Edges that are too long are halved for both of their triangles, so no crack opens. New vertices lie on the
     flat old triangles, so the surface keeps its shape.
@@ -137,7 +137,7 @@ def refine_patch(
 
 
 def _near(corners: Floats, centre: Floats, reach: float, edge_mm: float) -> NDArray[np.bool_]:
-    """Triangles (f,) that may have a point within reach, by the ball around their middle.
+    """Return triangles (f,) that may have a point within reach, by the ball around their middle.
 
     Raises DermisError when there is none, or when those wholly within reach will become too many: a triangle
     with edges of at most `edge_mm` has at most the area of the equilateral one.

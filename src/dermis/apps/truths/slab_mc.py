@@ -34,7 +34,7 @@ _NOTABLE_LOSS = 1e-3
 
 
 def default_edges() -> Floats:
-    """Edges of a disc of 0.001 mm and 92 rings around it, each 12 % wider than the last, to 40 mm [mm]."""
+    """Return edges of a disc of 0.001 mm and 92 rings, each 12 % wider than the last, to 40 mm [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
 
 
@@ -45,7 +45,7 @@ def trace_slab(
     edges_mm: Floats | None = None,
     report: Report | None = None,
 ) -> SlabResult:
-    """What becomes of a thin beam that falls at right angles on a stack of layers in air.
+    """Trace a pencil beam at normal incidence through a stack of layers in air.
 
     layers : topmost first; interfaces between unequal indices of refraction reflect and refract
     photons : how many to trace; standard errors fall with its square root
@@ -69,7 +69,7 @@ def trace_medium(
     edges_mm: Floats | None = None,
     report: Report | None = None,
 ) -> list[SlabResult]:
-    """`trace_slab` for each channel of a medium, with independent random numbers.
+    """Run `trace_slab` for each channel of a medium, with independent random numbers.
 
     g : mean cosine of the deflection in all layers; scattering is the reduced coefficient over 1 - g [-]
     """
@@ -94,7 +94,7 @@ def counted_profile(
     g: float = 0.0,
     report: Callable[[int, int], None] | None = None,
 ) -> RadialProfile:
-    """R(r) of a medium by Monte Carlo, averaged over rings, with standard errors.
+    """Return R(r) of a medium by Monte Carlo, averaged over rings, with standard errors.
 
     rgb : (3, c) weights from wavelengths to linear Rec. 709; the result is then per incident power
     photons : per channel or wavelength

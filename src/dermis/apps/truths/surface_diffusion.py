@@ -38,7 +38,7 @@ def diffuse_on_surface(
     variances_mm2: Sequence[float] | Floats,
     steps: int = STEPS,
 ) -> Floats:
-    """`values` blurred along the surface by a Gaussian of each variance, (k, n, c), in the unit of `values`.
+    """Return `values` blurred along the surface by a Gaussian of each variance, (k, n, c).
 
     Each level starts from the one before. TR-BDF2 advances time: it is of second order and, unlike Crank and
     Nicolson's rule, does not ring on points of light.
@@ -66,14 +66,14 @@ def diffuse_on_surface(
 
 
 def welded(mesh: Mesh) -> tuple[Floats, Index]:
-    """Positions (p, 3) [mm] without duplicates, and the triangles (f, 3) among them in their order."""
+    """Return positions (p, 3) [mm] without duplicates, and the triangles (f, 3) among them in their order."""
     positions = np.zeros((int(mesh.point.max()) + 1, 3))
     positions[mesh.point] = mesh.positions
     return positions, mesh.point[mesh.triangles].astype(np.int64)
 
 
 def vertex_areas(positions: ArrayLike, triangles: ArrayLike) -> Floats:
-    """The area that each vertex stands for (n,) [mm2]; diffusion keeps the sum of values times areas."""
+    """Return the area of each vertex (n,) [mm2]; diffusion keeps the sum of values times areas."""
     places, corners = _surface(positions, triangles)
     surface = delaunay(intrinsic(places, corners))
     thirds = np.repeat(surface.areas() / 3, 3)
@@ -81,13 +81,13 @@ def vertex_areas(positions: ArrayLike, triangles: ArrayLike) -> Floats:
 
 
 def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
-    """Length of the longest edge [mm]."""
+    """Return the length of the longest edge [mm]."""
     places, corners = _surface(positions, triangles)
     return float(sides(places, corners)[2].max())
 
 
 def resolved(variances_mm2: Sequence[float] | Floats, edge_mm: float) -> NDArray[np.bool_]:
-    """Which levels (k,) edges of this length allow: those that add a sigma of two edges to the last allowed.
+    """Return the levels (k,) that edges allow: those that add a sigma of two edges to the last allowed.
 
     variances_mm2 : (k,) rising, above 0 [mm2]
     edge_mm : the longest edge, see `longest_edge_mm`
@@ -100,18 +100,18 @@ def resolved(variances_mm2: Sequence[float] | Floats, edge_mm: float) -> NDArray
 
 
 def edge_for(variances_mm2: Sequence[float] | Floats) -> float:
-    """Longest edge that allows all levels [mm]: half the smallest standard deviation that one adds."""
+    """Return longest edge that allows all levels [mm]: half the smallest standard deviation that one adds."""
     least = float(np.diff(_rising(variances_mm2), prepend=0.0).min())
     return float(np.sqrt(least)) / EDGES_PER_SIGMA
 
 
 def margin_for(variances_mm2: Sequence[float] | Floats) -> float:
-    """How far a patch must extend beyond its radius [mm]: four standard deviations of the widest level."""
+    """Return the margin of a patch beyond its radius [mm]: four standard deviations of the widest level."""
     return MARGIN_SIGMAS * float(np.sqrt(_rising(variances_mm2)[-1]))
 
 
 def _diffused(mass: csc_array, stiffness: csc_array, values: Floats, variance: float, steps: int) -> Floats:
-    """`values` after the time variance/2."""
+    """Return `values` after the time variance/2."""
     step = variance / 2 / steps
     solve = _factorised((mass + (_GAMMA / 2 * step) * stiffness).tocsc())
     ahead = (mass - (_GAMMA / 2 * step) * stiffness).tocsr()
@@ -124,7 +124,7 @@ def _diffused(mass: csc_array, stiffness: csc_array, values: Floats, variance: f
 
 
 def _factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
-    """Solver for a symmetric, positive definite matrix: no pivoting, and an ordering that suits surfaces."""
+    """Return a solver of a symmetric, positive definite matrix, without pivoting, ordered for surfaces."""
     from scipy.sparse.linalg import splu
 
     options = {"SymmetricMode": True}
@@ -193,14 +193,14 @@ class Triangulation:
     length: Floats
 
     def areas(self) -> Floats:
-        """Area of each triangle (f,) [mm2], by Kahan's form of Heron's formula, which is safe for slivers."""
+        """Return areas (f,) [mm2] by Kahan's form of Heron's formula, which is safe for slivers."""
         c, b, a = np.sort(self.length[self.side], axis=1).T
         product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
         areas: Floats = np.sqrt(np.maximum(product, 0)) / 4
         return areas
 
     def cotangents(self) -> Floats:
-        """Cotangent of the angle opposite each side (f, 3)."""
+        """Return the cotangent of the angle opposite each side (f, 3)."""
         square = self.length[self.side] ** 2
         facing = square.sum(axis=1, keepdims=True) - 2 * square
         cotangents: Floats = facing / (4 * self.areas()[:, None])
@@ -208,7 +208,7 @@ class Triangulation:
 
 
 def intrinsic(positions: Floats, triangles: Index) -> Triangulation:
-    """The triangles by their edge lengths; all edges grow by the same tiny amount if one is degenerate.
+    """Return triangles by edge lengths; all edges grow by the same tiny amount if one is degenerate.
 
     positions : (n, 3) [mm]
     triangles : (f, 3)
@@ -222,7 +222,7 @@ def intrinsic(positions: Floats, triangles: Index) -> Triangulation:
 
 
 def delaunay(given: Triangulation) -> Triangulation:
-    """The same surface with edges flipped until the two angles opposite each sum to at most pi.
+    """Return the same surface with edges flipped until the two angles opposite each sum to at most pi.
 
     Heat then flows from hot to cold along every edge, whatever obtuse angles the mesh has. Borders, and edges
     where more than two triangles meet or two have opposite orientations, stay.
@@ -243,7 +243,7 @@ def delaunay(given: Triangulation) -> Triangulation:
 
 
 def _between_two(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
-    """Edges (e,) shared by two triangles of the same orientation, which run along it in opposite ways."""
+    """Return edges (e,) shared by two triangles of the same orientation."""
     forward = (corners < np.roll(corners, -1, axis=1)).ravel()
     uses = np.bincount(side.ravel(), minlength=count)
     along = np.bincount(side.ravel()[forward], minlength=count)
@@ -252,7 +252,7 @@ def _between_two(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
 
 
 def _apart(side: Index, bad: NDArray[np.bool_], weight: Floats) -> Index:
-    """Bad edges no two of which share a triangle, as indices (2, m) of their sides in `side.ravel()`.
+    """Return bad edges no two of which share a triangle, as indices (2, m) of their sides in `side.ravel()`.
 
     Each triangle votes for its worst edge. Edges with both votes are taken; the worst of all is among them.
     """
@@ -284,13 +284,13 @@ def _flip(now: Triangulation, pairs: Index) -> None:
 
 
 def _apex(base: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """Where the apex lies along the base, measured from the end at side `first`, and its height [mm]."""
+    """Return the position of the apex along the base, from the end at side `first`, and its height [mm]."""
     along = (base**2 + first**2 - second**2) / (2 * base)
     return along, np.sqrt(np.maximum(first**2 - along**2, 0))
 
 
 def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, csc_array]:
-    """Mass M [mm2] and stiffness K [-] of linear elements, (n, n): M du/dt = -K u is du/dt = Laplacian of u.
+    """Return mass M [mm2] and stiffness K [-] (n, n) of linear elements, with M du/dt = -K u for heat.
 
     M is the mean of the lumped and the consistent mass. Their errors in the speed of heat are opposite and,
     on regular triangles, cancel to fourth order in the edge length. The rows of M sum to the vertices' areas,
@@ -308,7 +308,7 @@ def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, c
     share = np.repeat(surface.areas()[:, None], 3, axis=1)
 
     def assembled(between: Floats, own: Floats) -> csc_array:
-        """Entries `between` start and end of each side and `own` at its start."""
+        """Return entries `between` start and end of each side and `own` at its start."""
         rows = np.concatenate([index.ravel() for index in (start, end, start)])
         columns = np.concatenate([index.ravel() for index in (end, start, start)])
         values = np.concatenate([entry.ravel() for entry in (between, between, own)])

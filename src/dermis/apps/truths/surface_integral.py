@@ -25,7 +25,7 @@ _STRICT_BOUND = 50.0
 
 
 def integrate(points: ArrayLike, samples: IrradianceSamples, profile: Profile, error: float = 1e-3) -> Floats:
-    """Radiant exitance (n, 3), in the samples' unit: the integral of R(|x - y|) E(y) dA over the surface.
+    """Return radiant exitance (n, 3), the integral of R(|x - y|) E(y) dA over the surface.
 
     points : (n, 3) x, on the surface [mm]
     samples : E, linear on small triangles; whether they are fine enough for the light is up to the caller
@@ -71,5 +71,5 @@ def _gathered(places: Floats, samples: IrradianceSamples, profile: Profile, erro
 
 
 def _weighed(tree: Tree, strictness: float) -> Tree:
-    """The tree with the errors that do not cancel multiplied by `strictness`."""
+    """Return the tree with the errors that do not cancel multiplied by `strictness`."""
     return tree._replace(spread=tree.spread + strictness * tree.mismatch, offset=strictness * tree.offset)

@@ -24,7 +24,7 @@ With 2, a quadrilateral is left over: the last entry cuts it along the other dia
 
 
 def sides(positions: Floats, corners: Index) -> tuple[Index, Index, Floats]:
-    """Ends (e, 2) of the edges, the edge of each triangle's side (f, 3), and lengths (e,) [mm].
+    """Return ends (e, 2) of the edges, the edge of each triangle's side (f, 3), and lengths (e,) [mm].
 
     positions : (n, 3) [mm]
     corners : (f, 3) triangles; side k runs from corner k to corner k + 1
@@ -37,7 +37,7 @@ def sides(positions: Floats, corners: Index) -> tuple[Index, Index, Floats]:
 def divide(
     corners: Index, weights: Floats, middle: Index, positions: Floats | None = None
 ) -> tuple[Index, Index, Floats]:
-    """The triangles (m, 3) after halving, which one each was cut from (m,), and its weights (m, 3, 3).
+    """Return the triangles (m, 3) after halving, which one each was cut from (m,), and its weights (m, 3, 3).
 
     corners : (f, 3)
     weights : (f, 3, 3) barycentric weights of the corners in a coarse triangle

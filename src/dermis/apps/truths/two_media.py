@@ -19,7 +19,7 @@ Counts = NDArray[np.int64]
 
 @compiled
 def _walk(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: Words) -> float:
-    """Where a photon leaves that entered straight down at x [mm]; NaN for one that is absorbed."""
+    """Return the exit x of a photon that entered straight down at x [mm]; NaN if it is absorbed."""
     z = ux = uy = 0.0
     uz = 1.0
     medium = 0 if x < 0.0 else 1
@@ -67,7 +67,7 @@ def count_crossings(
 def exchange(
     sigma_a: Floats, sigma_s_prime: Floats, edges_mm: Floats, photons: int, seed: int = 0, eta: float = 1.4
 ) -> Floats:
-    """(n, n) share of the light entering each strip, straight down, that leaves from each other strip [-].
+    """Return (n, n) shares of light entering each strip, straight down, that leave from each strip [-].
 
     The border runs between strips along x = 0; what leaves beyond the outer edges is left out.
 

@@ -33,20 +33,20 @@ _PHOTONS = 40_000
 
 @cache
 def _scattering() -> tuple[Doubles, Doubles]:
-    """Albedos of half-spaces, and roots of what single scatterings absorb in them: both change evenly."""
+    """Return albedos of half-spaces, and the roots of their single-scattering absorption, in even steps."""
     root = np.linspace(1.0, _LEAST_ROOT, 32)
     return np.array([diffuse_albedo(float(1.0 - one**2)) for one in root]), root
 
 
 def single_albedo(colour: ArrayLike) -> Doubles:
-    """Albedo of single scattering of half-spaces that give back a colour, under light from everywhere [-]."""
+    """Return the single-scattering albedo of half-spaces of a colour under uniform light [-]."""
     total, root = _scattering()
     wanted = np.clip(np.asarray(colour, np.float64) / PASSED, 0.0, _MOST_COLOUR)
     return np.asarray(1.0 - np.interp(wanted, total, root) ** 2)
 
 
 def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
-    """(3,) of media of a colour (3,) by the mean way (3,) from where light enters to where it leaves [mm].
+    """Return mean free paths (3,) of media of a colour (3,) by the mean lateral offset (3,) of exits [mm].
 
     By photons, which fall in at right angles.
     """
@@ -56,7 +56,7 @@ def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
 
 @cache
 def _mean_distance(albedo: float) -> float:
-    """From where light enters to where it leaves, in mean free paths."""
+    """Return the mean lateral offset of exit points, in mean free paths."""
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 400.0, 120)])
     layer = ScatteringLayer(1.0 - albedo, albedo, eta=1.0)
     found = trace_slab([layer], _PHOTONS, edges_mm=edges).reflectance * np.pi * np.diff(edges**2)
@@ -64,7 +64,7 @@ def _mean_distance(albedo: float) -> float:
 
 
 def medium_of(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: Doubles) -> MitsubaObject:
-    """Mitsuba's medium below the skin, exact in colour where the camera looks."""
+    """Return Mitsuba's medium below the skin, exact in colour where the camera looks."""
     extinction = 1.0 / mean_free_path_mm
     low, high = _box(person, camera)
     grid = single_albedo(colours_in(person, low, high, VOXELS)).astype(np.float32)
@@ -86,7 +86,7 @@ def medium_of(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: Do
 
 
 def _box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
-    """Two corners of what the picture shows of the head; beyond it colours go on as they end."""
+    """Return two corners of the part of the head in the picture; beyond it colours are constant."""
     reach = max(_MARGIN * camera.frame_mm, _LEAST_MM)
     skin = person.mesh.positions[np.unique(_skin(person))]
     middle = np.array(camera.target, np.float64)
@@ -96,14 +96,14 @@ def _box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
 
 
 def _skin(person: Person) -> NDArray[np.int32]:
-    """(f, 3) triangles of skin."""
+    """Return (f, 3) triangles of skin."""
     mesh = person.mesh
     kinds = np.array([one.kind == "skin" for one in mesh.materials])
     return np.asarray(mesh.triangles[kinds[mesh.material]])
 
 
 def colours_in(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doubles:
-    """(z, y, x, 3) colours of the nearest skin in even cells of a box, deeper inside the mean of all.
+    """Return (z, y, x, 3) colours of the nearest skin in even cells of a box, deeper inside the mean of all.
 
     low, high : (3,) corners of the box [mm]
     """
@@ -128,7 +128,7 @@ def colours_in(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doub
 
 
 def _samples(person: Person, low: Doubles, high: Doubles, side: float) -> tuple[Doubles, Doubles]:
-    """Places on the skin in a box (n, 3) and their colours (n, 3), the same each time."""
+    """Return places on the skin in a box (n, 3) and their colours (n, 3), the same each time."""
     mesh, triangles = person.mesh, _skin(person)
     corners = mesh.positions[triangles].astype(np.float64)
     inside = ((corners.max(axis=1) >= low - _DEEP_MM) & (corners.min(axis=1) <= high + _DEEP_MM)).all(axis=1)

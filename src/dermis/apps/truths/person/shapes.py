@@ -30,7 +30,7 @@ def picture(mi: Mitsuba, values: NDArray[np.floating]) -> Described:
 
 
 def coat(mi: Mitsuba, paint: Paint) -> MitsubaObject:
-    """The surface: what a dielectric of skin's index reflects, roughened as painted, over a hole.
+    """Return the surface: reflection of a dielectric of skin's index with painted roughness, over a hole.
 
     Through a refracting surface no ray to a light finds its way. So light passes this one unbent, but for a
     small share that meets a mirror as many times brighter as the share is small.
@@ -49,7 +49,7 @@ def coat(mi: Mitsuba, paint: Paint) -> MitsubaObject:
 
 
 def skin_shapes(mi: Mitsuba, person: Person, medium: MitsubaObject) -> tuple[Described, tuple[str, ...]]:
-    """Two surfaces around the medium, as `mitsuba_scene` has them, the upper one coated; and notes."""
+    """Return two surfaces around the medium, as `mitsuba_scene` has them, the upper one coated; and notes."""
     solid = skin_solid(person.mesh, person.name)
     notes = (f"{solid.caps} openings shut, {solid.cap_area:.0f} mm2",) if solid.caps else ()
     gap = gap_of(mi, solid)
@@ -70,7 +70,7 @@ def _skin(person: Person) -> NDArray[np.bool_]:
 
 
 def _coated(mi: Mitsuba, person: Person, upper: Solid, medium: MitsubaObject) -> MitsubaObject:
-    """The outer surface with the mesh's own normals and uv."""
+    """Return the outer surface with the mesh's own normals and uv."""
     mesh, triangles = person.mesh, person.mesh.triangles[_skin(person)]
     vertices, corners = np.unique(triangles, return_inverse=True)
     points = np.unique(mesh.point[triangles])
@@ -97,7 +97,7 @@ _FLAT = 0.02  # by which the disc ends inside the ball [mm]
 
 
 def ball() -> tuple[Doubles, Index, Doubles, Doubles]:
-    """Places of an eyeball in its own space [mm], triangles, normals, and uv by its layout."""
+    """Return places of an eyeball in its own space [mm], triangles, normals, and uv by its layout."""
     edge = np.arctan2(LIMBUS_MM + 2 * SOFT_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
     angle = np.concatenate([np.linspace(0.0, edge, _CLEAR, endpoint=False), np.linspace(edge, np.pi, _BACK)])
     turn = 2.0 * np.pi * np.arange(_AROUND + 1) / _AROUND
@@ -114,20 +114,20 @@ def ball() -> tuple[Doubles, Index, Doubles, Doubles]:
 
 
 def _grid(rows: int, columns: int) -> Index:
-    """Triangles of a grid of points, counter-clockwise where rows go away from +z and columns around it."""
+    """Return triangles of a grid of points whose rows go away from +z and columns around it."""
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     a, b, c, d = first, first + columns, first + columns + 1, first + 1
     return np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
 
 
 def clearness(off_mm: Doubles, z_mm: Doubles) -> Doubles:
-    """Share of a ball's surface that is clear, by its distance from the axis and its place along it."""
+    """Return the clear share of a ball's surface by distance from the axis and place along it."""
     t = np.clip((off_mm - LIMBUS_MM + SOFT_MM) / (2 * SOFT_MM), 0.0, 1.0)
     return np.where(z_mm > 0.0, 1.0 - t * t * (3.0 - 2.0 * t), 0.0)
 
 
 def clear_picture() -> Doubles:
-    """(n, n) of `clearness` by the layout's uv."""
+    """Return (n, n) of `clearness` by the layout's uv."""
     u = (np.arange(_PICTURE) + 0.5) / _PICTURE - 0.5
     angle = np.minimum(np.hypot(*np.meshgrid(u, u)) / RIM, 1.0) * np.pi
     radius = profile_mm(angle)
@@ -135,7 +135,7 @@ def clear_picture() -> Doubles:
 
 
 def disc() -> tuple[Doubles, Index, float]:
-    """Places of the plane of the iris up to the ball, triangles, and its radius [mm]."""
+    """Return places of the plane of the iris up to the ball, triangles, and its radius [mm]."""
     radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2)) - _FLAT
     turn = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
     rim = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.full(_AROUND, iris_mm())], axis=-1)
@@ -145,7 +145,7 @@ def disc() -> tuple[Doubles, Index, float]:
 
 
 def materials(mi: Mitsuba, paint: Paint) -> tuple[MitsubaObject, MitsubaObject]:
-    """Of the ball and of the iris."""
+    """Return the materials of the ball and of the iris."""
     white = {
         "type": "roughplastic",
         "distribution": "beckmann",
@@ -165,7 +165,7 @@ def materials(mi: Mitsuba, paint: Paint) -> tuple[MitsubaObject, MitsubaObject]:
 
 
 def eye_shapes(mi: Mitsuba, person: Person) -> Described:
-    """All eyes of a person, from the head's centre."""
+    """Return all eyes of a person, from the head's centre."""
     covered, iris = materials(mi, person.paint)
     places, triangles, normals, uv = ball()
     flat, fans, _ = disc()
@@ -195,7 +195,7 @@ _LEAST_MM = 1e-3
 
 
 def hair_shapes(mi: Mitsuba, hairs: Hairs, name: str = "hairs") -> Described:
-    """The hairs in groups of nearly the same absorption, each a shape of that name and a number."""
+    """Return the hairs in groups of nearly the same absorption, each a shape of that name and a number."""
     shapes = {}
     depth = hairs.absorption * hairs.radius_mm.max(axis=1, keepdims=True)  # Mitsuba's unit is the radius
     with tempfile.TemporaryDirectory() as folder:
@@ -217,13 +217,13 @@ def hair_shapes(mi: Mitsuba, hairs: Hairs, name: str = "hairs") -> Described:
 
 
 def groups(depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
-    """Rows (n, 3) in as many groups as `COLOURS` at most, by their sum."""
+    """Return rows (n, 3) in at most `COLOURS` groups by their sum."""
     order = np.argsort(depth.sum(axis=1), kind="stable")
     return [part for part in np.array_split(order, min(COLOURS, len(order))) if len(part)]
 
 
 def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating]) -> None:
-    """A file of curves for Mitsuba: a line for each control point, an empty one after each curve."""
+    """Write a file of curves for Mitsuba: a line for each control point, an empty one after each curve."""
     rows = np.concatenate([knots_mm, radius_mm[..., None].astype(np.float64)], axis=-1)
     points = control_points(rows)
     points[..., 3] = np.maximum(points[..., 3], _LEAST_MM)
@@ -234,7 +234,7 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
 
 
 def control_points(knots: Doubles) -> Doubles:
-    """(n, k + 2, c) of uniform cubic B-splines through knots (n, k, c), straight at both ends."""
+    """Return (n, k + 2, c) of uniform cubic B-splines through knots (n, k, c), straight at both ends."""
     count = knots.shape[1]
     matrix = np.eye(count)
     inner = np.arange(1, count - 1)

@@ -38,7 +38,7 @@ class Paint:
     teeth: tuple[Floats, Floats]
 
     def arrays(self) -> Iterator[Floats]:
-        """All of them."""
+        """Yield all pictures."""
         yield from (self.colour, self.roughness, self.height_mm, self.iris, self.white, *self.teeth)
 
 
@@ -72,7 +72,7 @@ class Person:
     paint: Paint
 
     def arrays(self) -> Iterator[NDArray[np.generic]]:
-        """All that it is, in numbers."""
+        """Yield all arrays of the person."""
         mesh = self.mesh
         yield from (mesh.positions, mesh.normals, mesh.uv, mesh.point, mesh.triangles, mesh.material)
         yield self.eyes
@@ -82,7 +82,7 @@ class Person:
 
 
 def person_of(scene: Scene, paint: Paint) -> Person:
-    """The head of a scene in its pose.
+    """Return the head of a scene in its pose.
 
     Raises DermisError for a head without eyes of true shape.
     """

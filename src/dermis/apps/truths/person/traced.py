@@ -84,7 +84,7 @@ def person_scene(
     mean_free_path_mm: NDArray[np.float64],
     size: tuple[int, int],
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
-    """Mitsuba's scene whose image is the radiance, and notes on what was done to the head."""
+    """Return Mitsuba's scene whose image is the radiance, and notes on what was done to the head."""
     medium = medium_of(mi, person, scene.camera, mean_free_path_mm)
     shapes, notes = skin_shapes(mi, person, medium)
     shapes |= eye_shapes(mi, person) | _opaque_shapes(mi, person)
@@ -95,7 +95,7 @@ def person_scene(
 
 
 def _opaque_shapes(mi: Mitsuba, person: Person) -> Described:
-    """What is neither skin nor an eye: teeth and tongue under saliva, all else matte."""
+    """Return parts that are neither skin nor eyes: teeth and tongue under saliva, others matte."""
     shapes = {}
     mesh = person.mesh
     for k, material in enumerate(mesh.materials):
@@ -133,7 +133,7 @@ def _glowing(mi: Mitsuba, person: Person) -> Described:
 
 
 def person_key(scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], form: str) -> str:
-    """A hash of all that the image depends on.
+    """Return a hash of all that the image depends on.
 
     form : versions, and how it is traced
     """

@@ -34,7 +34,7 @@ def specular() -> None:
 
 
 def read_albedo(model: str, cosine: Floats, m: Floats) -> Floats:
-    """Return albedo and its mean (..., 2) between the table's texels, as the shader reads them."""
+    """Return the albedo and its mean (..., 2) between the table's texels, as the shader reads them."""
     axes = np.sqrt(TABLE_ROUGHNESSES), np.sqrt(TABLE_COSINES)
     places = np.stack(np.broadcast_arrays(np.sqrt(m), np.sqrt(cosine)), axis=-1)
     return np.asarray(RegularGridInterpolator(axes, albedo_table(model).astype(float))(places))

@@ -101,7 +101,7 @@ def even_light(subject: Subject) -> Floats:
 
 
 def mean_and_high(even: Floats) -> str:
-    """Return mean and 95th percentile by channel."""
+    """Return the mean and 95th percentile by channel."""
     pairs = zip(even.mean(axis=0), np.percentile(even, 95, axis=0), strict=True)
     return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)
 

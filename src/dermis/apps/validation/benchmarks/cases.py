@@ -72,7 +72,7 @@ class Preset:
     technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENTS)
 
     def cases(self) -> list[Case]:
-        """The usual frame, then the others."""
+        """Return the usual frame, then the others."""
         found = [self.usual]
         sizes = "image", "atlas", "gaussians", "lights", "environment", "targets", "subdivide"
         for name in ("technique", *sizes):
@@ -111,7 +111,7 @@ PRESETS: dict[str, Preset] = {
 
 
 def settings_of(case: Case) -> Settings:
-    """How the case is rendered."""
+    """Return the settings of a case."""
     return Settings(
         size=case.image,
         atlas=case.atlas,
@@ -121,7 +121,7 @@ def settings_of(case: Case) -> Settings:
 
 
 def scenes_of(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
-    """The case at `count` moments: camera, lights and a moving head are never in the same place twice.
+    """Return the case at `count` moments: camera, lights and a moving head are never in the same place twice.
 
     folder : for the profile's file
     """
@@ -144,7 +144,7 @@ def _aside(place: tuple[float, float, float], sway: float) -> tuple[float, float
 
 
 def _lights(count: int) -> list[PointLight]:
-    """The studio's spots, then the same ones turned about the head."""
+    """Return the studio's spots, then the same ones turned about the head."""
     rig = [light for light in studio() if isinstance(light, PointLight)]
     return [_turned(rig[k % len(rig)], _TURN_DEGREES * (k // len(rig))) for k in range(count)]
 
@@ -165,7 +165,7 @@ def _profile_file(count: int, folder: Path) -> Path:
 
 
 def with_terms(profile: GaussianSum, count: int) -> GaussianSum:
-    """A stand-in with `count` Gaussians, the same albedo and the same widest Gaussian."""
+    """Return a stand-in with `count` Gaussians, the same albedo and the same widest Gaussian."""
     if count == len(profile.variance_mm2):
         return profile
     known = np.log(profile.variance_mm2)
@@ -185,14 +185,14 @@ Doubles = NDArray[np.float64]
 
 
 def rigged(head: Head, targets: int) -> Head:
-    """The head with morph targets all over it, and bones one above the other instead of its own."""
+    """Return the head with morph targets all over it, and bones one above the other instead of its own."""
     points = head.positions_mm.astype(np.float64)
     rig = replace(head.control, targets=_targets(points, targets), skeleton=_skeleton(points))
     return replace(head, rig=rig)
 
 
 def pose_at(head: Head, moment: int) -> Pose:
-    """A pose in which every target and every bone has moved since the moment before."""
+    """Return a pose in which every target and every bone has moved since the moment before."""
     weights = {name: 0.5 + 0.5 * math.sin(k + 0.3 * moment) for k, name in enumerate(head.targets)}
     turn = [_BONE_TURN_DEGREES * math.sin(0.2 * moment + k) for k in range(BONES)]
     bones = {name: (0.3 * angle, angle, 0.0) for name, angle in zip(head.bones, turn, strict=True)}
@@ -200,7 +200,7 @@ def pose_at(head: Head, moment: int) -> Pose:
 
 
 def _targets(points: Doubles, count: int) -> MorphTargets:
-    """Smooth lifts, each of a sixth of the points around one of them."""
+    """Return smooth lifts, each of a sixth of the points around one of them."""
     middles = points[np.linspace(0, len(points) - 1, count).astype(int)]
     nearest = max(1, int(_SHARE * len(points)))
     moved, deltas = [], []
@@ -217,7 +217,7 @@ def _targets(points: Doubles, count: int) -> MorphTargets:
 
 
 def _skeleton(points: Doubles) -> Skeleton:
-    """Bones in a row upwards; a point follows the two beside it."""
+    """Return bones in a row upwards; a point follows the two beside it."""
     low, high = points[:, 1].min(), points[:, 1].max()
     step = (high - low) / BONES
     local, bind = np.tile(np.eye(4), (2, BONES, 1, 1))

@@ -46,7 +46,7 @@ class Moved:
 
 
 def moved_by(device: Device, inputs: Inputs, vertices: int) -> Moved:
-    """Counts after a frame was drawn."""
+    """Return the counts after a frame was drawn."""
     texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
     seen = np.count_nonzero(download(device, inputs.resources.post.picture.bytes)[..., 3])
     maps, layers = inputs.resources.shadow_maps.texture, range(len(inputs.shadow_views.clips))
@@ -55,7 +55,7 @@ def moved_by(device: Device, inputs: Inputs, vertices: int) -> Moved:
 
 
 def stage_bytes(moved: Moved) -> dict[str, float]:
-    """Bytes by stage: inputs read once and results written once, in the formats in use.
+    """Return bytes by stage: inputs read once and results written once, in the formats in use.
 
     Where others are not needed, only texels with surface and pixels that show the head count. Repeated reads
     within a stage or a blur, scratch space between two passes, and tables that fit in caches do not count.
@@ -79,7 +79,7 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
 
 
 def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
-    """Bytes of the stages that light the atlas and spread the light."""
+    """Return bytes of the stages that light the atlas and spread the light."""
     inputs, texels, levels = moved.inputs, moved.texels, moved.inputs.resources.diffusion.levels
     blur = inputs.blurs[0]
     entered = texels * FORMAT_BYTES[levels.texel]
@@ -96,7 +96,7 @@ def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
 
 
 def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
-    """Bytes that blurs read of the surface: stretch, the extent of the chart, and gutters.
+    """Return bytes that blurs read of the surface: stretch, the extent of the chart, and gutters.
 
     The passes of 2007 blur the stretch map along with the light instead.
     """
@@ -128,13 +128,13 @@ def _through(thin: Translucency, levels: Levels, blur: Blur) -> float:
 
 
 def _maps(inputs: Inputs, most: int) -> int:
-    """Bytes of the head's maps that `most` points read, a texel each."""
+    """Return bytes of the head's maps that `most` points read, a texel each."""
     textures = [cast(Texture, inputs.lit[name]) for name in _MAPS]
     return sum(texel_bytes(one) * min(most, one.size[0] * one.size[1]) for one in textures)
 
 
 def copy_rate(device: Device) -> float:
-    """Bytes read and written per second by a pass that copies a texture, median of some frames [byte/s].
+    """Return the median rate of reading and writing in a pass that copies a texture [byte/s].
 
     Raises DermisError when the device has no timestamps.
     """
@@ -148,7 +148,7 @@ def copy_rate(device: Device) -> float:
 
 
 def _copy(device: Device, program: ComputeProgram, textures: list[Any]) -> float:
-    """Time of copying back and forth [ms]."""
+    """Return the time of copying back and forth [ms]."""
     frame, (one, other) = CommandList(device), textures
     for source, copied in ((one, other), (other, one)) * (_COPIES // 2):
         frame.compute("copy", program, {"source": source, "copied": copied}, one.size[:2])

@@ -38,7 +38,7 @@ class Fragments(GpuGems3):
     """Lights the atlas, blurs and adds up in render passes; the same up to the rounding of halves."""
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
-        """Space for the light that enters and the blurred levels, all of it halves."""
+        """Return space for the light that enters and the blurred levels, all of it halves."""
         count = max(map(len, halvings))
         stack = make_texture(device, (side, side), HALVES, layers=count, use="raster")
         scratch, *stretch = (make_texture(device, (side, side), HALVES, use="raster") for _ in range(3))
@@ -69,7 +69,7 @@ class Fragments(GpuGems3):
         return made.scattered
 
     def shader(self, device: Device, constants: Constants) -> FragmentProgram:
-        """The pass along one axis."""
+        """Return the program of the pass along one axis."""
         return _program(device, "gpu_gems_3_fragment.wgsl", constants, [HALVES, HALVES])
 
     def run(

@@ -27,7 +27,7 @@ _SIDE_ON_CPU, _LIGHTS_ON_CPU = 256, 16
 
 
 def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
-    """Device time of one evaluation by model and Fresnel curve, as named in MODELS and FRESNEL [ns].
+    """Return device time of one evaluation by model and Fresnel curve, as named in MODELS and FRESNEL [ns].
 
     The inverse throughput of the whole device, less the cost of the loop without the lobe.
     """
@@ -57,7 +57,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
 
 
 def _pass_ms(device: Device, program: ComputeProgram, bound: Figures, side: int) -> float:
-    """Time of one pass by the device's clock, or by the wall's without timestamps [ms]."""
+    """Return the time of one pass by the device's clock, or by the wall's without timestamps [ms]."""
     frame = CommandList(device)
     started = time.perf_counter()
     frame.compute("lobe", program, bound, (side, side))

@@ -38,7 +38,7 @@ class Effort:
     row: int = 100
 
     def within(self, seconds: float, frame_ms: float) -> Effort:
-        """The same with fewer frames, where these would take longer at `frame_ms` each."""
+        """Return the same with fewer frames, where these would take longer at `frame_ms` each."""
         frames = self.warming + 2 * self.row + 2 * self.timed * (1 + self.between)
         share = min(1.0, 1e3 * seconds / (frame_ms * frames))
         wanted = asdict(self).items()
@@ -115,7 +115,7 @@ def _measured(renderer: Renderer, case: Case, head: Head, folder: Path, rate: fl
 
 
 def row_ms(renderer: Renderer, scenes: Iterator[Scene], count: int, settings: Settings) -> float:
-    """Time of frames that follow each other without a pause, until the last one is done [ms].
+    """Return the time of frames that follow each other without a pause, until the last one is done [ms].
 
     scenes : each differs from the one before, so that nothing is kept that camera and lights change
     """
@@ -146,7 +146,7 @@ def stage_ms(
 def _around(
     renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: Effort
 ) -> tuple[float, float]:
-    """Medians of Python's time before a frame, and of fetching its image [ms]."""
+    """Return medians of Python's time before a frame, and of fetching its image [ms]."""
     before, after = [], []
     for k in range(max(effort.row, effort.timed)):
         renderer.device.wait()
@@ -166,6 +166,6 @@ def _lasted_ms(work: Callable[[], object]) -> float:
 
 
 def _floor(moved: dict[str, float], gpu_ms: dict[str, float], rate: float) -> dict[str, float]:
-    """Floor of each stage that was drawn, and "total" [ms]."""
+    """Return floor of each stage that was drawn, and "total" [ms]."""
     floor = {stage: 1e3 * moved[stage] / rate for stage in gpu_ms if stage in moved}
     return floor | {"total": sum(floor.values())}

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def as_json(made: Benchmark) -> Figures:
-    """The benchmark as one JSON-ready object; times in ms."""
+    """Return the benchmark as one JSON-ready object; times in ms."""
     return {
         "head": made.head,
         "adapter": made.adapter,
@@ -58,7 +58,7 @@ COLUMNS = (*_CASE, *_TIMES, "memory [MB]")
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """A row's figures as text, in the order of COLUMNS."""
+    """Return a row's figures as text, in the order of COLUMNS."""
     case, device = row.case, (row.gpu_ms["total"], row.floor_ms["total"], row.floor_ratio)
     return (
         f"{case.image[0]}x{case.image[1]}",
@@ -75,7 +75,7 @@ def cells(row: Row) -> tuple[str, ...]:
 
 
 def stage_table(made: Benchmark) -> list[tuple[str, ...]]:
-    """The usual frame by stage, titles first: device time, floor, their ratio, and the passes of 2007."""
+    """Return rows of the usual frame by stage, titles first: device time, floor, ratio, passes of 2007."""
     if made.usual is None:
         return []
     usual = made.usual
@@ -90,7 +90,7 @@ def stage_table(made: Benchmark) -> list[tuple[str, ...]]:
 
 
 def published_text(made: Benchmark) -> str:
-    """How much longer the passes of 2007 take, if that was measured."""
+    """Return a sentence with the relative time of the passes of 2007, if that was measured."""
     names = {GPU_GEMS_3: "as compute", FRAGMENTS: "as fragments"}
     found = {said: made.ratio(name) for name, said in names.items()}
     told = [f"{ratio:.2f} times as long {said}" for said, ratio in found.items() if ratio is not None]
@@ -98,7 +98,7 @@ def published_text(made: Benchmark) -> str:
 
 
 def left_out_lines(made: Benchmark) -> list[str]:
-    """What could not be measured, and why."""
+    """Return lines about cases that could not be measured, with reasons."""
     return [f"left out: {_told(one.case)}: {one.reason}" for one in made.left_out]
 
 
@@ -111,7 +111,7 @@ def _told(case: Case) -> str:
 
 
 def summary(made: Benchmark) -> str:
-    """The machine, the head, the date and the versions, in one line."""
+    """Return the machine, the head, the date and the versions, in one line."""
     versions = ", ".join(f"{name} {number}" for name, number in made.versions.items())
     return (
         f"{made.adapter} ({made.driver}), {made.head}, {made.date}; {versions}; "
@@ -139,7 +139,7 @@ def write_report(path: Path, made: Benchmark) -> None:
 
 
 def _table(lines: Sequence[tuple[str, ...]]) -> str:
-    """An HTML table whose first line has the titles."""
+    """Return an HTML table whose first line has the titles."""
     rows = []
     for number, line in enumerate(lines):
         tag = "td" if number else "th"
@@ -158,12 +158,12 @@ _AXES: dict[str, tuple[str, Callable[[Row], float]]] = {
 
 
 def plain(number: float) -> str:
-    """Three significant digits without an exponent."""
+    """Return three significant digits without an exponent."""
     return f"{number:.0f}" if number >= 1000 else f"{number:.3g}"
 
 
 def scaling(made: Benchmark) -> str:
-    """Device time and floor over each size that was varied, as SVG text."""
+    """Return the device time and floor over each size that was varied, as SVG text."""
     varied = [name for name in _AXES if any(row.case.varies == name for row in made.rows)]
     if not varied:
         return ""
@@ -183,7 +183,7 @@ def scaling(made: Benchmark) -> str:
 
 
 def stage_bars(row: Row) -> str:
-    """Device time of each stage and its floor as bars, as SVG text."""
+    """Return the device time of each stage and its floor as bars, as SVG text."""
     names = [stage for stage in row.gpu_ms if stage != "total"]
     figure, (axes,) = _figure(width=7.0, height=0.34 * len(names) + 0.9, columns=1)
     places = range(len(names))
@@ -212,7 +212,7 @@ def _figure(width: float, height: float, columns: int) -> tuple[Figure, list[Axe
 
 
 def _marks(axis: Axis, places: list[float] | None) -> None:
-    """Plain numbers at the measured places, or at round ones."""
+    """Label an axis with plain numbers at the measured places, or at round ones."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
     axis.set_major_locator(FixedLocator(places) if places else LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -58,12 +58,12 @@ class Benchmark:
         return next((row for row in self.rows if not row.case.varies), None)
 
     def row_of(self, technique: str) -> Row | None:
-        """The usual frame by another technique; None when it was not measured."""
+        """Return the usual frame by another technique; None when it was not measured."""
         found = (row for row in self.rows if row.case.varies == "technique")
         return next((row for row in found if row.case.technique == technique), None)
 
     def ratio(self, technique: str) -> float | None:
-        """Device time of another technique over that of our own, in the same frame."""
+        """Return the device time of another technique over that of our own, in the same frame."""
         other = self.row_of(technique)
         return other.gpu_ms["total"] / self.usual.gpu_ms["total"] if other and self.usual else None
 
@@ -107,7 +107,7 @@ def run(
 def _all_of(
     cases: list[Case], load: Callable[..., Head], renderer: Renderer, rate: float, progress: Progress
 ) -> tuple[list[Row], list[LeftOut]]:
-    """The cases that could be measured, and the others."""
+    """Return the cases that could be measured, and the others."""
     effort = ON_CPU if renderer.device.adapter.kind == "CPU" else Effort()
     subdivided = lru_cache(1)(lambda levels: load(subdivide=levels))
     rows: list[Row] = []

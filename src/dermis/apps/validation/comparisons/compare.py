@@ -66,7 +66,7 @@ class Comparison:
         return 0.8 / max(float(bright), 1e-9)
 
     def shown(self, image: Floats) -> Floats:
-        """sRGB (h, w, 3) in 0..1 at the comparison's exposure."""
+        """Return sRGB (h, w, 3) in 0..1 at the comparison's exposure."""
         return np.asarray(encode_srgb(np.clip(self.exposure * image, 0.0, 1.0)))
 
 
@@ -85,7 +85,7 @@ def compare(
     adapter: str = "auto",
     report: Callable[[str], None] = lambda doing: None,
 ) -> Comparison:
-    """Techniques with the profile's own colour, no surface reflection and no energy term, against a truth.
+    """Compare techniques, with the profile's own colour and no surface reflection, with a truth.
 
     against : of TRUTHS
     light, region : of `scenes.LIGHTS` and `scenes.REGIONS`
@@ -127,7 +127,7 @@ def subject_of(
     adapter: str,
     model: ModelName | None = None,
 ) -> Iterator[Subject]:
-    """What a comparison judges, valid within the context; arguments as of `compare`."""
+    """Provide the subject of a comparison within the context; arguments as of `compare`."""
     body = media()[medium].with_eta(1.0)
     with medium_scene(head, light, region, body, model) as (scene, profile):
         yield Subject(Renderer(adapter), scene, profile, body, settings)
@@ -185,7 +185,7 @@ _DIFFERENCE = "Andersson2020"
 
 
 def comparison_sources(against: str, techniques: Iterable[str]) -> tuple[str, ...]:
-    """Keys of the bibliography, without duplicates.
+    """Return keys of the bibliography, without duplicates.
 
     against : of `truths.TRUTHS`
     """

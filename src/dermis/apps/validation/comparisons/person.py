@@ -62,7 +62,7 @@ class Pair:
         return 0.8 / max(float(bright), 1e-9)
 
     def shown(self, image: Floats) -> NDArray[np.uint8]:
-        """(h, w, 3) sRGB bytes at the exposure of both."""
+        """Return (h, w, 3) sRGB bytes at the exposure of both."""
         encoded = encode_srgb(np.clip(self.exposure * image, 0.0, 1.0))
         return np.asarray(np.rint(255 * encoded), np.uint8)
 
@@ -79,7 +79,7 @@ def compare_person(
     keep: bool = True,
     report: Callable[[int, int], None] | None = None,
 ) -> Pair:
-    """A view of a person by both.
+    """Draw a view of a person by the frame and by path tracing.
 
     paint : what the frame shows on it, see `paint_of`
     name : of `VIEWS`
@@ -101,7 +101,7 @@ def compare_person(
 
 
 def drawn(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
-    """(h, w, 3) linear radiance by the frame, drawn twice as large and averaged.
+    """Return (h, w, 3) linear radiance by the frame, drawn twice as large and averaged.
 
     More samples of a pixel would do as well, but on software adapters many samples of many large lights end
     the shading before its last pixels.
@@ -122,7 +122,7 @@ def traced(
     report: Callable[[int, int], None] | None = None,
     variant: Variant = "scalar_rgb",
 ) -> PathTraced:
-    """A person path-traced; light below skin of the mean colour spreads as far as the profile says.
+    """Return a person path-traced; light below skin of the mean colour spreads as far as the profile says.
 
     variant : as of `path_trace`
     """
@@ -136,7 +136,7 @@ def traced(
 
 
 def pair_of(name: str, ours: Floats, truth: PathTraced, mask: NDArray[np.bool_]) -> Pair:
-    """Both pictures with their figures."""
+    """Return both pictures with their figures."""
     image, variance = truth.image.astype(np.float64), truth.variance.astype(np.float64)
     return Pair(
         name,
@@ -175,32 +175,32 @@ class View:
 
 
 def at_eye(head: Head) -> Camera:
-    """The left eye from the front, 30 mm of it."""
+    """Return the left eye from the front, 30 mm of it."""
     x, y, z = _eye_mm(head)
     return Camera(position=(x, y, z + 500.0), target=(x, y, z), frame_mm=EYE_MM)
 
 
 def at_eye_beside(head: Head) -> Camera:
-    """The left eye from its outer side."""
+    """Return the left eye from its outer side."""
     x, y, z = _eye_mm(head)
     return Camera(position=(x + 380.0, y, z + 330.0), target=(x, y, z), frame_mm=EYE_MM)
 
 
 def at_lips(head: Head) -> Camera:
-    """The mouth from a little to the left."""
+    """Return the mouth from a little to the left."""
     x, y, z = head.frontmost(0.0, _mouth_mm(head))
     return Camera(position=(x + 120.0, y, z + 500.0), target=(x, y - 4.0, z), frame_mm=_LIPS_MM)
 
 
 def behind_ear(head: Head) -> Camera:
-    """The left ear from behind."""
+    """Return the left ear from behind."""
     usual = PRESETS["ear"](head)
     x, y, z = usual.target
     return Camera(position=(x + 430.0, y + 10.0, z - 430.0), target=(x - 8.0, y, z), frame_mm=_EAR_MM)
 
 
 def _eye_mm(head: Head) -> tuple[float, float, float]:
-    """The left eye's apex, from the head's centre."""
+    """Return the left eye's apex, from the head's centre."""
     if head.eyes is None:
         return head.frontmost(30.0, 0.0)
     x, y, z = head.control.positions_mm[head.eyes.apex[0]] - np.array(head.centre_mm)
@@ -208,7 +208,7 @@ def _eye_mm(head: Head) -> tuple[float, float, float]:
 
 
 def _mouth_mm(head: Head) -> float:
-    """Height of the mouth: where upper and lower teeth meet, in the mean."""
+    """Return the height of the mouth: where upper and lower teeth meet, in the mean."""
     names = [material.part for material in head.mesh.materials]
     teeth = [names.index(part) for part in ("upper teeth", "lower teeth") if part in names]
     chosen = np.unique(head.mesh.triangles[np.isin(head.mesh.material, teeth)])
@@ -234,7 +234,7 @@ PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
 
 
 def scene_of(head: Head, view: View) -> Scene:
-    """A head in a view, in lights that have a size: through a refracting cornea no path finds a point."""
+    """Return a head in a view, in lights with a size: no path through a cornea finds a point light."""
     given = {"camera": view.camera(head), "pose": None if view.pose is None else Pose(expression(view.pose))}
     if view.light in PANORAMAS:
         return Scene(head, environment=Environment(name=view.light), **given)  # type: ignore[arg-type]
@@ -243,7 +243,7 @@ def scene_of(head: Head, view: View) -> Scene:
 
 
 def softbox(light: Light) -> Light:
-    """A light from a point as a softbox in its place; any other as it is."""
+    """Return a light from a point as a softbox in its place; any other as it is."""
     if type(light) is RectangleLight or not isinstance(light, PointLight) or hasattr(light, "radius_mm"):
         return light
     return RectangleLight(
@@ -277,7 +277,7 @@ class IrisFound(NamedTuple):
 
 
 def iris_of(pair: Pair, frame_mm: float) -> IrisFound:
-    """What is found in a picture with an eye in its middle, seen from the front.
+    """Return the figures of a picture with an eye in its middle, seen from the front.
 
     frame_mm : height of the picture
     """
@@ -296,7 +296,7 @@ def iris_of(pair: Pair, frame_mm: float) -> IrisFound:
 
 
 def _dull(image: Floats, ring: Mask) -> Mask:
-    """(h, w) pixels off highlights; a mean over neighbours tells them in a noisy picture."""
+    """Return (h, w) pixels off highlights; a mean over neighbours tells them in a noisy picture."""
     from scipy.ndimage import gaussian_filter
 
     smooth = gaussian_filter(image, 2.0)
@@ -304,7 +304,7 @@ def _dull(image: Floats, ring: Mask) -> Mask:
 
 
 def _shift(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> tuple[Estimate, Estimate]:
-    """By how much the truth lies to the right of and below ours, where it is so many times as bright."""
+    """Return the shift of the truth to the right of and below ours, fitted along with its brightness."""
     down, right = (np.asarray(slope) for slope in np.gradient(ours))
     columns = np.stack([ours[part], -right[part], -down[part], np.ones(int(part.sum()))], axis=-1)
     inverse = np.linalg.inv(columns.T @ columns) @ columns.T

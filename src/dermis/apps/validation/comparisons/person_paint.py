@@ -33,7 +33,7 @@ _ANY = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
 
 
 def paint_of(renderer: Renderer, scene: Scene, side: int = 2048) -> Paint:
-    """The colours, roughness and relief that frames of the scene show, at rest.
+    """Return the colours, roughness and relief that frames of the scene show, at rest.
 
     side : of the maps of the skin, a power of two from 256 to 4096 [texels]
 
@@ -57,7 +57,7 @@ def _painted(renderer: Renderer, scene: Scene, look: SkinLook, side: int) -> Pai
 
 
 def _detail(pores: Floats, furrows: Floats, density: Floats) -> Floats:
-    """(n, n) heights of what is finer than maps, as skin.wgsl lays its tile [mm].
+    """Return (n, n) heights of detail finer than the maps, tiled as skin.wgsl does [mm].
 
     pores, furrows : how much there is of each
     density : binary logarithm of the mm in a unit of uv
@@ -82,7 +82,7 @@ def _detail(pores: Floats, furrows: Floats, density: Floats) -> Floats:
 
 
 def _tiled(tile: Floats, u: Any, v: Any) -> Floats:
-    """A tile that goes on over its edges, between its texels bilinear, at (n, n) places in tiles."""
+    """Return a periodic tile at (n, n) places, in units of tiles, interpolated bilinearly."""
     from scipy.ndimage import map_coordinates
 
     rows, columns = tile.shape
@@ -91,7 +91,7 @@ def _tiled(tile: Floats, u: Any, v: Any) -> Floats:
 
 
 def _picture(renderer: Renderer, scene: Scene, part: int, reach: float) -> Floats:
-    """(n, n, 3) of eyes or teeth."""
+    """Return the picture (n, n, 3) of eyes or teeth."""
     inputs, device = renderer.prepare(scene, _ANY), renderer.device
     shader = program(device, Path(__file__).parent / "person_paint.wgsl")
     painted = make_texture(device, (_SIDE, _SIDE), "rgba32float")

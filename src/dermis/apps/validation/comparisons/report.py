@@ -43,7 +43,7 @@ def write_report(path: Path, made: Comparison) -> None:
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """A row's figures as text, with standard errors where there are any."""
+    """Return a row's figures as text, with standard errors where there are any."""
     flip = "-" if row.flip is None else f"{row.flip:.3f}"
     return (
         row.technique,

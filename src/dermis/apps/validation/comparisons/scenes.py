@@ -29,18 +29,18 @@ _EARS_MM = 60.0  # above and below the centre; farther below, shoulders are wide
 
 
 def _front(head: Head) -> tuple[Light, ...]:
-    """A key light from the upper left, whose shadow edges cross the face."""
+    """Return a key light from the upper left, whose shadow edges cross the face."""
     return (SpotLight(position=(450.0, 350.0, 750.0), irradiance=_WHITE),)
 
 
 def _back(head: Head) -> tuple[Light, ...]:
-    """A lamp behind the left ear."""
+    """Return a lamp behind the left ear."""
     ear = _ear(head)
     return (SpotLight(position=(ear[0] + 150.0, 60.0, -600.0), target=ear, irradiance=(12.0, 12.0, 12.0)),)
 
 
 def _laser(head: Head) -> tuple[Light, ...]:
-    """A vertical sheet of light over the cheek and the ear's front edge."""
+    """Return a vertical sheet of light over the cheek and the ear's front edge."""
     ear = _ear(head)
     place = (ear[0] - 12.0, ear[1], ear[2])
     return (StripeLight(direction=(-0.55, 0.0, -1.0), position=place, irradiance=(30.0, 30.0, 30.0)),)
@@ -50,7 +50,7 @@ LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {"front": _front, "back
 
 
 def _ear(head: Head) -> tuple[float, float, float]:
-    """The outermost point of the head's left half at the height of its ears."""
+    """Return the outermost point of the head's left half at the height of its ears."""
     places = head.mesh.positions - head.centre_mm
     off = np.abs(places[:, 1])
     beside = places[off <= max(_EARS_MM, float(off.min()))]
@@ -82,7 +82,7 @@ REGIONS: dict[str, Callable[[Head], Camera]] = {
 
 
 def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene:
-    """A head without maps or surface reflection, its skin in the profile's own colour.
+    """Return a head without maps or surface reflection, its skin in the profile's own colour.
 
     light, region : of LIGHTS and REGIONS
     profile : name or file
@@ -96,7 +96,7 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
 def medium_scene(
     head: Head, light: str, region: str, body: Medium, model: ModelName | None = None
 ) -> Iterator[tuple[Scene, GaussianSum]]:
-    """`comparison_scene` with a medium's profile, kept as a file within the context, and the profile."""
+    """Provide `comparison_scene` with a medium's profile, a file within the context, and the profile."""
     profile = gaussians_of(body, model)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "profile.toml"
@@ -105,7 +105,7 @@ def medium_scene(
 
 
 def usual_region(light: str) -> str:
-    """Where a light's effect shows most."""
+    """Return the region in which a light's effect is largest."""
     return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")
 
 
@@ -115,7 +115,7 @@ _PHOTONS = 2_000_000  # a channel
 
 
 def gaussians_of(body: Medium, model: ModelName | None = None) -> GaussianSum:
-    """Six Gaussians for a medium.
+    """Return six Gaussians for a medium.
 
     model : by default tables of photons where there are some, else layered diffusion
 

@@ -69,7 +69,7 @@ class Truth:
 
 
 def surface_integral(subject: Subject, samples: int) -> Truth:
-    """The same profile by straight-line distance, integrated over the surface: it shows the error of the map.
+    """Integrate the same profile of straight-line distance over the surface: shows the error of the map.
 
     samples : ignored
     """
@@ -81,7 +81,7 @@ def surface_integral(subject: Subject, samples: int) -> Truth:
 
 
 def heat(subject: Subject, samples: int) -> Truth:
-    """The same Gaussians diffused along the surface like heat, around the camera's target.
+    """Diffuse the same Gaussians along the surface like heat, around the camera's target.
 
     samples : ignored
     """
@@ -95,7 +95,7 @@ def heat_around(
     lit: IrradianceSamples,
     least_mm2: float = _LEAST_VARIANCE_MM2,
 ) -> Truth:
-    """The same Gaussians diffused along the surface like heat, around the visible point nearest to a place.
+    """Diffuse the same Gaussians along the surface like heat, around the visible point nearest to a place.
 
     place : from the head's centre [mm]
     lit : of the whole head, see `irradiance_samples`
@@ -128,7 +128,7 @@ def heat_around(
 
 
 def irradiance_samples(subject: Subject) -> IrradianceSamples:
-    """The light that enters all of the skin, sampled as finely as the truths need it."""
+    """Return the light that enters all of the skin, sampled as finely as the truths need it."""
     from dermis.apps.truths.irradiance_samples import Places, sample_irradiance
 
     def light(places: Places) -> Floats:
@@ -138,7 +138,7 @@ def irradiance_samples(subject: Subject) -> IrradianceSamples:
 
 
 def path_traced(subject: Subject, samples: int) -> Truth:
-    """Light through the medium itself, free of the errors of the profile and of diffuse surfaces.
+    """Trace paths through the medium itself, free of errors of the profile and of diffuse surfaces.
 
     samples : paths through each pixel
     """
@@ -150,7 +150,7 @@ def path_traced(subject: Subject, samples: int) -> Truth:
 
 
 def cycles(subject: Subject, samples: int) -> Truth:
-    """Blender's Cycles with random walks through the medium: a peer, not the truth.
+    """Render by Cycles with random walks through the medium: a peer, not the truth.
 
     samples : paths through each pixel
     """
@@ -178,7 +178,7 @@ def _entered(subject: Subject, triangle: NDArray[np.int64], barycentric: Floats)
 
 
 def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
-    """(n, 3) radiant exitance at points by Gaussians of the straight-line distance."""
+    """Return (n, 3) radiant exitance at points by Gaussians of the straight-line distance."""
     from dermis.apps.truths.surface_integral import GaussianSum as Profile
     from dermis.apps.truths.surface_integral import integrate
 
@@ -188,7 +188,7 @@ def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_m
 
 
 def positions(subject: Subject, seen: SurfacePoints) -> Floats:
-    """(n, 3) where rays through the pixels' centres meet the head [mm]."""
+    """Return (n, 3) where rays through the pixels' centres meet the head [mm]."""
     mesh = subject.scene.head.mesh
     corners = mesh.positions[mesh.triangles[seen.triangle]].astype(np.float64)
     return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))

@@ -79,7 +79,7 @@ def black() -> Any:
 
 
 def columns_of(skin: Any, camera: Any, path: Path, width_m: float, size: list[int], **given: int) -> Any:
-    """Mean radiance of each column of a picture of the plane so wide, across the edge of the light."""
+    """Return mean radiance of each column of a picture of the plane so wide, across the edge of the light."""
     camera.ortho_scale = width_m
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = size
