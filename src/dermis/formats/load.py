@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.base.arrays import Doubles, Floats, Ints
+from dermis.base.arrays import Doubles, Floats, Ints, Numbers
 from dermis.base.disk import Arrays, stored
 from dermis.base.errors import refuse
 from dermis.base.progress import preparing
@@ -214,7 +213,7 @@ def _packed(rigged: Rigged) -> Arrays:
     return arrays | rest | {"told": np.frombuffer(json.dumps(told).encode(), np.uint8)}
 
 
-def _fields(thing: Any, kind: str, names: list[str]) -> Arrays:
+def _fields(thing: MorphTargets | Skeleton, kind: str, names: list[str]) -> Arrays:
     found = {f"{kind} {name}": getattr(thing, name) for name in names}
     return {name: _NONE if array is None else array for name, array in found.items()}
 
@@ -226,7 +225,7 @@ def _unpacked(found: Arrays) -> Rigged:
     vars(mesh)["outline"] = Outline(found["outline"])  # finding it imports scipy, which is slower
     if "targets" not in told:
         return Rigged(mesh, None)
-    values: dict[str, NDArray[Any] | None] = {name: found[f"target {name}"] for name in _TARGETS}
+    values: dict[str, Numbers | None] = {name: found[f"target {name}"] for name in _TARGETS}
     values["rest"] = values["rest"] if len(found["target rest"]) else None
     targets = MorphTargets(tuple(told["targets"]), **values)  # type: ignore[arg-type]
     if told["bones"] is None:

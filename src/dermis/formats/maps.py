@@ -7,14 +7,13 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.base.arrays import Bytes, Doubles, Floats
+from dermis.base.arrays import Bytes, Doubles, Floats, Numbers
 from dermis.base.errors import refuse
-from dermis.images.codecs import strips
+from dermis.images.codecs import Pixels, strips
 from dermis.images.colour import decode_srgb_levels
 from dermis.images.filters import without_steps
 from dermis.images.io import Picture, read_bytes, read_image, read_size
@@ -22,18 +21,19 @@ from dermis.images.sizes import MOST_PIXELS
 from dermis.mesh.maps import Maps
 
 PathLike = str | Path | Picture
+A = TypeVar("A", bound=Numbers)
 
 MOST_SIDE = 8192
 """Texels of a map's side: as many as any device takes."""
 _ALIKE = 2.5 / 255  # JPEG may separate the channels of a grey picture by a level or two
 _MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
-Load = Callable[[PathLike], NDArray[Any]]
+Load = Callable[[PathLike], Numbers]
 _MOST_AT_ONCE = MOST_PIXELS  # texels of all maps, for maps to be decoded side by side
 _LARGE = 1 << 14  # bytes; maps of larger files are kept on disk, to be read faster than decoded
 _FORM = 1  # increment when the same files give other maps
 
 
-def finite(path: PathLike, values: NDArray[Any]) -> NDArray[Any]:
+def finite(path: PathLike, values: A) -> A:
     """A map whose numbers are all finite.
 
     DermisError : some are not, after whatever was done to those of the file
@@ -45,7 +45,7 @@ def finite(path: PathLike, values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
-def _converted(image: NDArray[Any], shape: tuple[int, ...], convert: Callable[[NDArray[Any]], Any]) -> Floats:
+def _converted(image: Pixels, shape: tuple[int, ...], convert: Callable[[Any], Floats]) -> Floats:
     """(H, W, *shape) of what a picture becomes, some rows at a time, so that little is in memory twice."""
     found = np.empty((*image.shape[:2], *shape), np.float32)
     for rows in strips(image):
@@ -93,7 +93,7 @@ def label_map(path: PathLike) -> Bytes:
     image = _read(path, "a map of labels")
     if image.dtype != np.uint8 or image.shape[2] != 1:
         refuse(path, "labels in 8-bit grey", f"{image.dtype} x {image.shape[2]} came", "Save it as such")
-    return image[..., 0]
+    return np.asarray(image[..., 0], np.uint8)
 
 
 def slope_map(path: PathLike, normal_y: str) -> Floats:
@@ -132,7 +132,7 @@ def _check_normals(path: PathLike, texels: float, outward: float, z: float, outw
         refuse(path, "a tangent-space normal map, which looks light blue", came, "Check which map this is")
 
 
-def _read(path: PathLike, role: str) -> NDArray[Any]:
+def _read(path: PathLike, role: str) -> Pixels:
     width, height = read_size(path)
     if max(width, height) > MOST_SIDE:
         expected = f"{role} of at most {MOST_SIDE} texels a side"
@@ -141,7 +141,7 @@ def _read(path: PathLike, role: str) -> NDArray[Any]:
     return finite(path, image) if image.dtype == np.float32 else image
 
 
-def _grey(path: PathLike, role: str, image: NDArray[Any]) -> Floats:
+def _grey(path: PathLike, role: str, image: Pixels) -> Floats:
     """(H, W) in units of the full scale, of a grey picture or of RGB whose channels agree."""
     if image.shape[2] > 1:
         apart = max(_apart(image[rows]) for rows in strips(image))
@@ -151,16 +151,16 @@ def _grey(path: PathLike, role: str, image: NDArray[Any]) -> Floats:
     return _converted(image[..., 0], (), _as_unit)
 
 
-def _apart(image: NDArray[Any]) -> float:
+def _apart(image: Pixels) -> float:
     """How much green and blue differ from red at most, in units of the full scale."""
     channels = _as_unit(image[..., :3])
     return max(float(np.abs(channels[..., k] - channels[..., 0]).max()) for k in (1, 2))
 
 
-def _as_unit(image: NDArray[Any]) -> Floats:
+def _as_unit(image: Pixels) -> Floats:
     if image.dtype == np.float32:
-        return image
-    return image.astype(np.float32) / np.float32(np.iinfo(image.dtype).max)
+        return np.asarray(image, np.float32)
+    return np.asarray(image.astype(np.float32) / np.float32(np.iinfo(image.dtype.str).max))
 
 
 def _within_unit(path: PathLike, role: str, values: Floats) -> Floats:

@@ -10,12 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, combinations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.base.arrays import Doubles, Floats, Index
+from dermis.base.arrays import Doubles, Floats, Index, Numbers
 from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Rig
@@ -116,7 +115,7 @@ class MovedPoints:
         return found
 
     @cached_property
-    def bones(self) -> tuple[NDArray[Any], Floats]:
+    def bones(self) -> tuple[Numbers, Floats]:
         """(v, 4) bones that each vertex follows, and by what share."""
         bone, share = influences(self.rig, self.finer)
         kind = np.uint8 if bone.max() < 256 else np.uint16

@@ -6,15 +6,18 @@ trimesh parses OBJ and PLY; the groups, which it would rename, are numbered in t
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.arrays import Doubles, Index, Ints
+from dermis.base.arrays import Doubles, Index, Ints, Numbers
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 Colour = tuple[float, float, float]
 
@@ -96,7 +99,7 @@ class Model:
         return self.bones is not None or any(part.targets for part in self.parts)
 
 
-def trimesh_parts(data: bytes, kind: str, groups: list[Group], **options: Any) -> Iterator[Part]:
+def trimesh_parts(data: bytes, kind: str, groups: list[Group], **options: object) -> Iterator[Part]:
     """What trimesh reads from `data`, each under the group that its material numbers."""
     from io import BytesIO
 
@@ -114,7 +117,7 @@ def trimesh_parts(data: bytes, kind: str, groups: list[Group], **options: Any) -
             yield _part(mesh, groups[int(tag or 0) if len(groups) > 1 else 0])
 
 
-def _part(mesh: Any, group: Group) -> Part:
+def _part(mesh: Trimesh, group: Group) -> Part:
     """A trimesh's arrays."""
     uv = getattr(mesh.visual, "uv", None)
     normals = mesh.vertex_normals if "vertex_normals" in mesh._cache else None
@@ -132,13 +135,13 @@ def _part(mesh: Any, group: Group) -> Part:
     )
 
 
-def fractions(values: NDArray[Any]) -> Doubles:
+def fractions(values: Numbers) -> Doubles:
     """Numbers of which integers stand for fractions of their type's largest."""
-    scale = np.iinfo(values.dtype).max if values.dtype.kind in "iu" else 1
+    scale = np.iinfo(values.dtype.str).max if values.dtype.kind in "iu" else 1
     return np.asarray(values / scale, dtype=np.float64)
 
 
-def colour_of(numbers: Any) -> Colour:
+def colour_of(numbers: Sequence[float | str]) -> Colour:
     """Three numbers in [0, 1]."""
     r, g, b = (min(max(float(x), 0.0), 1.0) for x in list(numbers)[:3])
     return (r, g, b)

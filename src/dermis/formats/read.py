@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from dermis.formats.ply import read_ply
 
 FARTHEST_UV = 1e4
 """Beyond this uv are damage, not tiles."""
+S = TypeVar("S", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 READERS: dict[str, Callable[[Path], Model]] = {
@@ -81,7 +82,7 @@ def _part_normals(part: Part) -> Doubles:
     return np.full(part.positions.shape, np.nan)
 
 
-def _side_by_side(arrays: list[NDArray[Any] | None]) -> NDArray[Any] | None:
+def _side_by_side(arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
     """Arrays of any width one under the other, filled up with 0; None if they are None."""
     given = [array for array in arrays if array is not None]
     if len(given) < len(arrays):

@@ -7,14 +7,17 @@ import struct
 import threading
 import zlib
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.arrays import Bytes, Floats
+from dermis.base.arrays import Bytes, Floats, Numbers
 from dermis.base.extras import needed
 from dermis.images.sizes import MOST_PIXELS, check_size
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 Pixels = Bytes | NDArray[np.uint16] | Floats
 
@@ -77,14 +80,14 @@ def pillow_size(data: bytes) -> tuple[int, int]:
     return check_size(picture.width, picture.height)
 
 
-def strips(image: NDArray[Any]) -> Iterator[slice]:
+def strips(image: Numbers) -> Iterator[slice]:
     """Rows of a picture, some at a time: enough for whole arrays to be fast, too few to fill the memory."""
     rows = max(1, _STRIP // max(1, image.shape[1]))
     for top in range(0, len(image), rows):
         yield slice(top, min(top + rows, len(image)))
 
 
-def _open(data: bytes) -> Any:
+def _open(data: bytes) -> Image:
     """The picture opened by Pillow: its header is read and its size accepted."""
     picture = _open_header(data)
     check_size(picture.width, picture.height)
@@ -95,7 +98,7 @@ def _open(data: bytes) -> Any:
     return picture
 
 
-def _open_header(data: bytes) -> Any:
+def _open_header(data: bytes) -> Image:
     import PIL.Image
 
     with _PILLOW_LOCK:  # Pillow's own limit is a global, and other than ours
@@ -108,20 +111,20 @@ def _open_header(data: bytes) -> Any:
             PIL.Image.MAX_IMAGE_PIXELS = limit
 
 
-def _format_of_16_bit(data: bytes, picture: Any) -> str | None:
+def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
     """FFmpeg's name of the pixel format where Pillow would drop the lower 8 of 16 bits, else None."""
     if data.startswith(PNG_START):
         depth, kind = data[24], data[25]
         return {0: "gray16", 2: "rgb48", 4: "ya16", 6: "rgba64"}[kind] if depth == 16 else None
-    bits = picture.tag_v2.get(258, ()) if picture.format == "TIFF" else ()
+    bits = getattr(picture, "tag_v2", {}).get(258, ())
     return {3: "rgb48", 4: "rgba64"}.get(len(bits)) if 16 in bits else None
 
 
-def _decode_16_bit(data: bytes, pixel_format: str, picture: Any) -> NDArray[np.uint16]:
+def _decode_16_bit(data: bytes, pixel_format: str, picture: Image) -> NDArray[np.uint16]:
     av = needed("av", "a picture with 16 bits of colour")
     # bytes, not the path: FFmpeg would take a percent sign in a name for a numbered sequence; and one format,
     # not what it guesses from them, as some of its formats open other files
-    with av.open(io.BytesIO(data), format=f"{picture.format.lower()}_pipe") as container:
+    with av.open(io.BytesIO(data), format=f"{picture.format}_pipe".lower()) as container:
         container.streams.video[0].codec_context.options = {"max_pixels": str(MOST_PIXELS)}
         frame = next(container.decode(video=0))
     if (frame.width, frame.height) != picture.size:
@@ -137,7 +140,7 @@ def _decode_16_bit(data: bytes, pixel_format: str, picture: Any) -> NDArray[np.u
     return levels.astype(np.uint16)
 
 
-def encode_png(levels: NDArray[Any], effort: int = 6, quick: bool = False) -> bytes:
+def encode_png(levels: Numbers, effort: int = 6, quick: bool = False) -> bytes:
     """A PNG file of (H, W, 1, 3 or 4) uint8 or uint16.
 
     effort : of zlib's compression, from 1 (fast) to 9 (small files)
@@ -176,7 +179,7 @@ def png_size(data: bytes) -> tuple[int, int]:
     return width, height
 
 
-def decode_rows(data: bytes) -> NDArray[Any] | None:
+def decode_rows(data: bytes) -> Bytes | NDArray[np.uint16] | None:
     """(H, W, 1, 3 or 4) uint8 or uint16; None for PNG files of other forms, and for other files.
 
     data : of which the checksums are tested

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +17,7 @@ _WHITE = _XYZ_OF_REC709.sum(axis=1)
 _EDGE = 6.0 / 29.0
 
 
-def encode_srgb(linear: ArrayLike) -> NDArray[np.floating[Any]]:
+def encode_srgb(linear: ArrayLike) -> NDArray[np.floating]:
     """sRGB values [-] of linear ones by the exact piecewise curve, neither clipped nor rounded.
 
     linear : any shape; float32 stays float32, everything else becomes float64
@@ -29,7 +28,7 @@ def encode_srgb(linear: ArrayLike) -> NDArray[np.floating[Any]]:
     return np.asarray(np.where(value <= 0.0031308, 12.92 * value, curve))
 
 
-def decode_srgb(encoded: ArrayLike) -> NDArray[np.floating[Any]]:
+def decode_srgb(encoded: ArrayLike) -> NDArray[np.floating]:
     """Linear values [-] of sRGB ones in 0..1 by the exact piecewise curve, not clipped.
 
     encoded : any shape; float32 stays float32, everything else becomes float64
@@ -53,7 +52,7 @@ def decode_srgb_levels(levels: Bytes | NDArray[np.uint16]) -> Floats:
     return _linear_of_level(np.iinfo(levels.dtype).max + 1)[levels]
 
 
-def luminance(linear: ArrayLike) -> NDArray[np.floating[Any]]:
+def luminance(linear: ArrayLike) -> NDArray[np.floating]:
     """Relative luminance Y [-] of linear Rec. 709 colours.
 
     linear : (..., 3) or (..., 4), whose alpha is ignored
@@ -69,7 +68,7 @@ def _linear_of_level(count: int) -> Floats:
     return table
 
 
-def _as_float(values: ArrayLike) -> NDArray[np.floating[Any]]:
+def _as_float(values: ArrayLike) -> NDArray[np.floating]:
     array = np.asarray(values)
     return array if array.dtype == np.float32 else array.astype(np.float64)
 

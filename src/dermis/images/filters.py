@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +10,7 @@ from dermis.base.arrays import Floats, Mask
 _STRIP = 16  # rows filtered at a time, which stay in the cache
 
 
-def mip_chain(image: NDArray[np.floating[Any]]) -> list[Floats]:
+def mip_chain(image: NDArray[np.floating]) -> list[Floats]:
     """The picture and its mip levels down to one texel, each the mean of the one before.
 
     image : (H, W, C) or (H, W), linear values; level k has max(1, H >> k) x max(1, W >> k) texels
@@ -41,7 +39,7 @@ def _halve(image: Floats, axis: int) -> Floats:
     return np.ascontiguousarray(np.moveaxis(halved, 0, axis), np.float32)
 
 
-def without_steps(height: NDArray[np.floating[Any]]) -> Floats:
+def without_steps(height: NDArray[np.floating]) -> Floats:
     """A height map smoothed by 1.2 texels, since 8-bit steps would show as contour lines.
 
     height : (H, W) in any unit
@@ -60,7 +58,7 @@ def without_steps(height: NDArray[np.floating[Any]]) -> Floats:
     return smooth
 
 
-def fill_empty(image: NDArray[np.floating[Any]], known: Mask) -> Floats:
+def fill_empty(image: NDArray[np.floating], known: Mask) -> Floats:
     """The picture with unknown pixels filled with the mean of known ones near by.
 
     image : (H, W, C) with sides that are powers of two

@@ -92,7 +92,7 @@ def _window_size(window: Any) -> tuple[int, int]:
     return high[0] - low[0] + 1, high[1] - low[1] + 1
 
 
-def encode_exr(picture: NDArray[np.floating[Any]]) -> bytes:
+def encode_exr(picture: NDArray[np.floating]) -> bytes:
     """An OpenEXR file of (H, W, 1 or 3) float16 or float32, as the channels Y or R, G, B.
 
     Runs of equal bytes alone are compressed: pictures with noise pack no better otherwise, and slower.

@@ -7,12 +7,13 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base import atomic_write as outputs
+from dermis.base.arrays import Numbers
 from dermis.base.errors import DermisError, refuse
 from dermis.base.reading import read_file
 from dermis.images.codecs import PILLOW_STARTS, Pixels, decode_with_pillow, encode_png, pillow_size
@@ -21,7 +22,7 @@ from dermis.images.hdr import EXR_START, RADIANCE_START, decode_exr, decode_radi
 from dermis.images.sizes import MOST_BYTES, TooLargeError
 
 OUTPUT_SUFFIXES = (".png", ".exr")
-_Codec = Callable[[bytes], Any]
+T = TypeVar("T")
 _READABLE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
 
 
@@ -62,7 +63,13 @@ def read_size(path: str | Path | Picture) -> tuple[int, int]:
     return size
 
 
-def _by_kind(path: str | Path | Picture, data: bytes, exr: _Codec, radiance: _Codec, pillow: _Codec) -> Any:
+def _by_kind(
+    path: str | Path | Picture,
+    data: bytes,
+    exr: Callable[[bytes], T],
+    radiance: Callable[[bytes], T],
+    pillow: Callable[[bytes], T],
+) -> T:
     """What the codec of the kind that the bytes begin as says of them."""
     kinds = {EXR_START: exr, RADIANCE_START: radiance} | dict.fromkeys(PILLOW_STARTS, pillow)
     codec = next((codec for start, codec in kinds.items() if data.startswith(start)), None)
@@ -89,7 +96,7 @@ def check_output(path: str | Path) -> Path:
     return outputs.check_output(path, OUTPUT_SUFFIXES, "Choose .png to look at, .exr to work with")
 
 
-def write_image(path: str | Path, linear: NDArray[np.floating[Any]]) -> None:
+def write_image(path: str | Path, linear: NDArray[np.floating]) -> None:
     """Write a linear picture: .png as 8-bit sRGB rounded to nearest, .exr as linear float32.
 
     linear : (H, W, 3) or (H, W, 4), Rec. 709; alpha is stored as it is, not through the sRGB curve. Bytes
@@ -122,7 +129,7 @@ def write_image(path: str | Path, linear: NDArray[np.floating[Any]]) -> None:
     write_png(path, levels)
 
 
-def write_png(path: str | Path, levels: NDArray[Any], effort: int = 6) -> None:
+def write_png(path: str | Path, levels: Numbers, effort: int = 6) -> None:
     """Write grey levels as they are to an 8- or 16-bit PNG, by dtype.
 
     levels : (H, W), or (H, W, C) with C of 1, 3 or 4; uint8 or uint16
@@ -139,8 +146,8 @@ def write_png(path: str | Path, levels: NDArray[Any], effort: int = 6) -> None:
 
 def write_exr(
     path: str | Path,
-    linear: NDArray[np.floating[Any]],
-    layers: Mapping[str, NDArray[np.floating[Any]]] | None = None,
+    linear: NDArray[np.floating],
+    layers: Mapping[str, NDArray[np.floating]] | None = None,
     swift: bool = False,
 ) -> None:
     """Write a linear float32 OpenEXR file, compressed without loss.
@@ -161,7 +168,7 @@ def write_exr(
         OpenEXR.File(header, channels).write(str(temporary))
 
 
-def encode_exr_parts(parts: Mapping[str, Mapping[str, NDArray[Any]]], swift: bool = False) -> bytes:
+def encode_exr_parts(parts: Mapping[str, Mapping[str, Numbers]], swift: bool = False) -> bytes:
     """A float32 OpenEXR file of several pictures, compressed without loss; of one, a file of one part.
 
     parts : channels (H, W) by name, of each part by its name; the first is what other programs show

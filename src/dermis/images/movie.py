@@ -10,10 +10,9 @@ from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.base import atomic_write as outputs
 from dermis.base.arrays import Bytes
@@ -143,7 +142,7 @@ class MovieWriter:
         self._reformatter = VideoReformatter()
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="dermis-movie")
 
-    def write(self, picture: NDArray[Any]) -> None:
+    def write(self, picture: Bytes) -> None:
         """Queue the next frame; waits only while the queue is full.
 
         picture : (H, W, 3) uint8 sRGB; do not change it afterwards

@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.arrays import Floats, Intp, Mask
+from dermis.base.arrays import Floats, Intp, Mask, Numbers
 from dermis.base.summary import Summarised
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.morph_targets import MorphTargets
@@ -178,7 +177,7 @@ def _directions(count: int) -> Floats:
 def _pool(places: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
     """Numbers of points among which those that are outermost in any pose are looked for."""
     layers = min(_LAYERS, len(places))
-    found: list[NDArray[Any]] = [outermost(places, _FINER[-1])]
+    found: list[Numbers] = [outermost(places, _FINER[-1])]
     for height in _heights(places, _DIRECTIONS):
         found.append(np.argpartition(height, -layers, axis=1)[:, -layers:].ravel())
     for target in range(len(targets.names)):

@@ -48,7 +48,7 @@ class Pose(Summarised):
                 refuse(f"pose: {part}", "a mapping by name", f"{shown_value(given)} came", "Correct it")
 
     @classmethod
-    def of(cls, given: Any) -> Pose | None:
+    def of(cls, given: object) -> Pose | None:
         """A pose, the pose of a plain mapping of weights, or None."""
         if given is None or isinstance(given, Pose):
             return given
@@ -167,12 +167,12 @@ def _check_matrices(matrices: Doubles, names: list[str], culprit: object) -> Non
         refuse(where, "a matrix that can be inverted", "this one flattens what it moves", "Correct it")
 
 
-def _refuse_form(culprit: str, given: Any) -> NoReturn:
+def _refuse_form(culprit: str, given: object) -> NoReturn:
     expected = f"{_FORMS}, no angle beyond {MOST_DEGREES:g}, nothing beyond {FARTHEST_MM:g}"
     refuse(culprit, expected, f"{shown_value(given, 80)} came", "Correct it")
 
 
-def _refuse_weights(weights: Mapping[Any, Any], names: tuple[str, ...], culprit: object) -> NoReturn:
+def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culprit: object) -> NoReturn:
     """Raise the error of the first weight that cannot be."""
     for name, weight in weights.items():
         if name not in names:
@@ -181,7 +181,7 @@ def _refuse_weights(weights: Mapping[Any, Any], names: tuple[str, ...], culprit:
     refuse(f"{culprit}: weights", "a number for each target", "something else came", "Correct it")
 
 
-def _refuse_name(culprit: str, name: Any, known: Iterable[str], kind: str) -> NoReturn:
+def _refuse_name(culprit: str, name: object, known: Iterable[str], kind: str) -> NoReturn:
     """Raise the error of a name that the head lacks, with those that are nearest to it."""
     names = list(known)
     if not names:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.base.arrays import Doubles, Floats, Intp, Ints, Mask
+from dermis.base.arrays import Doubles, Floats, Intp, Ints, Mask, Numbers
 from dermis.base.disk import cached_array
 from dermis.base.summary import Summarised
 from dermis.mesh.eyeball import Contact
@@ -169,7 +168,7 @@ class Rig(Summarised):
         if self.template is not None:
             return np.union1d(self.template._outline_points, corners_of(self.positions_mm))
         targets, skeleton = self.targets, self.skeleton
-        sources: list[NDArray[Any]] = [self.positions_mm, targets.first, targets.point, targets.delta_mm]
+        sources: list[Numbers] = [self.positions_mm, targets.first, targets.point, targets.delta_mm]
         if skeleton is not None:
             sources += [skeleton.parent, skeleton.local, skeleton.to_head, skeleton.bone, skeleton.weight]
         return cached_array(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from dermis.base.arrays import Numbers
+from dermis.formats.gltf.document import FrozenTree, Tree
 
 VERTICES, INDICES = 34962, 34963
 """What a buffer view holds, where it holds nothing else."""
@@ -25,8 +27,8 @@ class Binary:
     """The file's one buffer as it grows, with the views and accessors into it."""
 
     data: bytearray = field(default_factory=bytearray)
-    views: list[dict[str, Any]] = field(default_factory=list)
-    accessors: list[dict[str, Any]] = field(default_factory=list)
+    views: list[Tree] = field(default_factory=list)
+    accessors: list[Tree] = field(default_factory=list)
     _still: dict[int, int] = field(default_factory=dict)
 
     def view(self, part: bytes, target: int | None = None) -> int:
@@ -37,7 +39,7 @@ class Binary:
         self.data += part
         return len(self.views) - 1
 
-    def array(self, rows: NDArray[Any], target: int | None = None, *, bounded: bool = False) -> int:
+    def array(self, rows: Numbers, target: int | None = None, *, bounded: bool = False) -> int:
         """The number of a new accessor; rows : (n, k), float32 or unsigned.
 
         bounded : tell the least and the largest of each column
@@ -46,11 +48,11 @@ class Binary:
         more = _bounds(values) if bounded else {}
         return self._accessor(values, {"bufferView": self.view(values.tobytes(), target)} | more)
 
-    def triangles(self, index: NDArray[Any], count: int) -> int:
+    def triangles(self, index: Numbers, count: int) -> int:
         """An accessor of corners (f, 3) among so many vertices."""
         return self.array(index.reshape(-1, 1).astype(_whole(count)), INDICES)
 
-    def displacements(self, row: NDArray[Any], columns: list[NDArray[Any]], count: int) -> list[int]:
+    def displacements(self, row: Numbers, columns: Sequence[Numbers], count: int) -> list[int]:
         """Accessors of `count` rows of three of which most are 0, whichever form is the smaller.
 
         row : (m,) those that are not, in order
@@ -80,23 +82,23 @@ class Binary:
             self._still[count] = self._accessor(none, {"min": [0.0] * 3, "max": [0.0] * 3})
         return self._still[count]
 
-    def _dense(self, row: NDArray[Any], values: NDArray[Any], count: int) -> int:
+    def _dense(self, row: Numbers, values: Numbers, count: int) -> int:
         whole = np.zeros((count, 3), "<f4")
         whole[row] = values
         return self.array(whole, VERTICES, bounded=True)
 
-    def _accessor(self, values: NDArray[Any], more: Mapping[str, Any]) -> int:
+    def _accessor(self, values: Numbers, more: FrozenTree) -> int:
         told = {"componentType": _TYPES[values.dtype.str], "type": _KINDS[values.shape[1]]}
         self.accessors.append({"count": len(values), **told, **more})
         return len(self.accessors) - 1
 
 
-def _little(rows: NDArray[Any]) -> NDArray[Any]:
+def _little(rows: Numbers) -> Numbers:
     """The same with the bytes in a file's order."""
     return np.ascontiguousarray(rows, rows.dtype.newbyteorder("<"))
 
 
-def _bounds(values: NDArray[Any]) -> dict[str, list[float]]:
+def _bounds(values: Numbers) -> dict[str, list[float]]:
     return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
 
 
@@ -115,7 +117,7 @@ def placed(value: Any, places: Mapping[str, int]) -> Any:
     return value
 
 
-def glb_bytes(tree: Mapping[str, Any], binary: bytes | bytearray) -> bytes:
+def glb_bytes(tree: FrozenTree, binary: bytes | bytearray) -> bytes:
     """A .glb file of a tree and its one buffer."""
     text = json.dumps(tree, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import base64
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.base.arrays import Doubles
+from dermis.base.arrays import Doubles, Numbers
 from dermis.base.errors import refuse
 from dermis.base.reading import BROKEN, parse_json, read_file, understood
 from dermis.formats.named_files import named_by_uri
@@ -23,6 +23,8 @@ from dermis.formats.parts import fractions
 from dermis.formats.size_limits import MOST_BYTES, MOST_JSON, MOST_NUMBERS
 
 Tree = dict[str, Any]
+FrozenTree = Mapping[str, Any]
+"""JSON as other programs write it: its values are checked where they are used."""
 
 _MAGIC = 0x46546C67
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
@@ -64,7 +66,7 @@ class Document:
         found: list[Tree] = self.tree.get(key, [])
         return found
 
-    def one(self, key: str, index: Any) -> Tree:
+    def one(self, key: str, index: object) -> Tree:
         """A thing by its kind and number.
 
         Raises ValueError where there is none of that number.
@@ -86,7 +88,7 @@ class Document:
             raise ValueError(f"buffer view {index} ends outside of its buffer")
         return data
 
-    def numbers(self, index: int) -> NDArray[Any]:
+    def numbers(self, index: int) -> Numbers:
         """(n, k) the values of an accessor as they are stored; sparse ones in their places."""
         accessor = self.one("accessors", index)
         kind, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
@@ -112,7 +114,7 @@ class Document:
             return values.astype(np.float64)
         return fractions(values)
 
-    def _with_sparse(self, values: NDArray[Any], sparse: Tree) -> NDArray[Any]:
+    def _with_sparse(self, values: Numbers, sparse: Tree) -> Numbers:
         count = _whole(sparse["count"])
         if count > len(values):
             raise ValueError(f"{count} of {len(values)} values are said to differ")
@@ -123,8 +125,8 @@ class Document:
         return changed
 
     def _rows(
-        self, place: Tree, shape: tuple[int, int], kind: np.dtype[Any], stride: int = 0
-    ) -> NDArray[Any]:
+        self, place: Tree, shape: tuple[int, int], kind: np.dtype[np.number], stride: int = 0
+    ) -> Numbers:
         """(n, k) numbers that begin at a place in a buffer view; stride [byte] 0 where they lie close."""
         data, start = self.view(place["bufferView"]), _whole(place.get("byteOffset", 0))
         size = kind.itemsize
@@ -146,7 +148,7 @@ class Document:
         return data
 
 
-def numbered(index: Any, count: int, kind: str) -> int:
+def numbered(index: object, count: int, kind: str) -> int:
     """The number of one of so many things.
 
     Raises ValueError where it is none of them.
@@ -156,7 +158,7 @@ def numbered(index: Any, count: int, kind: str) -> int:
     return index
 
 
-def _whole(value: Any) -> int:
+def _whole(value: object) -> int:
     if not (isinstance(value, int) and 0 <= value <= MOST_BYTES):
         raise ValueError(f"{str(value)[:40]!r} came for a number of bytes or values")
     return value

@@ -5,11 +5,10 @@ from __future__ import annotations
 import base64
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 from dermis.base.errors import about, refuse
 from dermis.base.reading import BROKEN, is_file, understood
-from dermis.formats.gltf.document import Document, read_document
+from dermis.formats.gltf.document import Document, Tree, read_document
 from dermis.formats.named_files import named_by_uri
 from dermis.formats.size_limits import MOST_RELIEF_MM
 from dermis.images.io import Picture, read_size
@@ -20,7 +19,7 @@ _READABLE = {"image/png", "image/jpeg"}
 ROLES = ("normal", "height", "specular", "roughness", "region")
 
 
-def embedded_maps(path: Path) -> dict[str, Any]:
+def embedded_maps(path: Path) -> Tree:
     """Options of `load_maps` that a .glb or .gltf file gives itself, {} for one without pictures.
 
     The skin's material gives its base colour and, when the package wrote the file, the maps that its extras
@@ -44,17 +43,17 @@ def embedded_maps(path: Path) -> dict[str, Any]:
     return found
 
 
-def _maps(document: Document) -> dict[str, Any]:
+def _maps(document: Document) -> Tree:
     materials = document.all("materials") or [{}]
     skin = next((one for one in materials if "skin" in one.get("name", "").lower()), materials[0])
 
-    def picture(reference: dict[str, Any] | None) -> Picture | Path | None:
+    def picture(reference: Tree | None) -> Picture | Path | None:
         if reference is None or reference.get("texCoord", 0) != 0:
             return None
         source = document.one("textures", reference["index"]).get("source")
         return None if source is None else _picture(document, source)
 
-    found: dict[str, Any] = {"colour": picture(skin.get("pbrMetallicRoughness", {}).get("baseColorTexture"))}
+    found: Tree = {"colour": picture(skin.get("pbrMetallicRoughness", {}).get("baseColorTexture"))}
     own = skin.get("extras", {}).get("dermis")
     if own is None:
         found["normal"] = picture(skin.get("normalTexture"))
@@ -65,7 +64,7 @@ def _maps(document: Document) -> dict[str, Any]:
     return {role: value for role, value in found.items() if value is not None}
 
 
-def _relief(height_mm: Any) -> float | None:
+def _relief(height_mm: object) -> float | None:
     """The relief of a grey level [mm] that a file tells."""
     if height_mm is None:
         return None

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.base.arrays import Bytes, Floats
+from dermis.base.arrays import Bytes, Floats, Numbers
+from dermis.formats.gltf.document import FrozenTree, Tree
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.eyeball import EyePictures
@@ -37,12 +36,12 @@ class Added:
     pictures : PNG files by the names that textures in these have: {"index": name}
     """
 
-    surface: Mapping[str, Any] = field(default_factory=dict)
-    extensions: Mapping[str, Any] = field(default_factory=dict)
-    extras: Mapping[str, Any] = field(default_factory=dict)
+    surface: FrozenTree = field(default_factory=dict)
+    extensions: FrozenTree = field(default_factory=dict)
+    extras: FrozenTree = field(default_factory=dict)
     pictures: Mapping[str, bytes] = field(default_factory=dict)
 
-    def to(self, material: Mapping[str, Any]) -> dict[str, Any]:
+    def to(self, material: FrozenTree) -> Tree:
         """The material with it; where a picture of colours is shown no more, this package still finds it."""
         told = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
         surface, extras = (
@@ -57,13 +56,13 @@ class Added:
         return told | {"pbrMetallicRoughness": surface, "extras": extras}
 
 
-def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], dict[str, Any]]:
+def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
     """PNG files by name, and what this package reads of them: {"index": name} by role.
 
     slopes : (n, n, 2) of the relief for other programs, where `maps` has a height map and no normals
     """
-    found: dict[str, NDArray[Any]] = {}
-    roles: dict[str, Any] = {}
+    found: dict[str, Numbers] = {}
+    roles: Tree = {}
     if maps.colour is not None:
         found["colour"] = encode_srgb8(maps.colour)
     shown = slopes if maps.normal is None else maps.normal
@@ -90,9 +89,7 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
         return dict(zip(found, beside.map(encode_png, found.values()), strict=True)), roles
 
 
-def material_of(
-    one: Material, pictures: Mapping[str, bytes], roles: Mapping[str, Any], roughness: float
-) -> dict[str, Any]:
+def material_of(one: Material, pictures: Mapping[str, bytes], roles: FrozenTree, roughness: float) -> Tree:
     """A glTF material, in which a texture is named by its picture: {"index": name}.
 
     roughness : Beckmann's m of skin without a map of it [-]
@@ -107,7 +104,7 @@ def material_of(
     if "metallic roughness" in pictures:
         surface |= {"roughnessFactor": 1.0, "metallicRoughnessTexture": {"index": "metallic roughness"}}
     name = one.name if "skin" in one.name.casefold() else f"{one.name} skin"
-    told: dict[str, Any] = {"name": name, "pbrMetallicRoughness": surface}
+    told: Tree = {"name": name, "pbrMetallicRoughness": surface}
     if "normal" in pictures:
         told["normalTexture"] = {"index": "normal"}
     return told | {"extensions": _IOR, "extras": {"dermis": dict(roles)}}
@@ -118,7 +115,7 @@ def eye_pictures(eyes: EyePictures) -> dict[str, bytes]:
     return {EYE: colours_png(eyes.colour), EYE_NORMAL: encode_png(_bytes(0.5 * eyes.normal + 0.5))}
 
 
-def eye_material(one: Material) -> dict[str, Any]:
+def eye_material(one: Material) -> Tree:
     """An eyeball that is painted as seen through its cornea, whose film of tears is a coat over it.
 
     What lies below faces otherwise than the coat, and shines by itself only where a program has none.
@@ -134,7 +131,7 @@ def eye_material(one: Material) -> dict[str, Any]:
     }
 
 
-def hair_material(name: str) -> dict[str, Any]:
+def hair_material(name: str) -> Tree:
     """Hairs with a picture of their own name."""
     surface = {"baseColorTexture": {"index": name}, "metallicFactor": 0.0, "roughnessFactor": _HAIR_ROUGH}
     return {"name": name, "pbrMetallicRoughness": surface, "extensions": {"KHR_materials_ior": {"ior": ETA}}}
@@ -145,7 +142,7 @@ def colours_png(linear: Floats) -> bytes:
     return encode_png(encode_srgb8(linear))
 
 
-def _plain(one: Material, roughness: float) -> dict[str, Any]:
+def _plain(one: Material, roughness: float) -> Tree:
     factor = [*(float(value) for value in one.colour), 1.0]
     return {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": round(roughness, 4)}
 
@@ -157,5 +154,5 @@ def _normals(slopes: Floats) -> Bytes:
     return _bytes(0.5 * normal + 0.5)
 
 
-def _bytes(values: NDArray[Any]) -> Bytes:
+def _bytes(values: Numbers) -> Bytes:
     return np.asarray(np.rint(np.clip(values, 0, 1) * 255), np.uint8)

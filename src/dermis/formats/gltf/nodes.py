@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -114,7 +113,7 @@ def _shown(document: Document, nodes: list[Tree]) -> tuple[int, ...] | None:
     return tuple(found)
 
 
-def _local(node: dict[str, Any]) -> Doubles:
+def _local(node: Tree) -> Doubles:
     """(4, 4) from a node's space to its parent's: its matrix, or translation, rotation and scale."""
     matrix = np.eye(4)
     if "matrix" in node:

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Index, Intp, Ints
 from dermis.formats.gltf.binary import VERTICES, Binary
+from dermis.formats.gltf.document import Tree
 from dermis.formats.moved_points import MovedPoints, Target
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, Strands, frames, points_of, weights
-
-Tree = dict[str, Any]
 
 _M = 1e-3  # of a millimetre
 COLOURS = 64

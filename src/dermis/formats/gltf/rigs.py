@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -212,10 +212,10 @@ def resting_weights(document: Document, nodes: Nodes) -> dict[str, float]:
     for index in nodes.shown or ():
         node = document.all("nodes")[index]
         mesh: Tree = document.one("meshes", node["mesh"]) if "mesh" in node else {"primitives": []}
-        weights: Any = node.get("weights", mesh.get("weights", []))
+        weights = node.get("weights", mesh.get("weights", []))
         if weights and id(mesh) not in names:
             names[id(mesh)] = target_names(mesh)
-        for name, weight in zip(names[id(mesh)] if weights else (), weights, strict=False):
+        for name, weight in zip(names[id(mesh)] if weights else (), weights or (), strict=False):
             found.setdefault(name, float(weight))
     if not np.isfinite(list(found.values())).all():
         refuse(document.path, "finite weights of targets", "some are not", "Export the file again")

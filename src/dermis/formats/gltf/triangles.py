@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -159,7 +158,7 @@ class _Reader:
 
     def _group(self, mesh: Tree, primitive: Tree) -> Group:
         one = self.document.one
-        material: dict[str, Any] = one("materials", primitive["material"]) if "material" in primitive else {}
+        material: Tree = one("materials", primitive["material"]) if "material" in primitive else {}
         names = tuple(str(thing["name"]) for thing in (material, mesh) if thing.get("name"))
         factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
         return Group(names, colour_of(factor) if factor else GREY)

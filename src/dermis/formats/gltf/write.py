@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dermis.base.arrays import Doubles, Floats
 from dermis.formats.gltf.binary import CLAMPED, Binary, glb_bytes, placed
+from dermis.formats.gltf.document import FrozenTree, Tree
 from dermis.formats.gltf.materials import (
     Added,
     colours_png,
@@ -25,8 +25,6 @@ from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 from dermis.mesh.skeleton import Skeleton
 
-Tree = dict[str, Any]
-
 BROWS, HAIR = "brows and lashes", "hair"
 """Names of the materials of hairs, and of their pictures."""
 _KNOTS = {BROWS: 5, HAIR: 4}
@@ -40,7 +38,7 @@ def encode_head(
     roughness: float,
     weights: Mapping[str, float] | None = None,
     slopes: Floats | None = None,
-    notes: Mapping[str, Any] | None = None,
+    notes: FrozenTree | None = None,
     eyes: EyePictures | None = None,
     added: Added | None = None,
 ) -> bytes:
@@ -91,7 +89,7 @@ def encode_head(
 def _parts(
     points: MovedPoints,
     pictures: dict[str, bytes],
-    roles: Mapping[str, Any],
+    roles: FrozenTree,
     roughness: float,
     eyes: EyePictures | None,
 ) -> tuple[list[Part], list[Tree]]:
@@ -115,7 +113,7 @@ def _parts(
     return parts, kinds
 
 
-def _asset(head: Head, notes: Mapping[str, Any] | None) -> Tree:
+def _asset(head: Head, notes: FrozenTree | None) -> Tree:
     asset: Tree = {"version": "2.0", "generator": "dermis"}
     if head.attribution:
         asset["copyright"] = head.attribution

@@ -6,7 +6,7 @@ import io
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -110,7 +110,7 @@ def _row(culprit: str, number: int, line: str, fps: float | None, columns: dict[
     return _Row(number, seconds, places, weights, None if matrix is None else _matrix(culprit, matrix))
 
 
-def _seconds(culprit: str, number: int, told: Mapping[str, Any], fps: float | None) -> float:
+def _seconds(culprit: str, number: int, told: Mapping[str, object], fps: float | None) -> float:
     for key, scale in _SECONDS.items():
         if key in told:
             return scale * quantities.number(f"{culprit}: {key}", told[key], -_LATEST, _LATEST)
@@ -119,7 +119,7 @@ def _seconds(culprit: str, number: int, told: Mapping[str, Any], fps: float | No
     return (number - 1) / fps
 
 
-def _scores(culprit: str, shapes: Any) -> dict[str, float]:
+def _scores(culprit: str, shapes: object) -> dict[str, float]:
     """Scores by name, from either form."""
     if isinstance(shapes, list):
         categories = [one if isinstance(one, dict) else {} for one in shapes]
@@ -135,7 +135,7 @@ def _scores(culprit: str, shapes: Any) -> dict[str, float]:
     return {name: score for name, score in shapes.items() if name != _NEUTRAL}
 
 
-def _matrix(culprit: str, given: Any) -> Doubles:
+def _matrix(culprit: str, given: object) -> Doubles:
     """(4, 4) with the translation in its last column, from rows or columns."""
     flat = isinstance(given, list) and not any(isinstance(one, list) for one in given)
     shape = (16,) if flat else (4, 4)
