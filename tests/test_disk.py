@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.atlas import cached
+from dermis.atlas import build as cached
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.base import disk
 from dermis.base.disk import cached_array
 from dermis.formats.load import Rigged, cached_rigged

@@ -13,7 +13,7 @@ import dermis
 from dermis.human.person_file import read_person
 from dermis.human.regions.average import average_head
 from dermis.human.regions.labels import average_landmarks, load_landmarks, to_average
-from dermis.human.regions.table import load_table
+from dermis.human.regions.zones import load_table
 from dermis.optics.profiles import find_table
 from dermis.optics.tissue import load_tissue
 from dermis.scene.lights import LIGHTS

@@ -17,7 +17,7 @@ from dermis.formats.motion.live_link import load_live_link
 from dermis.formats.motion.mediapipe import load_mediapipe
 from dermis.human.person_file import read_person
 from dermis.human.regions.labels import load_landmarks
-from dermis.human.regions.table import load_table
+from dermis.human.regions.zones import load_table
 from dermis.mesh.head import Head
 from dermis.scene.files import load_camera
 

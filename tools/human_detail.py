@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from dermis.base.command_line import run_script
-from dermis.human.skin.detail import FULL_MM, SIDE, TILE_MM
+from dermis.human.skin.textures import FULL_MM, SIDE, TILE_MM
 
 Doubles = NDArray[np.float64]
 

@@ -8,10 +8,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from dermis.atlas.unwrap.charts import tidy
-from dermis.atlas.unwrap.flatten import flatten
+from dermis.atlas.unwrap.flatten import flatten, singular_values
 from dermis.atlas.unwrap.pack import pack
 from dermis.atlas.unwrap.seams import border_sides
-from dermis.atlas.unwrap.stretch import singular_values
 from dermis.mesh.geometry import halves
 
 Doubles = NDArray[np.float64]

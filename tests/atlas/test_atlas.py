@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER, Atlas
 from dermis.atlas.build import build_atlas
-from dermis.atlas.uv_charts import charts
+from dermis.atlas.raster import charts
 from dermis.base.errors import DermisError
 from dermis.formats.samples import SAMPLES
 from dermis.mesh.mesh import Mesh, build_mesh

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.stitched.lay import Span, lay_shapes
+from dermis.atlas.stitched.pack import Span, lay_shapes
 
 N = 24
 Flags = NDArray[np.bool_]

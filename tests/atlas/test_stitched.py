@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.atlas.uv_charts import charts
+from dermis.atlas.raster import charts
 from dermis.mesh.geometry import triangle_areas, uv_cross
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import plane

@@ -8,8 +8,7 @@ from cut_meshes import cut_cone, cut_cylinder, cut_sphere
 from numpy.typing import NDArray
 
 from dermis.atlas.stitched.build import find_pieces
-from dermis.atlas.stitched.conflicts import find_conflicts
-from dermis.atlas.stitched.overlap_cuts import cut_overlaps
+from dermis.atlas.stitched.overlap_cuts import cut_overlaps, find_conflicts
 from dermis.atlas.stitched.surface import FlatSurface, survey
 from dermis.atlas.stitched.walk import walk
 from dermis.mesh.mesh import Mesh, build_mesh

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.atlas.uv_charts import chart_uv_area, charts, usable
+from dermis.atlas.raster import chart_uv_area, charts, usable
 from dermis.formats.load import load_mesh
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import plane, uv_sphere

@@ -14,7 +14,7 @@ from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.openpbr.materials import OPEN_PBR
 from dermis.apps.export.targets.openpbr.target import TARGET, fitted_mm, radii_mm
 from dermis.apps.truths.half_space import diffuse_albedo
-from dermis.optics.van_de_hulst import albedo_of_colour
+from dermis.optics.media import albedo_of_colour
 
 pytest.importorskip("MaterialX")
 import MaterialX

@@ -12,7 +12,7 @@ from setups import entered_light, head_of, joined, place, probe, run_frame, scen
 from tolerances import AREA_LIGHT, LIT, TWIN
 from twins import surface
 
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.base.errors import DermisError
 from dermis.frame.features.irradiance.irradiance import TEXEL_AREA
 from dermis.frame.features.shading.shade import shade_program

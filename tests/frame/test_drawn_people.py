@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
+from dermis.human.model import template
 from dermis.human.person import Human
-from dermis.human.template import template
 from dermis.mesh.pose import Pose
 from dermis.scene.lights import preset_lights
 from dermis.scene.model import Scene

@@ -14,7 +14,7 @@ from setups import entered_light, front_camera, frontal, head_of, probe, run_fra
 from tolerances import FURNACE, PANORAMA, PREFILTERED
 from twins import DEFAULT_COLOUR, surface, surface_albedo
 
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.base.errors import DermisError
 from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import directions, solid_angles

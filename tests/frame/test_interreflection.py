@@ -11,7 +11,7 @@ from setups import entered_light, front_camera, frontal, head_of, place, run_fra
 from tolerances import FURNACE_OF_LINKS, INTEGRATING_SPHERE
 from twins import surface
 
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.environment import Environment

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from setups import AnyLight, entered_light, head_of, place, run_frame, scene_of
 from tolerances import TWIN
 
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from setups import frontal, head_of, probe, run_frame, scene_of
 
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.frame.features.shape.mesh import upload_geometry
 from dermis.frame.features.shape.shape import rest_shape, shape_tables
 from dermis.frame.renderer import Renderer

@@ -14,7 +14,7 @@ from setups import front_camera, run_frame, scene_of, settings_of
 from tolerances import FOLLOWED, OCCLUSION, STILL
 from twins import surface
 
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.frame.features.occlusion import moving as moving_occlusion
 from dermis.frame.features.occlusion.baked import bake_occlusion
 from dermis.frame.features.occlusion.moving import SIDE as MAP_SIDE

@@ -13,8 +13,7 @@ from setups import front_camera, head_of, run_frame, scene_of, settings_of
 from tolerances import LIT, OCCLUSION
 from twins import surface
 
-from dermis.atlas.build import build_atlas
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import build_atlas, cached_atlas
 from dermis.frame.features.occlusion.baked import bake_occlusion, whole_map
 from dermis.frame.lights import environment as surroundings
 from dermis.frame.renderer import Renderer

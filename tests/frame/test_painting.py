@@ -17,10 +17,9 @@ from dermis.frame.features.surface.painting import paint as given
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
-from dermis.human.skin.colours import colours, mean_colour
+from dermis.human.skin.face import MOVEMENTS, movements
 from dermis.human.skin.look import SkinLook
-from dermis.human.skin.movements import MOVEMENTS, movements
-from dermis.human.skin.painted import PaintedMaps
+from dermis.human.skin.painted import PaintedMaps, colours, mean_colour
 from dermis.human.skin.surface import FIELDS, Painting, painting
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

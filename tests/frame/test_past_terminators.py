@@ -11,12 +11,11 @@ import twins
 from numpy.typing import NDArray
 from setups import AnyLight, entered_light, head_of, place, run_frame, scene_of
 
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.directions import ROWS, directions
-from dermis.optics.flesh import medium_of
-from dermis.optics.oblique import aside_mm
+from dermis.optics.flesh import aside_mm, medium_of
 from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight, StripeLight
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from setups import head_of, place, run_frame, scene_of
 from tolerances import SEAM
 
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import REMEDIES
 from dermis.gpu import download

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from setups import AnyLight, frontal, head_of, joined, place, probe, run_frame, scene_of, settings_of
 from tolerances import LIT
 
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.frame.lights import light_views
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis import Human, Pose
-from dermis.human.hair.skin import Skin
+from dermis.human.hair.grown import Skin
 from dermis.mesh.head import Head
 from dermis.mesh.strands import points_of
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from dermis import Human, Pose
 from dermis.base.errors import DermisError
 from dermis.human.hair import groom, hairy_skin
+from dermis.human.hair.grown import Skin
 from dermis.human.hair.head_hair import MOST_PER_CM2
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.rooting import Rooting
-from dermis.human.hair.skin import Skin
 from dermis.human.skin.surface import average
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Strands, points_of

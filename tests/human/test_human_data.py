@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.human.skin.detail import detail_slopes
+from dermis.human.skin.textures import detail_slopes
 
 TOOLS = Path(__file__).parents[2] / "tools"
 DATA = Path(__file__).parents[2] / "src" / "dermis" / "human" / "data"

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from dermis import Human
 from dermis.human import lids
-from dermis.human.lid_targets import axes, conformed_targets
-from dermis.human.lids import conformed
+from dermis.human.lids import axes, conformed, conformed_targets
 from dermis.human.model import _sockets, human_head
 from dermis.human.movement import expressions
 from dermis.human.published import places_mm

@@ -11,7 +11,7 @@ import pytest
 import dermis
 from dermis import DermisError, Human, Pose
 from dermis.atlas.build import build_atlas
-from dermis.atlas.unwrap.stretch import singular_values
+from dermis.atlas.unwrap.flatten import singular_values
 from dermis.human.model import MATERIALS
 from dermis.human.published import count
 from dermis.human.skin import face

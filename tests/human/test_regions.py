@@ -16,7 +16,7 @@ from dermis.base.errors import DermisError
 from dermis.cli.scene_options import SceneOptions, assemble
 from dermis.human.person import Human
 from dermis.human.regions import apply
-from dermis.human.regions.apply import soften, with_regions
+from dermis.human.regions.apply import soften, with_regions, with_usual_regions
 from dermis.human.regions.average import (
     AVERAGE,
     average_head,
@@ -26,9 +26,7 @@ from dermis.human.regions.average import (
     parts,
 )
 from dermis.human.regions.labels import average_landmarks, known_landmarks, label_texels, to_average
-from dermis.human.regions.table import RegionTable, load_table
-from dermis.human.regions.usual import with_usual_regions
-from dermis.human.regions.zones import REGIONS
+from dermis.human.regions.zones import REGIONS, RegionTable, load_table
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh

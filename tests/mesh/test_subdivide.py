@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.atlas.uv_charts import chart_uv_area, charts
+from dermis.atlas.raster import chart_uv_area, charts
 from dermis.base.errors import DermisError
 from dermis.formats.mesh_checks import check_mesh
 from dermis.mesh.geometry import edges, weld

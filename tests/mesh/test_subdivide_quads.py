@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from dermis.atlas.uv_charts import chart_uv_area, charts
+from dermis.atlas.raster import chart_uv_area, charts
 from dermis.formats.load import load_mesh
 from dermis.formats.mesh_checks import check_mesh
 from dermis.mesh.geometry import edges, halves, triangle_areas

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.optics.directions import directional_albedo, directions
-from dermis.optics.interpolated import STEPS, interpolated
+from dermis.optics.directions import STEPS, directional_albedo, directions, interpolated
 
 
 def test_what_is_linear_is_itself() -> None:

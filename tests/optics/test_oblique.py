@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from dermis.optics.flesh import aside_mm
 from dermis.optics.media import Layer, Medium
-from dermis.optics.oblique import aside_mm
 
 Floats = NDArray[np.float64]
 _PHOTONS, _MOST_STEPS, _LEAST = 100_000, 3000, 0.05

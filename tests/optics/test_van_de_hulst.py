@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dermis.apps.truths.half_space import diffuse_albedo
-from dermis.optics.van_de_hulst import albedo_of_colour, colour_of_albedo
+from dermis.optics.media import albedo_of_colour, colour_of_albedo
 
 PRINTED = 1e-4  # its constants have six digits
 

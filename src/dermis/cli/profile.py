@@ -118,8 +118,8 @@ def profile(
         Add Monte Carlo points with error bars to the plot.
     """
     from dermis.cli.profile_report import Report, Request
-    from dermis.optics.counted import COUNTED
-    from dermis.optics.diffusion.known_errors import counted_error, known_error
+    from dermis.optics.diffusion.models import counted_error, known_error
+    from dermis.optics.half_space import COUNTED
     from dermis.optics.profiles import find_table
     from dermis.optics.radial import profile_of_table
 

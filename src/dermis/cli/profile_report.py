@@ -16,7 +16,7 @@ from dermis.optics.fits.burley import BurleyFit
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 
 if TYPE_CHECKING:
-    from dermis.optics.diffusion.known_errors import ModelError
+    from dermis.optics.diffusion.models import ModelError
     from dermis.optics.fits.separable import SeparableFit
     from dermis.optics.gaussians import GaussianSum
     from dermis.optics.media import Floats

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.frame.features import diffusion, hair, outputs, post, shape
 from dermis.frame.features.atlas.gutters import Walks, make_walks, with_lists
 from dermis.frame.features.atlas.lit import Walked

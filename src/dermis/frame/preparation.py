@@ -30,7 +30,7 @@ from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Constants, Device, Memo, Record
 from dermis.gpu.memo import same
 from dermis.gpu.memory import OutOfMemoryError
-from dermis.human.skin.movements import movements
+from dermis.human.skin.face import movements
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import Motion

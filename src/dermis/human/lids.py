@@ -1,4 +1,4 @@
-"""Lids on eyes of true size: the published ones, which are shaped for a larger ball, drawn onto them."""
+"""Eyelids on eyes of true size: published lids fitted to smaller balls, and the targets that close them."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.human.movement import expressions, gaze
 from dermis.human.published import FACE_UNITS, Points, data, moves
 from dermis.human.skin.surface import average, lid_rings
 from dermis.mesh.eyeball import SCLERA_MM, Contact, clearance_mm
+from dermis.mesh.eyeball import globe as true_globe
 
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -41,6 +43,8 @@ _MOVED_MM = 2.0  # by a blink: skin that slides over the eye
 _RINGS, _EDGE, _CREST = 4, 1, 2  # columns of lid_rings.csv
 AHEAD = np.array([0.0, 0.0, 1.0])
 """Where eyes look at rest."""
+_TARGETS = "eyeBlink", "eyeLook", "eyeSquint", "eyeWide"
+Doubles = NDArray[np.float64]
 
 
 class Socket(NamedTuple):
@@ -194,3 +198,82 @@ def _sliding(rings: Index, point: Index, name: str) -> Index:
     for _ in range(_ROWS):  # from the lids outwards, never over their edges
         skin = np.union1d(skin, quads[np.isin(quads, skin).any(axis=1)])
     return np.setdiff1d(np.intersect1d(skin, moved), rings)
+
+
+def conformed_targets(places: Points, sockets: tuple[Socket, Socket]) -> NDArray[np.float32]:
+    """(m, 3) what `expressions` move points by, corrected where they move a person's lids [mm].
+
+    places : (n, 3) the person's published points
+    """
+    moved, found = _lid_moves(), expressions().delta_mm.copy()
+    resting = places[moved.point]
+    drawn = np.tile(resting, (len(moved.closed), 1, 1))
+    drawn[moved.target, moved.number] += found[moved.row]
+    for side, eye, which in zip(moved.sides, sockets, moved.which, strict=True):
+        draw_onto(resting, side, eye, False, AHEAD)
+        near = drawn[which]
+        draw_onto(near, side, eye, moved.closed[which], moved.axis[which])
+        drawn[which] = near
+    found[moved.row] = drawn[moved.target, moved.number] - resting[moved.number]
+    return found
+
+
+class _LidMoves(NamedTuple):
+    """Expressions that move lids.
+
+    closed, axis : (t,) whether lids close, and (t, 1, 3) along which eyes look
+    point : (n,) points around both eyes
+    sides, which : of the left and of the right eye, by numbers of these points; and what moves its lids
+    row, target, number : (m,) displacements of these points, whose they are, and of which point
+    """
+
+    closed: Flags
+    axis: Points
+    point: Index
+    sides: tuple[Side, ...]
+    which: tuple[Index, ...]
+    row: Index
+    target: Index
+    number: Index
+
+
+@cache
+def _lid_moves() -> _LidMoves:
+    both, moved = sides(), expressions()
+    point = np.unique(np.concatenate([side.point for side in both]))
+    names = [name for name in moved.names if name.startswith(_TARGETS)]
+    parts = [np.arange(*moved.first[index : index + 2]) for index in map(moved.names.index, names)]
+    rows = [part[np.isin(moved.point[part], point)] for part in parts]
+    near = [[np.isin(moved.point[row], side.point).any() for row in rows] for side in both]
+    row = np.concatenate(rows)
+    return _LidMoves(
+        np.array(["Blink" in name for name in names]),
+        np.array([axes().get(name, AHEAD) for name in names])[:, None],
+        point,
+        tuple(side.numbered(point) for side in both),
+        tuple(np.flatnonzero(one) for one in near),
+        row,
+        np.repeat(np.arange(len(rows)), [len(one) for one in rows]),
+        np.searchsorted(point, moved.point[row]),
+    )
+
+
+@cache
+def axes() -> dict[str, Points]:
+    """Along which an eye looks by each target of gaze."""
+    turns = {turn.target: np.radians(turn.degrees) for turn in gaze()}
+    found = {
+        name: np.array([np.sin(y), -np.sin(x), np.cos(x) * np.cos(y)]) for name, (x, y, _) in turns.items()
+    }
+    return {name: axis / np.linalg.norm(axis) for name, axis in found.items()}
+
+
+def globe() -> tuple[Doubles, Index]:
+    """(n, 3) control points of an eyeball around its centre, looking along +Z [mm], and (q, 4) quads."""
+    return true_globe(swell=SPLINE)
+
+
+def placed(eye: Socket) -> tuple[Doubles, Doubles]:
+    """(n, 3) points of a person's eyeball, and its centre (3,) [mm]."""
+    centre = eye.middle + eye.size * FORWARD_MM * np.array([0.0, 0.0, 1.0])
+    return centre + eye.size * globe()[0], centre

@@ -1,17 +1,19 @@
-"""The parametric human in the package: heads of people with expressions, neck, jaw and eyes that move."""
+"""The parametric human: heads of people with expressions, neck, jaw and moving eyes, and their template."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human import globes, lids, teeth
-from dermis.human.lid_targets import conformed_targets
+from dermis.human import lids, teeth
+from dermis.human import lids as globes
+from dermis.human.hair.rooting import Rooting, eye_middles
+from dermis.human.lids import conformed_targets
 from dermis.human.movement import expressions, gaze, skeleton
 from dermis.human.published import Points, count, data, places_mm
 from dermis.mesh import eyeball
@@ -22,6 +24,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material, build_mesh
 from dermis.mesh.rig import Rig
+from dermis.mesh.subdivide import Refinement, refinement
 
 Layout = Literal["own", "hm08"]
 Index = NDArray[np.int64]
@@ -39,6 +42,13 @@ MATERIALS = {
     "cap": Material("cut", "opaque", (0.02, 0.02, 0.02)),
 }
 """Groups of quads, and what they are."""
+_SHARE = 1 / 6
+MEAN = {
+    f"macrodetails/{people}-{sex}-young": _SHARE
+    for people in ("african", "asian", "caucasian")
+    for sex in ("female", "male")
+}
+"""Weights of the person whom atlas and tables are made for, and whose brows are where the artist has them."""
 
 
 class _Laid(NamedTuple):
@@ -148,3 +158,41 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
         np.concatenate([corner[stays], len(uv) + quads, len(uv) + quads]),
         np.concatenate([material[stays], *eyes]),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """What all people with a layout and a level have in common.
+
+    head : the mean person, bare
+    rooting : where brows and lashes grow on it
+    refinement : how meshes are refined; None at level 0
+    """
+
+    head: Head
+    rooting: Rooting
+    refinement: Refinement | None
+
+    def shaped(self, plain: Head) -> Head:
+        """A person's head on the finer mesh, drawn by the template's atlas and tables.
+
+        plain : before any subdivision, of the same layout
+        """
+        rig = replace(plain.control, stencils=self.head.control.stencils, template=self.head.control)
+        mesh = plain.mesh if self.refinement is None else self.refinement.mesh(plain.mesh)
+        return replace(plain, mesh=mesh, rig=rig, levels=self.head.levels, template=self.head)
+
+
+@cache
+def template(layout: Layout, levels: int) -> Template:
+    """The template of a layout.
+
+    levels : of subdivision
+    """
+    head = plain = human_head(MEAN, Maps(), layout, EyeLook())
+    found = refinement(plain.mesh, levels) if levels else None
+    if found is not None:
+        rig = replace(plain.control, stencils=found.stencils)
+        head = replace(plain, mesh=found.mesh(plain.mesh), rig=rig, levels=levels)
+    mean_mm = plain.control.positions_mm.astype(np.float64)
+    return Template(head, Rooting(plain.mesh, mean_mm, eye_middles(plain.mesh), head.mesh), found)

@@ -1,22 +1,34 @@
-"""Light that a half-space returns, by its directions of entry and exit, under a surface that may refract."""
+"""Directions in a scattering medium: tables over the cosine, and light by direction."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.optics.interpolated import interpolated
-
 Floats = NDArray[np.float64]
+STEPS = 64
+"""Between tables at 0 and at 1."""
 ROWS = 32
 """Of the table over directions."""
 _NODES = 32
 _MOST_ALBEDO = 1.0 - 1e-8
 KEPT = 256
 """Shares of light, or albedos, whose numbers are remembered."""
+
+
+def interpolated(made: Callable[[float], Floats], at: float) -> Floats:
+    """The table at a number in 0..1.
+
+    made : the same at a multiple of 1 / STEPS; to be remembered by the caller
+    """
+    place = min(max(at, 0.0), 1.0) * STEPS
+    low = min(int(place), STEPS - 1)
+    share = place - low
+    return np.asarray((1.0 - share) * made(low / STEPS) + share * made((low + 1) / STEPS))
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The medium that a profile stands for."""
+"""The medium that a profile stands for, and its lateral offset of oblique light."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from dermis.optics.curve import Curve
 from dermis.optics.diffusion import hankel, layered_diffusion
 from dermis.optics.diffusion.boundary import mismatch
-from dermis.optics.directions import KEPT
+from dermis.optics.directions import KEPT, interpolated
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.half_space import Kind, albedo_of, half_space, kind_under
-from dermis.optics.interpolated import interpolated
 from dermis.optics.media import Layer, Medium
 
 Floats = NDArray[np.float64]
 MOST_ALBEDO, LEAST_ALBEDO = 1.0 - 1e-6, 1e-3
 _LOGS = (-14.0, 14.0)  # of frequencies that are searched [1/mm]
+_ABSORBED = 0.35  # of absorption in the published length
 
 
 def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
@@ -104,3 +104,16 @@ def _half(transform: Callable[[float], float]) -> float:
 
     total = transform(float(hankel.STILL[0]))
     return float(np.exp(brentq(lambda log: transform(float(np.exp(log))) - 0.5 * total, *_LOGS)))
+
+
+def aside_mm(body: Medium) -> float:
+    """How far from where it entered the middle of light lies that came along the surface, the channels' mean.
+
+    body : of one layer
+
+    Light from an angle lies its sine times that far from there, on along its way.
+
+    Source: [WangJacques1995].
+    """
+    layer = body.layers[0]
+    return float(np.mean(1.0 / (layer.sigma_s_prime + _ABSORBED * layer.sigma_a)) / body.eta)

@@ -13,10 +13,10 @@ from dermis.optics.directions import (
     Directions,
     albedo_returning,
     directions,
+    interpolated,
     mean_of_once,
     refracted,
 )
-from dermis.optics.interpolated import interpolated
 from dermis.optics.slabs import NODES, leaving_deep
 
 Floats = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Homogeneous half-spaces by Monte Carlo, from tables: scattering is isotropic, and lengths scale."""
+"""Homogeneous half-spaces by Monte Carlo tables, and profiles counted from photons."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from dermis.base.tables import read_rows
 from dermis.optics.curve import Curve, between
-from dermis.optics.media import SKIN_ETA, Floats
+from dermis.optics.media import SKIN_ETA, Floats, Medium
+from dermis.optics.radial import RadialProfile, light_beyond, radius_grid, ring_edges
 
 Kind = Literal["skin", "matched", "walk"]
 """A smooth surface of index 1.4 lit at right angles, an index-matched one, and an index-matched one that
@@ -21,6 +22,11 @@ SOURCES = ("Wang1995",)
 ALBEDOS = 0.02, 0.99999
 """Least and most of the tables [-]."""
 _PLAIN = ("kind", "albedo", "total")
+Counted = Literal["counted"]
+COUNTED: Counted = "counted"
+"""Name of the model."""
+_LEAST_STEP, _MOST_STEP = 0.05, 0.4  # of log r across which R(r) is told: more where few photons leave
+_STEP = 0.02  # by the root of mean free paths over r
 
 
 class _Table(NamedTuple):
@@ -96,3 +102,43 @@ def _table(kind: Kind) -> _Table:
     edges = np.array([0.0, *map(float, columns)])
     from_axis = lambda place: np.pad(known[0](place), ((0, 0), (1, 0)))  # noqa: E731
     return _Table(scale[order], total[order], edges, from_axis, known[1])
+
+
+def is_counted(medium: Medium) -> bool:
+    """Whether tables have a medium: one layer without end, in three channels, under a surface they know."""
+    layer = medium.layers[0]
+    plain = len(medium.layers) == 1 and medium.semi_infinite and medium.channels == 3
+    least, most = ALBEDOS
+    told = (layer.alpha_prime >= least) & (layer.alpha_prime <= most)
+    return plain and kind_under(medium.eta) is not None and bool(told.all())
+
+
+def counted_curve(medium: Medium) -> Curve | None:
+    """The curve of a medium that tables have, scattering made isotropic; None for others."""
+    kind, layer = kind_under(medium.eta), medium.layers[0]
+    if kind is None or not is_counted(medium):
+        return None
+    return half_space(kind, layer.alpha_prime, layer.mean_free_path_mm)
+
+
+def tabulated_profile(medium: Medium) -> RadialProfile | None:
+    """R(r) of a medium that tables have, scattering made isotropic; None for others."""
+    curve, kind, layer = counted_curve(medium), kind_under(medium.eta), medium.layers[0]
+    if curve is None or kind is None:
+        return None
+    path, edges, radius = layer.mean_free_path_mm, ring_edges(), radius_grid()
+    within = shares_within(kind, layer.alpha_prime, path)
+    rings = np.diff(within(edges), axis=0) * curve.energy
+    step = np.clip(_STEP * np.sqrt(path.min() / radius), _LEAST_STEP, _MOST_STEP)
+    rate = (within(radius * np.exp(step)) - within(radius * np.exp(-step))) / (2.0 * step)[:, None]
+    return RadialProfile(
+        name=medium.name,
+        model=COUNTED,
+        radius_mm=radius,
+        reflectance=curve.energy * rate / (2.0 * np.pi * radius[:, None] ** 2),
+        total=curve.energy,
+        edges_mm=edges,
+        ring_energy=rings,
+        warnings=tuple(light_beyond(curve.energy, rings)),
+        sources=(*medium.sources, *SOURCES),
+    )

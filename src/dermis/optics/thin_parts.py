@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from dermis.optics.diffusion import hankel
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.diffusion.layered_diffusion import respond_sheets
-from dermis.optics.directions import KEPT, refracted
+from dermis.optics.directions import KEPT, interpolated, refracted
 from dermis.optics.directions import ROWS as DIRECTIONS
 from dermis.optics.flesh import LEAST_ALBEDO, MOST_ALBEDO, albedo_of_total
-from dermis.optics.interpolated import interpolated
 from dermis.optics.media import Layer, Medium
 from dermis.optics.slabs import DEEP, NODES, Slabs, doubled_slabs, slabs
 

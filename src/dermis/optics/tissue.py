@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike
 
 from dermis.base.errors import DermisError, refuse, shown_value
 from dermis.base.reading import named_path, read_toml
-from dermis.optics.counted import COUNTED, is_counted, tabulated_profile
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import Model, diffusion_profile, diffusion_rings, through_slab
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.fits.targets import Rings
-from dermis.optics.half_space import ALBEDOS
+from dermis.optics.half_space import ALBEDOS, COUNTED, is_counted, tabulated_profile
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium, media, medium_from_toml
 from dermis.optics.pigments.parameters import DEFAULT_STRUCTURE, SKINS, SkinParameters, Structure
 from dermis.optics.pigments.skin import spectral_medium

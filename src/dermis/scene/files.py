@@ -12,7 +12,7 @@ from pydantic import Field
 from dermis.base.errors import about, refuse
 from dermis.base.reading import is_file, named_path, read_toml
 from dermis.human.regions.apply import with_regions
-from dermis.human.regions.table import load_table
+from dermis.human.regions.zones import load_table
 from dermis.mesh.head import Head
 from dermis.mesh.pose import MOST_WEIGHT, Pose
 from dermis.scene.camera import PRESETS, Camera, preset

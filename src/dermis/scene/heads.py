@@ -19,14 +19,23 @@ from dermis.formats.mesh_checks import check_head_height
 from dermis.formats.obj import obj_maps
 from dermis.formats.parts import is_gltf
 from dermis.formats.samples import SAMPLES, Sample, fetch
-from dermis.human.regions.usual import with_usual_regions
+from dermis.human.regions.apply import with_usual_regions
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.fitted_eyes.fit import with_fitted_eyes
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import subdivide_head
-from dermis.scene.head_checks import check_given, check_options, check_relief, named
-from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin
+from dermis.scene.head_table import (
+    AUTO,
+    Eyes,
+    NormalY,
+    Up,
+    VOrigin,
+    check_given,
+    check_options,
+    check_relief,
+    named,
+)
 from dermis.scene.smoothness import Levels, Subdivide, chosen_levels
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from dermis.formats.motion.sequence import is_sequence, load_sequence
 from dermis.formats.parts import is_gltf
 from dermis.mesh.clip import Clip, check_rate
 from dermis.mesh.head import Head
-from dermis.scene.head_checks import check_options
-from dermis.scene.head_table import Up
+from dermis.scene.head_table import Up, check_options
 
 _LINES = (".jsonl", ".ndjson", ".json")
 _KINDS = "a glTF clip (.glb .gltf), Live Link Face (.csv), MediaPipe (.jsonl) or a sequence of .obj or .ply"

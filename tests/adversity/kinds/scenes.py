@@ -188,7 +188,7 @@ def _take_regions(plan: Plan) -> None:
     """The table and the files that it names; painting a head by them takes seconds."""
     from dermis.formats.maps import load_labels
     from dermis.human.regions.labels import load_landmarks
-    from dermis.human.regions.table import load_table
+    from dermis.human.regions.zones import load_table
 
     table = load_table(plan["file"])
     check_finite(table.values, "regions")

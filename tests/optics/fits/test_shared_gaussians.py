@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.optics.fits.shared import SHARED_TERMS, shared_errors, shared_gaussians
+from dermis.optics.fits.gaussian import SHARED_TERMS, shared_errors, shared_gaussians
 from dermis.optics.profiles import load_profile
 
 

@@ -12,7 +12,7 @@ from tolerances import PUBLISHED
 
 from dermis.base.errors import DermisError
 from dermis.optics.media import Floats
-from dermis.optics.pigments import chromophores
+from dermis.optics.pigments import spectra as chromophores
 
 VISIBLE_NM = np.arange(380.0, 781.0)
 

@@ -12,10 +12,17 @@ from dermis.base import citations as cite
 from dermis.base.errors import DermisError
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.media import Floats, Layer
-from dermis.optics.pigments.chromophores import baseline, blood, donner_jensen_2006, jacques_1998, melanosome
 from dermis.optics.pigments.parameters import SKINS, SkinParameters, Structure
 from dermis.optics.pigments.skin import LEAKED_MELANIN, spectral_medium
-from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
+from dermis.optics.pigments.spectra import (
+    WAVELENGTHS_NM,
+    baseline,
+    blood,
+    donner_jensen_2006,
+    jacques_1998,
+    melanosome,
+    rgb_weights,
+)
 
 STRUCTURES: tuple[Structure, ...] = get_args(Structure)
 SKIN = SkinParameters(melanin=0.02, eumelanin=0.6, blood=0.01, oxygen=0.8, epidermis_mm=0.1)

@@ -11,10 +11,9 @@ import pytest
 from dermis.base.errors import DermisError
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Medium
-from dermis.optics.pigments.chromophores import jacques_1998
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import spectral_medium
-from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights, tabulated
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, jacques_1998, rgb_weights, tabulated
 
 FINE_NM = np.arange(380.0, 781.0, 5.0)
 COLOUR = 3e-5

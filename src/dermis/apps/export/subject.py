@@ -20,9 +20,9 @@ from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.optics.counted import counted_curve
 from dermis.optics.curve import Curve
 from dermis.optics.diffusion.boundary import normal_reflectance
+from dermis.optics.half_space import counted_curve
 from dermis.optics.media import Floats
 from dermis.optics.profiles import find_table
 from dermis.optics.radial import RadialProfile, profile_of_table

@@ -1,15 +1,18 @@
-"""Packing of pieces and their gutters into the square."""
+"""Packing of charts with their gutters into a square."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from dermis.atlas.stitched.gutter import Border, GutterWidth, Packing, find_border, needed
-from dermis.atlas.stitched.lay import lay_shapes
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 
+Span = tuple[int, int, int]
+"""Row, first and last column of a run of cells."""
 _CELLS = 512  # along the square at most
 _COARSE = 4  # of them in one of those with which the best order is looked for, along each axis
 _HALVINGS = 8  # in the search for the scale
@@ -19,6 +22,48 @@ _GAIN = 1.003  # least gain of the scale for which an order is searched
 _MASKS = 4  # times at most that masks are made
 _CLOSE = 0.65  # share of the scale of masks below which they are made again,
 _ABOVE = 1.15  # so much above the one that was found
+
+
+def lay_shapes(shapes: Sequence[Sequence[Span]], n: int) -> list[tuple[int, int]] | None:
+    """Column and row of shapes in n x n cells, each at the first free place by rows; None if one has none.
+
+    shapes : runs of each, from row and column 0
+    """
+    taken, corners = 0, []
+    for spans in shapes:
+        free = _free(taken, spans, n)
+        if not free:
+            return None
+        place = (free & -free).bit_length() - 1
+        cells = 0
+        for row, first, last in spans:
+            cells |= ((2 << last - first) - 1) << row * n + first
+        taken |= cells << place
+        corners.append((place % n, place // n))
+    return corners
+
+
+def _free(taken: int, spans: Sequence[Span], n: int) -> int:
+    """Cells at which the upper left one of a shape may come to lie."""
+    height = 1 + max(row for row, _, _ in spans)
+    width = 1 + max(last for _, _, last in spans)
+    if max(height, width) > n:
+        return 0
+    blocked, ahead = 0, [taken]  # cells from which one of the next 1, 2, 4, ... is taken
+    for row, first, last in spans:
+        length = last - first + 1
+        step = length.bit_length() - 1
+        while len(ahead) <= step:
+            ahead.append(ahead[-1] | ahead[-1] >> (1 << len(ahead) - 1))
+        blocked |= (ahead[step] | ahead[step] >> length - (1 << step)) >> row * n + first
+    rows = _every_row(n) & ((1 << n * (n - height + 1)) - 1)
+    return rows * ((2 << n - width) - 1) & ~blocked
+
+
+@cache
+def _every_row(n: int) -> int:
+    """The first cell of each row."""
+    return ((1 << n * n) - 1) // ((1 << n) - 1)
 
 
 class _Piece(NamedTuple):

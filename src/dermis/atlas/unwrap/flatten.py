@@ -1,4 +1,4 @@
-"""Sheets of triangles laid flat: conformal first, then with as little stretch as can be."""
+"""Flattening of a chart: stretch of triangles, and untangling of flipped ones."""
 
 from __future__ import annotations
 
@@ -7,13 +7,88 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.unwrap.stretch import Complexes, flat_shapes, turning_and_shear
-from dermis.atlas.unwrap.untangle import untangle
+from dermis.mesh.geometry import edges, uv_cross
 
-Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]
-
+Complexes = NDArray[np.complex128]
+Index = NDArray[np.int64]
+_RINGS = 5  # around mirrored triangles, of points that may move
 _STIFFENINGS, _ROUNDS = 6, 8  # changes of the weights, and rounds after each
+
+
+def flat_shapes(corners: NDArray[np.floating]) -> Complexes:
+    """Corners (f, 3) of each triangle in a plane of its own, seen from outside, as complex numbers [mm].
+
+    corners : (f, 3, 3) [mm]; the first one comes to 0 and the second onto the positive real axis
+    """
+    a, b, c = (np.asarray(corners[:, k], dtype=np.float64) for k in range(3))
+    length = np.linalg.norm(b - a, axis=1)
+    along = np.einsum("fi,fi->f", c - a, b - a) / length
+    up = np.linalg.norm(np.cross(b - a, c - a), axis=1) / length
+    return np.column_stack((np.zeros(len(a)), length, along + 1j * up))
+
+
+def turning_and_shear(shapes: Complexes, places: Complexes) -> tuple[Complexes, Complexes]:
+    """a and b of the map z -> a z + b conj(z) + c from each shape to its places, both (f, 3).
+
+    |a| + |b| and |a| - |b| are the map's singular values, the latter negative where it turns the triangle
+    over; a / |a| is the rotation nearest to it.
+    """
+    e1, e2 = shapes[:, 1] - shapes[:, 0], shapes[:, 2] - shapes[:, 0]
+    d1, d2 = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    cross = e1 * np.conj(e2) - e2 * np.conj(e1)
+    return (d1 * np.conj(e2) - d2 * np.conj(e1)) / cross, (e1 * d2 - e2 * d1) / cross
+
+
+def singular_values(corners: NDArray[np.floating], uv: NDArray[np.floating]) -> Doubles:
+    """Greatest and least length in uv of a mm on the surface (f, 2) [1/mm]; the least is signed.
+
+    corners : (f, 3, 3) [mm]
+    uv : (f, 3, 2) v down; triangles that are mirrored as seen from outside have a negative least value
+    """
+    places = np.asarray(uv[..., 0] - 1j * uv[..., 1], dtype=np.complex128)
+    a, b = turning_and_shear(flat_shapes(corners), places)
+    return np.column_stack((np.abs(a) + np.abs(b), np.abs(a) - np.abs(b)))
+
+
+def untangle(places: Doubles, triangles: Index) -> Doubles:
+    """The places (n, 2) with few or no mirrored triangles.
+
+    Points around these move to the mean of their neighbours, which mirrors no triangle within a convex
+    outline [Tutte1963]; more and more points, until none is mirrored. The border stays.
+
+    places : (n, 2) x to the right, y up
+    triangles : (f, 3)
+    """
+    ends, _, counts = edges(triangles)
+    inner = np.ones(len(places), dtype=bool)
+    inner[ends[counts != 2]] = False
+    for rings in range(_RINGS):
+        free = np.zeros(len(places), dtype=bool)
+        free[triangles[uv_cross(places[triangles]) <= 0]] = True
+        for _ in range(rings):
+            free[triangles[free[triangles].any(axis=1)]] = True
+        free &= inner
+        if not free.any():
+            break
+        places = _even(places, ends, free)
+    return places
+
+
+def _even(places: Doubles, ends: Index, free: NDArray[np.bool_]) -> Doubles:
+    """The places with the free ones at the mean of their neighbours."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import laplacian
+    from scipy.sparse.linalg import spsolve
+
+    n = len(places)
+    both = np.vstack((ends, ends[:, ::-1]))
+    links = csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
+    matrix: Any = laplacian(links)
+    pull: Any = csr_array(matrix)[free]  # it comes in a form that is slow to index
+    moved = places.copy()
+    moved[free] = spsolve(pull[:, free].tocsc(), -(pull[:, ~free] @ places[~free])).reshape(-1, 2)
+    return moved
 
 
 def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles) -> Doubles:

@@ -1,4 +1,4 @@
-"""Unwraps a mesh with given charts to a uv layout."""
+"""Unwrapping of a mesh to a uv layout by given or found charts."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dermis.atlas.unwrap.charts import grow, tidy
 from dermis.atlas.unwrap.pack import pack
-from dermis.atlas.unwrap.seams import border_sides
-from dermis.atlas.unwrap.settle import Flat, Surface, lay_flat
+from dermis.atlas.unwrap.seams import Flat, Surface, border_sides, lay_flat
 from dermis.base.errors import refuse
 from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.mesh import Mesh, build_mesh
 
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]
@@ -22,6 +23,8 @@ UPRIGHT = (0.0, 1.0, -0.1)
 """Direction in space that points up on a map: up and, for level surfaces, towards the back."""
 
 _LEAST_MM2 = 1e-10
+_CHARTS = 16
+_LEAST_CHART_MM2 = 1e-6
 
 
 @dataclass(frozen=True)
@@ -103,3 +106,23 @@ def _pack(places: Doubles, flat: Flat, padding: float) -> Doubles:
     scale, offset = pack([places[some] for some in np.split(sides[order], starts)], padding)
     uv = scale * places + offset[_owners(flat)]
     return np.column_stack((uv[:, 0], 1 - uv[:, 1]))
+
+
+def with_other_seams(mesh: Mesh) -> Mesh:
+    """The same triangles in the same order on a layout of about 16 charts grown from random places.
+
+    Triangles without an area keep no place on it: their uv is 0.
+    """
+    positions = np.zeros((int(mesh.point.max()) + 1, 3))
+    positions[mesh.point] = mesh.positions
+    points = mesh.point[mesh.triangles].astype(np.int64)
+    kept = np.flatnonzero(triangle_areas(positions[points]) > _LEAST_CHART_MM2)
+    triangles = points[kept]
+    layout = unwrap(positions, triangles, tidy(grow(positions, triangles, _CHARTS), triangles))
+    corner = np.full((len(points), 3), len(layout.uv), dtype=np.int64)
+    corner[kept] = layout.triangles
+    normals = np.zeros((len(positions), 3))
+    normals[mesh.point] = mesh.normals
+    point = np.append(layout.point, 0)
+    uv = np.vstack([layout.uv, np.zeros(2)])
+    return build_mesh(positions[point], uv, corner, mesh.material, mesh.materials, normals[point], point)

@@ -1,14 +1,17 @@
-"""Eyebrows: short hairs that stand up at the inner end and lean outwards, together from above and below."""
+"""Brows: hairs rooted in the skin around the eyes, on a grid over the front plane of the mean person."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from dermis.base.arrays import Doubles
-from dermis.human.hair.brow_skin import BrowSkin
+from dermis.human.hair.grown import flattened
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.skin import flattened
 
+_CELL_MM = 2.5
+_LOW, _HIGH = (1.0, -2.0), (64.0, 40.0)  # around the left brow and the tips of its hairs [mm]
 KNOTS = 9
 _MOST = 760  # hairs of the bushiest brow
 # Artist's values along the brow, from its inner to its outer end, on a head seen from the front [mm]: its
@@ -20,6 +23,78 @@ _HALF = np.array([2.8, 3.4, 3.7, 3.5, 2.9, 2.0, 1.0])
 _TURN = np.radians([82, 66, 43, 21, 3, -20, -32])
 _DENSITY = np.array([0.3, 0.75, 1.0, 1.0, 1.0, 0.9, 0.55])
 _LENGTH = np.array([4.5, 6.3, 8.0, 9.0, 9.0, 7.5, 5.5])
+
+
+class Walked(NamedTuple):
+    """Where hairs are on the skin.
+
+    place, normal : (n, 3) [mm]
+    along_x, along_y : (n, 3) by how much the place moves with those on the front plane [-]
+    """
+
+    place: Doubles
+    normal: Doubles
+    along_x: Doubles
+    along_y: Doubles
+
+    def step(self, ways: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
+        """Along x and y of the front plane, how far what lies of ways (n, 3) along the skin leads [mm].
+
+        length : (n,) of the step on the skin [mm]
+        """
+        u, v = self.along_x, self.along_y
+        xx, xy, yy, x, y = (_dots(a, b) for a, b in ((u, u), (u, v), (v, v), (u, ways), (v, ways)))
+        dx, dy = yy * x - xy * y, xx * y - xy * x
+        scale = length / np.sqrt(xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy)
+        return scale * dx, scale * dy
+
+
+def _dots(a: Doubles, b: Doubles) -> Doubles:
+    return np.asarray(np.einsum("nc,nc->n", a, b))
+
+
+def nodes() -> tuple[Doubles, Doubles]:
+    """x and y of the grid (nodes,) on the front plane, the left brow's side [mm]."""
+    x, y = np.meshgrid(*_axes(), indexing="ij")
+    return x.ravel(), y.ravel()
+
+
+def _axes() -> tuple[Doubles, Doubles]:
+    x, y = (np.arange(low, high + 0.5, _CELL_MM) for low, high in zip(_LOW, _HIGH, strict=True))
+    return x, y
+
+
+class BrowSkin:
+    """A person's skin around the brows.
+
+    node_mm, normal : (2 nodes, 3) where the places of the left and of the right grid are on the person, see
+        `Skin.foot`; x counts from the nose outwards on both sides
+    """
+
+    def __init__(self, node_mm: Doubles, normal: Doubles) -> None:
+        shape = tuple(map(len, _axes()))
+        ways = np.gradient(node_mm.reshape(2, *shape, 3), _CELL_MM, axis=(1, 2))
+        self._last = np.array(shape) - 1
+        plane = (node_mm * normal).sum(axis=1, keepdims=True)
+        self._node = np.concatenate([node_mm, normal, *(way.reshape(-1, 3) for way in ways), plane], axis=1)
+
+    def at(self, side: Doubles, x: Doubles, y: Doubles) -> Walked:
+        """The skin behind places of the front plane (n,) [mm]; beyond the grid, as at its edge.
+
+        side : 1 for the left one
+        """
+        at = (np.stack([x, y]) - np.array(_LOW)[:, None]) / _CELL_MM
+        at = np.clip(at, 0.0, self._last[:, None] - 1e-9)
+        cell = at.astype(np.int64)
+        s, t = at - cell
+        first = cell[0] * (self._last[1] + 1) + cell[1] + (side < 0) * (len(self._node) // 2)
+        near = first[:, None] + [0, 1, self._last[1] + 1, self._last[1] + 2]
+        share = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=-1)
+        found = np.einsum("nk,nkc->nc", share, self._node.take(near, axis=0))
+        place, normal, along_x, along_y, plane = np.split(found, [3, 6, 9, 12], axis=1)
+        # curved skin lies as far from its chords as from its tangent planes
+        lift = 0.5 * (plane - _dots(place, normal)[:, None])
+        return Walked(place + lift * normal, normal, along_x, along_y)
 
 
 def places(rng: np.random.Generator) -> tuple[Doubles, Doubles, Doubles, Doubles]:

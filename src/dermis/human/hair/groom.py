@@ -9,13 +9,12 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.human.hair import brows, lashes
-from dermis.human.hair.brow_skin import BrowSkin
-from dermis.human.hair.grown import Ground, Grown, Rooted
+from dermis.human.hair.brows import BrowSkin
+from dermis.human.hair.grown import Ground, Grown, Rooted, Skin
 from dermis.human.hair.hairy_skin import skin_beside
 from dermis.human.hair.head_hair import beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.rooting import SIDES, Rooting, eye_middles
-from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, Strands, seen_in
 from dermis.specular.hair import absorption_per_mm

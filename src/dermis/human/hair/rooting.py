@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles
 from dermis.human.hair import lashes
-from dermis.human.hair.brow_skin import nodes
+from dermis.human.hair.brows import nodes
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, corners
 
@@ -22,6 +22,7 @@ _ENDS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
 _INSIDE = -1e-9  # least share of a corner
 _CELL_MM = 2.0  # of the grid that triangles are listed in
 _LOW, _HIGH = np.array([-70.0, -20.0]), np.array([70.0, 50.0])  # of places in front, around the brows [mm]
+_HALVES = np.array([[0, 1, 2], [2, 3, 0]])
 
 
 class _Front(NamedTuple):
@@ -153,9 +154,6 @@ class Rooting:
         for (x, y), numbers in cells.items():
             listed[x, y, : len(numbers)] = numbers
         return _Front(listed, quad, half, corner)
-
-
-_HALVES = np.array([[0, 1, 2], [2, 3, 0]])
 
 
 def _box(corner: Doubles) -> tuple[Doubles, Doubles]:

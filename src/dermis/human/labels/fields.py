@@ -1,9 +1,10 @@
-"""How a mesh is labelled: a class for each triangle, and distances by which parts of them are of others."""
+"""Labels of the parametric human's skin: distances from the borders of parts, and classes of hairs."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
+from functools import cache
 from threading import Lock
 from typing import NamedTuple
 
@@ -11,23 +12,130 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Floats
+from dermis.human.hair import brows
+from dermis.human.hair.hairy_skin import above_hairline
 from dermis.human.labels.classes import class_number
-from dermis.human.labels.of_human import HUMAN_FIELDS, human_fields
-from dermis.human.regions.average import is_human
+from dermis.human.regions.average import AVERAGE, average_head, is_human, parts
 from dermis.human.regions.labels import known_landmarks, to_average
+from dermis.human.regions.zones import neck_mm, nose_mm
+from dermis.human.skin.surface import FIELDS, average, lid_rings
 from dermis.mesh.eyeball import LIMBUS_MM
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material
-from dermis.mesh.strands import points_of
+from dermis.mesh.strands import corners, points_of
 
 Doubles = NDArray[np.float64]
 
-SIDES = "right", "left"
+HUMAN_FIELDS = (
+    "right_ear",
+    "left_ear",
+    "mouth_interior",
+    "upper_lip",
+    "lower_lip",
+    "right_eye",
+    "left_eye",
+    "nose",
+    "right_brow",
+    "left_brow",
+    "neck",
+)
+"""Classes in the order in which they count."""
+SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])
+"""Distance from the middle and height where the lips meet."""
 _OUTSIDE = -1.0
+_BROW_AHEAD_MM = -30.0  # of the front, where no brow is
+_HAIR_MM = -8.0  # above the hairline, from where on hair is of the head and no beard
+_LEVELS = 2
+SIDES = "right", "left"
 _PARTS = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "neck"}
 _MOST_KEPT = 3
-_KEPT: dict[bytes, Labelling] = {}
 _ALONE = Lock()
+
+
+@cache
+def human_fields() -> Doubles:
+    """(k, p) `HUMAN_FIELDS` at the control points [mm, positive inside]."""
+    places = average_head().positions_mm.astype(np.float64)
+    told = np.full((len(FIELDS), len(places)), -_OUTSIDE)
+    told[:, : len(average()[1])] = average()[1].T
+    lips, mouth, lids = told
+    left = places[:, 0] > 0
+    above = places[:, 1] - np.interp(np.abs(places[:, 0]), *SEAM_MM.T)
+    found = {
+        "mouth_interior": -mouth,
+        "upper_lip": np.minimum(lips, above),
+        "lower_lip": np.minimum(lips, -above),
+        "nose": nose_mm(places),
+        "neck": neck_mm(places),
+    }
+    for name, values in (("ear", _ears()), ("eye", -lids), ("brow", _brows(places))):
+        found[f"left_{name}"] = np.where(left, values, _OUTSIDE)
+        found[f"right_{name}"] = np.where(left, _OUTSIDE, values)
+    return np.stack([found[name] for name in HUMAN_FIELDS])
+
+
+def dense_fields() -> tuple[Doubles, Doubles]:
+    """(n, 3) places all over the average human's outer skin [mm], and (k, n) the fields there."""
+    head = AVERAGE.head(subdivide=_LEVELS)
+    assert head.control.stencils is not None
+    skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
+    fields = head.control.stencils.points(human_fields().T.copy())[skin].T
+    outer = fields[HUMAN_FIELDS.index("mouth_interior")] < 0
+    return points_of(head.mesh)[skin][outer], fields[:, outer]
+
+
+def hair_classes(head: Head) -> NDArray[np.uint8]:
+    """(n,) class of each of the head's hairs, brows and lashes first; all hair where nobody knows."""
+    both = [part for part in (head.strands, head.hair) if part is not None]
+    quads = [part.roots.quad >> (2 * head.levels) for part in both]
+    if not quads:
+        return np.zeros(0, np.uint8)
+    fine, coarse = _classes_of_quads()
+    if max(int(one.max(initial=0)) for one in quads) >= len(fine):
+        return np.full(sum(map(len, quads)), class_number("hair"), np.uint8)
+    tables = [fine if part is head.strands else coarse for part in both]
+    return np.concatenate([table[one] for table, one in zip(tables, quads, strict=True)])
+
+
+@cache
+def _classes_of_quads() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """(q,) class of fine and of coarse hairs on each of the human's quads."""
+    mesh = average_head().mesh
+    around = corners(mesh, np.arange(len(mesh.quads)))
+    middle = average_head().positions_mm.astype(np.float64)[around].mean(axis=1)
+    lids = np.isin(around, lid_rings()).any(axis=1)
+    right, left, lashes, hair, beard = map(
+        class_number, ("right_brow", "left_brow", "lashes", "hair", "beard")
+    )
+    fine = np.where(lids, lashes, np.where(middle[:, 0] > 0, left, right))
+    coarse = np.where(above_hairline(middle) > _HAIR_MM, hair, beard)
+    return fine.astype(np.uint8), coarse.astype(np.uint8)
+
+
+def _ears() -> Doubles:
+    """(p,) above 0 where most quads around a control point are of the ears."""
+    mesh = average_head().mesh
+    around = corners(mesh, np.arange(len(mesh.quads)))
+    within = np.zeros(len(around))
+    within[parts()["ears"]] = 1.0
+    count = len(average_head().positions_mm)
+    sums, all_of = (
+        np.bincount(around.ravel(), np.repeat(each, 4), count) for each in (within, np.ones(len(around)))
+    )
+    return np.asarray(sums / np.maximum(all_of, 1.0) - 0.5)
+
+
+def _brows(places: Doubles) -> Doubles:
+    """(p,) how far inside the strip where brows grow, seen from the front [mm]."""
+    x, y = np.abs(places[:, 0]), places[:, 1]
+    low, high = (brows.strip(side) for side in (-1.0, 1.0))
+    ends = 0.5 * (low + high)
+    below, above = (np.interp(x, *side.T) for side in (low, high))
+    across = np.minimum(np.minimum(y - below, above - y), np.minimum(x - ends[0, 0], ends[-1, 0] - x))
+    return np.where(places[:, 2] > _BROW_AHEAD_MM, across, _OUTSIDE)
+
+
+_KEPT: dict[bytes, Labelling] = {}
 
 
 class Labelling(NamedTuple):
@@ -117,7 +225,7 @@ def _warped(head: Head, places: Mapping[str, tuple[float, float, float]]) -> dic
     """Those of the point of the average human where landmarks take each point."""
     from scipy.spatial import cKDTree
 
-    from dermis.human.labels.of_human import dense_fields
+    from dermis.human.labels.fields import dense_fields
 
     points = points_of(head.mesh)
     average, values = dense_fields()

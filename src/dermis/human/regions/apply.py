@@ -1,4 +1,4 @@
-"""Maps of roughness and strength by region of the face."""
+"""Maps of roughness and strength by region of the face, for heads given or loaded."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.human.regions.labels import label_texels
-from dermis.human.regions.table import DEFAULT, LIMITS, RegionTable, load_table
-from dermis.human.regions.zones import Doubles
+from dermis.base.disk import Array, Arrays, cached_arrays
+from dermis.base.errors import DermisError
+from dermis.base.progress import preparing
+from dermis.human.regions.labels import known_landmarks, label_texels
+from dermis.human.regions.zones import DEFAULT, LIMITS, Doubles, RegionTable, load_table
 from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
 
 Floats = NDArray[np.float32]
 
@@ -26,6 +29,7 @@ _DARKEST, _BRIGHTEST = 0.4, 3.0  # of the mean and of the surroundings: else spe
 _CELL_MM = 2.0
 _MOST_CELLS = 256  # along the longest side
 _REACH = 3  # standard deviations
+_FORM = 2  # increment when `with_regions` gives other maps for the same head
 
 
 def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT) -> tuple[Head, float]:
@@ -110,3 +114,27 @@ def soften(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
     weight = spread(count.astype(np.float64))
     sums = [np.bincount(cell, column, minlength=len(count)).astype(np.float64) for column in values.T]
     return np.stack([spread(column) / weight for column in sums], axis=-1)
+
+
+@preparing("finding the regions of the face")
+def with_usual_regions(head: Head) -> Head:
+    """The head with the package's table by region, where it knows the regions and no map says the roughness.
+
+    Strengths are relative to each other: a skin's rho_s is their mean, as of every map. A map of the head's
+    own stays: it knows the person, and the table is an artist's.
+    """
+    if head.maps.rough or known_landmarks(head) is None:
+        return head
+    table = load_table(DEFAULT)
+    missing = ["roughness"] if head.maps.specular is not None else ["roughness", "specular"]
+    sources: list[Array] = [head.mesh.positions, head.mesh.uv, head.mesh.triangles, table.values]
+
+    def make() -> Arrays:
+        maps = with_regions(replace(head, maps=Maps()), table)[0].maps
+        return {name: np.asarray(getattr(maps, name), np.float32) for name in missing}
+
+    try:
+        found = cached_arrays(sources, f"regions {_FORM} {SIZE} {head.name}", missing, make)
+    except DermisError:  # of a known name, but another head
+        return head
+    return replace(head, maps=replace(head.maps, **found))

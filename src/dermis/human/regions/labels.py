@@ -26,8 +26,7 @@ from dermis.human.regions.average import (
     is_human,
     on_average,
 )
-from dermis.human.regions.table import RegionTable
-from dermis.human.regions.zones import REGIONS, Doubles
+from dermis.human.regions.zones import REGIONS, Doubles, RegionTable
 from dermis.mesh.head import Head
 
 Place = tuple[float, float, float]

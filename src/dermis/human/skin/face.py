@@ -1,4 +1,4 @@
-"""Where on the average person the skin is what: zones, the edge of the hair, folds."""
+"""Places and amounts of the skin of a face, and what expressions change: folds and blood."""
 
 from __future__ import annotations
 
@@ -11,10 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.tables import numbers, read_rows
-from dermis.human.skin.movements import MOVEMENTS
 
 Floats = NDArray[np.float32]
 
+MOVEMENTS = (
+    "raised-brows",
+    "frown",
+    "sneer",
+    "squint",
+    "smile",
+    "sad-mouth",
+    "raised-chin",
+    "flush",
+    "pressed",
+)
+"""Those that deepen folds, see folds.csv, then those that move blood."""
+FOLDING = MOVEMENTS.index("flush")
+"""How many deepen folds."""
 AMOUNTS = (
     "blood", "melanin", "strength", "roughness", "pores", "furrows",
     "sun", "level", "around", "hair", "beard", "veins",
@@ -25,11 +38,27 @@ DEGREES = 2
 _EDGES = 180 // DEGREES + 1
 _PIECES = 4
 _MOST_KEPT = 32  # tables of receding hair
-
-
 _CROWN = "crown"  # zone that thin hair leaves
 _TEMPLES_MM, _FOREHEAD_MM = 22.0, 16.0  # by which hair recedes at most, there and all over the forehead
 _TEMPLES, _TEMPLES_WIDE, _FOREHEAD_WIDE = 33.0, 15.0, 38.0  # where these are and how wide [degrees]
+
+
+def movements(names: tuple[str, ...], weights: Floats) -> Floats:
+    """(m,) how far each movement is made, 0 to 1.
+
+    names, weights : of a rig's targets
+    """
+    return np.asarray(np.clip(_shares(names) @ weights, 0.0, 1.0), np.float32)
+
+
+@cache
+def _shares(names: tuple[str, ...]) -> Floats:
+    """(m, t) of each target in each movement."""
+    table = np.zeros((len(MOVEMENTS), len(names)), np.float32)
+    for row in read_rows(__package__, "movements"):
+        if row["target"] in names:
+            table[MOVEMENTS.index(row["movement"]), names.index(row["target"])] = float(row["share"])
+    return table
 
 
 @lru_cache(maxsize=_MOST_KEPT)

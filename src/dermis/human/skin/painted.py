@@ -1,20 +1,49 @@
-"""Maps that are numbers still: what the frame paints a human's skin from."""
+"""Maps of skin painted by a look, and the mean colours of face and lips."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
+from threading import Lock
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.skin.colours import mean_colour
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.maps import Maps
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
+from dermis.optics.skin_colours import ColourTable, colour_table
 
+LIP_EPIDERMIS_MM = 0.03
+"""What stands over the blood of the lips, which shows through more than elsewhere [mm]."""
+_ALONE = Lock()  # the frame and the painting ask for the same table at the same time
 LEAST_SIDE, MOST_SIDE = 256, 4096
 """Sides of painted maps [texels]."""
+
+
+def colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
+    """Colour of skin by its shares of melanin and of blood."""
+    with _ALONE:
+        return _colours(eumelanin, oxygen, epidermis_mm)
+
+
+@lru_cache(maxsize=64)
+def _colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
+    return colour_table(SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=epidermis_mm))
+
+
+def mean_colour(look: SkinLook) -> NDArray[np.float64]:
+    """(3,) colour of the skin of usual places, linear Rec. 709 [-]."""
+    table = colours(look.eumelanin, look.oxygen, DEFAULT_SKIN.epidermis_mm)
+    return np.asarray(table.read(np.array([look.melanin]), np.array([look.blood]))[0])
+
+
+def colour_tables(look: SkinLook) -> NDArray[np.float32]:
+    """(2, n, n, 3) colours of the face's skin and of the lips', as `ColourTable` has them."""
+    thick = DEFAULT_SKIN.epidermis_mm, LIP_EPIDERMIS_MM
+    both = [colours(look.eumelanin, look.oxygen, mm).colours for mm in thick]
+    return np.stack(both).astype(np.float32)
 
 
 @dataclass(frozen=True, repr=False)

@@ -1,9 +1,11 @@
-"""Random textures of the skin: which noises make it up, and which scattered dots."""
+"""Random textures of skin: noises, scattered dots, and a tile of fine relief."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
+from importlib import resources
+from io import BytesIO
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -19,6 +21,14 @@ GROUNDS: tuple[Ground, ...] = ("all", "lips", "lines", "furrows", "folds", "vein
 _TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 """From each size of a fractal to the next: their lattices never line up."""
 _SHRINK = 0.49
+WANDERING = 2
+"""How many of the first noises, of a single octave, bend the borders of zones."""
+SIDE = 512
+"""Of the tile [texels]."""
+TILE_MM = 32.0
+"""Its length on the skin [mm]."""
+FULL_MM = 0.2
+"""Full scale of its heights [mm]."""
 
 
 class Noise(NamedTuple):
@@ -81,8 +91,6 @@ NOISES = (
     Noise("level-lines", (11.0, 1.5, 11.0), "level", fades=True, ground="lines"),
     Noise("eye-lines", (1.1, 9.0, 9.0), "ring", fades=True, ground="lines"),
 )
-WANDERING = 2
-"""How many of the first noises, of a single octave, bend the borders of zones."""
 
 
 class Dots(NamedTuple):
@@ -140,3 +148,23 @@ def _rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int, int, 
 def dot_table() -> NDArray[np.float32]:
     """(d, 4) spacing [mm], radii [of the spacing] and raggedness [mm]."""
     return np.array([dots[1:] for dots in DOTS], np.float32)
+
+
+@cache
+def detail_heights_mm() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(SIDE, SIDE) heights of pores and of furrows; they go on over the edges [mm]."""
+    from PIL import Image
+
+    file = resources.files("dermis.human").joinpath("data", "detail.png")
+    levels = np.asarray(Image.open(BytesIO(file.read_bytes())), np.float32)
+    pores, furrows = np.moveaxis(levels[..., :2] * np.float32(FULL_MM / 255), -1, 0)
+    return pores, furrows
+
+
+@cache
+def detail_slopes() -> NDArray[np.float32]:
+    """(SIDE, SIDE, 4) slopes of pores along +u and down, and of furrows; it goes on over the edges [-]."""
+    heights = np.stack(detail_heights_mm(), axis=-1)
+    per_mm = np.float32(SIDE / TILE_MM / 2)
+    across, down = (per_mm * (np.roll(heights, -1, axis) - np.roll(heights, 1, axis)) for axis in (1, 0))
+    return np.stack([across[..., 0], down[..., 0], across[..., 1], down[..., 1]], axis=-1)

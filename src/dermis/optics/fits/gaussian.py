@@ -1,8 +1,10 @@
-"""Fits of sums of Gaussians to a diffusion profile."""
+"""Fits of sums of Gaussians to a diffusion profile, alone or shared by several."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -22,6 +24,11 @@ _STARTS = ((0.02, 0.99), (0.1, 0.999), (0.02, 0.9), (0.1, 0.6), (0.001, 0.99))
 # run, and its error within 0.0001.
 _STILL_NEAR = 3e-6
 _STIFFNESS = 1e4  # of the energy's equation against the others'; squared, it bounds the energy's error
+SHARED_TERMS = 6
+"""Gaussians of profiles that share them: as many as one profile alone has."""
+_EDGES_MM = np.concatenate([[0.0], np.geomspace(1e-3, 60.0, 93)])
+_KEPT = 8
+_Table = tuple[str, bytes, bytes, int]
 
 
 @dataclass(frozen=True)
@@ -167,3 +174,45 @@ def single_gaussian(profile: GaussianSum) -> GaussianSum:
 
     ends = np.log(profile.variance_mm2[[0, -1]])
     return at(minimize_scalar(misfit, bounds=(ends[0] - 1e-6, ends[1] + 1e-6), method="bounded").x)
+
+
+def shared_gaussians(profiles: Sequence[GaussianSum], terms: int = SHARED_TERMS) -> tuple[GaussianSum, ...]:
+    """The profiles as sums of the same Gaussians; those that share theirs already are taken as they are.
+
+    Each keeps its total. Relative root mean square errors over rings: `shared_errors`.
+    """
+    first = profiles[0].variance_mm2
+    if all(np.array_equal(first, one.variance_mm2) for one in profiles):
+        return tuple(profiles)
+    fitted = _fitted(tuple(map(_table, profiles)), terms)
+    return tuple(replace(one, counted=own.counted) for one, own in zip(fitted, profiles, strict=True))
+
+
+def shared_errors(profiles: Sequence[GaussianSum], shared: Sequence[GaussianSum]) -> Floats:
+    """(p, 3) E_b of each profile and channel: how far the shared sums are from what they stand for [-]."""
+    pairs = zip(profiles, shared, strict=True)
+    return np.array([_rings([one]).error(other.variance_mm2, other.weight) for one, other in pairs])
+
+
+@lru_cache(_KEPT)
+def _fitted(tables: tuple[_Table, ...], terms: int) -> tuple[GaussianSum, ...]:
+    profiles = [
+        GaussianSum(name, np.frombuffer(variance), np.frombuffer(weight).reshape(-1, channels))
+        for name, variance, weight, channels in tables
+    ]
+    fit = fit_gaussians(_rings(profiles), terms, keep_energy=True, name="shared profiles").profile
+    ends = np.cumsum([one.weight.shape[1] for one in profiles])[:-1]
+    parts = np.split(fit.weight, ends, axis=1)
+    return tuple(
+        GaussianSum(one.name, fit.variance_mm2, part) for one, part in zip(profiles, parts, strict=True)
+    )
+
+
+def _table(profile: GaussianSum) -> _Table:
+    return profile.name, profile.variance_mm2.tobytes(), profile.weight.tobytes(), profile.weight.shape[1]
+
+
+def _rings(profiles: Sequence[GaussianSum]) -> Rings:
+    """Light through rings, channels of all profiles side by side."""
+    within = np.hstack([one.within(_EDGES_MM) for one in profiles])
+    return Rings(_EDGES_MM, np.diff(within, axis=0), np.hstack([one.albedo for one in profiles]))

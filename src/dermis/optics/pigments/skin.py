@@ -10,16 +10,17 @@ import numpy as np
 
 from dermis.base.errors import refuse, shown_value
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
-from dermis.optics.pigments.chromophores import (
+from dermis.optics.pigments.parameters import SkinParameters, Structure
+from dermis.optics.pigments.spectra import (
     DERMIS_SHARE,
+    WAVELENGTHS_NM,
     ScatteringLaw,
     baseline,
     blood,
     donner_jensen_2006,
     melanosome,
+    visible,
 )
-from dermis.optics.pigments.parameters import SkinParameters, Structure
-from dermis.optics.pigments.spectra import WAVELENGTHS_NM, visible
 
 LEAKED_MELANIN: Final = 0.175
 """Absorption of the sheet under the epidermis over that of the epidermis' melanin, after [Donner2008] [-]."""
@@ -29,6 +30,7 @@ _CORNEUM_MM, _PAPILLARY_MM = 0.01, 0.2
 _RETICULAR_BLOOD = 0.0091 / 0.012
 _ONE_INDEX = f"all layers have the index {SKIN_ETA:g}: light meets no surface between them"
 _THIN = "the multipole misjudges so thin a layer: take layered diffusion"
+_Build = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
 
 
 def spectral_medium(
@@ -124,8 +126,6 @@ def mixed_layers(parameters: SkinParameters, shares: Floats) -> tuple[Layer, Lay
     epidermis, dermis = (np.broadcast_to(k * scattered, brown.shape) for k in (1.0, DERMIS_SHARE))
     return Layer(brown, epidermis, parameters.epidermis_mm, "epidermis"), Layer(red, dermis, name="dermis")
 
-
-_Build = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
 
 _STRUCTURES: dict[str, tuple[_Build, str, tuple[str, ...]]] = {
     "dj2006": (

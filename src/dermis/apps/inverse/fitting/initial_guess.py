@@ -10,7 +10,7 @@ import numpy as np
 from dermis.apps.inverse.fitting.frames import Frames
 from dermis.apps.inverse.fitting.light_basis import BASIS, fault_by, strengths_by
 from dermis.apps.inverse.fitting.unknowns import UNKNOWNS, Point, tangents
-from dermis.human.skin.colours import colours
+from dermis.human.skin.painted import colours
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.optics.media import Floats
 

@@ -14,7 +14,7 @@ from dermis.apps.inverse.unmixing.unmix import Unmixed
 from dermis.base.atomic_write import replacing
 from dermis.base.errors import refuse
 from dermis.images.hdr import encode_exr
-from dermis.optics.fits.shared import shared_gaussians
+from dermis.optics.fits.gaussian import shared_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import SkinParameters

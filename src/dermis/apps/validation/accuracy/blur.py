@@ -14,8 +14,7 @@ from scipy.ndimage import zoom
 import dermis
 from dermis.apps.validation.pages import data_file, print_tables, use_tests_folder
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.build import build_atlas
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import build_atlas, cached_atlas
 from dermis.frame.features.atlas import stretch as stretched
 from dermis.frame.features.atlas.textures import upload_atlas
 from dermis.frame.features.diffusion import blur as diffuse

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import dermis
 from dermis.apps.validation.pages import print_tables
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.environment.mirror_fits import MIRROR_ROUGHNESSES, ROUGH, VIEWS
 from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles, split_suns

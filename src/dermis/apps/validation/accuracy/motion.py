@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import dermis
 from dermis.apps.validation.accuracy import blur
 from dermis.apps.validation.pages import DOCS, data_file, fill_page, in_checkout, use_tests_folder
-from dermis.atlas.cached import cached_atlas
+from dermis.atlas.build import cached_atlas
 from dermis.formats.maps import load_maps
 from dermis.frame.features.occlusion.baked import bake_occlusion
 from dermis.frame.renderer import Renderer

@@ -15,10 +15,10 @@ from dermis.frame.features.surface.painting import paint
 from dermis.frame.programs import program
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download, make_texture
-from dermis.human.skin.detail import TILE_MM, detail_heights_mm
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import painting
+from dermis.human.skin.textures import TILE_MM, detail_heights_mm
 from dermis.mesh.eyeball import SCLERA_MM, iris_mm
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

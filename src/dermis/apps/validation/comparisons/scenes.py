@@ -13,8 +13,8 @@ import numpy as np
 from dermis.apps.truths.slab_mc import counted_profile
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.optics.counted import COUNTED
 from dermis.optics.gaussians import GaussianSum
+from dermis.optics.half_space import COUNTED
 from dermis.optics.media import Medium
 from dermis.optics.profiles import fit_radial, write_profile
 from dermis.optics.tissue import Tissue

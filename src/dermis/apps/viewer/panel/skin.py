@@ -23,7 +23,7 @@ from dermis.apps.viewer.panel.fields import (
 from dermis.apps.viewer.session import Session, apply_regions
 from dermis.apps.viewer.state import ViewerState, changed
 from dermis.base.errors import DermisError
-from dermis.human.regions.table import DEFAULT
+from dermis.human.regions.zones import DEFAULT
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.optics.profiles import PUBLISHED, preset_names
 from dermis.scene.head_table import AUTO, NO_REGIONS, names_regions

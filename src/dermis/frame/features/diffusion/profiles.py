@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.frame.features.diffusion.mixture import load_shares
-from dermis.optics.fits.shared import shared_gaussians
+from dermis.optics.fits.gaussian import shared_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import fit_profile, load_profile, preset_names
 from dermis.scene.skin import Pigments, Skin

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.cached import cached_occlusion
+from dermis.atlas.build import cached_occlusion
 from dermis.base.progress import preparing
 from dermis.frame.features.shape.mesh import upload_geometry
 from dermis.frame.features.shape.shape import rest_shape, shape_tables

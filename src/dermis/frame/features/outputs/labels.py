@@ -12,8 +12,7 @@ from dermis.frame.features.outputs.seen import SeenFrame
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Bindings, Buffer, Device, Memo, MutableBindings, Recorder, Texture
 from dermis.human.labels.classes import class_number, label_classes
-from dermis.human.labels.fields import Labelling, labelling
-from dermis.human.labels.of_human import hair_classes
+from dermis.human.labels.fields import Labelling, hair_classes, labelling
 from dermis.mesh.head import Head
 
 STAGE = "label"

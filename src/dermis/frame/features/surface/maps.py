@@ -7,17 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.raster import rasterise
-from dermis.atlas.uv_charts import triangle_uv_area
+from dermis.atlas.raster import rasterise, triangle_uv_area
 from dermis.frame.features.surface import mips as map_mips
 from dermis.frame.features.surface.painting import paint
 from dermis.frame.features.surface.painting.paint import Face
 from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.gpu import Device, MutableBindings, Texture, make_texture, upload
 from dermis.gpu.textures import texture_from
-from dermis.human.skin.detail import detail_slopes
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import Painting, painting
+from dermis.human.skin.textures import detail_slopes
 from dermis.images.colour import encode_srgb
 from dermis.images.filters import mip_chain
 from dermis.mesh.geometry import triangle_areas

@@ -12,10 +12,9 @@ from dermis.human import teeth
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.mesh.maps import Maps
-from dermis.optics.flesh import medium_of
+from dermis.optics.flesh import aside_mm, medium_of
 from dermis.optics.forward import forward_directions
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.oblique import aside_mm
 from dermis.optics.thin_parts import across
 from dermis.scene.skin import USUAL_ROUGHNESS, Skin, lobe_name
 from dermis.specular.albedo import ROOT_OF_FIRST_ROW

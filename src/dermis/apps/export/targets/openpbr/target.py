@@ -24,8 +24,7 @@ from dermis.apps.export.targets.openpbr.materials import (
 from dermis.base.extras import needed
 from dermis.optics.curve import Curve
 from dermis.optics.half_space import half_space
-from dermis.optics.media import Floats, Layer
-from dermis.optics.van_de_hulst import albedo_of_colour
+from dermis.optics.media import Floats, Layer, albedo_of_colour
 from dermis.specular.fresnel import SKIN_ETA
 
 TYPED = "diffuse mean free path, as published"

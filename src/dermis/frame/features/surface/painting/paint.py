@@ -35,13 +35,11 @@ from dermis.gpu.shader_types import record_of, struct_dtype
 from dermis.gpu.textures import download
 from dermis.gpu.wgsl_source import Member
 from dermis.human.skin import face, textures
-from dermis.human.skin.colours import colour_tables
-from dermis.human.skin.detail import TILE_MM
-from dermis.human.skin.face import AMOUNTS, DEGREES, sizes
+from dermis.human.skin.face import AMOUNTS, DEGREES, FOLDING, sizes
 from dermis.human.skin.look import SkinLook
-from dermis.human.skin.movements import FOLDING
+from dermis.human.skin.painted import colour_tables
 from dermis.human.skin.surface import Painting
-from dermis.human.skin.textures import DOTS, GROUNDS, NOISES, WANDERING, noise_table
+from dermis.human.skin.textures import DOTS, GROUNDS, NOISES, TILE_MM, WANDERING, noise_table
 from dermis.mesh.maps import Maps
 from dermis.scene.skin import USUAL_RHO_S
 
