@@ -14,8 +14,8 @@ import pytest
 from moving_head import CAPTURE, write_moving_head
 
 import dermis
-from dermis.cli import head_options
 from dermis.images.io import read_image
+from dermis.mesh.pose import laid_over
 
 Run = Callable[..., Any]
 SMALL = ("--size", "32x32", "--atlas", "64", "--samples", "1", "--shadow-size", "64")
@@ -92,7 +92,7 @@ def test_whole_frames_are_not_drawn_again(animate: Run) -> None:
 def test_an_interruption_leaves_whole_frames_and_no_movie(
     animate: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    laid, left = head_options.laid_over, [0]
+    laid, left = laid_over, [0]
 
     def interrupted(*words: Any) -> Any:
         left[0] -= 1
@@ -100,7 +100,7 @@ def test_an_interruption_leaves_whole_frames_and_no_movie(
             raise KeyboardInterrupt
         return laid(*words)
 
-    monkeypatch.setattr("dermis.cli.animate.laid_over", interrupted)
+    monkeypatch.setattr("dermis.mesh.pose.laid_over", interrupted)
     left[0] = 3
     ended = animate("face.glb", "-o", "a.mp4")
     assert (ended.code, ended.stdout, ended.stderr) == (130, "", "")

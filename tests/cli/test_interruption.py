@@ -41,14 +41,14 @@ Path.replace = replace
 """
 IN_THE_CACHE = AT_THE_END.replace("if not path", "if path")
 AT_A_FRAME = """
-import dermis.cli.animate as command
-usual, drawn = command.laid_over, []
+import dermis.mesh.pose as module
+usual, drawn = module.laid_over, []
 def laid_over(*given):
     drawn.append(1)
     if len(drawn) == 3:
         asked(signal.{0})
     return usual(*given)
-command.laid_over = laid_over
+module.laid_over = laid_over
 """
 SMALL = "--size 32x32 --atlas 64 --adapter cpu"
 

@@ -7,7 +7,7 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -33,6 +33,14 @@ def print_lines(*lines: str) -> None:
     """Lines of a result on stdout, at once."""
     sys.stdout.write("\n".join(lines) + "\n")
     sys.stdout.flush()
+
+
+def print_report(as_json: bool, report: object, lines: Callable[[], Iterable[str]]) -> None:
+    """Print a report as one JSON object, or as the lines that `lines` makes of it."""
+    if as_json:
+        print_json(report)
+    else:
+        print_lines(*lines())
 
 
 def note(text: str) -> None:

@@ -5,25 +5,25 @@ from __future__ import annotations
 import hashlib
 import math
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.console import note, print_json, print_lines, progress, working_on
+from dermis.base.console import note, print_report, progress, working_on
 from dermis.base.errors import refuse
 from dermis.base.quantities import number
-from dermis.cli.head_options import laid_over
-from dermis.cli.options import Adapter, Json, Whole
+from dermis.cli.options import Adapter, Json, Options, Whole
 from dermis.cli.output_options import MovingOutput
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
     from dermis.mesh.clip import Clip
+    from dermis.mesh.head import Head
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
 
@@ -43,6 +43,8 @@ class _Take:
 
     def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
         """The scene of each frame; what the clip does not move keeps the scene's own pose."""
+        from dermis.mesh.pose import laid_over
+
         for frame in numbers:
             pose = self.clip.pose_at(float(frame / self.rate))
             yield replace(self.scene, pose=laid_over(pose, self.scene.pose))
@@ -140,10 +142,7 @@ def animate(
         "seconds": round(now - started, 3),
         "frames_per_s": round(len(missing) / (now - began), 3),
     }
-    if as_json:
-        print_json(report)
-    else:
-        print_lines(_in_words(report), *filter(None, [described.head.attribution]))
+    print_report(as_json, report, lambda: [_in_words(report), *filter(None, [described.head.attribution])])
     return 0
 
 
@@ -152,7 +151,7 @@ def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: st
     from dermis.frame.renderer import Renderer
 
     renderer, size = Renderer(adapter), take.settings.size
-    options: dict[str, Any] = {**take.settings.model_dump(), "linear": target.linear}
+    options: Options = {**take.settings.model_dump(), "linear": target.linear}
     options["exposure"] = _exposure(take, renderer)
     options["alpha"] = target.numbered and take.settings.background == "none"
     writing, bar = target.writing(size, take.rate), progress("drawing frames")
@@ -194,7 +193,7 @@ def _as_it_is(name: str) -> str:
     return name if told is None else f"{path.resolve()} {name} {told.st_size} {told.st_mtime_ns}"
 
 
-def _in_words(report: dict[str, Any]) -> str:
+def _in_words(report: Options) -> str:
     count, drawn = report["frames"], report["drawn"]
     kept = f" ({count - drawn} were there)" if drawn < count else ""
     place = f" on {report['adapter']}" if report["adapter"] else ""
@@ -205,16 +204,11 @@ def _in_words(report: dict[str, Any]) -> str:
 def _list_names(name: str, given: SceneOptions, as_json: bool) -> int:
     with working_on("loading"):
         found = names_of(name, assemble(name, given)[0].head)
-    if as_json:
-        print_json(found)
-    else:
-        print_lines(*(f"{kind}: {', '.join(each) or 'none'}" for kind, each in found.items()))
+    print_report(
+        as_json, found, lambda: (f"{kind}: {', '.join(each) or 'none'}" for kind, each in found.items())
+    )
     return 0
 
-
-if TYPE_CHECKING:
-    from dermis.mesh.clip import Clip
-    from dermis.mesh.head import Head
 
 _USUAL_RATE = 30.0
 
@@ -282,9 +276,7 @@ def motion_file(name: str, motion: str | None) -> str:
     return own
 
 
-def clip_of(
-    name: str, head: Head, motion: str, clip: str | None, given: Mapping[str, Any], span: Span
-) -> Clip:
+def clip_of(name: str, head: Head, motion: str, clip: str | None, given: Options, span: Span) -> Clip:
     """The motion of a file for a head.
 
     name : of the head as it was typed
@@ -310,7 +302,7 @@ def names_of(name: str, head: Head) -> dict[str, tuple[str, ...]]:
     return {"targets": head.targets, "bones": head.bones, "clips": clips}
 
 
-def _table(name: str) -> dict[str, Any]:
+def _table(name: str) -> Options:
     """The [head] of a scene's file; empty for other heads."""
     from dermis.scene.files import head_table
 

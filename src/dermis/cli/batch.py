@@ -9,13 +9,13 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from dermis.base.console import note, print_json, print_lines, working_on
+from dermis.base.console import note, print_json, print_lines, print_report, working_on
 from dermis.base.errors import refuse
-from dermis.cli.options import Adapter, Json, Whole, given, parse_size
+from dermis.cli.options import Adapter, Json, Options, Whole, given, parse_size
 
 if TYPE_CHECKING:
     from dermis.apps.batch.run import Crew, Report
@@ -101,15 +101,17 @@ def batch(
     as_json:
         Print one JSON object: counts, seconds, images/s, shards, what was skipped and what was left out.
     """
-    if example:
-        from dermis.apps.batch.spec import example_text
+    from dermis.apps.batch.spec import example_text, load_spec
 
+    if example:
         print_lines(example_text().rstrip("\n"))
         return 0
     part = _part(shard)
     if spec is None:
         refuse("SPEC", "a file", "none was named", "Print one to start from with --example")
-    read = _spec(spec, given(count=count, size=size and parse_size(size), seed=seed, format=format))
+    changed = given(count=count, size=size and parse_size(size), seed=seed, format=format)
+    with working_on("reading the spec"):
+        read = load_spec(spec, **changed)
     if dry_run:
         return _dry_run(read, adapter, output or Path("dry-run.png"), as_json)
     if output is None:
@@ -122,13 +124,6 @@ def batch(
     report = _drawn(read, output, crew, each, part, keep_going)
     _tell(report, output, as_json)
     return 0
-
-
-def _spec(path: Path, values: dict[str, Any]) -> Spec:
-    from dermis.apps.batch.spec import load_spec
-
-    with working_on("reading the spec"):
-        return load_spec(path, **values)
 
 
 def _part(text: str) -> tuple[int, int]:
@@ -174,7 +169,7 @@ def _numbers(adapter: str, adapters: str | None) -> tuple[int, ...]:
     return tuple(map(int, adapters.split(",")))
 
 
-def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: dict[str, Any]) -> Crew:
+def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: Options) -> Crew:
     from dermis.apps.batch.dask_cluster import Cluster
 
     if address is not None and file is not None:
@@ -226,10 +221,8 @@ def _dry_run(spec: Spec, adapter: str, sheet: Path, as_json: bool) -> int:
     with working_on("drawing a contact sheet"):
         rows, picture = dry_run(spec, adapter)
     write_png(sheet, picture)
-    if as_json:
-        print_json({"sheet": str(sheet), "parameters": rows})
-    else:
-        print_lines(*table_lines(rows), str(sheet))
+    report = {"sheet": str(sheet), "parameters": rows}
+    print_report(as_json, report, lambda: [*table_lines(rows), str(sheet)])
     return 0
 
 

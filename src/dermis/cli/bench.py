@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
-from dermis.base.console import print_json, print_lines, progress
+from dermis.base.console import print_report, progress
 from dermis.cli.head_options import HEAD, FileOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, Output, refuse_options
 
@@ -68,10 +68,7 @@ def bench(
     cases = PRESETS[preset or ("cpu" if software else "interactive")].cases()
     with progress("measuring") as tell:
         made = run(cases, _head(head), adapter, tell, file)
-    if as_json:
-        print_json(to_json(made))
-    else:
-        print_lines(*_lines(made))
+    print_report(as_json, to_json(made), lambda: _lines(made))
     if output is not None:  # last: where it cannot be written any more, the figures are not lost
         write_report(output, made)
     return 0

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from dermis.base.console import print_lines
-from dermis.cli.options import NOTHING, options_of, refuse_options
+from dermis.cli.options import NOTHING, Options, options_of, refuse_options
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 if TYPE_CHECKING:
-    SettingsOptions = dict[str, Any]
-    SkinOptions = dict[str, Any]
+    SettingsOptions = Options
+    SkinOptions = Options
 else:
     SettingsOptions = options_of(Settings, only=("technique", "seams", "transmission", "tone", "bloom"))
     SkinOptions = options_of(Skin, only=("profile", "specular", "fresnel", "energy", "direction"))
@@ -71,7 +70,7 @@ def _of_comparison(against: str, technique: str | None) -> tuple[str, ...]:
     return comparison_sources(against, [technique] if technique else TECHNIQUES)
 
 
-def _of_picture(file: Path | None, settings: Mapping[str, Any], skin: Mapping[str, Any]) -> tuple[str, ...]:
+def _of_picture(file: Path | None, settings: Options, skin: Options) -> tuple[str, ...]:
     from dermis.scene import load_scene
     from dermis.scene.lights import studio
     from dermis.scene.sources import sources_of

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dermis.apps.validation.comparisons.scenes import ModelName
+from dermis.base.arrays import Doubles
 from dermis.base.atomic_write import refuse_output, replacing
-from dermis.base.console import print_json, print_lines, working_on
+from dermis.base.console import print_report, working_on
 from dermis.base.errors import refuse
 from dermis.base.extras import needed
 from dermis.cli.head_options import ShapeOptions, check_head, note_eyes
-from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, given, option_name, options_of
+from dermis.cli.options import (
+    NOTHING,
+    Adapter,
+    Json,
+    Options,
+    Output,
+    Whole,
+    check,
+    given,
+    option_name,
+    options_of,
+)
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
@@ -28,10 +40,12 @@ _SIZES = {"size": (256, 256), "atlas": 1024}
 _DIRECTION = {"direction": "that of the truth's skin"}
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from dermis.apps.validation.comparisons.compare import Comparison
 
-    SizeOptions = dict[str, Any]
-    SkinOptions = dict[str, Any]
+    SizeOptions = Options
+    SkinOptions = Options
 else:
     SizeOptions = options_of(Settings, only=_SIZES, defaults=_SIZES)
     SkinOptions = options_of(Skin, only=("direction", "roughness"), defaults=_DIRECTION)
@@ -108,7 +122,7 @@ def compare(
     return 0
 
 
-def _check_used(what: str, chosen: Mapping[str, Any]) -> None:
+def _check_used(what: str, chosen: Options) -> None:
     """Refuse options that would change nothing."""
     if what == "specular":
         idle = dict.fromkeys(chosen.keys() - {"roughness"}, "surface models are compared without a head")
@@ -122,7 +136,7 @@ def _check_used(what: str, chosen: Mapping[str, Any]) -> None:
             refuse(option_name(name), "no such option here", f"it came, and {why}", "Leave it out")
 
 
-def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, Any]:
+def _choose(chosen: Options, sizes: Options) -> Options:
     """What `dermis.apps.validation.comparisons.compare` is asked for."""
     from dermis.apps.validation.comparisons.scenes import usual_region
 
@@ -144,7 +158,7 @@ def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, An
 
 
 def _compare_techniques(
-    head: str, shape: Mapping[str, Any], chosen: dict[str, Any], output: Path | None, as_json: bool
+    head: str, shape: Options, chosen: Options, output: Path | None, as_json: bool
 ) -> None:
     """Render a head with each technique, judge it by a truth, print and write what came of it."""
     from dermis.apps.validation.comparisons import compare as comparison
@@ -162,19 +176,13 @@ def _compare_techniques(
         made = comparison.compare(loaded, **chosen)
     if output is not None:
         write_report(output, made)
-    if as_json:
-        print_json(_report(made))
-    else:
-        print_lines(*_lines(made))
-
-
-def _report(made: Comparison) -> dict[str, Any]:
-    return {
+    report = {
         "title": made.title,
         "adapter": made.adapter,
         "truth": {"seconds": made.truth.seconds, "notes": list(made.truth.notes)},
         "rows": [asdict(row) for row in made.rows],
     }
+    print_report(as_json, report, lambda: _lines(made))
 
 
 def _lines(made: Comparison) -> Sequence[str]:
@@ -206,13 +214,10 @@ def compare_specular(output: Path | None, roughness: float, adapter: str, as_jso
         _draw_lobes_and_albedo(output, roughness)
     with working_on("measuring"):
         report = _specular_report(adapter)
-    if as_json:
-        print_json(report)
-    else:
-        print_lines(*_specular_lines(report, roughness))
+    print_report(as_json, report, lambda: _specular_lines(report, roughness))
 
 
-def _specular_report(adapter: str) -> dict[str, Any]:
+def _specular_report(adapter: str) -> Options:
     """All findings as one JSON-ready object."""
     from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
     from dermis.gpu.failures import on_device
@@ -237,7 +242,7 @@ def _specular_report(adapter: str) -> dict[str, Any]:
     }
 
 
-def _specular_lines(report: dict[str, Any], m: float) -> list[str]:
+def _specular_lines(report: Options, m: float) -> list[str]:
     from dermis.specular.comparison import peak
 
     cosine = np.cos(np.radians(_DEGREES))
@@ -278,14 +283,13 @@ def _drawn() -> list[str]:
     return [name for name in MODELS if name != _SAME_CURVE]
 
 
-def _lobes(m: float) -> Any:
+def _lobes(m: float) -> Figure:
     """Intensity under three lights in the plane of incidence: a polar panel for each model."""
     whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
     roots = {name: np.sqrt(_intensity(name, m) / whole) for name in _drawn()}
     farthest = max(_FARTHEST, 1.05 * float(np.max(list(roots.values()))))
     rows = -(-len(roots) // _COLUMNS)
-    make = needed("matplotlib.figure", "plots").Figure
-    figure = make(figsize=(3.0 * _COLUMNS, 2.4 * rows), dpi=130, layout="constrained")
+    figure = _figure(3.0 * _COLUMNS, 2.4 * rows)
     figure.suptitle(f"Intensity over kelemen's peak under the same light, on a root scale; m = {m:g}")
     panels = figure.subplots(rows, _COLUMNS, subplot_kw={"projection": "polar"}).ravel()
     for axes in panels[len(roots) :]:
@@ -305,7 +309,7 @@ def _lobes(m: float) -> Any:
     return figure
 
 
-def _intensity(name: str, m: float) -> Any:
+def _intensity(name: str, m: float) -> Doubles:
     """(3, n) BRDF times both cosines, for each incident angle and view [1/sr]."""
     angle = _view_angles()
     view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
@@ -317,13 +321,13 @@ def _intensity(name: str, m: float) -> Any:
     return np.stack(rows)
 
 
-def _view_angles() -> Any:
+def _view_angles() -> Doubles:
     return np.radians(np.linspace(-89.9, 89.9, 1200))
 
 
-def _albedos(m: float) -> Any:
+def _albedos(m: float) -> Figure:
     """Directional albedo by angle, all models in one panel."""
-    figure = needed("matplotlib.figure", "plots").Figure(figsize=(7.2, 4.6), dpi=130, layout="constrained")
+    figure = _figure(7.2, 4.6)
     axes = figure.subplots()
     degrees = np.linspace(0.0, 89.0, 180)
     for name in _drawn():
@@ -336,6 +340,12 @@ def _albedos(m: float) -> Any:
     return figure
 
 
-def _save_figure(figure: Any, path: Path) -> None:
+def _figure(width: float, height: float) -> Figure:
+    """Return an empty figure of some size [inch]."""
+    make: type[Figure] = needed("matplotlib.figure", "plots").Figure
+    return make(figsize=(width, height), dpi=130, layout="constrained")
+
+
+def _save_figure(figure: Figure, path: Path) -> None:
     with replacing(path) as trial:
         figure.savefig(trial)

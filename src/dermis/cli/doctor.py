@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import platform
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import TYPE_CHECKING
 
-from dermis.base.console import print_json, print_lines
+from dermis.base.console import print_report
 from dermis.base.errors import DermisError
-from dermis.cli.options import Adapter, Json
+from dermis.cli.options import Adapter, Json, Options
+
+if TYPE_CHECKING:
+    from dermis.frame.renderer import Renderer
 
 _LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "OpenEXR", "pillow")
 
@@ -25,14 +28,11 @@ def doctor(*, adapter: Adapter = "auto", as_json: Json = False) -> int:
         dermis doctor --adapter cpu --json
     """
     report = examine(adapter)
-    if as_json:
-        print_json(report)
-    else:
-        print_lines(*_lines(report))
+    print_report(as_json, report, lambda: _lines(report))
     return 0 if report["healthy"] else 2
 
 
-def examine(wanted: str) -> dict[str, Any]:
+def examine(wanted: str) -> Options:
     """All findings as one JSON-ready object."""
     from dermis.base.private import cache_folder
     from dermis.formats.samples import SAMPLES, cached
@@ -62,7 +62,7 @@ def _version(name: str) -> str:
         return "not installed"
 
 
-def _try_out(wanted: str) -> dict[str, Any]:
+def _try_out(wanted: str) -> Options:
     """Open the adapter and use it."""
     from dermis.frame.renderer import Renderer
     from dermis.gpu.textures import half_store_rounding
@@ -83,7 +83,7 @@ def _try_out(wanted: str) -> dict[str, Any]:
     return {"healthy": test["passed"], "used": used, "self_test": test, "problem": problem}
 
 
-def _self_test(renderer: Any) -> dict[str, Any]:
+def _self_test(renderer: Renderer) -> Options:
     """A white sphere, lit from the camera: its middle must reflect what the light sends, no pixel more."""
     from dermis.mesh.head import Head
     from dermis.mesh.maps import Maps
@@ -105,7 +105,7 @@ def _self_test(renderer: Any) -> dict[str, Any]:
     return {"passed": passed, "centre": centre, "frame_ms": rendered.frame_ms}
 
 
-def _lines(report: dict[str, Any]) -> list[str]:
+def _lines(report: Options) -> list[str]:
     mark = {True: "yes", False: "no"}
     lines = ["adapters:"]
     for one in report["adapters"]:

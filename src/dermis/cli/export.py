@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from dermis.apps.export.registry import TARGETS
-from dermis.base.console import print_json, print_lines, working_on
+from dermis.base.console import print_report, working_on
 from dermis.base.errors import refuse
 from dermis.cli.head_options import HeadOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, given
@@ -92,20 +92,12 @@ def export(
 
     check_head(what, head)
     if diffuse_transmission:
-        _check_alone(variant)
+        if variant is not None:
+            came = f"--variant {variant} came with it"
+            refuse("--diffuse-transmission", "no other variant", came, "Leave one of them out")
         variant = "diffuse-transmission"
-    told: dict[str, Any] = given(version=version, variant=variant, model=model)
-    told |= given(profile=profile, library=library)
+    told = given(version=version, variant=variant, model=model, profile=profile, library=library)
     with working_on(f"exporting {what}"):
         report = export_skin(what, to, output, side=map_side, adapter=adapter, **told, **head)
-    if as_json:
-        print_json(report.as_json())
-    else:
-        print_lines(*report.lines(naive), "", *map(str, report.files))
+    print_report(as_json, report.as_json(), lambda: [*report.lines(naive), "", *map(str, report.files)])
     return 0
-
-
-def _check_alone(variant: str | None) -> None:
-    if variant is not None:
-        came = f"--variant {variant} came with it"
-        refuse("--diffuse-transmission", "no other variant", came, "Leave one of them out")

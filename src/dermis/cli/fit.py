@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from dermis.base.console import print_json, print_lines, progress
-from dermis.cli.options import Adapter, Json
+from dermis.cli.options import Adapter, Json, Options, parse_colour
 
 if TYPE_CHECKING:
     from dermis.apps.inverse.fitting.result import FitResult
@@ -79,11 +79,11 @@ def fit(
     from dermis.apps.inverse.fitting.fit import fit as fitted
     from dermis.apps.inverse.fitting.result import SUMMARY, save_fit
     from dermis.base.atomic_write import check_folder
-    from dermis.cli.options import parse_colour
 
-    given: Any = white if white == "specular" else parse_colour(white, "--white")
+    colour = white if white == "specular" else parse_colour(white, "--white")
     check_folder(output, SUMMARY)
-    how = {"suns": suns, "exposure": exposure, "white": given, "noise": noise, "side": side, "atlas": atlas}
+    how: Options = {"suns": suns, "exposure": exposure, "white": colour, "noise": noise}
+    how |= {"side": side, "atlas": atlas}
     with progress("fitting") as told:
         found = fitted(photo, head, camera=camera, landmarks=landmarks, adapter=adapter, told=told, **how)
     _report(found, save_fit(output, found), as_json)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.console import note, print_json, print_lines, progress
+from dermis.base.console import note, print_report, progress
 from dermis.cli.options import Adapter, Json, Whole
 
 if TYPE_CHECKING:
@@ -73,11 +73,9 @@ def gallery(
                 note(f"dermis: {picture.script.name}: {picture.fault}")
     page = output / "index.html"
     write_page(page, pictures, studio.name, studio.renderer.device.adapter.name)
-    if as_json:
-        print_json({"page": str(page), "pictures": [_row(picture) for picture in pictures]})
-    else:
-        number = f"{len(pictures)} picture{'s' * (len(pictures) != 1)}"
-        print_lines(f"{page}  {number}  {sum(one.seconds for one in pictures):.0f} s")
+    number = f"{len(pictures)} picture{'s' * (len(pictures) != 1)}"
+    said = f"{page}  {number}  {sum(one.seconds for one in pictures):.0f} s"
+    print_report(as_json, {"page": str(page), "pictures": list(map(_row, pictures))}, lambda: [said])
     return 2 if any(picture.fault for picture in pictures) else 0
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 from cyclopts import Parameter
 
-from dermis.base.console import print_json, print_lines, working_on
+from dermis.base.console import print_report, working_on
 from dermis.base.errors import refuse
 from dermis.cli.head_options import parse_weights
-from dermis.cli.options import Adapter, Json, Whole, given
+from dermis.cli.options import Adapter, Json, Options, Whole, given
 
 if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook
@@ -129,31 +129,43 @@ def head(
     from dermis.base.atomic_write import check_output
     from dermis.frame.features.surface.painting.painted_head import painted_head
     from dermis.gpu.failures import on_device
-    from dermis.human.person_file import write_numbers
+    from dermis.human.person_file import numbers_of, write_numbers
+    from dermis.human.published import human_targets
 
     if list_targets:
-        return _list_targets(as_json)
+        print_report(as_json, list(human_targets()), human_targets)
+        return 0
     started = time.perf_counter()
     check_output(output, (".glb", ".json"), "Choose .glb for a head, .json for the numbers of a person")
-    numbers = given(african=african, asian=asian, caucasian=caucasian, sex=sex, age=age)
-    numbers |= given(weight=weight, muscle=muscle)
+    ancestry = given(african=african, asian=asian, caucasian=caucasian)
+    numbers = ancestry | given(sex=sex, age=age, weight=weight, muscle=muscle)
     resting = parse_weights(expression or [], EXPRESSION)
     person = _person(seed, numbers, parse_weights(target or [], TARGET))
     own = _look(person.look, skin, "--skin"), _look(person.iris, eye, "--eye")
     person = replace(person, skin=own[0], eyes=own[1], hair=_hair(person.hairdo, hair))
+    report: Options = {"head": str(output), "person": numbers_of(person)}
     if output.suffix.lower() == ".json":
-        length = write_numbers(output, person)
-        return _tell_numbers(output, person, length, as_json)
+        report |= {"bytes": write_numbers(output, person)}
+        print_report(as_json, report, lambda: [f"{output}  {report['bytes']} bytes"])
+        return 0
     with working_on("making the head"):
         made = person.head(layout=layout, **given(subdivide=subdivide))
         made = _with_maps(made, given(colour=colour, normal=normal, roughness=roughness))
         made, eyes = on_device(adapter, lambda device: painted_head(device, made, size))
         length = _write(output, person, made, resting, eyes)
-    _report(output, person, made, as_json, bytes=length, seconds=round(time.perf_counter() - started, 3))
+    seconds, triangles = round(time.perf_counter() - started, 3), len(made.mesh.triangles)
+    report |= {
+        "vertices": len(made.mesh.positions),
+        "triangles": triangles,
+        "bytes": length,
+        "seconds": seconds,
+    }
+    said = f"{output}  {triangles:,} triangles  {length / 1e6:.1f} MB  {seconds:.1f} s"
+    print_report(as_json, report, lambda: [said, *filter(None, [made.attribution])])
     return 0
 
 
-def _person(seed: int | None, numbers: dict[str, Any], targets: dict[str, float]) -> Human:
+def _person(seed: int | None, numbers: Options, targets: dict[str, float]) -> Human:
     """The drawn or the usual person, with what was given in place of its own."""
     from dermis.human.person import Human
 
@@ -168,7 +180,7 @@ def _look(usual: L, words: list[str] | None, option: str) -> L:
     for name in chosen:
         if name not in known:
             refuse(option, f"names of {', '.join(known)}", f"{name!r} came", "Correct it")
-    numbers: dict[str, Any] = dict(chosen)
+    numbers: Options = dict(chosen)
     if (seed := chosen.get("seed")) is not None and seed.is_integer():
         numbers["seed"] = int(seed)
     return replace(usual, **numbers)
@@ -176,17 +188,14 @@ def _look(usual: L, words: list[str] | None, option: str) -> L:
 
 def _hair(usual: HairLook, words: list[str] | None) -> HairLook:
     """Hair with some of it replaced; its style is a word."""
-    style: Any = usual.style
-    numbers = []
-    for pair in ",".join(words or []).split(","):
-        if pair.startswith("style="):
-            style = pair.removeprefix("style=")
-        elif pair:
-            numbers.append(pair)
-    return replace(_look(usual, numbers, "--hair"), style=style)
+    pairs = [pair for pair in ",".join(words or []).split(",") if pair]
+    styles = [pair.removeprefix("style=") for pair in pairs if pair.startswith("style=")]
+    numbers = [pair for pair in pairs if not pair.startswith("style=")]
+    style: Options = {"style": styles[-1]} if styles else {}
+    return replace(_look(usual, numbers, "--hair"), **style)
 
 
-def _with_maps(made: Head, files: dict[str, Any]) -> Head:
+def _with_maps(made: Head, files: Options) -> Head:
     """The head with maps of files in place of its own; a normal map takes the place of its relief."""
     from dermis.formats.maps import load_maps
 
@@ -204,34 +213,3 @@ def _write(
 
     Pose(expression).motion(made.control, EXPRESSION)  # names and weights that can be
     return write_person(output, person, made, roughness=Skin().roughness, weights=expression, eyes=eyes)
-
-
-def _report(output: Path, person: Human, made: Head, as_json: bool, **told: Any) -> None:
-    from dermis.human.person_file import numbers_of
-
-    if as_json:
-        size = {"vertices": len(made.mesh.positions), "triangles": len(made.mesh.triangles)}
-        print_json({"head": str(output), "person": numbers_of(person), **size, **told})
-        return
-    counted = f"{len(made.mesh.triangles):,} triangles  {told['bytes'] / 1e6:.1f} MB"
-    print_lines(f"{output}  {counted}  {told['seconds']:.1f} s", *filter(None, [made.attribution]))
-
-
-def _tell_numbers(output: Path, person: Human, length: int, as_json: bool) -> int:
-    from dermis.human.person_file import numbers_of
-
-    if as_json:
-        print_json({"head": str(output), "person": numbers_of(person), "bytes": length})
-    else:
-        print_lines(f"{output}  {length} bytes")
-    return 0
-
-
-def _list_targets(as_json: bool) -> int:
-    from dermis.human.published import human_targets
-
-    if as_json:
-        print_json(list(human_targets()))
-    else:
-        print_lines(*human_targets())
-    return 0

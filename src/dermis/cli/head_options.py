@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from dermis.base.console import note
 from dermis.base.errors import DermisError, refuse
-from dermis.cli.options import check, options_of
+from dermis.cli.options import Options, check, options_of
 from dermis.mesh.eye_look import LIMITS
 from dermis.scene.head_table import HeadTable
 
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from dermis.mesh.pose import Pose
     from dermis.scene.model import Scene
 
-    HeadOptions = dict[str, Any]
-    ShapeOptions = dict[str, Any]
-    FileOptions = dict[str, Any]
+    HeadOptions = Options
+    ShapeOptions = Options
+    FileOptions = Options
 else:
     HeadOptions = options_of(HeadTable, without=("name",), names=HEAD)
     ShapeOptions = options_of(HeadTable, only=_SHAPE)
     FileOptions = options_of(HeadTable, only=(*_SHAPE, *_MAPS), names=HEAD)
 
 
-def check_head(name: str, options: Mapping[str, Any]) -> None:
+def check_head(name: str, options: Options) -> None:
     """Refuse what no head can be read with."""
     check(HeadTable, {"name": name, **options}, HEAD)
 
@@ -97,37 +97,24 @@ Turns = Annotated[
 
 def parse_weights(words: Sequence[str], option: str = POSE) -> dict[str, float]:
     """Weights by name of "jawOpen=0.6,mouthSmileLeft=1"."""
-    weights = {}
-    for word in (part for text in words for part in text.split(",")):
-        name, sign, number = word.rpartition("=")
-        weight = _numbers(number)
-        if not sign or not name.strip() or weight is None or len(weight) != 1:
-            expected = "NAME=WEIGHT with commas between, such as jawOpen=0.6,mouthSmileLeft=1"
-            refuse(option, expected, f"{word!r} came", "Correct it")
-        weights[name.strip()] = weight[0]
-    return weights
+    expected = "NAME=WEIGHT with commas between, such as jawOpen=0.6,mouthSmileLeft=1"
+    parts = (part for text in words for part in text.split(","))
+    return {name: weight for name, (weight,) in _pairs(parts, 1, option, expected)}
 
 
 def parse_turns(words: Sequence[str]) -> dict[str, list[float]]:
     """Angles [degrees] by name of the bone of "head=0,25,0"."""
-    turns = {}
+    return dict(_pairs(words, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"))
+
+
+def _pairs(words: Iterable[str], count: int, option: str, expected: str) -> Iterator[tuple[str, list[float]]]:
+    """Yield name and numbers of each "NAME=NUMBER,..."."""
     for word in words:
-        name, sign, numbers = word.rpartition("=")
-        angles = _numbers(numbers)
-        if not sign or not name.strip() or angles is None or len(angles) != 3:
-            expected = "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"
-            refuse(BONE, expected, f"{word!r} came", "Correct it")
-        turns[name.strip()] = angles
-    return turns
-
-
-def laid_over(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
-    """A pose that keeps from another one what it says nothing of."""
-    from dermis.mesh.pose import Pose
-
-    under = Pose.of(base) or Pose()
-    places = under.positions_mm if pose.positions_mm is None else pose.positions_mm
-    return Pose({**under.weights, **pose.weights}, {**under.bones, **pose.bones}, places)
+        name, _, text = word.rpartition("=")
+        numbers = _numbers(text)
+        if not name.strip() or numbers is None or len(numbers) != count:
+            refuse(option, expected, f"{word!r} came", "Correct it")
+        yield name.strip(), numbers
 
 
 def pose_given(
@@ -141,7 +128,7 @@ def pose_given(
     """
     from dermis.mesh.pose import Pose
 
-    parts: dict[str, Any] = {POSE: Pose(weights), BONE: Pose(bones=turns)}
+    parts = {POSE: Pose(weights), BONE: Pose(bones=turns)}
     for option, part in parts.items():
         try:
             part.motion(head.control, option)

@@ -22,7 +22,7 @@ def _whole(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
 
 
-def _word(model: type[Plain], field: str, kind: Any, tokens: Sequence[Token]) -> str:
+def _word(model: type[Plain], field: str, kind: object, tokens: Sequence[Token]) -> str:
     """Return a word that the field may be now, which may be more than when the command was imported."""
     from dermis.scene.plain import choices_of
 
@@ -55,7 +55,9 @@ Adapter = Annotated[
 ]
 Output = Annotated[Path | None, Parameter(name=("--output", "-o"))]
 _LENGTHS_MM = 1e-6, 1e4
-NOTHING: dict[str, Any] = {}
+Options = dict[str, Any]
+"""Fields of a model by name, as they were typed."""
+NOTHING: Options = {}
 """Options of a model when none is given."""
 # cyclopts itself would round 64.5.
 Whole = Annotated[int | None, Parameter(converter=_whole)]
@@ -67,7 +69,7 @@ def options_of(
     only: Collection[str] = (),
     without: Collection[str] = (),
     names: Mapping[str, str] | None = None,
-    defaults: Mapping[str, Any] | None = None,
+    defaults: Mapping[str, object] | None = None,
 ) -> Any:
     """The type of a command's parameter that takes a dictionary: the fields of a model that were given.
 
@@ -80,7 +82,7 @@ def options_of(
     """
     from dermis.scene.plain import heading_of
 
-    options: dict[str, Any] = {}
+    options: dict[str, object] = {}
     for field in only or model.model_fields:
         kind, how = _kind(model, field)
         if kind is not None and field not in without:
@@ -92,7 +94,7 @@ def options_of(
     return Annotated[made(model.__name__, options, total=False), Parameter(name="*")]
 
 
-def given(**options: Any) -> dict[str, Any]:
+def given(**options: object) -> Options:
     """Those that are not None."""
     return {name: value for name, value in options.items() if value is not None}
 
@@ -107,7 +109,7 @@ def is_option(model: type[Plain], field: str) -> bool:
     return _kind(model, field)[0] is not None
 
 
-def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
+def _kind(model: type[Plain], field: str) -> tuple[Any, Options]:
     """What cyclopts takes a field's words for, and how it makes the value of them; None for no option."""
     from dermis.scene.field_errors import words_of
     from dermis.scene.plain import choices_of
@@ -123,7 +125,7 @@ def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
     kind = model.model_fields[field].annotation
     kind = next((one for one in get_args(kind) if get_args(kind)[-1] is NoneType), kind)
     parts = tuple(get_args(part)[0] if get_args(part) else part for part in get_args(kind))
-    known: dict[Any, tuple[Any, dict[str, Any]]] = {
+    known: dict[object, tuple[object, Options]] = {
         int: (int, {"converter": _whole}),
         (int, int): (
             tuple[int, int],
@@ -138,7 +140,7 @@ def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
     return (kind, {}) if kind in (bool, float, str) else known.get(parts or kind, (None, {}))
 
 
-def _help(model: type[Plain], field: str, defaults: Mapping[str, Any]) -> str:
+def _help(model: type[Plain], field: str, defaults: Mapping[str, object]) -> str:
     """A field's help with its bounds, where they say something, and its default."""
     from dermis.scene.field_errors import words_of
     from dermis.scene.plain import choices_of, help_of, shown, values_of
@@ -151,7 +153,7 @@ def _help(model: type[Plain], field: str, defaults: Mapping[str, Any]) -> str:
     return f"{text} [default: {default}]" if default else text
 
 
-def check(model: type[Plain], values: Mapping[str, Any], names: Mapping[str, str] | None = None) -> None:
+def check(model: type[Plain], values: Mapping[str, object], names: Mapping[str, str] | None = None) -> None:
     """Refuse values that no field of a model can have, under the names of their options.
 
     values : by field

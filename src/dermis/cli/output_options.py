@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -18,7 +18,17 @@ from dermis.human.landmarks.sets import SETS
 from dermis.scene.outputs import OUTPUTS, checked_outputs
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
+
+    from dermis.base.arrays import Floats
+    from dermis.frame.features.outputs.planes import PlaneArray
+    from dermis.frame.observation import Landmarks as SeenLandmarks
+    from dermis.frame.observation import Observation
+    from dermis.frame.renderer import Renderer
+    from dermis.mesh.head import Head
+    from dermis.scene.model import Scene
+    from dermis.scene.settings import Settings
 
 _OUTPUTS_HELP = (
     "What else is known of each pixel, with commas between: "
@@ -57,7 +67,7 @@ class FrameOutputs:
         if "motion" in self.names:
             note("note: motion is 0 in a single picture; Renderer.observe counts it from one to the next")
 
-    def write(self, picture: NDArray[Any] | None, values: Mapping[str, NDArray[Any]]) -> None:
+    def write(self, picture: Floats | None, values: Mapping[str, PlaneArray]) -> None:
         """Write them.
 
         picture : linear, where they are parts of its file
@@ -105,7 +115,7 @@ class FrameLandmarks:
             self.names = checked_landmarks([name.strip() for name in typed.split(",")])
             check_output(self.path, (self.path.suffix,))
 
-    def check(self, head: Any) -> None:
+    def check(self, head: Head) -> None:
         """Raises DermisError for a head that has no landmarks of these names."""
         if self.names:
             from dermis.human.landmarks.points import landmark_points
@@ -113,7 +123,7 @@ class FrameLandmarks:
             for name in self.names:
                 landmark_points(head, name)
 
-    def write(self, renderer: Any, scene: Any, settings: Any) -> None:
+    def write(self, renderer: Renderer, scene: Scene, settings: Settings) -> None:
         """Write them, if any are asked."""
         if not self.names:
             return
@@ -125,7 +135,7 @@ class FrameLandmarks:
             part.write_text(text, "utf-8")
 
 
-def _told(seen: Any) -> dict[str, Any]:
+def _told(seen: Observation) -> dict[str, object]:
     camera = seen.camera
     return {
         "camera": {"K": camera.K.tolist(), "R": camera.R.tolist(), "t_mm": camera.t.tolist()},
@@ -135,7 +145,7 @@ def _told(seen: Any) -> dict[str, Any]:
     }
 
 
-def _rows(one: Any) -> list[dict[str, Any]]:
+def _rows(one: SeenLandmarks) -> list[dict[str, object]]:
     each = zip(one.names, one.pixels.tolist(), one.positions_mm.tolist(), one.visible.tolist(), strict=True)
     return [
         {"name": name, "pixel": pixel, "position_mm": place, "visible": visible}
@@ -143,7 +153,7 @@ def _rows(one: Any) -> list[dict[str, Any]]:
     ]
 
 
-Write = Callable[[int, Any], None]
+Write = Callable[[int, "NDArray[np.generic]"], None]
 """Takes the number of a frame and its picture."""
 
 

@@ -15,7 +15,15 @@ import sys
 import threading
 import time
 from types import FrameType, TracebackType
-from typing import Any, Self, TextIO
+from typing import TYPE_CHECKING, Any, Self, TextIO
+
+if TYPE_CHECKING:
+    from asyncio import AbstractEventLoop
+    from collections.abc import Callable
+
+    from _typeshed import ReadableBuffer
+
+    Handler = Callable[[int, FrameType | None], Any] | int | signal.Handlers | None
 
 _USES = (os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)  # of what takes the place of a closed stdin, stdout, stderr
 
@@ -80,7 +88,7 @@ class _Guarded(io.RawIOBase):
         self._inner, self.number = inner, number
         self.fault: OSError | None = None
 
-    def write(self, data: Any, /) -> int:
+    def write(self, data: ReadableBuffer, /) -> int:
         """Take all of it, or as much as goes at once."""
         while self.fault is None:
             try:
@@ -89,7 +97,7 @@ class _Guarded(io.RawIOBase):
                 select.select([], [self.number], [])  # it does not block, and is full
             except OSError as fault:
                 self.fault = fault
-        return len(data)
+        return memoryview(data).nbytes
 
     def writable(self) -> bool:
         """Yes, as far as its user can tell."""
@@ -138,7 +146,7 @@ class Interruption:
     def __init__(self) -> None:
         self.code = 0
         self._is_raised = self._is_late = False
-        self._usual: dict[int, Any] = {}
+        self._usual: dict[int, Handler] = {}
         self._sent = 0  # by ourselves
 
     def __enter__(self) -> Self:
@@ -187,7 +195,7 @@ class Interruption:
         self._is_raised, self._is_late = False, True
         self._writing.send(_RETRY)
 
-    def _lost(self, lost: Any) -> None:
+    def _lost(self, lost: sys.UnraisableHookArgs) -> None:
         """What Python calls with an exception that nobody gets, as in a destructor."""
         if self.code and issubclass(lost.exc_type, KeyboardInterrupt):
             self._raise_later()
@@ -228,14 +236,15 @@ def _interrupt() -> None:
     raise KeyboardInterrupt
 
 
-def _running_loop() -> Any:
+def _running_loop() -> AbstractEventLoop | None:
     """asyncio's, if the main thread is in one."""
     if (asyncio := sys.modules.get("asyncio")) is None:
         return None
     try:
-        return asyncio.get_running_loop()
+        loop: AbstractEventLoop = asyncio.get_running_loop()
     except RuntimeError:
         return None
+    return loop
 
 
 def _would_be_lost(frame: FrameType | None) -> bool:

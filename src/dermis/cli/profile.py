@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from dermis.base.console import note, print_json, print_lines, progress
 from dermis.base.errors import refuse
 from dermis.base.quantities import number, whole_number
-from dermis.cli.options import NOTHING, Json, Output, Whole, option_name, options_of, parse_lengths
+from dermis.cli.options import NOTHING, Json, Options, Output, Whole, option_name, options_of, parse_lengths
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.scene.skin import Pigments
 
@@ -33,10 +33,11 @@ if TYPE_CHECKING:
     from dermis.optics.radial import RadialProfile
     from dermis.optics.tissue import Tissue
 
-    PigmentOptions = dict[str, Any]
+    PigmentOptions = Options
 else:
     PigmentOptions = options_of(Pigments, names=_NAMES, defaults=_defaults())
 
+Clamp = Literal["layer", "none"]
 Model = Literal["counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
 Flag = Annotated[bool, Parameter(negative="")]
 
@@ -48,7 +49,7 @@ def profile(
     /,
     *,
     model: Model | None = None,
-    clamp: Literal["layer", "none"] = "layer",
+    clamp: Clamp = "layer",
     eta: float | None = None,
     photons: Whole = None,
     seed: Whole = None,
@@ -169,7 +170,7 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
         refuse("--check", "a plot to add photons to", "no --plot came", "Add --plot picture.png")
 
 
-def _light(photons: int | None, seed: int | None, anisotropy: float, traced: bool) -> dict[str, Any]:
+def _light(photons: int | None, seed: int | None, anisotropy: float, traced: bool) -> Options:
     """What to trace, with a note when nothing is going to be traced."""
     if not traced and (photons, seed, anisotropy) != (None, None, 0.0):
         note("note: no photons are traced without --model montecarlo or --check")
@@ -180,14 +181,14 @@ def _light(photons: int | None, seed: int | None, anisotropy: float, traced: boo
     }
 
 
-def _refuse_tissue_options(name: str, given: dict[str, Any]) -> None:
+def _refuse_tissue_options(name: str, given: Options) -> None:
     for option, value in given.items():
         if value is not None:
             expected, came = "a medium or a skin of pigments", f"{name} is a table of Gaussians"
             refuse(option_name(option, _NAMES), expected, came, "Leave it out")
 
 
-def _tissue(name: str, given: dict[str, Any], eta: float | None) -> Tissue:
+def _tissue(name: str, given: Options, eta: float | None) -> Tissue:
     from dermis.optics.tissue import load_tissue
 
     structure = given.get("structure")
@@ -197,13 +198,13 @@ def _tissue(name: str, given: dict[str, Any], eta: float | None) -> Tissue:
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
 
-def _spectrum(tissue: Tissue, model: Model | None, clamp: Any) -> Floats | None:
+def _spectrum(tissue: Tissue, model: Model | None, clamp: Clamp) -> Floats | None:
     if model is None or model == "counted" or model == "montecarlo":
         return tissue.spectrum(clamp=clamp)
     return tissue.spectrum(model, clamp)
 
 
-def _profile(tissue: Tissue, model: Model | None, clamp: Any, light: dict[str, Any]) -> RadialProfile:
+def _profile(tissue: Tissue, model: Model | None, clamp: Clamp, light: Options) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
     from dermis.apps.truths.slab_mc import counted_profile

@@ -16,6 +16,9 @@ from dermis.optics.fits.burley import BurleyFit
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from dermis.optics.diffusion.models import ModelError
     from dermis.optics.fits.separable import SeparableFit
     from dermis.optics.gaussians import GaussianSum
@@ -104,10 +107,10 @@ class Report:
         other = _other(radial, request.kind)
         return cls(radial, tissue, fit, ring_error, other, through_mm, model_error, spectrum)
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, object]:
         """Everything, in plain lists."""
         radial, sum_ = self.radial, self.fit.profile
-        found: dict[str, Any] = plain(
+        found: dict[str, object] = plain(
             {
                 "name": radial.name,
                 "model": radial.model,
@@ -187,7 +190,7 @@ class Report:
         """Write the Gaussians for the renderer."""
         from dermis.optics.profiles import write_profile
 
-        remarks: dict[str, Any] = {"name": self.radial.name, "model": self.radial.model}
+        remarks: dict[str, object] = {"name": self.radial.name, "model": self.radial.model}
         if self.tissue is not None:
             medium = self.tissue.medium
             remarks |= {"eta": medium.eta, "layers": [layer.name for layer in medium.layers]}
@@ -204,11 +207,11 @@ class Report:
             "of incident light, surface reflection apart" if self.radial.incident else "of light that enters"
         )
 
-    def _tissue_json(self) -> dict[str, Any]:
+    def _tissue_json(self) -> dict[str, object]:
         if self.tissue is None:
             return {}
         medium, parameters = self.tissue.medium, self.tissue.parameters
-        found: dict[str, Any] = {
+        found: dict[str, object] = {
             "eta": medium.eta,
             "layers": [layer.name for layer in medium.layers],
             "thickness_mm": [layer.thickness_mm for layer in medium.layers],
@@ -223,7 +226,7 @@ class Report:
             found["reflectance"] = self.spectrum
         return found
 
-    def _other_json(self) -> dict[str, Any]:
+    def _other_json(self) -> dict[str, object]:
         from dermis.optics.fits.burley import BurleyFit, unity_parameters, unreal_parameters
 
         if self.other is None:
@@ -241,7 +244,7 @@ class Report:
         ways = {"gaussians": through_gaussians(self.fit.profile, self.through_mm)}
         return ways if self.tissue is None else ways | {"slab": self.tissue.through(self.through_mm)}
 
-    def _through_json(self) -> dict[str, Any]:
+    def _through_json(self) -> dict[str, object]:
         ways = self._through()
         return {"transmission": {"thickness_mm": self.through_mm, **ways}} if ways else {}
 
@@ -258,17 +261,13 @@ def _other(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
     return None
 
 
-if TYPE_CHECKING:
-    from dermis.cli.profile_report import Report
-    from dermis.optics.media import Floats
-    from dermis.optics.radial import RadialProfile
-
 _INK = ("#c0392b", "#2e8b57", "#2a62b0")
 _ABOVE: dict[str, Any] = {"frameon": False, "fontsize": 7, "loc": "lower left", "bbox_to_anchor": (0, 1)}
 _LAYERS = ("#b8860b", "#8e44ad", "#16808a", "#7f8c8d")
+_DASHES = (0, (4, 3))
 _NAMES = ("red", "green", "blue")
 _FAINTEST = 1e-5  # of the peak of r R(r): below that numbers are noise and eyes see nothing
-_UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+_UNDATED: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """What keeps the same plot the same file."""
 _LEAST_COUNT = 0.3  # relative standard error beyond which a ring of photons is left out
 
@@ -300,24 +299,26 @@ def draw_plot(path: Path, found: Report, counted: RadialProfile | None) -> None:
         trial.write_bytes(drawn.getvalue())
 
 
-def _spectra(axes: Any, found: Report) -> None:
+def _spectra(axes: Axes, found: Report) -> None:
     """Reflectance by wavelength, and the layers' coefficients on an axis of their own."""
     from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
-    assert found.tissue is not None
+    assert found.tissue is not None and found.spectrum is not None
     axes.plot(WAVELENGTHS_NM, found.spectrum, color="black", linewidth=1.6, label="R")
     axes.set(xlim=(400, 700), ylim=(0, 1), xlabel="wavelength [nm]", ylabel="R, of incident light")
     right = axes.twinx()
     right.set(yscale="log", ylabel="µa, µs′ [1/mm]")
     for layer, ink in zip(found.tissue.medium.layers, _LAYERS, strict=False):
         right.plot(WAVELENGTHS_NM, layer.sigma_a, color=ink, linewidth=1.0, label=f"µa, {layer.name}")
-        dashes = {"linewidth": 1.0, "linestyle": (0, (4, 3)), "label": f"µs′, {layer.name}"}
-        right.plot(WAVELENGTHS_NM, layer.sigma_s_prime, color=ink, **dashes)
+        label = f"µs′, {layer.name}"
+        right.plot(
+            WAVELENGTHS_NM, layer.sigma_s_prime, color=ink, linewidth=1.0, linestyle=_DASHES, label=label
+        )
     lines = [*axes.get_lines(), *right.get_lines()]
-    axes.legend(lines, [line.get_label() for line in lines], ncols=5, **_ABOVE)
+    axes.legend(lines, [str(line.get_label()) for line in lines], ncols=5, **_ABOVE)
 
 
-def _legend(figure: Any, axes: Any) -> None:
+def _legend(figure: Figure, axes: Axes) -> None:
     """A column for each channel, below the curves."""
     entries = zip(*axes.get_legend_handles_labels(), strict=True)
     by_channel = sorted(entries, key=lambda entry: _NAMES.index(entry[1].partition(",")[0]))
@@ -326,7 +327,7 @@ def _legend(figure: Any, axes: Any) -> None:
     )
 
 
-def _curves(axes: Any, found: Report) -> float:
+def _curves(axes: Axes, found: Report) -> float:
     radial, fit = found.radial, found.fit.profile
     r = radial.radius_mm
     fitted = fit.radiant_exitance(r)
@@ -340,7 +341,7 @@ def _curves(axes: Any, found: Report) -> float:
             peak = max(peak, float((r * radial.reflectance[:, channel]).max()))
         terms = len(fit.weight) if found.fit.shared else np.count_nonzero(fit.weight[:, channel])
         label = f"{name}, {terms} Gaussians, error {found.fit.error[channel]:.2%}"
-        axes.plot(r, r * fitted[:, channel], color=ink, linewidth=1.1, linestyle=(0, (4, 3)), label=label)
+        axes.plot(r, r * fitted[:, channel], color=ink, linewidth=1.1, linestyle=_DASHES, label=label)
         if isinstance(found.other, BurleyFit):
             other = r * found.other.profile.radiant_exitance(r)[:, channel]
             label = f"{name}, Burley, error {found.other.error[channel]:.1%} of rings"
@@ -348,7 +349,7 @@ def _curves(axes: Any, found: Report) -> float:
     return peak
 
 
-def _photons(axes: Any, counted: RadialProfile) -> float:
+def _photons(axes: Axes, counted: RadialProfile) -> float:
     r, peak = counted.radius_mm, 0.0
     error: Floats = counted.standard_error if counted.standard_error is not None else np.zeros((len(r), 3))
     for channel, ink in enumerate(_INK):
@@ -356,8 +357,8 @@ def _photons(axes: Any, counted: RadialProfile) -> float:
         sure = (R > 0.0) & (se < _LEAST_COUNT * np.abs(R)) & (r > 1e-3)
         peak = max(peak, float((r * R)[sure].max(initial=0.0)))
         label = f"{_NAMES[channel]}, Monte Carlo"
-        bars = {"markersize": 2.2, "elinewidth": 0.8, "color": ink, "alpha": 0.7, "label": label}
-        axes.errorbar(r[sure], (r * R)[sure], (r * se)[sure], fmt="o", **bars)
+        bars: dict[str, Any] = {"markersize": 2.2, "elinewidth": 0.8, "color": ink, "alpha": 0.7}
+        axes.errorbar(r[sure], (r * R)[sure], (r * se)[sure], fmt="o", label=label, **bars)
     return peak
 
 

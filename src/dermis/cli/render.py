@@ -5,18 +5,24 @@ from __future__ import annotations
 import contextlib
 import gc
 import time
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.console import note, print_json, print_lines, working_on
+from dermis.base.console import note, print_report, working_on
 from dermis.cli.options import Adapter, Json
 from dermis.cli.output_options import Format, FrameLandmarks, FrameOutputs, Landmarks, Outputs
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 from dermis.scene.techniques import TECHNIQUES
+
+if TYPE_CHECKING:
+    from dermis.frame.features.outputs.planes import PlaneArray
+    from dermis.frame.rendered import Rendered
+    from dermis.scene.model import Scene
+    from dermis.scene.settings import Settings
 
 _MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
 
@@ -82,7 +88,35 @@ def render(
             described, settings = assemble(head, scene)
             marked.check(described.head)
         note_levels(head, scene, described.head)
-        return _draw_and_report(described, settings, output, (more, marked), opening, as_json, started)
+        with working_on("rendering"):
+            renderer = opening.result()
+            rendered = renderer.draw(described, settings, outputs=more.names)
+            values = {name: rendered.output(name) for name in more.names}
+            setup_ms = rendered.setup_ms
+            if as_json:  # the first frame fills caches; a warm one is timed
+                rendered = renderer.draw_warm(described, settings)
+        _note_light(described, settings, rendered)
+        _write(rendered, output, more, values)
+        _note_clipped(rendered)
+        marked.write(renderer, described, settings)
+    report = {
+        "image": str(output),
+        **({"outputs": more.report} if more.names else {}),
+        **({"landmarks": str(marked.path)} if marked.names else {}),
+        "adapter": renderer.device.adapter.name,
+        "size": list(settings.size),
+        "atlas": settings.atlas,
+        "subdivide": described.head.levels,
+        "triangles": len(described.head.mesh.triangles),
+        "exposure": rendered.exposure,
+        "gaussians": rendered.gaussians,
+        "gpu_ms": rendered.gpu_ms,
+        "frame_ms": rendered.frame_ms,
+        "setup_ms": setup_ms,
+    }
+    said = f"{output}  {time.perf_counter() - started:.1f} s on {report['adapter']}"
+    print_report(as_json, report, lambda: [said, *filter(None, [described.head.attribution])])
+    return 0
 
 
 @contextlib.contextmanager
@@ -97,63 +131,13 @@ def _uncollected() -> Iterator[None]:
             gc.enable()
 
 
-def _draw_and_report(
-    scene: Any,
-    settings: Any,
-    output: Path,
-    besides: tuple[FrameOutputs, FrameLandmarks],
-    opening: Future[Any],
-    as_json: bool,
-    started: float,
-) -> int:
-    more, marked = besides
-    with working_on("rendering"):
-        renderer = opening.result()
-        rendered = renderer.draw(scene, settings, outputs=more.names)
-        values = {name: rendered.output(name) for name in more.names}
-        setup_ms = rendered.setup_ms
-        if as_json:  # the first frame fills caches; a warm one is timed
-            rendered = renderer.draw_warm(scene, settings)
-    technique = TECHNIQUES[settings.technique]
-    if technique.on_atlas and technique.stitches and rendered.unscattered > _MOST_UNSCATTERED:
-        share = f"{rendered.unscattered:.0%} of the skin's triangles"
-        why = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
-        note(f"note: {share} are lit without scattering: {why}")
-    _note_light(scene, settings, rendered.suns)
-    _write(rendered, settings, output, more, values)
-    _note_clipped(rendered)
-    marked.write(renderer, scene, settings)
-    report = {
-        "image": str(output),
-        **({"outputs": more.report} if more.names else {}),
-        **({"landmarks": str(marked.path)} if marked.names else {}),
-        "adapter": renderer.device.adapter.name,
-        "size": list(settings.size),
-        "atlas": settings.atlas,
-        "subdivide": scene.head.levels,
-        "triangles": len(scene.head.mesh.triangles),
-        "exposure": rendered.exposure,
-        "gaussians": rendered.gaussians,
-        "gpu_ms": rendered.gpu_ms,
-        "frame_ms": rendered.frame_ms,
-        "setup_ms": setup_ms,
-    }
-    if as_json:
-        print_json(report)
-    else:
-        seconds = time.perf_counter() - started
-        print_lines(f"{output}  {seconds:.1f} s on {report['adapter']}", *_thanks(scene.head.attribution))
-    return 0
-
-
-def _write(rendered: Any, settings: Any, output: Path, more: FrameOutputs, values: Any) -> None:
-    """The image, and the outputs in it or beside it."""
+def _write(rendered: Rendered, output: Path, more: FrameOutputs, values: Mapping[str, PlaneArray]) -> None:
+    """Write the image, and the outputs in it or beside it."""
     from dermis.images.io import write_image, write_png
 
-    with_alpha = settings.background == "none"
+    linear, with_alpha = None, rendered.settings.background == "none"
     if output.suffix.lower() == ".png":
         write_png(output, rendered.rgba8() if with_alpha else rendered.srgb8())
-        linear = None
     else:
         linear = rendered.linear_rgba() if with_alpha else rendered.linear()
         if not (more.names and more.together):
@@ -162,21 +146,22 @@ def _write(rendered: Any, settings: Any, output: Path, more: FrameOutputs, value
         more.write(linear, values)
 
 
-def _note_light(scene: Any, settings: Any, suns: int) -> None:
-    if suns:
-        one, name = suns == 1, scene.environment.name
-        peaks = "a sun-like peak" if one else f"{suns} sun-like peaks"
-        shine = "shines as a light" if one else "shine as lights"
-        note(f"note: {peaks} of {name} {shine} with shadows, the rest from all around")
+def _note_light(scene: Scene, settings: Settings, rendered: Rendered) -> None:
+    """Print what of the light is not as one may expect."""
+    technique, suns = TECHNIQUES[settings.technique], rendered.suns
+    if technique.on_atlas and technique.stitches and rendered.unscattered > _MOST_UNSCATTERED:
+        share = f"{rendered.unscattered:.0%} of the skin's triangles"
+        why = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
+        note(f"note: {share} are lit without scattering: {why}")
+    if suns and scene.environment:
+        peaks = "a sun-like peak" if suns == 1 else f"{suns} sun-like peaks"
+        shine = "shines as a light" if suns == 1 else "shine as lights"
+        note(f"note: {peaks} of {scene.environment.name} {shine} with shadows, the rest from all around")
     if settings.gamma == "wrong":
         note("note: --gamma wrong shades encoded colours, which is a mistake: for comparison only")
 
 
-def _note_clipped(rendered: Any) -> None:
+def _note_clipped(rendered: Rendered) -> None:
     if (share := rendered.clipped()) > _MOST_CLIPPED:
         remedy = f"take less than --exposure {rendered.exposure:.3g}, or --tone neutral"
         note(f"note: {share:.0%} of the head is brighter than the picture can show: {remedy}")
-
-
-def _thanks(attribution: str) -> list[str]:
-    return [attribution] if attribution else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -21,13 +21,12 @@ from dermis.cli.head_options import (
     Weights,
     check_head,
     gaze_given,
-    laid_over,
     note_eyes,
     parse_turns,
     parse_weights,
     pose_given,
 )
-from dermis.cli.options import check, option_name, options_of, refuse_options
+from dermis.cli.options import Options, check, option_name, options_of, refuse_options
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, names_regions
 from dermis.scene.settings import PHOTOGRAPHED, Settings
@@ -39,9 +38,9 @@ if TYPE_CHECKING:
     from dermis.scene import Scene
     from dermis.scene.lights import Light
 
-    SkinOptions = dict[str, Any]
-    SettingsOptions = dict[str, Any]
-    EnvironmentOptions = dict[str, Any]
+    SkinOptions = Options
+    SettingsOptions = Options
+    EnvironmentOptions = Options
     SkinPreset = str | None
 
 AROUND = {field: f"env_{field}" for field in Environment.model_fields}
@@ -104,6 +103,8 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     scene, settings = _begin(name, given)
     note_eyes(scene.head, given.head.get("eyes"))
     if weights or turns:
+        from dermis.mesh.pose import laid_over
+
         scene = replace(scene, pose=laid_over(pose_given(weights, turns, scene.head, name), scene.pose))
     environment = _environment(scene.environment, given.around)
     made = Scene(
@@ -181,7 +182,7 @@ def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     return Scene(head, skin=skin), Settings()
 
 
-def _environment(before: Environment | None, around: dict[str, Any]) -> Environment | None:
+def _environment(before: Environment | None, around: Options) -> Environment | None:
     if around and before is None and "name" not in around:
         option = option_name(next(iter(around)), AROUND)
         refuse(option, "an environment with it", "there is none", "Add --env, or [environment] to the scene")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from dermis.base.console import print_json, print_lines, progress
-from dermis.cli.options import Adapter, Json
+from dermis.cli.options import Adapter, Json, Options
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
@@ -86,6 +86,7 @@ def unmix(
     adapter:
         Which adapter computes: auto, cpu or part of a name.
     """
+    from dermis.apps.inverse.unmixing.profile_widths import save_widths, widths_of
     from dermis.apps.inverse.unmixing.unmix import SUMMARY, save_maps
     from dermis.apps.inverse.unmixing.unmix import unmix as unmixed
     from dermis.base.atomic_write import check_folder
@@ -107,15 +108,9 @@ def unmix(
     recoloured = None if change is None else found.recoloured(change, adapter)
     written = save_maps(output, found, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))
     if widths:
-        written += _save_widths(output, found)
+        written += save_widths(output, widths_of(found))
     _report(found, written, time.perf_counter() - started, as_json)
     return 0
-
-
-def _save_widths(folder: Path, found: Unmixed) -> list[Path]:
-    from dermis.apps.inverse.unmixing.profile_widths import save_widths, widths_of
-
-    return save_widths(folder, widths_of(found))
 
 
 def _change(
@@ -132,9 +127,7 @@ def _change(
         if value is not None:
             number(option, value, 0.0, 1.0, "a share")
     words = {"melanin": melanin, "blood": blood}
-    found: dict[str, Any] = {
-        name: parse_share(f"--{name}", one) for name, one in words.items() if one is not None
-    }
+    found: Options = {name: parse_share(f"--{name}", one) for name, one in words.items() if one is not None}
     return Change(**found, oxygen=oxygen, eumelanin=eumelanin)
 
 

@@ -130,6 +130,13 @@ class Pose(Summarised):
         return rig.completed(places) if rig.carried else places
 
 
+def laid_over(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
+    """Return a pose that takes what it does not state from another one."""
+    under = Pose.of(base) or Pose()
+    places = under.positions_mm if pose.positions_mm is None else pose.positions_mm
+    return Pose({**under.weights, **pose.weights}, {**under.bones, **pose.bones}, places)
+
+
 def _changes(
     skeleton: Skeleton, ordered: list[tuple[int, str]], given: Mapping[str, Any], culprit: object
 ) -> Doubles:

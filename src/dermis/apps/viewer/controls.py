@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dermis.apps.viewer.navigation import dolly, drag_light, focus, orbit, pan, pick
@@ -125,7 +125,7 @@ class Controls:
         if point is not None:
             self.history.change(state.with_camera(focus(state.scene.camera, point)))
 
-    def _key(self, key: str, modifiers: Any) -> None:
+    def _key(self, key: str, modifiers: Iterable[str]) -> None:
         if "Control" in modifiers or "Meta" in modifiers:
             if key.lower() == "z":
                 self.history.redo() if "Shift" in modifiers else self.history.undo()
@@ -167,7 +167,7 @@ class Split:
         return self.held
 
 
-def shifted(event: Event, left: float) -> dict[str, Any]:
+def shifted(event: Event, left: float) -> Event:
     """An event in the coordinates of a picture that begins so far from the window's left edge."""
     found = dict(event)
     if "x" in found:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.viewer.posing import posed_positions
 from dermis.apps.viewer.state import ViewerState, changed
@@ -59,7 +58,7 @@ def dolly(camera: Camera, factor: float) -> Camera:
     return _placed(camera, np.array(camera.target) + away * (moved / distance), camera.target, frame_mm=frame)
 
 
-def focus(camera: Camera, point: Any) -> Camera:
+def focus(camera: Camera, point: ArrayLike) -> Camera:
     """Make a point the target, keeping direction and distance."""
     shift = np.subtract(point, camera.target)
     return _placed(camera, np.array(camera.position) + shift, point)
@@ -164,16 +163,16 @@ def _same(a: Camera, b: Camera) -> bool:
     return max(off) < 5e-4 * b.frame_mm and abs(a.frame_mm - b.frame_mm) < 5e-4 * b.frame_mm
 
 
-def _placed(camera: Camera, position: Any, target: Any, **fields: float) -> Camera:
+def _placed(camera: Camera, position: ArrayLike, target: ArrayLike, **fields: float) -> Camera:
     return changed(camera, position=_vector(position), target=_vector(target), **fields)
 
 
-def _vector(v: Any) -> tuple[float, float, float]:
+def _vector(v: ArrayLike) -> tuple[float, float, float]:
     x, y, z = (float(c) for c in np.clip(v, -FARTHEST_MM, FARTHEST_MM))
     return x, y, z
 
 
-def _mixed(a: Any, b: Any, t: float) -> Floats:
+def _mixed(a: ArrayLike, b: ArrayLike, t: float) -> Floats:
     return (1.0 - t) * np.array(a, dtype=np.float64) + t * np.array(b, dtype=np.float64)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,13 +53,6 @@ def with_angles(scene: Scene, bone: str, degrees: Angles) -> Pose | None:
     return _shortest(replace(_pose(scene), bones=bones))
 
 
-def with_moves(pose: Pose | None, moves: Pose) -> Pose:
-    """A pose with all that a motion moves in its place."""
-    before = pose or AT_REST
-    places = before.positions_mm if moves.positions_mm is None else moves.positions_mm
-    return Pose({**before.weights, **moves.weights}, {**before.bones, **moves.bones}, places)
-
-
 def at_rest(scene: Scene) -> Pose | None:
     """The scene's pose without expressions and turns: the person stays."""
     return _shortest(replace(_pose(scene), weights={}, bones={}))
@@ -79,7 +71,7 @@ def same_pose(a: Pose | Mapping[str, float] | None, b: Pose | Mapping[str, float
     )
 
 
-def posed_positions(scene: Scene) -> NDArray[Any]:
+def posed_positions(scene: Scene) -> NDArray[np.floating]:
     """(v, 3) where the corners of the scene's mesh are, as the device computes them [mm]."""
     mesh, motion = scene.head.mesh, scene.motion
     if motion is None:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.apps.viewer.posing import same_pose, with_moves
+from dermis.apps.viewer.posing import same_pose
 from dermis.base.errors import refuse
 from dermis.human.person import Human
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
-from dermis.mesh.pose import Pose
+from dermis.mesh.pose import Pose, laid_over
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.files import head_table, load_lights, load_scene
@@ -64,6 +64,8 @@ class Chart:
 
 
 P = TypeVar("P", bound=Plain)
+Table = Mapping[str, Any]
+"""The [head] table of a scene file."""
 PICTURE = "picture"
 PARTS = {"diffuse": "diffuse", "specular": "specular"}
 """Views that are the picture with part of its light, by the value of `Settings.parts`."""
@@ -83,30 +85,30 @@ class ViewerState:
 
     scene: Scene
     settings: Settings = field(default_factory=Settings)
-    head: Mapping[str, Any] = field(default_factory=dict)
+    head: Table = field(default_factory=dict)
     view: str = PICTURE
     rig: str = "studio"
     chart: Chart = field(default_factory=Chart)
     seconds: float = 0.0
 
     @property
-    def table(self) -> Mapping[str, Any]:
+    def table(self) -> Table:
         """The [head] table with the levels of subdivision that were found; empty for one made in memory."""
         return self.head and {"subdivide": self.scene.head.levels, **self.head}
 
-    def with_skin(self, **fields: Any) -> ViewerState:
+    def with_skin(self, **fields: object) -> ViewerState:
         """Change fields of the skin.
 
         Raises DermisError for impossible values.
         """
         return self._with_scene(skin=changed(self.scene.skin, **fields))
 
-    def with_pigments(self, **fields: Any) -> ViewerState:
+    def with_pigments(self, **fields: object) -> ViewerState:
         """Change pigments of the skin."""
         pigments = self.scene.skin.pigments or Pigments()
         return self.with_skin(pigments=changed(pigments, **fields).model_dump())
 
-    def with_settings(self, **fields: Any) -> ViewerState:
+    def with_settings(self, **fields: object) -> ViewerState:
         """Change settings."""
         return replace(self, settings=changed(self.settings, **fields))
 
@@ -122,7 +124,7 @@ class ViewerState:
         """Replace the lights by a preset."""
         return self.with_lights(load_lights(name), name)
 
-    def with_light(self, index: int, **fields: Any) -> ViewerState:
+    def with_light(self, index: int, **fields: object) -> ViewerState:
         """Change fields of one light."""
         lights = list(self.scene.lights)
         lights[index] = changed(lights[index], **fields)
@@ -149,10 +151,10 @@ class ViewerState:
 
         Raises DermisError for a frame that cannot be read.
         """
-        pose = with_moves(self.scene.pose, clip.pose_at(seconds))
+        pose = laid_over(clip.pose_at(seconds), self.scene.pose)
         return replace(self.with_pose(pose), seconds=seconds)
 
-    def with_head(self, head: Head, table: Mapping[str, Any], rho_s: float) -> ViewerState:
+    def with_head(self, head: Head, table: Table, rho_s: float) -> ViewerState:
         """Replace the head or its maps.
 
         table : the [head] table that it was loaded from
@@ -168,7 +170,7 @@ class ViewerState:
 def same(a: ViewerState, b: ViewerState) -> bool:
     """Whether two states are equal; heads are compared by identity, not by their arrays."""
 
-    def rest(state: ViewerState) -> tuple[Any, ...]:
+    def rest(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
         seen = tuple(scene.lights), scene.camera, scene.skin, scene.environment
         return (*seen, state.settings, state.table, state.view, state.rig, state.chart, state.seconds)
@@ -177,7 +179,7 @@ def same(a: ViewerState, b: ViewerState) -> bool:
     return one.head is other.head and same_pose(one.pose, other.pose) and rest(a) == rest(b)
 
 
-def changed(values: P, **fields: Any) -> P:
+def changed(values: P, **fields: object) -> P:
     """A copy with other values, validated."""
     return type(values)(**(values.model_dump() | fields))
 
@@ -236,7 +238,7 @@ def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
     return opened(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)
 
 
-def opened(scene: Scene, settings: Settings, head: Mapping[str, Any], rig: str) -> ViewerState:
+def opened(scene: Scene, settings: Settings, head: Table, rig: str) -> ViewerState:
     """The first state of a scene: `Settings.parts` becomes the view."""
     view = settings.parts if settings.parts in PARTS else PICTURE
     return ViewerState(scene, changed(settings, parts="all"), head, view, rig)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from dermis.apps.viewer.views import Views
 from dermis.base.errors import refuse
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Device, download, make_texture
+from dermis.gpu import Device, Texture, download, make_texture
 from dermis.images.io import write_image, write_png
 from dermis.mesh.mesh import Mesh
 from dermis.scene.camera import Camera
@@ -96,6 +96,8 @@ class Pace:
         )
 
 
+Images = tuple[Texture, Texture | None]
+"""The live picture and that of a frozen state, None without."""
 _SIZES = 2  # of everything: for frames in motion and for still ones
 _SMALL = (96, 64)  # a picture that needs all shaders and little time
 _TIMED_FRAMES = 120
@@ -109,7 +111,7 @@ class Frozen:
     state: ViewerState
     camera: Camera
     settings: Settings
-    image: Any
+    image: Texture
 
 
 class Studio:
@@ -128,7 +130,7 @@ class Studio:
         self.settings: Settings | None = None
         self._views = Views(self.renderer)
         self._shown: tuple[ViewerState, Camera, Settings] | None = None
-        self.last_image: Any = None
+        self.last_image: Texture | None = None
         self._size = (0, 0)
         self.times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAMES)
         self._frozen: Frozen | None = None
@@ -158,7 +160,7 @@ class Studio:
         camera: Camera,
         size: tuple[int, int],
         moving: bool,
-    ) -> tuple[Any, Any]:
+    ) -> Images:
         """The image of a state as `image` makes it, and that of a frozen one, None without.
 
         Raises DermisError for states that cannot be rendered and when the device fails.
@@ -169,7 +171,7 @@ class Studio:
         image = self._frozen_image(before, camera, size, moving)
         return self.image(state, camera, size, moving), image
 
-    def image(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Any:
+    def image(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Texture:
         """A texture of sRGB bytes, of the window's size or smaller in motion; the last one where it holds.
 
         Raises DermisError for states that cannot be rendered and when the device fails.
@@ -177,20 +179,21 @@ class Studio:
         self._size = size
         settings = self._settings(state, size, moving)
         known = self._shown and self._shown[0] is state and self._shown[1:] == (camera, settings)
-        if known:
+        if known and self.last_image is not None:
             return self.last_image
         before = self.rendered
         self.last_image = self._draw(replace(state, settings=settings).with_camera(camera))
         self._shown = state, camera, settings
         if self.rendered and self.rendered is not before:
             self.times.append(self.rendered.gpu_ms or {})
-            if moving and "shade" in (
-                self.rendered.gpu_ms or {"shade"}
-            ):  # others tell nothing of the next one
+            stages = self.rendered.gpu_ms or {"shade"}
+            if moving and "shade" in stages:  # other frames tell nothing about the next one
                 self.pace.note(self.rendered.frame_ms)
         return self.last_image
 
-    def _frozen_image(self, before: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Any:
+    def _frozen_image(
+        self, before: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+    ) -> Texture:
         """A copy, for the renderer has one picture of each size; it is made anew when the camera moves."""
         settings, frozen = self._settings(before, size, moving), self._frozen
         finest = self._settings(before, size, moving=False)
@@ -237,11 +240,11 @@ class Studio:
         """That of the last frame, metered or given."""
         return self.rendered.exposure if self.rendered else 1.0
 
-    def read(self, image: Any) -> NDArray[np.uint8]:
+    def read(self, image: Texture) -> NDArray[np.uint8]:
         """(h, w, 3) bytes of an image."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
-    def _draw(self, state: ViewerState, side: str = "") -> Any:
+    def _draw(self, state: ViewerState, side: str = "") -> Texture:
         parts = PARTS.get(state.view, state.settings.parts)
         settings = self.settings = changed(state.settings, parts=parts)
         if state.view == ATLAS and self._shows_light_of(state, side):
@@ -262,7 +265,7 @@ class Studio:
         return same(replace(self._lit[0], chart=state.chart), state)
 
 
-def copied(device: Device, image: Any, space: Any = None) -> Any:
+def copied(device: Device, image: Texture, space: Texture | None = None) -> Texture:
     """A texture of bytes alike.
 
     space : an older copy, whose place is taken when its size fits
@@ -289,7 +292,7 @@ class Preparation:
         self._ready: Mesh | None = None  # with other maps it takes little more than a frame
         self._coming: Future[None] | None = None
         self._next: Mesh | None = None
-        self._kept: Any = None
+        self._kept: Texture | None = None
 
     @property
     def is_running(self) -> bool:
@@ -300,7 +303,7 @@ class Preparation:
         """Leave what was begun, for another studio."""
         self._ready = self._coming = self._next = self._kept = None
 
-    def picture(self, studio: Studio, state: ViewerState) -> Any:
+    def picture(self, studio: Studio, state: ViewerState) -> Texture | None:
         """The last picture while the head of a state is prepared; None when the state may be drawn.
 
         Raises what stopped the preparation, once.

@@ -8,18 +8,20 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dermis.apps.viewer.controls import shifted
+from dermis.apps.viewer.controls import Event, shifted
 from dermis.apps.viewer.navigation import Easing
 from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.state import ViewerState
-from dermis.apps.viewer.studio import Preparation, Studio
+from dermis.apps.viewer.studio import Images, Preparation, Studio
 from dermis.base.errors import DermisError
-from dermis.gpu import Device
+from dermis.gpu import Device, Texture, TextureView
 from dermis.gpu.failures import DeviceLostError, gpu_failures
 from dermis.gpu.program import Program
 from dermis.scene.camera import Camera
 
+Canvas = Any
+"""A canvas of any backend of rendercanvas, which has no types for mypy."""
 Box = tuple[int, int, int, int]
 """Left, top, width and height [pixel]."""
 
@@ -30,7 +32,7 @@ class Patch(NamedTuple):
     image : texture of sRGB bytes
     """
 
-    image: Any
+    image: Texture
     box: Box
     shown: Box
 
@@ -55,7 +57,7 @@ class Blit(Program):
             primitive={"topology": "triangle-list", "cull_mode": "none"},
         )
 
-    def draw(self, patches: Sequence[Patch], view: Any) -> None:
+    def draw(self, patches: Sequence[Patch], view: TextureView) -> None:
         """Draw patches on black.
 
         view : of the target texture
@@ -101,7 +103,7 @@ class Viewer:
     def __init__(
         self,
         state: ViewerState,
-        canvas: Any,
+        canvas: Canvas,
         adapter: str = "auto",
         clock: Callable[[], float] = time.perf_counter,
         motion: MotionFile | None = None,
@@ -179,7 +181,7 @@ class Viewer:
         width, height = self.canvas.get_physical_size()
         return max(1, width - self._panel_width()), max(1, height)
 
-    def _patches(self, image: Any, frozen: Any, size: tuple[int, int]) -> list[Patch]:
+    def _patches(self, image: Texture, frozen: Texture | None, size: tuple[int, int]) -> list[Patch]:
         """The live picture, and the frozen one left of the divider."""
         left = self._panel_width()
         box = left, 0, *size
@@ -189,9 +191,7 @@ class Viewer:
         sides = (frozen, (left, 0, edge, size[1])), (image, (left + edge, 0, size[0] - edge, size[1]))
         return [Patch(one, box, shown) for one, shown in sides if shown[2]]
 
-    def _images(
-        self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
-    ) -> tuple[Any, Any]:
+    def _images(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Images:
         """The live and the frozen picture; a state that cannot be rendered leaves the last picture."""
         import wgpu
 
@@ -215,6 +215,7 @@ class Viewer:
                     raise
                 self._refuse(state)
                 session.tell_fault("This cannot be drawn", error)
+        assert session.studio.last_image is not None  # or it was raised
         return session.studio.last_image, None
 
     def _refuse(self, state: ViewerState, message: str = "") -> None:
@@ -237,7 +238,7 @@ class Viewer:
             return text
         return f"{text}, atlas {settings.atlas} while moving, refined when still"
 
-    def _on_event(self, event: dict[str, Any]) -> None:
+    def _on_event(self, event: Event) -> None:
         kind = event["event_type"]
         self._panel_frames = _PANEL_FRAMES
         wanted = self.panel.feed(event, self.canvas.get_logical_size())
@@ -249,7 +250,7 @@ class Viewer:
             self._on_panel = False
         self.canvas.request_draw()
 
-    def _on_picture(self, event: dict[str, Any]) -> None:
+    def _on_picture(self, event: Event) -> None:
         """Handle an event over the picture, which begins where the panel ended at the press."""
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import weakref
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,17 @@ from dermis.frame.features.translucency.resources import PairBuffers, Translucen
 from dermis.frame.inputs import Inputs
 from dermis.frame.programs import each, program
 from dermis.frame.renderer import Renderer
-from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture, upload
+from dermis.gpu import (
+    Bindings,
+    CommandList,
+    ComputeProgram,
+    Device,
+    Texture,
+    TextureOrView,
+    download,
+    make_texture,
+    upload,
+)
 from dermis.gpu.failures import gpu_failures
 from dermis.gpu.textures import texture_from
 from dermis.scene.model import Scene
@@ -42,11 +51,11 @@ class Views:
         self._renderer, device = renderer, renderer.device
         self._flat = ComputeProgram(device, Path(__file__).parent / "chart.wgsl")
         self._nothing = texture_from(device, np.zeros((1, 1, 4), np.float32), "rgba32float")
-        self._image: Any = None
-        self._thick: weakref.WeakKeyDictionary[PairBuffers, Any] = weakref.WeakKeyDictionary()
-        self._density: weakref.WeakKeyDictionary[Any, float] = weakref.WeakKeyDictionary()
+        self._image: Texture | None = None
+        self._thick: weakref.WeakKeyDictionary[PairBuffers, Texture] = weakref.WeakKeyDictionary()
+        self._density: weakref.WeakKeyDictionary[Texture, float] = weakref.WeakKeyDictionary()
 
-    def draw(self, scene: Scene, settings: Settings, view: str, side: str = "") -> Any:
+    def draw(self, scene: Scene, settings: Settings, view: str, side: str = "") -> Texture:
         """A texture of bytes that shows an intermediate of the frame drawn last on a side of the divider.
 
         Raises DermisError for what the technique does not make.
@@ -64,11 +73,10 @@ class Views:
             "look": record,
             "visibility_buffer": inputs.resources.visibility.texture,
             "layer": layer,
-            "bytes": self._space(settings.size),
         }
         return self._computed(shader, bound, settings.size)
 
-    def draw_chart(self, scene: Scene, settings: Settings, chart: Chart, side: str = "") -> Any:
+    def draw_chart(self, scene: Scene, settings: Settings, chart: Chart, side: str = "") -> Texture:
         """A texture of bytes that shows a part of the atlas of the frame drawn last on a side of the divider.
 
         Raises DermisError for what the technique does not make.
@@ -77,28 +85,29 @@ class Views:
         layer, scale = self._layer(inputs, chart.layer, settings)
         shown = {"centre": chart.centre, "span": chart.span, "scale": scale}
         sheet = self._flat.record("Sheet", what=_NUMBERS.get(chart.layer, 0), **shown)
-        bound = {"sheet": sheet, "layer": layer, "bytes": self._space(settings.size)}
-        return self._computed(self._flat, bound, settings.size)
+        return self._computed(self._flat, {"sheet": sheet, "layer": layer}, settings.size)
 
-    def _computed(self, shader: ComputeProgram, bound: dict[str, Any], size: tuple[int, int]) -> Any:
-        with gpu_failures(self._renderer.device):
-            frame = CommandList(self._renderer.device)
-            frame.compute("view", shader, bound, size)
+    def _computed(self, shader: ComputeProgram, bound: Bindings, size: tuple[int, int]) -> Texture:
+        """Return the image that a shader stores to `bytes`."""
+        device = self._renderer.device
+        if self._image is None or self._image.size[:2] != size:
+            self._image = make_texture(device, size, "rgba8uint")
+        with gpu_failures(device):
+            frame = CommandList(device)
+            frame.compute("view", shader, {**bound, "bytes": self._image}, size)
             frame.submit()
         return self._image
 
-    def _layer(self, inputs: Inputs, view: str, settings: Settings) -> tuple[Any, float]:
+    def _layer(self, inputs: Inputs, view: str, settings: Settings) -> tuple[TextureOrView, float]:
         """The map of the atlas that a view reads, and how its numbers are scaled."""
         if view in LEVELS:
-            layer, blurs = LEVELS[view], inputs.blurs[:1]
-            own = blurs[0].own if blurs else ()
-            count = len(own)
-            if layer >= count:
+            level, blur = LEVELS[view], next(iter(inputs.blurs), None)
+            count = len(blur.own) if blur else 0
+            if blur is None or level >= count:
                 refuse(f"view {view}", "a level of light on the atlas", f"there are {count}", _ATLAS_NEEDED)
-            halvings, scale = blurs[0].halvings[own[layer]], blurs[0].scale
-            return inputs.resources.diffusion.levels.layer(own[layer], halvings), self._exposure(
-                inputs
-            ) / scale
+            layer = blur.own[level]
+            texture = inputs.resources.diffusion.levels.layer(layer, blur.halvings[layer])
+            return texture, self._exposure(inputs) / blur.scale
         if view == "stretch":
             stretch = inputs.layouts[0].atlas.resources["stretch_map"]
             return stretch, self._mean_density(stretch)
@@ -109,7 +118,7 @@ class Views:
         meter, given = inputs.resources.post.meter, inputs.settings.exposure
         return read_meter(self._renderer.device, meter) if meter else float(given)
 
-    def _thickness(self, inputs: Inputs) -> Any:
+    def _thickness(self, inputs: Inputs) -> Texture:
         thin = inputs.layouts[0].translucency
         if thin is None:
             refuse("view thickness", "light through thin parts", "there is none", "Set transmission to thin")
@@ -121,7 +130,7 @@ class Views:
             self._thick[thin.pairs] = texture
         return draw_thickness(self._renderer.device, thin, self._thick[thin.pairs])
 
-    def _mean_density(self, stretch: Any) -> float:
+    def _mean_density(self, stretch: Texture) -> float:
         """Geometric mean of the texels per mm."""
         if stretch not in self._density:
             metric = download(self._renderer.device, stretch)[..., :2].astype(np.float64)
@@ -129,20 +138,15 @@ class Views:
             self._density[stretch] = float(np.exp(np.log(covered).mean())) if len(covered) else 1.0
         return self._density[stretch]
 
-    def _space(self, size: tuple[int, int]) -> Any:
-        if self._image is None or self._image.size[:2] != size:
-            self._image = make_texture(self._renderer.device, size, "rgba8uint")
-        return self._image
 
-
-def draw_thickness(device: Device, thin: Translucency, into: Any) -> Any:
+def draw_thickness(device: Device, thin: Translucency, into: Texture) -> Texture:
     """Least depth of the flesh behind each cell of the atlas that has pairs, at most their radius [mm].
 
     into : texture of the cells; those without pairs stay as they are
     """
     pairs, shader = thin.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]
-    bound = {
+    bound: Bindings = {
         "reach": shader.record("Reach", radius_mm=pairs.cells.radius_mm, count=count),
         "sums": pairs.sums,
         "pairs": pairs.pairs,

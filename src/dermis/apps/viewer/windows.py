@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
+from dermis.apps.viewer.controls import Event
 from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.state import ViewerState, state_of
 from dermis.apps.viewer.viewer import Viewer
@@ -130,7 +131,7 @@ def _notebook_canvas(backend: Any) -> Any:
     """rendercanvas' notebook widget with two corrections."""
 
     class NotebookCanvas(backend.AnywidgetRenderCanvas):  # type: ignore[misc]
-        def _rfb_handle_msg(self, widget: Any, content: dict[str, Any], buffers: list[Any]) -> None:
+        def _rfb_handle_msg(self, widget: object, content: Event, buffers: list[bytes]) -> None:
             kind = content.get("type")
             super()._rfb_handle_msg(widget, content, buffers)
             if kind == "resize":

@@ -27,7 +27,7 @@ _ENCODERS = 2  # frames encoded at the same time, while the next one is drawn
 class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
     """A canvas shown in web pages; a slow page skips frames and gets the newest when it is ready."""
 
-    def __init__(self, **given: Any) -> None:
+    def __init__(self, **given: object) -> None:
         self._encoders = ThreadPoolExecutor(_ENCODERS, "encoder")
         self._encoding = 0  # lossy frames being encoded
         self._drawn = self._sent = 0  # numbers of the last frame drawn and of the last one sent
@@ -35,7 +35,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._ticket_holder = 0
         self.ticket = ""  # of the page that has control, for files that it sends
         self.on_file: Callable[[Path, str], None] | None = None  # takes them when there is a viewer
-        self._said: dict[str, Any] | None = None  # to pages that have nothing to show yet
+        self._said: dict[str, object] | None = None  # to pages that have nothing to show yet
         super().__init__(**given)
 
     def tell_stage(self, text: str, number: int, of: int) -> None:
@@ -46,7 +46,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         """Tell the pages why there will be no picture."""
         self._say({"type": "failure", "text": text})
 
-    def _say(self, message: dict[str, Any]) -> None:
+    def _say(self, message: dict[str, object]) -> None:
         self._said = message
         asgi.send_all(message)
 

@@ -24,18 +24,18 @@ Button = Annotated[int, Field(ge=0, le=16)]
 Word = Annotated[str, Field(max_length=32)]
 
 
-class _Message(BaseModel):
-    """Fields that are not listed are dropped, and numbers are finite."""
+class _Checked(BaseModel):
+    """A model that drops fields that are not listed, and takes finite numbers only."""
 
     model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False)
 
+
+class _Message(_Checked):
     timestamp: Seconds
 
 
-class Touch(BaseModel):
+class Touch(_Checked):
     """A finger."""
-
-    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False)
 
     x: Place
     y: Place
@@ -117,7 +117,7 @@ _MESSAGES: TypeAdapter[Any] = TypeAdapter(
 )
 
 
-def checked(text: Any) -> str | None:
+def checked(text: object) -> str | None:
     """The message with nothing but what its kind has; None for one that no page sends.
 
     text : of any kind, from anyone

@@ -7,9 +7,10 @@ import secrets
 import socket
 from collections.abc import Callable, Coroutine
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import h11
+import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from dermis.apps.viewer.browser.canvas import PageCanvas
@@ -31,7 +32,7 @@ HEADERS_S = 10.0
 class LimitedConnection(H11Protocol):  # type: ignore[misc]
     """uvicorn's HTTP protocol with limits that it lacks."""
 
-    def __init__(self, *given: Any, **named: Any) -> None:
+    def __init__(self, *given: object, **named: object) -> None:
         super().__init__(*given, **named)
         self._deadline: asyncio.TimerHandle | None = None
 
@@ -56,7 +57,7 @@ class LimitedConnection(H11Protocol):  # type: ignore[misc]
         elif self._deadline is None:
             self._expect_headers()
 
-    def handle_websocket_upgrade(self, event: Any) -> None:
+    def handle_websocket_upgrade(self, event: object) -> None:
         """Leave a socket to its own protocol, which pings it."""
         self._expect_nothing()
         super().handle_websocket_upgrade(event)
@@ -88,7 +89,7 @@ STAGES = (
 _LAST_WORDS_S = 0.7  # in which pages hear why there is nothing to see
 
 
-async def shown(pages: Any, canvas: PageCanvas, load: Load, adapter: str) -> Viewer:
+async def shown(pages: uvicorn.Server, canvas: PageCanvas, load: Load, adapter: str) -> Viewer:
     """The viewer on the canvas, when all is prepared; whatever stops that is told in the pages and ends them.
 
     pages : the server, which runs
@@ -181,12 +182,11 @@ def bind(host: str, port: int, *, secret: bool = False) -> tuple[socket.socket, 
     return listener, Address(host, int(listener.getsockname()[1]), token)
 
 
-def server(address: Address, canvas: PageCanvas, folder: Path) -> Any:
+def server(address: Address, canvas: PageCanvas, folder: Path) -> uvicorn.Server:
     """A uvicorn server of rendercanvas' application with our own page, behind the guard.
 
     folder : an empty one for files that pages send
     """
-    import uvicorn
     from rendercanvas.http import asgi, resources
 
     own = Path(__file__).parent
@@ -206,7 +206,9 @@ def server(address: Address, canvas: PageCanvas, folder: Path) -> Any:
     return uvicorn.Server(config)
 
 
-def run_until(pages: Any, listener: socket.socket, begin: Callable[[], Coroutine[Any, Any, T]]) -> T | None:
+def run_until(
+    pages: uvicorn.Server, listener: socket.socket, begin: Callable[[], Coroutine[None, None, T]]
+) -> T | None:
     """Run a server until it is told to exit, and something beside it: what that returned, if it has ended.
 
     Raises what it raises.

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import hmac
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
+from dermis.apps.viewer.browser.canvas import PageCanvas
 from dermis.apps.viewer.browser.guard import App, Message, Receive, Send
 from dermis.apps.viewer.session import HEAD_FILES
 from dermis.base.errors import DermisError, refuse
@@ -38,7 +39,7 @@ class Uploads:
     folder : where files go, by numbers: what a page calls them is shown and no more
     """
 
-    def __init__(self, app: App, canvas: Any, folder: Path) -> None:
+    def __init__(self, app: App, canvas: PageCanvas, folder: Path) -> None:
         self._app, self._canvas, self._folder = app, canvas, folder
         self._count = self._bytes = 0
         self._is_busy = False
@@ -53,16 +54,16 @@ class Uploads:
         status, answer = 200, ""
         content = [(b"content-type", b"text/plain; charset=utf-8")]
         try:
-            kind = self._kind(name, headers)
-            self._canvas.on_file(await self._store(name, kind, receive), name)
+            kind, take = self._accepted(name, headers)
+            take(await self._store(name, kind, receive), name)
         except DermisError as error:
             status, answer = 400, str(error)
             content.append((b"connection", b"close"))  # whatever of the file is still to come
         await send({"type": "http.response.start", "status": status, "headers": content})
         await send({"type": "http.response.body", "body": answer.encode()})
 
-    def _kind(self, name: str, headers: dict[bytes, bytes]) -> str:
-        """What the file is, as one of `HEAD_FILES`, when it may come."""
+    def _accepted(self, name: str, headers: dict[bytes, bytes]) -> tuple[str, Callable[[Path, str], None]]:
+        """Return the file's kind, one of `HEAD_FILES`, and what takes it, when it may come."""
         ticket = headers.get(TICKET_HEADER, b"")
         if not self._canvas.ticket or not hmac.compare_digest(ticket, self._canvas.ticket.encode()):
             refuse("upload", "the page that has control", "another one sent this", "Close the other page")
@@ -70,7 +71,7 @@ class Uploads:
         if kind is None:
             kinds = ", ".join(HEAD_FILES)
             refuse(name, f"a mesh, a person or a scene ({kinds})", "it ends otherwise", "Convert it")
-        if self._canvas.on_file is None:
+        if (take := self._canvas.on_file) is None:
             refuse(name, "a page that shows a head", "the first one is being prepared", "Send it again soon")
         if self._is_busy:
             refuse(name, "one file at a time", "another one is on its way", "Wait for it")
@@ -78,7 +79,7 @@ class Uploads:
             refuse(name, f"at most {MOST_FILES} files", "this is one more", "Start the viewer again")
         length = headers.get(b"content-length", b"0")
         self._check_size(name, int(length) if length.isdigit() and len(length) < 16 else 0)
-        return kind
+        return kind, take
 
     def _check_size(self, name: str, size: int) -> None:
         if size > MOST_BYTES:

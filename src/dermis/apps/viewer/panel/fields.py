@@ -49,7 +49,7 @@ class Style:
     form: str = ""
     options: tuple[int, ...] = ()
     called: Mapping[str, str] = field(default_factory=dict)
-    own: Callable[[Session], Any] | None = None
+    own: Callable[[Session], object] | None = None
 
 
 _PLAIN = Style()
@@ -79,7 +79,7 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
     label = (style.label or _label_of(name)) + suffix
     span = style.span or range_of(kind, name) or Range(0.0, 1.0)
 
-    def put(found: Any) -> ViewerState:
+    def put(found: object) -> ViewerState:
         return apply(**{name: found})
 
     if words := words_of(kind, name):
@@ -110,7 +110,7 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
 
 
 def _draw_words(
-    session: Session, label: str, value: Any, words: tuple[str, ...], put: Put, style: Style
+    session: Session, label: str, value: object, words: tuple[str, ...], put: Put, style: Style
 ) -> None:
     """A list of the words that a number or a colour may be instead."""
     own = style.own
@@ -189,9 +189,19 @@ def combo(
     names : "" is a line between two groups
     called : what is shown instead of a name
     """
+    chosen = choose(session, label, current, names, called)
+    if chosen is not None:
+        attempt(session, lambda: session.change(put(chosen)))
+
+
+def choose(
+    session: Session, label: str, current: str, names: Iterable[str], called: Mapping[str, str]
+) -> str | None:
+    """Draw a list as of `combo`; return the name that was clicked."""
+    chosen = None
     if not imgui.begin_combo(label, called.get(current, current), _ALL_NAMES):
         record_position(session, label)
-        return
+        return None
     for name in names:
         if not name:
             imgui.separator()
@@ -199,8 +209,9 @@ def combo(
         clicked, _ = imgui.selectable(f"{called.get(name, name)}###{name}", name == current)
         record_position(session, f"{_key(label)}/{name}")
         if clicked and name != current:
-            attempt(session, lambda chosen=name: session.change(put(chosen)))  # type: ignore[misc]
+            chosen = name
     imgui.end_combo()
+    return chosen
 
 
 def button(session: Session, label: str) -> bool:

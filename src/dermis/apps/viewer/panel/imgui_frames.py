@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import imgui_bundle
 from imgui_bundle import imgui, implot
 from wgpu.utils.imgui import ImguiRenderer, ImguiWgpuBackend
 
-from dermis.gpu import Device
+from dermis.apps.viewer.controls import Event
+from dermis.gpu import Device, TextureView
 
 _FONT_SIZE = 15.0
 _GREYS = (  # without hues, which would affect how the skin beside them is judged
@@ -59,8 +59,6 @@ class ImguiFrames:
 
     def __init__(self, tell: Tell) -> None:
         self._tell = tell
-        self._context: Any = None
-        self._plots: Any = None
         self._is_new = self._is_whole = False
 
     def open(self, device: Device, target: str) -> None:
@@ -97,7 +95,7 @@ class ImguiFrames:
             self._tell(error)
             self._begin_anew()
 
-    def render(self, target: Any) -> None:
+    def render(self, target: TextureView) -> None:
         """Draw over what the target shows; nothing where the last layout failed."""
         if not self._is_whole:
             return
@@ -136,7 +134,7 @@ POINTER = ("pointer_down", "pointer_move", "pointer_up", "double_click", "wheel"
 _WHEEL = 0.01
 
 
-def feed_pointer(event: Mapping[str, Any], frame: Callable[[], None]) -> None:
+def feed_pointer(event: Event, frame: Callable[[], None]) -> None:
     """Process an event of `POINTER`.
 
     frame : lays out the panel with the events so far
@@ -152,7 +150,7 @@ def feed_pointer(event: Mapping[str, Any], frame: Callable[[], None]) -> None:
         imgui.get_io().add_mouse_wheel_event(-_WHEEL * event["dx"], -_WHEEL * event["dy"])
 
 
-def feed_key(event: Mapping[str, Any], frame: Callable[[], None]) -> None:
+def feed_key(event: Event, frame: Callable[[], None]) -> None:
     """Process a key or a letter; it is seen in a frame of its own, as keys between two frames cancel out.
 
     frame : as above
@@ -165,7 +163,7 @@ def feed_key(event: Mapping[str, Any], frame: Callable[[], None]) -> None:
     frame()
 
 
-def _change_key(io: Any, name: str, down: bool) -> None:
+def _change_key(io: imgui.IO, name: str, down: bool) -> None:
     key = ImguiRenderer.KEY_MAP.get(name)
     if key is None and len(name) == 1 and name.isascii() and name.isalnum():
         key = getattr(imgui.Key, f"_{name}" if name.isdigit() else name.lower(), None)

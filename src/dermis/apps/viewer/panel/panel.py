@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from imgui_bundle import imgui
 
-from dermis.apps.viewer.controls import Split
+from dermis.apps.viewer.controls import Event, Split
 from dermis.apps.viewer.panel.fields import attempt, button, record_position
 from dermis.apps.viewer.panel.imgui_frames import POINTER, ImguiFrames, closed_again, feed_key, feed_pointer
 from dermis.apps.viewer.panel.sections import SECTIONS
 from dermis.apps.viewer.session import Session
-from dermis.gpu import Device
+from dermis.gpu import Device, TextureView
 
 HELP_KEYS = ("?", "h", "H", "F1")
 """Keys that show and hide the list of shortcuts."""
@@ -148,7 +147,7 @@ class Panel:
         else:
             self.visible = not self.visible
 
-    def feed(self, event: Mapping[str, Any], size: tuple[float, float]) -> bool:
+    def feed(self, event: Event, size: tuple[float, float]) -> bool:
         """Process an event; returns whether it was for the panel, not for the picture."""
         self._frames.enter()
         self._size = size
@@ -167,7 +166,7 @@ class Panel:
         feed_key(event, lambda: self._frame(size))
         return bool(imgui.get_io().want_text_input)  # of a context that the frame may have made
 
-    def draw(self, target: Any, size: tuple[float, float], pixel_ratio: float) -> None:
+    def draw(self, target: TextureView, size: tuple[float, float], pixel_ratio: float) -> None:
         """Draw over what the target shows.
 
         size : of the window, logical
@@ -181,7 +180,7 @@ class Panel:
         self._size = size
         self._frames.lay_out(size, lambda: self._draw_windows(size))
 
-    def _shortcut(self, event: Mapping[str, Any]) -> bool:
+    def _shortcut(self, event: Event) -> bool:
         """Whether a key was a shortcut of the panel."""
         key, session = str(event["key"]), self._session
         if {"Control", "Meta"} & set(event.get("modifiers", ())):

@@ -24,6 +24,7 @@ from dermis.apps.viewer.panel.fields import (
     attempt,
     begin_plot,
     button,
+    choose,
     combo,
     draw_fields,
     explain,
@@ -76,16 +77,9 @@ def _choice(session: Session) -> None:
     """The heads of the package and recent files."""
     now = str(session.state.head.get("name", session.state.scene.head.name))
     names = dict.fromkeys((*built_in(), *session.heads.recent, now))
-    is_open = imgui.begin_combo("head", session.heads.called(now))
-    if not is_open:
-        record_position(session, "head")
-        return
-    for name in names:
-        clicked, _ = imgui.selectable(f"{session.heads.called(name)}###{name}", name == now)
-        record_position(session, f"head/{name}")
-        if clicked and name != now:
-            session.heads.open(name)
-    imgui.end_combo()
+    chosen = choose(session, "head", now, names, {name: session.heads.called(name) for name in names})
+    if chosen is not None:
+        session.heads.open(chosen)
 
 
 def _seed_of(session: Session) -> int:
