@@ -66,7 +66,7 @@ def test_all_that_is_no_python_is_in_it(empty: Path) -> None:
     there = {path.relative_to(installed) for path in installed.rglob("*.*")}
     assert {path for path in here if "__pycache__" not in path.parts} <= there
     assert {path.name for path in (ROOT / "gallery").glob("*.py")} == {
-        path.name for path in there if path.parent == Path("gallery/scripts") and path.suffix == ".py"
+        path.name for path in there if path.parent == Path("apps/gallery/scripts") and path.suffix == ".py"
     }
 
 
