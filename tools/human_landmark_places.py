@@ -11,7 +11,7 @@ from dermis.human.hair import brows
 from dermis.human.model import MATERIALS
 from dermis.human.regions.average import AVERAGE, average_head, parts
 from dermis.human.skin.surface import FIELDS, average, lid_rings
-from dermis.mesh.strands import Roots, corners, finer_roots, points_of, weights
+from dermis.mesh.strands import Roots, corners, finer_roots, weights
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -47,7 +47,7 @@ class Surface:
         self.place = np.tile(steps, (quads, 1)).astype(np.float32)
         fine = finer_roots(average_head().mesh, Roots(self.quad.astype(np.int32), self.place), LEVELS)
         self._corner, self._share = corners(self.head.mesh, fine.quad), weights(fine.place)
-        self.points_mm = points_of(self.head.mesh)
+        self.points_mm = self.head.mesh.points_mm
         self.at_mm = self._of(self.points_mm)
         self.lips, self.mouth, self.lids = self._of(self._fields()).T
 

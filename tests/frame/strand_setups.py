@@ -9,7 +9,7 @@ from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material, Mesh, build_mesh
-from dermis.mesh.strands import Roots, Strands, frames, points_of, seen_from
+from dermis.mesh.strands import Roots, Strands, frames, seen_from
 
 SIDE_MM = 100.0
 _CELLS = 4
@@ -39,7 +39,7 @@ def hairy(
     roots = Roots(np.zeros(count, np.int32), np.full((count, 2), 0.5, np.float32))
     t = np.linspace(0, 1, knots)[None, :, None]
     places = (1 - t) * np.asarray(begins, float)[:, None] + t * np.asarray(ends, float)[:, None]
-    root, _ = frames(mesh, roots, points_of(mesh))
+    root, _ = frames(mesh, roots, mesh.points_mm)
     radius = np.broadcast_to(np.asarray(radius_mm, np.float32), (count,))
     strands = Strands(
         roots,

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from dermis import Human, Pose
 from dermis.human.hair.grown import Skin
 from dermis.mesh.head import Head
-from dermis.mesh.strands import points_of
 
 Floats = NDArray[np.float64]
 BROW_Y = 6.0  # hairs rooted above it are brows, on people of usual size [mm]
@@ -31,7 +30,7 @@ def grown(index: int = 0) -> Head:
 def knots(head: Head, **pose: float) -> Floats:
     """(n, k, 3) in space [mm]."""
     assert head.strands is not None
-    points = points_of(head.mesh) if not pose else head.control.points_mm(Pose.of(pose).motion(head.control))
+    points = head.mesh.points_mm if not pose else head.control.points_mm(Pose.of(pose).motion(head.control))
     return head.strands.places_mm(head.mesh, points)
 
 

@@ -21,7 +21,6 @@ from dermis.human.hair.look import HairLook
 from dermis.human.head_file import write_person
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import LIMBUS_MM, EyePictures, eye_uv, profile_mm
-from dermis.mesh.strands import points_of
 
 LOOK = EyeLook(eumelanin=0.1, pupil_mm=2.5, redness=0.0, seed=3)
 PERSON = replace(Human.drawn(7), eyes=LOOK)
@@ -94,10 +93,10 @@ def test_hairs_are_closed_tubes_of_the_hairs_width() -> None:
     head = PERSON.head(subdivide=0)
     assert head.strands is not None
     fibres = Fibres.of(head.strands, head.mesh, 100_000, 5)
-    places, normals = fibres.placed(points_of(head.mesh))
+    places, normals = fibres.placed(head.mesh.points_mm)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
     rings = places.reshape(len(head.strands), -1, 3)[:, :3]
-    middle = head.strands.places_mm(head.mesh, points_of(head.mesh))[:, 0]
+    middle = head.strands.places_mm(head.mesh, head.mesh.points_mm)[:, 0]
     np.testing.assert_allclose(rings.mean(axis=1), middle, atol=1e-4)
     far = np.linalg.norm(rings - middle[:, None], axis=2)
     np.testing.assert_allclose(far, 1.2092 * head.strands.radius_mm[:, :1].repeat(3, axis=1), rtol=1e-3)

@@ -17,7 +17,7 @@ from dermis.human.hair.look import HairLook
 from dermis.human.hair.rooting import Rooting
 from dermis.human.skin.surface import average
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Strands, points_of
+from dermis.mesh.strands import Strands
 
 Floats = NDArray[np.float64]
 ALL = np.ones(len(average()[0]), bool)
@@ -40,7 +40,7 @@ def hair(head: Head) -> Strands:
 
 def knots(head: Head, **pose: float) -> Floats:
     """(n, k, 3) in space [mm]."""
-    points = points_of(head.mesh) if not pose else head.control.points_mm(Pose.of(pose).motion(head.control))
+    points = head.mesh.points_mm if not pose else head.control.points_mm(Pose.of(pose).motion(head.control))
     return hair(head).places_mm(head.mesh, points)
 
 

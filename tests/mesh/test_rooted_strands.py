@@ -10,7 +10,7 @@ from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material, Mesh, build_mesh
-from dermis.mesh.strands import Roots, Strands, finer_roots, frames, points_of, seen_from
+from dermis.mesh.strands import Roots, Strands, finer_roots, frames, seen_from
 from dermis.mesh.subdivide import subdivide_head
 
 Floats = NDArray[np.float64]
@@ -54,8 +54,8 @@ def test_roots_stay_where_they_are_on_a_finer_mesh(levels: int) -> None:
     inside = np.flatnonzero(_roots(mesh, 400).quad == 4)
     roots = Roots(*(part[inside] for part in _roots(mesh, 400)))
     finer = subdivide_head(Head("sheet", mesh, Maps()), levels).mesh
-    before, _ = frames(mesh, roots, points_of(mesh))
-    after, _ = frames(finer, finer_roots(mesh, roots, levels), points_of(finer))
+    before, _ = frames(mesh, roots, mesh.points_mm)
+    after, _ = frames(finer, finer_roots(mesh, roots, levels), finer.points_mm)
     assert np.abs(before - after).max() < 0.6
     if levels == 3:  # borders are smoothed, and bring the rest along by a little
         assert np.abs(before - after).mean() < 0.3
@@ -67,14 +67,14 @@ def test_a_subdivided_head_keeps_its_hairs() -> None:
     head = Head("sheet", mesh, Maps(), strands=_strands(mesh))
     finer = subdivide_head(head, 2)
     assert head.strands is not None and finer.strands is not None
-    before = head.strands.places_mm(mesh, points_of(mesh))
-    after = finer.strands.places_mm(finer.mesh, points_of(finer.mesh))
+    before = head.strands.places_mm(mesh, mesh.points_mm)
+    after = finer.strands.places_mm(finer.mesh, finer.mesh.points_mm)
     assert np.abs((after - after[:, :1]) - (before - before[:, :1])).max() < 1e-4
 
 
 def test_hairs_turn_with_their_quad() -> None:
     mesh = _sheet(bent=6.0)
-    strands, points = _strands(mesh), points_of(mesh)
+    strands, points = _strands(mesh), mesh.points_mm
     turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
     still = strands.places_mm(mesh, points)
@@ -84,6 +84,6 @@ def test_hairs_turn_with_their_quad() -> None:
 
 def test_frames_are_orthonormal() -> None:
     mesh = _sheet(bent=9.0)
-    _, frame = frames(mesh, _roots(mesh), points_of(mesh))
+    _, frame = frames(mesh, _roots(mesh), mesh.points_mm)
     assert np.abs(np.einsum("nic,njc->nij", frame, frame) - np.eye(3)).max() < 1e-12
     assert np.allclose(np.linalg.det(frame), 1.0)

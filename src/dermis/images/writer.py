@@ -14,9 +14,9 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.base import atomic_write as outputs
-from dermis.base.arrays import Numbers
 from dermis.base.errors import DermisError, refuse
 from dermis.base.reading import read_file
 from dermis.images.codecs import png_size
@@ -45,7 +45,7 @@ class ImageWriter:
         self._waiting: deque[Future[None]] = deque()
         self._tried: set[tuple[Path, str]] = set()
 
-    def write(self, path: str | Path, picture: Numbers) -> None:
+    def write(self, path: str | Path, picture: NDArray[np.generic]) -> None:
         """Queue a picture to be written, whole or not at all; waits only while the queue is full.
 
         picture : (H, W, 3 or 4) uint8 sRGB for .png, or linear floats for .exr; do not change it afterwards

@@ -59,9 +59,7 @@ class Head:
         """Its rig, or that of its points alone."""
         if self.rig is not None:
             return self.rig
-        points = np.zeros((int(self.mesh.point.max()) + 1, 3), np.float32)
-        points[self.mesh.point] = self.mesh.positions
-        return Rig(points)
+        return Rig(self.mesh.points_mm.astype(np.float32))
 
     @cached_property
     def bare(self) -> Head:

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.base.arrays import Floats, Ints
+from dermis.base.arrays import Doubles, Floats, Ints
 from dermis.base.summary import Summarised
 from dermis.mesh.geometry import tangents, vertex_normals, weld
 from dermis.mesh.outline import Outline, hull
@@ -62,6 +62,13 @@ class Mesh(Summarised):
     material: Ints
     materials: tuple[Material, ...]
     quads: Ints = field(default_factory=lambda: np.zeros((0, 2), np.int32))
+
+    @property
+    def points_mm(self) -> Doubles:
+        """(p, 3) the unique positions [mm]."""
+        points = np.zeros((int(self.point.max()) + 1, 3))
+        points[self.point] = self.positions
+        return points
 
     @property
     def size_mm(self) -> Floats:

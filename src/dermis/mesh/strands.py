@@ -54,11 +54,11 @@ class Strands(Summarised):
 
     def middle_mm(self, mesh: Mesh) -> Doubles:
         """(3,) the mean of the roots on a mesh at rest [mm]."""
-        return np.asarray(_places(mesh, self.roots, points_of(mesh))[0].mean(axis=1))
+        return np.asarray(_places(mesh, self.roots, mesh.points_mm)[0].mean(axis=1))
 
     def refined(self, mesh: Mesh, finer: Mesh, levels: int) -> Strands:
         """The same hairs on the mesh refined by Catmull's and Clark's rules."""
-        _, frame = frames(mesh, self.roots, points_of(mesh))
+        _, frame = frames(mesh, self.roots, mesh.points_mm)
         ways = np.einsum("nic,nki->nkc", frame, self.knots_mm)
         roots = finer_roots(mesh, self.roots, levels)
         return replace(self, roots=roots, knots_mm=seen_from(finer, roots, ways))
@@ -66,19 +66,12 @@ class Strands(Summarised):
 
 def seen_from(mesh: Mesh, roots: Roots, ways_mm: Doubles) -> Floats:
     """(n, k, 3) ways in space from roots to knots, as `Strands.knots_mm` has them on a mesh at rest [mm]."""
-    return seen_in(frames(mesh, roots, points_of(mesh))[1], ways_mm)
+    return seen_in(frames(mesh, roots, mesh.points_mm)[1], ways_mm)
 
 
 def seen_in(frame: Doubles, ways_mm: Doubles) -> Floats:
     """The same in frames (n, 3, 3) of the roots, from `frames`."""
     return np.asarray(np.einsum("nic,nkc->nki", frame, ways_mm), np.float32)
-
-
-def points_of(mesh: Mesh) -> Doubles:
-    """(p, 3) the points of a mesh at rest [mm]."""
-    points = np.zeros((int(mesh.point.max()) + 1, 3))
-    points[mesh.point] = mesh.positions
-    return points
 
 
 def corners(mesh: Mesh, quad: NDArray[np.integer]) -> Ints:

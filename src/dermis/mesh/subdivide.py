@@ -56,9 +56,7 @@ class Refinement:
 
     def mesh(self, coarse: Mesh) -> Mesh:
         """The finer mesh of one with this topology."""
-        control = np.zeros((self.weights.shape[1], 3))
-        control[coarse.point] = coarse.positions
-        places, kinds = (self.weights @ control)[self.point], coarse.materials
+        places, kinds = (self.weights @ coarse.points_mm)[self.point], coarse.materials
         rest = {"point": self.point, "quads": self.quads}
         return build_mesh(places, self.uv, self.triangles, self.material, kinds, **rest)
 

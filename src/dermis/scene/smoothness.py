@@ -93,10 +93,8 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, 
 
     The curve through two points bends as their normals n say: it leaves the chord d by |dn . dd| / 8.
     """
-    count = int(mesh.point.max()) + 1
-    places, normals = np.zeros((count, 3)), sum_at(mesh.point, mesh.normals.astype(np.float64), count)
-    places[mesh.point] = mesh.positions
-    places = places @ R.T + t
+    places = mesh.points_mm @ R.T + t
+    normals = sum_at(mesh.point, mesh.normals.astype(np.float64), len(places))
     normals = normals @ R.T / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     depth = np.maximum(places[:, 2], _NEAREST_MM)
     pixels = (places @ K.T)[:, :2] / depth[:, None]

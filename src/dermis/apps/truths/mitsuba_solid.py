@@ -44,9 +44,7 @@ def skin_solid(mesh: Mesh, culprit: str) -> Solid:
     if not skin.any():
         refuse(culprit, "skin to trace", "all of its groups are opaque", "Leave a group out of opaque")
     used, triangles = np.unique(mesh.point[mesh.triangles[skin]], return_inverse=True)
-    positions = np.zeros((int(mesh.point.max()) + 1, 3), np.float32)
-    positions[mesh.point] = mesh.positions
-    solid = _shut(positions[used], triangles.reshape(-1, 3).astype(np.int32))
+    solid = _shut(mesh.points_mm[used].astype(np.float32), triangles.reshape(-1, 3).astype(np.int32))
     corners = solid.positions[solid.triangles].astype(np.float64)
     depth = 3.0 * _volume(corners) / float(triangle_areas(corners).sum())
     if depth < _LEAST_DEPTH_MM:

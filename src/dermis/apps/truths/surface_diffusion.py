@@ -67,9 +67,7 @@ def diffuse_on_surface(
 
 def welded(mesh: Mesh) -> tuple[Floats, Index]:
     """Return positions (p, 3) [mm] without duplicates, and the triangles (f, 3) among them in their order."""
-    positions = np.zeros((int(mesh.point.max()) + 1, 3))
-    positions[mesh.point] = mesh.positions
-    return positions, mesh.point[mesh.triangles].astype(np.int64)
+    return mesh.points_mm, mesh.point[mesh.triangles].astype(np.int64)
 
 
 def vertex_areas(positions: ArrayLike, triangles: ArrayLike) -> Floats:

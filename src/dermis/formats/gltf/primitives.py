@@ -16,7 +16,7 @@ from dermis.formats.moved_points import MovedPoints, Target
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, Strands, frames, points_of, weights
+from dermis.mesh.strands import Roots, Strands, frames, weights
 
 _M = 1e-3  # of a millimetre
 COLOURS = 64
@@ -110,7 +110,7 @@ class Hairs:
 
     @cached_property
     def _rest(self) -> Doubles:
-        return rest_points(self.points.head.mesh, self.points.positions_mm)
+        return replace(self.points.head.mesh, positions=self.points.positions_mm).points_mm
 
     def primitive(self, binary: Binary) -> Tree:
         """Corners and attributes; the extras tell this package to leave it out."""
@@ -270,8 +270,3 @@ class Fibres:
         row = sums / np.maximum(np.bincount(group, minlength=COLOURS), 1)[:, None]
         u = np.repeat((group + 0.5) / COLOURS, self.each)
         return row[None].astype(np.float32), np.stack([u, np.full_like(u, 0.5)], axis=1).astype(np.float32)
-
-
-def rest_points(mesh: Mesh, positions_mm: Floats) -> Doubles:
-    """(p, 3) the points of a mesh whose vertices lie elsewhere (v, 3) [mm]."""
-    return points_of(replace(mesh, positions=positions_mm))

@@ -23,25 +23,7 @@ MOST_FRAMES, MOST_NAMES = 200_000, 500
 _USUAL_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
 _NEARLY = 0.02
 _SIDE_LETTERS = {"l": "left", "r": "right"}
-_ASIDE = frozenset(
-    (
-        "mixamorig",
-        "cc",
-        "base",
-        "def",
-        "org",
-        "rig",
-        "bip",
-        "bone",
-        "joint",
-        "jnt",
-        "skel",
-        "j",
-        "c",
-        "x",
-        "m",
-    )
-)
+_ASIDE = re.compile("mixamorig|cc|base|def|org|rig|bip|bone|joint|jnt|skel|j|c|x|m")
 """Words that programs write around the names of bones."""
 _SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _NECKS, _EYES = (["neck"], ["neck", "twist"]), (["eye"], ["eyeball"])
@@ -237,6 +219,6 @@ def _above(skeleton: Skeleton, bone: int) -> set[int]:
 def _words(name: str) -> tuple[list[str], str]:
     """The words that a bone's name is made of without numbers and prefixes, and its side."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])|[\W_]|\d+", " ", name.rpartition(":")[2])
-    words = [word for word in apart.lower().split() if word not in _ASIDE]
+    words = [word for word in apart.lower().split() if not _ASIDE.fullmatch(word)]
     sides = [_SIDES[word] for word in words if word in _SIDES]
     return [word for word in words if word not in _SIDES], sides[0] if len(sides) == 1 else ""

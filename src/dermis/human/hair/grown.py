@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles, Floats
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, finer_roots, frames, points_of
+from dermis.mesh.strands import Roots, finer_roots, frames
 
 _NEAR = 6  # vertices that a place's tangent plane is the mean of
 
@@ -81,7 +81,7 @@ class Ground:
     def __init__(self, head: Head, plain: Mesh, skin: Skin, share: float = 1.0) -> None:
         self.plain, self.skin, self.share = plain, skin, share
         self._mesh, self._levels = head.mesh, head.levels
-        self._columns = np.ascontiguousarray(points_of(head.mesh).T)
+        self._columns = np.ascontiguousarray(head.mesh.points_mm.T)
 
     @property
     def points_mm(self) -> Doubles:

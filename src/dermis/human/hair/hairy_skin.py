@@ -16,7 +16,7 @@ from dermis.human.skin.face import AMOUNTS, DEGREES, hairline, zones
 from dermis.human.skin.surface import FIELDS, average
 from dermis.mesh.geometry import crosses, dots
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, between, corners, points_of
+from dermis.mesh.strands import Roots, between, corners
 
 HEAD_AXIS_Z = -72.0
 """Of the axis around which the hairline is told [mm]."""
@@ -120,7 +120,7 @@ def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
 
 def areas_cm2(plain: Mesh, quad: Index) -> Doubles:
     """(n,) area of quads [cm2]."""
-    around = points_of(plain).T.take(corners(plain, quad).T, axis=1)
+    around = plain.points_mm.T.take(corners(plain, quad).T, axis=1)
     a, b, c, d = around.swapaxes(0, 1)
     across = crosses(c - a, d - b)
     return np.asarray(np.sqrt(dots(across, across)) / 200.0)

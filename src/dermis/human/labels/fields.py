@@ -22,7 +22,7 @@ from dermis.human.skin.surface import FIELDS, average, lid_rings
 from dermis.mesh.eyeball import LIMBUS_MM
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material
-from dermis.mesh.strands import corners, points_of
+from dermis.mesh.strands import corners
 
 Doubles = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ def dense_fields() -> tuple[Doubles, Doubles]:
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
     fields = head.control.stencils.points(human_fields().T.copy())[skin].T
     outer = fields[HUMAN_FIELDS.index("mouth_interior")] < 0
-    return points_of(head.mesh)[skin][outer], fields[:, outer]
+    return head.mesh.points_mm[skin][outer], fields[:, outer]
 
 
 def hair_classes(head: Head) -> NDArray[np.uint8]:
@@ -189,7 +189,7 @@ def _irises(head: Head) -> dict[str, Doubles]:
     """How far inside the limbus points of eyeballs are [mm of a usual eye]."""
     if head.eyes is None:
         return {}
-    mesh, places = head.mesh, points_of(head.mesh)
+    mesh, places = head.mesh, head.mesh.points_mm
     found = {}
     frames = head.eyes.frames(head.control, head.control.rest)
     for frame, material, side in zip(frames, head.eyes.material, reversed(SIDES), strict=False):
@@ -227,7 +227,7 @@ def _warped(head: Head, places: Mapping[str, tuple[float, float, float]]) -> dic
 
     from dermis.human.labels.fields import dense_fields
 
-    points = points_of(head.mesh)
+    points = head.mesh.points_mm
     average, values = dense_fields()
     _, near = cKDTree(average).query(to_average(head, places, points))
     return {name: values[k][near] for k, name in enumerate(HUMAN_FIELDS) if not name.endswith("_eye")}

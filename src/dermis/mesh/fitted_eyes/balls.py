@@ -95,20 +95,13 @@ def _pieces(mesh: Mesh, called: Index) -> list[_Piece]:
     label = components(len(points), own[:, [0, 1]].ravel(), own[:, [1, 2]].ravel())
     thirds = np.repeat(triangle_areas(mesh.positions[mesh.triangles[called]]) / 3, 3)
     area = np.bincount(own.ravel(), thirds, minlength=len(points))
-    places = _places(mesh)[points]
+    places = mesh.points_mm[points]
     found = []
     for piece in range(int(label.max()) + 1):
         inside = label == piece
         sphere = fit_sphere(places[inside], area[inside])
         found.append(_Piece(points[inside], area[inside], sphere))
     return found
-
-
-def _places(mesh: Mesh) -> Doubles:
-    """(p, 3) where the mesh's points lie [mm]."""
-    places = np.zeros((int(mesh.point.max()) + 1, 3))
-    places[mesh.point] = mesh.positions
-    return places
 
 
 def _far(places: Doubles, piece: _Piece) -> Doubles:
@@ -118,7 +111,7 @@ def _far(places: Doubles, piece: _Piece) -> Doubles:
 
 def _looking(mesh: Mesh, left: _Piece, right: _Piece, pieces: list[_Piece]) -> tuple[Ball, Ball]:
     """The balls with all that lies in them, each with its own way of looking or straight ahead."""
-    places = _places(mesh)
+    places = mesh.points_mm
     middle = (left.sphere.middle + right.sphere.middle) / 2
     ahead = np.cross(left.sphere.middle - right.sphere.middle, (0.0, 1.0, 0.0))
     ahead /= np.linalg.norm(ahead)

@@ -67,8 +67,7 @@ def no_curvature(device: Device) -> Buffer:
 
 def _steps(mesh: Mesh, pairs: Index, both: Index) -> int:
     """Steps of averaging over neighbours until the smoothing reaches `SMOOTH_MM`."""
-    place = np.zeros((int(mesh.point.max()) + 1, 3))
-    place[mesh.point] = mesh.positions
+    place = mesh.points_mm
     square = ((place[pairs[:, 0]] - place[pairs[:, 1]]) ** 2).sum(axis=1)
     degree = 1.0 + np.bincount(both[:, 0], minlength=len(place))
     # A step moves a value by an edge or leaves it; its variance along each of the surface's two axes:

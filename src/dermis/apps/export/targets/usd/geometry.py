@@ -17,7 +17,7 @@ from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.skeleton import Skeleton
-from dermis.mesh.strands import Strands, points_of
+from dermis.mesh.strands import Strands
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
@@ -106,7 +106,7 @@ def _add_uv(made: UsdGeom.Mesh, uv: Floats, faces: Faces) -> None:
 
 def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) -> UsdGeom.BasisCurves:
     """Write hairs at rest as lines with a width at each knot."""
-    places = strands.places_mm(head.mesh, points_of(head.mesh))
+    places = strands.places_mm(head.mesh, head.mesh.points_mm)
     made = UsdGeom.BasisCurves.Define(stage, path)
     count = np.full(len(places), places.shape[1], np.int32)
     points = Vt.Vec3fArray.FromNumpy(metres(places.reshape(-1, 3)))
