@@ -1,1 +1,0 @@
-"""Small modules that all packages share: errors, registries, files on disk, reading limits, numbers."""

@@ -27,7 +27,7 @@ _INTERRUPTED = 130
 
 
 def main() -> None:
-    """Run the command line; exit with 2 when the caller can mend what went wrong.
+    """Run the command line; exit with 2 for faults that the caller can correct.
 
     130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP; 2 also when stdout could not be written to, but
     not when its reader left.
@@ -47,7 +47,7 @@ def main() -> None:
         except KeyboardInterrupt:
             code = _INTERRUPTED
             streams.drop()
-        except Exception:  # some libraries make one of their own of it
+        except Exception:  # some libraries raise their own error for an interruption
             if not (code := interruption.code):
                 raise
     sys.exit(interruption.code or code)

@@ -16,7 +16,7 @@ from cyclopts import Parameter
 from dermis.base.console import note, print_report, progress, working_on
 from dermis.base.errors import refuse
 from dermis.base.quantities import number
-from dermis.cli.options import Adapter, Json, Options, Whole
+from dermis.cli.options import Adapter, Destination, Flag, Json, Options, Whole
 from dermis.cli.output_options import MovingOutput
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Take:
-    """What is drawn: a scene moved by a clip, frame k at k / rate.
+    """Scene moved by a clip, with frame k at k / rate.
 
     first : number of the first frame
     """
@@ -42,7 +42,7 @@ class _Take:
     first: int
 
     def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
-        """The scene of each frame; what the clip does not move keeps the scene's own pose."""
+        """Yield the scene of each frame; what the clip does not move keeps the scene's own pose."""
         from dermis.mesh.pose import laid_over
 
         for frame in numbers:
@@ -55,15 +55,15 @@ def animate(
     /,
     *,
     motion: str | None = None,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("dermis.mp4"),
+    output: Destination = Path("dermis.mp4"),
     clip: str | None = None,
     fps: str | None = None,
     motion_fps: float | None = None,
     begin: Annotated[float | None, Parameter(name="--from")] = None,
     end: Annotated[float | None, Parameter(name="--to")] = None,
     crf: Whole = None,
-    anew: Annotated[bool, Parameter(negative="", show_default=False)] = False,
-    names: Annotated[bool, Parameter(negative="", show_default=False)] = False,
+    anew: Flag = False,
+    names: Flag = False,
     scene: SceneOptions = DEFAULTS,
     adapter: Adapter = "auto",
     as_json: Json = False,
@@ -147,7 +147,7 @@ def animate(
 
 
 def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: str) -> str:
-    """Draw and write frames; the adapter's name."""
+    """Draw and write frames; return the adapter's name."""
     from dermis.frame.renderer import Renderer
 
     renderer, size = Renderer(adapter), take.settings.size
@@ -164,7 +164,7 @@ def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: st
 
 
 def _exposure(take: _Take, renderer: Renderer) -> float:
-    """One for all frames: that given, or metered at the first, whichever of them are still to be drawn."""
+    """Return the exposure of all frames: the given one, or that metered at the first frame of the motion."""
     if take.settings.exposure != "auto":
         return take.settings.exposure
     (scene,) = take.scenes([take.first])
@@ -174,7 +174,7 @@ def _exposure(take: _Take, renderer: Renderer) -> float:
 
 
 def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
-    """A text that two frames of one number share if they look the same.
+    """Return a digest that two frames of one number share if they look the same.
 
     files : head and motion as they were typed; files count with their size and time
     """
@@ -183,14 +183,17 @@ def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
     metered_at = take.first if take.settings.exposure == "auto" else None
     seen = scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate, metered_at
     typed = given.head, given.eye, given.pose, given.bone, given.look_at
-    parts = [*map(_as_it_is, named), *map(repr, typed), repr(seen), str(scene.head.levels)]
+    parts = [*map(_file_state, named), *map(repr, typed), repr(seen), str(scene.head.levels)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def _as_it_is(name: str) -> str:
+def _file_state(name: str) -> str:
+    """Return a name, with size and time of the file where it is one."""
     path = Path(name.partition("#")[0])
-    told = path.stat() if path.exists() else None
-    return name if told is None else f"{path.resolve()} {name} {told.st_size} {told.st_mtime_ns}"
+    if not path.exists():
+        return name
+    state = path.stat()
+    return f"{path.resolve()} {name} {state.st_size} {state.st_mtime_ns}"
 
 
 def _in_words(report: Options) -> str:
@@ -215,7 +218,7 @@ _USUAL_RATE = 30.0
 
 @dataclass(frozen=True)
 class Span:
-    """From when to when frames are wanted, and how many a second; None where nothing was said.
+    """Times between which frames are drawn, and their rate; None where an option was left out.
 
     begin, end : seconds of the motion
     own_rate : of the motion itself, where it does not tell [1/s]
@@ -247,7 +250,7 @@ class Span:
 
 
 def parse_span(begin: float | None, end: float | None, fps: str | None, own_rate: float | None) -> Span:
-    """The span that was typed."""
+    """Return the span that was typed."""
     from dermis.images.movie import exact_rate
     from dermis.mesh.clip import LONGEST_S, check_rate
 
@@ -264,7 +267,7 @@ def parse_span(begin: float | None, end: float | None, fps: str | None, own_rate
 
 
 def motion_file(name: str, motion: str | None) -> str:
-    """The file that was named, else the head's own where that can hold clips."""
+    """Return the motion's file as named, else the head's own file where that can hold clips."""
     from dermis.formats.parts import is_gltf
 
     if motion is not None:
@@ -277,7 +280,7 @@ def motion_file(name: str, motion: str | None) -> str:
 
 
 def clip_of(name: str, head: Head, motion: str, clip: str | None, given: Options, span: Span) -> Clip:
-    """The motion of a file for a head.
+    """Return the motion of a file for a head.
 
     name : of the head as it was typed
     given : fields of its [head] that were typed, of which unit_mm and up hold for a sequence too
@@ -293,7 +296,7 @@ def clip_of(name: str, head: Head, motion: str, clip: str | None, given: Options
 
 
 def names_of(name: str, head: Head) -> dict[str, tuple[str, ...]]:
-    """What can move a head: names of its morph targets and bones, and of the clips in its file."""
+    """Return names of the head's morph targets and bones, and of the clips in its file."""
     from dermis.formats.gltf.animations import clip_names
     from dermis.formats.parts import is_gltf
 
@@ -303,7 +306,7 @@ def names_of(name: str, head: Head) -> dict[str, tuple[str, ...]]:
 
 
 def _table(name: str) -> Options:
-    """The [head] of a scene's file; empty for other heads."""
+    """Return the [head] table of a scene's file; empty for other heads."""
     from dermis.scene.files import head_table
 
     return head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else {}

@@ -9,27 +9,24 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Literal
 
 from dermis.base.console import note, print_json, print_lines, print_report, working_on
 from dermis.base.errors import refuse
-from dermis.cli.options import Adapter, Json, Options, Whole, given, parse_size
+from dermis.cli.options import Adapter, Flag, Json, Options, Output, Whole, given, parse_size
 
 if TYPE_CHECKING:
     from dermis.apps.batch.run import Crew, Report
     from dermis.apps.batch.spec import Spec
 
 _MOST_PROCESSES = 1024
-Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 
 
 def batch(
     spec: Path | None = None,
     /,
     *,
-    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    output: Output = None,
     count: Whole = None,
     size: str | None = None,
     seed: Whole = None,
@@ -116,18 +113,23 @@ def batch(
         return _dry_run(read, adapter, output or Path("dry-run.png"), as_json)
     if output is None:
         refuse("--output", "the folder of the data set", "none was named", "Name one with -o")
+    from dermis.apps.batch.run import run
+    from dermis.apps.batch.worker import Work
+
     if scheduler is not None or cluster is not None:
         elsewhere = given(adapters=adapters, workers=workers, workers_per_gpu=workers_per_gpu)
         crew, each = _cluster(scheduler, cluster, adapter, elsewhere), _number("--encoders", encoders, 0)
     else:
         crew, each = _crew(adapter, adapters, workers, workers_per_gpu, encoders)
-    report = _drawn(read, output, crew, each, part, keep_going)
+    work = Work(read, output, each or 0, keep_going)
+    with rate_of_images() as told:
+        report = run(work, crew, part, lambda now: told(now.images, now.to_draw))
     _tell(report, output, as_json)
     return 0
 
 
 def _part(text: str) -> tuple[int, int]:
-    """What of --shard I/N."""
+    """Return I and N of --shard I/N."""
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text)
     if not match or int(match[1]) >= int(match[2]):
         refuse("--shard", "I/N with I from 0 to N - 1, such as 3/16", f"{text!r} came", "Correct it")
@@ -143,7 +145,7 @@ def _number(option: str, value: int | None, least: int) -> int | None:
 def _crew(
     adapter: str, adapters: str | None, workers: int | None, per_gpu: int | None, encoders: int | None
 ) -> tuple[Crew, int]:
-    """Processes of this machine, and how many encoders each has."""
+    """Return the processes of this machine, and how many encoders each has."""
     from dermis.apps.batch.worker_pool import Processes, SlotRequest
 
     if workers is not None and per_gpu is not None:
@@ -178,18 +180,6 @@ def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: Op
         option = f"--{name.replace('_', '-')}"
         refuse(option, "no such option with dask's workers", "it came", "Start as many of them as you want")
     return Cluster(address, file, adapter)
-
-
-def _drawn(
-    spec: Spec, out: Path, crew: Crew, encoders: int | None, part: tuple[int, int], keep_going: bool
-) -> Report:
-    from dermis.apps.batch.run import run
-    from dermis.apps.batch.worker import Work
-
-    with rate_of_images() as told:
-        return run(
-            Work(spec, out, encoders or 0, keep_going), crew, part, lambda now: told(now.images, now.to_draw)
-        )
 
 
 def _tell(report: Report, out: Path, as_json: bool) -> None:
@@ -232,7 +222,7 @@ _WINDOW_S = 60.0  # that the rate is taken over
 
 @contextmanager
 def rate_of_images() -> Iterator[Callable[[int, int], None]]:
-    """What is told how many images are done, of how many."""
+    """Yield a function that takes how many images are done, of how many."""
     if not sys.stderr.isatty():
         yield Lines(note).tell
         return

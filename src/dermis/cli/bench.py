@@ -56,30 +56,25 @@ def bench(
     from dermis.apps.validation.benchmarks.run import run
     from dermis.base.atomic_write import check_output
     from dermis.base.extras import needed
+    from dermis.formats.samples import cached
     from dermis.gpu.adapters import fitting_adapters
 
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
         needed("matplotlib", "the report's plots")
+    name = head
     if head == "auto":
         refuse_options(file, HEAD, "without a file", "Add --head")
+        name = "lee_perry_smith" if cached("lee_perry_smith") else "human"
     check_head(head, file)
     software = fitting_adapters(adapter)[0][0].kind == "CPU"
     cases = PRESETS[preset or ("cpu" if software else "interactive")].cases()
     with progress("measuring") as tell:
-        made = run(cases, _head(head), adapter, tell, file)
+        made = run(cases, name, adapter, tell, file)
     print_report(as_json, to_json(made), lambda: _lines(made))
     if output is not None:  # last: where it cannot be written any more, the figures are not lost
         write_report(output, made)
     return 0
-
-
-def _head(name: str) -> str:
-    from dermis.formats.samples import cached
-
-    if name != "auto":
-        return name
-    return "lee_perry_smith" if cached("lee_perry_smith") else "human"
 
 
 def _lines(made: Benchmark) -> list[str]:

@@ -137,7 +137,7 @@ def _check_used(what: str, chosen: Options) -> None:
 
 
 def _choose(chosen: Options, sizes: Options) -> Options:
-    """What `dermis.apps.validation.comparisons.compare` is asked for."""
+    """Return the arguments for `dermis.apps.validation.comparisons.compare`."""
     from dermis.apps.validation.comparisons.scenes import usual_region
 
     names = [name.strip() for name in chosen.get("techniques", ",".join(TECHNIQUES)).split(",")]
@@ -160,7 +160,7 @@ def _choose(chosen: Options, sizes: Options) -> Options:
 def _compare_techniques(
     head: str, shape: Options, chosen: Options, output: Path | None, as_json: bool
 ) -> None:
-    """Render a head with each technique, judge it by a truth, print and write what came of it."""
+    """Render a head with each technique, compare it with a truth, print and write the result."""
     from dermis.apps.validation.comparisons import compare as comparison
     from dermis.apps.validation.comparisons.report import write_report
     from dermis.base.atomic_write import check_output
@@ -218,7 +218,7 @@ def compare_specular(output: Path | None, roughness: float, adapter: str, as_jso
 
 
 def _specular_report(adapter: str) -> Options:
-    """All findings as one JSON-ready object."""
+    """Return all findings as one object for JSON."""
     from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
     from dermis.gpu.failures import on_device
     from dermis.specular.comparison import albedo_rows, reciprocity_error
@@ -278,15 +278,15 @@ def _draw_lobes_and_albedo(folder: Path, m: float) -> None:
     _save_figure(_albedos(m), folder / "albedo.png")
 
 
-def _drawn() -> list[str]:
-    """Names of the models that have a curve of their own."""
+def _distinct_models() -> list[str]:
+    """Return names of the models that have a curve of their own."""
     return [name for name in MODELS if name != _SAME_CURVE]
 
 
 def _lobes(m: float) -> Figure:
-    """Intensity under three lights in the plane of incidence: a polar panel for each model."""
+    """Return the intensity under three lights in the plane of incidence: a polar panel for each model."""
     whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
-    roots = {name: np.sqrt(_intensity(name, m) / whole) for name in _drawn()}
+    roots = {name: np.sqrt(_intensity(name, m) / whole) for name in _distinct_models()}
     farthest = max(_FARTHEST, 1.05 * float(np.max(list(roots.values()))))
     rows = -(-len(roots) // _COLUMNS)
     figure = _figure(3.0 * _COLUMNS, 2.4 * rows)
@@ -310,7 +310,7 @@ def _lobes(m: float) -> Figure:
 
 
 def _intensity(name: str, m: float) -> Doubles:
-    """(3, n) BRDF times both cosines, for each incident angle and view [1/sr]."""
+    """Return the BRDF times both cosines, (3, n), for each incident angle and view [1/sr]."""
     angle = _view_angles()
     view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
     rows = []
@@ -326,11 +326,11 @@ def _view_angles() -> Doubles:
 
 
 def _albedos(m: float) -> Figure:
-    """Directional albedo by angle, all models in one panel."""
+    """Return the directional albedo by angle, all models in one panel."""
     figure = _figure(7.2, 4.6)
     axes = figure.subplots()
     degrees = np.linspace(0.0, 89.0, 180)
-    for name in _drawn():
+    for name in _distinct_models():
         rho = directional_albedo(np.cos(np.radians(degrees)), m, MODELS[name].lobe)
         axes.plot(degrees, rho, linewidth=1.4, label=name)
     axes.set(xlabel="angle from the normal [°]", ylabel="share reflected, ρ_s = 1", xlim=(0, 90))

@@ -33,7 +33,7 @@ def doctor(*, adapter: Adapter = "auto", as_json: Json = False) -> int:
 
 
 def examine(wanted: str) -> Options:
-    """All findings as one JSON-ready object."""
+    """Return all findings as one object for JSON."""
     from dermis.base.private import cache_folder
     from dermis.formats.samples import SAMPLES, cached
     from dermis.gpu.adapters import WANTED_FEATURES, list_adapters
@@ -55,7 +55,7 @@ def examine(wanted: str) -> Options:
 
 
 def _version(name: str) -> str:
-    """Of a package; sources that were never installed have none."""
+    """Return the version of a package; sources that were never installed have none."""
     try:
         return version(name)
     except PackageNotFoundError:
@@ -63,7 +63,7 @@ def _version(name: str) -> str:
 
 
 def _try_out(wanted: str) -> Options:
-    """Open the adapter and use it."""
+    """Open the adapter and draw a test frame with it."""
     from dermis.frame.renderer import Renderer
     from dermis.gpu.textures import half_store_rounding
 
@@ -84,7 +84,7 @@ def _try_out(wanted: str) -> Options:
 
 
 def _self_test(renderer: Renderer) -> Options:
-    """A white sphere, lit from the camera: its middle must reflect what the light sends, no pixel more."""
+    """Draw a white sphere, lit from the camera: its middle must reflect the irradiance, and no pixel more."""
     from dermis.mesh.head import Head
     from dermis.mesh.maps import Maps
     from dermis.mesh.primitives import uv_sphere

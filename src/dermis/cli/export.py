@@ -11,7 +11,7 @@ from dermis.apps.export.registry import TARGETS
 from dermis.base.console import print_report, working_on
 from dermis.base.errors import refuse
 from dermis.cli.head_options import HeadOptions, check_head
-from dermis.cli.options import NOTHING, Adapter, Json, given
+from dermis.cli.options import NOTHING, Adapter, Destination, Flag, Json, given
 
 if TYPE_CHECKING:
     TargetName = str
@@ -26,17 +26,17 @@ def export(
     /,
     *,
     to: TargetName,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    output: Destination,
     version: str | None = None,
     variant: str | None = None,
-    diffuse_transmission: Annotated[bool, Parameter(negative="", show_default=False)] = False,
+    diffuse_transmission: Flag = False,
     model: Model | None = None,
     profile: str | None = None,
     library: Path | None = None,
     map_side: int = 2048,
     head: HeadOptions = NOTHING,
     adapter: Adapter = "auto",
-    naive: Annotated[bool, Parameter(negative="", show_default=False)] = False,
+    naive: Flag = False,
     as_json: Json = False,
 ) -> int:
     """Write a skin or a head for another program, and say how wrong it will be there.

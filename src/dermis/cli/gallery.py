@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from dermis.base.console import note, print_report, progress
-from dermis.cli.options import Adapter, Json, Whole
+from dermis.cli.options import Adapter, Destination, Json, Whole
 
 if TYPE_CHECKING:
     from dermis.apps.gallery.script import Picture
@@ -21,7 +21,7 @@ def gallery(
     only: Annotated[list[str] | None, Parameter(negative="", consume_multiple=True)] = None,
     head: str | None = None,
     size: Whole = None,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("gallery"),
+    output: Destination = Path("gallery"),
     adapter: Adapter = "auto",
     as_json: Json = False,
 ) -> int:

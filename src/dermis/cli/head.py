@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from dermis.base.console import print_report, working_on
 from dermis.base.errors import refuse
 from dermis.cli.head_options import parse_weights
-from dermis.cli.options import Adapter, Json, Options, Whole, given
+from dermis.cli.options import Adapter, Destination, Flag, Json, Options, Whole, given
 
 if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook
@@ -30,7 +30,7 @@ _Pairs = Parameter(negative="", metavar="NAME=WEIGHT,...", show_default=False)
 
 def head(
     *,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("head.glb"),
+    output: Destination = Path("head.glb"),
     seed: Whole = None,
     african: float | None = None,
     asian: float | None = None,
@@ -51,7 +51,7 @@ def head(
     layout: Literal["own", "hm08"] = "own",
     subdivide: Whole = None,
     adapter: Adapter = "auto",
-    list_targets: Annotated[bool, Parameter(negative="", show_default=False)] = False,
+    list_targets: Flag = False,
     as_json: Json = False,
 ) -> int:
     """Make a person of the parametric human and write it as glTF.

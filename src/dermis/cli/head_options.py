@@ -14,7 +14,7 @@ from dermis.mesh.eye_look import LIMITS
 from dermis.scene.head_table import HeadTable
 
 HEAD = {"specular": "specular_map", "roughness": "roughness_map"}
-"""Options by field of a [head], where they are not called like it."""
+"""Options by field of a [head], where their name differs."""
 _SHAPE = "unit_mm", "v_origin", "up", "opaque", "eyes", "eye_groups"
 _MAPS = "colour", "normal", "normal_y", "height", "height_mm", "specular", "roughness"
 
@@ -33,7 +33,7 @@ else:
 
 
 def check_head(name: str, options: Options) -> None:
-    """Refuse what no head can be read with."""
+    """Refuse impossible options of a head."""
     check(HeadTable, {"name": name, **options}, HEAD)
 
 
@@ -52,7 +52,7 @@ EyeLooks = Annotated[
 
 
 def note_eyes(head: Head, wanted: str | None) -> None:
-    """A line on stderr about a file's eyes that stay plain although their names, or who typed, want more.
+    """Print a line on stderr if eyes of a file stay plain although names or options request fitted ones.
 
     wanted : what was typed for --eyes
     """
@@ -96,14 +96,14 @@ Turns = Annotated[
 
 
 def parse_weights(words: Sequence[str], option: str = POSE) -> dict[str, float]:
-    """Weights by name of "jawOpen=0.6,mouthSmileLeft=1"."""
+    """Return weights by name of "jawOpen=0.6,mouthSmileLeft=1"."""
     expected = "NAME=WEIGHT with commas between, such as jawOpen=0.6,mouthSmileLeft=1"
     parts = (part for text in words for part in text.split(","))
     return {name: weight for name, (weight,) in _pairs(parts, 1, option, expected)}
 
 
 def parse_turns(words: Sequence[str]) -> dict[str, list[float]]:
-    """Angles [degrees] by name of the bone of "head=0,25,0"."""
+    """Return angles [degrees] by name of the bone of "head=0,25,0"."""
     return dict(_pairs(words, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"))
 
 
@@ -120,7 +120,7 @@ def _pairs(words: Iterable[str], count: int, option: str, expected: str) -> Iter
 def pose_given(
     weights: Mapping[str, float], turns: Mapping[str, Sequence[float]], head: Head, name: str
 ) -> Pose:
-    """The pose of what was typed.
+    """Return the pose that was typed.
 
     name : of the head as it was typed, for messages
 
@@ -140,7 +140,7 @@ def pose_given(
 
 
 def gaze_given(words: str, scene: Scene) -> Pose:
-    """The scene's pose with eyes that look where it was typed."""
+    """Return the scene's pose with eyes that look at the place that was typed."""
     from dermis.scene.gaze import looking_at
 
     place = scene.camera.position if words == "camera" else _numbers(words)
@@ -150,7 +150,7 @@ def gaze_given(words: str, scene: Scene) -> Pose:
 
 
 def _numbers(text: str) -> list[float] | None:
-    """The numbers between commas; None where one is none, or beyond all of them."""
+    """Return the numbers between commas; None where one is not a number, or too large."""
     try:
         found = [float(part) for part in text.split(",")]
     except ValueError:

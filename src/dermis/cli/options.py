@@ -23,7 +23,7 @@ def _whole(_: type, tokens: Sequence[Token]) -> int:
 
 
 def _word(model: type[Plain], field: str, kind: object, tokens: Sequence[Token]) -> str:
-    """Return a word that the field may be now, which may be more than when the command was imported."""
+    """Return a word that the field takes; choices may have been registered after the command was imported."""
     from dermis.scene.plain import choices_of
 
     if (word := tokens[0].value) in (choices := choices_of(model, field)):
@@ -53,7 +53,10 @@ Adapter = Annotated[
         help="auto (the best), cpu (software), a part of an adapter's name, or its number as #1 (see doctor)."
     ),
 ]
-Output = Annotated[Path | None, Parameter(name=("--output", "-o"))]
+_TO = Parameter(name=("--output", "-o"))
+Output = Annotated[Path | None, _TO]
+Destination = Annotated[Path, _TO]
+Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 _LENGTHS_MM = 1e-6, 1e4
 Options = dict[str, Any]
 """Fields of a model by name, as they were typed."""
@@ -71,13 +74,13 @@ def options_of(
     names: Mapping[str, str] | None = None,
     defaults: Mapping[str, object] | None = None,
 ) -> Any:
-    """The type of a command's parameter that takes a dictionary: the fields of a model that were given.
+    """Return the type of a command's parameter that takes a dictionary of the fields that were given.
 
-    Each field is an option, with the model's own type, choices, bounds and help; fields that are models
-    themselves are none.
+    Each field is an option, with the model's own type, choices, bounds and help, except fields that are
+    models themselves.
 
-    only, without : fields that are options here, all when left out; fields that are none
-    names : options by field, where they are not called like it
+    only, without : fields that are options (all by default), and fields that are not
+    names : options by field, where their name differs
     defaults : what the help shows in place of the model's own
     """
     from dermis.scene.plain import heading_of
@@ -95,22 +98,22 @@ def options_of(
 
 
 def given(**options: object) -> Options:
-    """Those that are not None."""
+    """Return the options that are not None."""
     return {name: value for name, value in options.items() if value is not None}
 
 
 def option_name(field: str, names: Mapping[str, str] | None = None) -> str:
-    """What is typed for a field: --rho-s for rho_s."""
+    """Return the option of a field: --rho-s for rho_s."""
     return "--" + (names or {}).get(field, field).replace("_", "-")
 
 
 def is_option(model: type[Plain], field: str) -> bool:
-    """Whether a field can be an option: it holds words or numbers, not other models."""
+    """Return whether a field can be an option: it holds words or numbers, not other models."""
     return _kind(model, field)[0] is not None
 
 
 def _kind(model: type[Plain], field: str) -> tuple[Any, Options]:
-    """What cyclopts takes a field's words for, and how it makes the value of them; None for no option."""
+    """Return the type of a field's option, None for no option, and keywords of its `Parameter`."""
     from dermis.scene.field_errors import words_of
     from dermis.scene.plain import choices_of
 
@@ -141,7 +144,7 @@ def _kind(model: type[Plain], field: str) -> tuple[Any, Options]:
 
 
 def _help(model: type[Plain], field: str, defaults: Mapping[str, object]) -> str:
-    """A field's help with its bounds, where they say something, and its default."""
+    """Return a field's help with its bounds, unless they are trivial, and its default."""
     from dermis.scene.field_errors import words_of
     from dermis.scene.plain import choices_of, help_of, shown, values_of
 
@@ -154,10 +157,10 @@ def _help(model: type[Plain], field: str, defaults: Mapping[str, object]) -> str
 
 
 def check(model: type[Plain], values: Mapping[str, object], names: Mapping[str, str] | None = None) -> None:
-    """Refuse values that no field of a model can have, under the names of their options.
+    """Refuse impossible values of a model's fields, under the names of their options.
 
     values : by field
-    names : options by field, where they are not called like it
+    names : options by field, where their name differs
     """
     from dermis.scene.field_errors import ImpossibleError
 
@@ -170,13 +173,13 @@ def check(model: type[Plain], values: Mapping[str, object], names: Mapping[str, 
 
 
 def refuse_options(fields: Iterable[str], names: Mapping[str, str] | None, place: str, remedy: str) -> None:
-    """Refuse options that would change nothing."""
+    """Refuse options that would have no effect."""
     for field in fields:
         refuse(option_name(field, names), f"no such option {place}", "it came", remedy)
 
 
 def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
-    """Width and height [pixel] of "1024x1024"."""
+    """Return width and height [pixel] of "1024x1024"."""
     match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
     if not match:
         came, remedy = f"{text!r} came", "Write two whole numbers with an x"
@@ -185,7 +188,7 @@ def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
 
 
 def parse_colour(text: str, option: str) -> tuple[float, float, float]:
-    """Linear Rec. 709 of "red,green,blue"."""
+    """Return linear Rec. 709 of "red,green,blue"."""
     try:
         red, green, blue = (float(part) for part in text.split(","))
     except ValueError:
@@ -194,7 +197,7 @@ def parse_colour(text: str, option: str) -> tuple[float, float, float]:
 
 
 def parse_lengths(option: str, text: str) -> tuple[float, ...]:
-    """Lengths [mm] of "0.5,1,2"."""
+    """Return lengths [mm] of "0.5,1,2"."""
     try:
         lengths = tuple(float(part) for part in text.split(","))
     except ValueError:

@@ -12,15 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from dermis.base.atomic_write import check_output, replacing
 from dermis.base.console import note
 from dermis.base.errors import refuse
 from dermis.human.landmarks.sets import SETS
 from dermis.scene.outputs import OUTPUTS, checked_outputs
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from dermis.base.arrays import Floats
     from dermis.frame.features.outputs.planes import PlaneArray
     from dermis.frame.observation import Landmarks as SeenLandmarks
@@ -41,7 +39,7 @@ Format = Annotated[Literal["exr", "png", "npy"] | None, Parameter(name="--output
 
 
 class FrameOutputs:
-    """Outputs that were asked for on the command line.
+    """Outputs that were requested on the command line.
 
     Raises DermisError for unknown names and for files that cannot be written.
     """
@@ -55,7 +53,6 @@ class FrameOutputs:
         if not self.names:
             self.paths: dict[str, Path] = {}
             return
-        from dermis.base import atomic_write as outputs
         from dermis.frame.output_files import beside, check_formats
 
         check_formats(self.names, kind or "exr")
@@ -63,12 +60,12 @@ class FrameOutputs:
             name: image if self.together else beside(image, name, kind or "exr") for name in self.names
         }
         for path in self.paths.values():
-            outputs.check_output(path, (path.suffix,))
+            check_output(path, (path.suffix,))
         if "motion" in self.names:
             note("note: motion is 0 in a single picture; Renderer.observe counts it from one to the next")
 
     def write(self, picture: Floats | None, values: Mapping[str, PlaneArray]) -> None:
-        """Write them.
+        """Write the outputs.
 
         picture : linear, where they are parts of its file
         values : by name
@@ -84,7 +81,7 @@ class FrameOutputs:
 
     @property
     def report(self) -> dict[str, str]:
-        """Files by name."""
+        """Paths of the files by name of the output."""
         return {name: str(path) for name, path in self.paths.items()}
 
 
@@ -100,7 +97,7 @@ Landmarks = Annotated[str | None, Parameter(name="--landmarks", help=_LANDMARKS_
 
 
 class FrameLandmarks:
-    """Landmarks that were asked for on the command line.
+    """Landmarks that were requested on the command line.
 
     Raises DermisError for unknown sets and for a file that cannot be written.
     """
@@ -109,10 +106,9 @@ class FrameLandmarks:
         self.names: tuple[str, ...] = ()
         self.path = image.with_name(f"{image.stem}.landmarks.json")
         if typed is not None:
-            from dermis.base.atomic_write import check_output
             from dermis.frame.features.outputs.landmarks import checked_landmarks
 
-            self.names = checked_landmarks([name.strip() for name in typed.split(",")])
+            self.names = checked_landmarks(_names(typed))
             check_output(self.path, (self.path.suffix,))
 
     def check(self, head: Head) -> None:
@@ -124,11 +120,9 @@ class FrameLandmarks:
                 landmark_points(head, name)
 
     def write(self, renderer: Renderer, scene: Scene, settings: Settings) -> None:
-        """Write them, if any are asked."""
+        """Write the landmarks, if any were requested."""
         if not self.names:
             return
-        from dermis.base.atomic_write import replacing
-
         seen = next(renderer.observe([scene], settings, landmarks=self.names))
         text = json.dumps(_told(seen), indent=1) + "\n"
         with replacing(self.path) as part:
@@ -153,16 +147,16 @@ def _rows(one: SeenLandmarks) -> list[dict[str, object]]:
     ]
 
 
-Write = Callable[[int, "NDArray[np.generic]"], None]
+Write = Callable[[int, "PlaneArray"], None]
 """Takes the number of a frame and its picture."""
 
 
 @dataclass(frozen=True)
 class MovingOutput:
-    """What was typed of the output.
+    """Output of a moving head, as it was typed.
 
     crf : quality of a movie; None for the usual one
-    anew : draw numbered pictures again that are there
+    anew : whether to draw numbered pictures again that exist
     """
 
     path: Path
@@ -171,12 +165,12 @@ class MovingOutput:
 
     @property
     def numbered(self) -> bool:
-        """Whether it is numbered pictures."""
+        """Whether the output is numbered pictures."""
         return "%" in self.path.name
 
     @property
     def linear(self) -> bool:
-        """Whether its pictures are linear floats."""
+        """Whether the pictures are linear floats."""
         return self.path.suffix.lower() == ".exr"
 
     def check(self, size: tuple[int, int]) -> None:
@@ -197,7 +191,7 @@ class MovingOutput:
         check_movie(self.path, size, DEFAULT_CRF if self.crf is None else self.crf)
 
     def missing(self, numbers: range, size: tuple[int, int], made_of: str) -> Sequence[int]:
-        """The frames to be drawn."""
+        """Return the numbers of the frames to be drawn."""
         from dermis.images.writer import FrameFiles
 
         if not self.numbered:
@@ -208,7 +202,7 @@ class MovingOutput:
 
     @contextmanager
     def writing(self, size: tuple[int, int], rate: Fraction) -> Iterator[Write]:
-        """What writes frames while others are drawn; at its end all of them are there."""
+        """Yield a function that writes frames while others are drawn; at the end all are written."""
         from dermis.images.movie import DEFAULT_CRF, MovieWriter
         from dermis.images.writer import FrameFiles, ImageWriter
 

@@ -31,8 +31,8 @@ _USES = (os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)  # of what takes the place of a 
 class Streams:
     """Guards stdout and stderr, where they are the process's own, inside a `with` block.
 
-    A stream that was closed is as one that cannot be written to; its number is taken, or the next file that
-    is opened would get it, and what libraries print would land in there.
+    A closed stream is treated as one that cannot be written to. Its number is occupied, as the next file that
+    is opened would get it otherwise, and libraries would print into that file.
     """
 
     def __enter__(self) -> Self:
@@ -55,13 +55,13 @@ class Streams:
         sys.stdout, sys.stderr = self._usual
 
     def fault(self) -> OSError | None:
-        """Why something on stdout was lost; a reader that left, as `head` does, is no fault."""
+        """Return why output on stdout was lost; a reader that closes the pipe is no fault."""
         sys.stdout.flush()
         faults = [raw.fault for raw in self._raw if raw.number == 1]
         return next((one for one in faults if not isinstance(one, BrokenPipeError)), None)
 
     def drop(self) -> None:
-        """Write no more to stdout: it may be held up, and nobody wants the rest of an interrupted command."""
+        """Discard the rest of stdout: its reader may block, and the command was interrupted."""
         for raw in self._raw:
             if raw.number == 1:
                 raw.fault = raw.fault or BrokenPipeError()
@@ -89,7 +89,7 @@ class _Guarded(io.RawIOBase):
         self.fault: OSError | None = None
 
     def write(self, data: ReadableBuffer, /) -> int:
-        """Take all of it, or as much as goes at once."""
+        """Write as many bytes as possible at once; return their number."""
         while self.fault is None:
             try:
                 if (written := self._inner.write(data)) is not None:
@@ -100,20 +100,20 @@ class _Guarded(io.RawIOBase):
         return memoryview(data).nbytes
 
     def writable(self) -> bool:
-        """Yes, as far as its user can tell."""
+        """Return True: faults are reported at the end only."""
         return True
 
     def fileno(self) -> int:
-        """The stream's number."""
+        """Return the file descriptor."""
         return self.number
 
     def isatty(self) -> bool:
-        """Whether somebody may be looking."""
+        """Return whether the stream is a terminal."""
         return self._inner.isatty()
 
 
 def _occupy(number: int, use: int) -> None:
-    """Take the number of a stream if it is closed."""
+    """Open the null device under a stream's number if the stream is closed."""
     try:
         os.fstat(number)
     except OSError:
@@ -137,10 +137,10 @@ _SHELLS = 128  # a shell's status of what a signal ended, less the signal's numb
 class Interruption:
     """Raises KeyboardInterrupt once for Ctrl-C, SIGTERM or SIGHUP inside a `with` block.
 
-    Asked again, the process ends at once, also while the main thread is in a driver or another library.
-    Signals that the caller ignores or handles stay his.
+    At a second signal the process ends at once, also while the main thread is in a driver or another library.
+    Signals that the caller ignores or handles are left alone.
 
-    code : the exit status that follows; 0 as long as nobody has asked
+    code : the exit status that follows; 0 before any signal
     """
 
     def __init__(self) -> None:
@@ -196,14 +196,14 @@ class Interruption:
         self._writing.send(_RETRY)
 
     def _lost(self, lost: sys.UnraisableHookArgs) -> None:
-        """What Python calls with an exception that nobody gets, as in a destructor."""
+        """Handle an exception that Python cannot raise, as in a destructor."""
         if self.code and issubclass(lost.exc_type, KeyboardInterrupt):
             self._raise_later()
         else:
             self._usual_hook(lost)
 
     def _watch(self) -> None:
-        """See signals arrive, which the main thread does only between two steps of Python."""
+        """Receive signals, which the main thread does only between two steps of Python."""
         asked_s = 0.0
         with self._reading:
             while True:
@@ -237,7 +237,7 @@ def _interrupt() -> None:
 
 
 def _running_loop() -> AbstractEventLoop | None:
-    """asyncio's, if the main thread is in one."""
+    """Return the event loop of asyncio in which the main thread runs, if any."""
     if (asyncio := sys.modules.get("asyncio")) is None:
         return None
     try:
@@ -248,7 +248,7 @@ def _running_loop() -> AbstractEventLoop | None:
 
 
 def _would_be_lost(frame: FrameType | None) -> bool:
-    """Whether an exception would not come out of there as it is."""
+    """Return whether libraries between the frame and its callers would swallow an exception."""
     while frame is not None:
         package, name = str(frame.f_globals.get("__name__")).partition(".")[0], frame.f_code.co_name
         if package in _TO_BE_LEFT or (package in _DRIVERS and "callback" in name):

@@ -19,7 +19,7 @@ _NAMES = {"structure": "skin"}
 
 
 def _defaults() -> dict[str, str]:
-    """Default of each pigment: the default skin's, and those of other skins where they differ."""
+    """Return the default of each pigment: the default skin's, and those of other skins where they differ."""
     found: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - found.keys():
         usual, own = getattr(DEFAULT_SKIN, field), {name: getattr(one, field) for name, one in SKINS.items()}
@@ -118,7 +118,7 @@ def profile(
     check:
         Add Monte Carlo points with error bars to the plot.
     """
-    from dermis.cli.profile_report import Report, Request
+    from dermis.cli.profile_report import Report, draw_plot, gaussian_fit, other_fit
     from dermis.optics.diffusion.models import counted_error, known_error
     from dermis.optics.half_space import COUNTED
     from dermis.optics.profiles import find_table
@@ -141,14 +141,12 @@ def profile(
         error = counted_error(radial, counted) if counted else known_error(radial.model, usual)
         spectrum = _spectrum(tissue, model, clamp)
     kept = keep_energy or radial.model == COUNTED
-    request = Request(_TERMS if fit is None else fit, fit_kind, variances == "shared", kept)
-    own = None if fit is not None else table
-    found = Report.of(radial, tissue, request, own, thicknesses, error, spectrum)
+    own, terms = (table, _TERMS) if fit is None else (None, fit)
+    fitted = gaussian_fit(radial, own, terms, shared=variances == "shared", keep_energy=kept)
+    found = Report(radial, tissue, fitted, other_fit(radial, fit_kind), thicknesses, error, spectrum)
     if output is not None:
         found.save(output)
     if plot is not None:
-        from dermis.cli.profile_report import draw_plot
-
         draw_plot(plot, found, counted)
     if as_json:
         print_json(found.as_json())
@@ -171,7 +169,7 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
 
 
 def _light(photons: int | None, seed: int | None, anisotropy: float, traced: bool) -> Options:
-    """What to trace, with a note when nothing is going to be traced."""
+    """Return the options of tracing; print a note when no photons will be traced."""
     if not traced and (photons, seed, anisotropy) != (None, None, 0.0):
         note("note: no photons are traced without --model montecarlo or --check")
     return {

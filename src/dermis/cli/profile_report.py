@@ -5,58 +5,60 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dermis.base.atomic_write import replacing
 from dermis.base.extras import needed
 from dermis.optics.diffusion.models import through_gaussians
-from dermis.optics.fits.burley import BurleyFit
+from dermis.optics.fits.burley import BurleyFit, fit_burley, unity_parameters, unreal_parameters
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
+from dermis.optics.fits.separable import SeparableFit, fit_separable
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from dermis.optics.diffusion.models import ModelError
-    from dermis.optics.fits.separable import SeparableFit
     from dermis.optics.gaussians import GaussianSum
     from dermis.optics.media import Floats
     from dermis.optics.radial import RadialProfile
     from dermis.optics.tissue import Tissue
 
 
-def row(values: Floats) -> str:
-    """Three numbers of a report."""
+def _row(values: Floats) -> str:
+    """Return three numbers of a report as text."""
     return " ".join(f"{value:7.4f}" for value in values)
 
 
-def plain(value: Any) -> Any:
-    """Arrays as lists, without what is None."""
+def _plain(value: object) -> object:
+    """Return arrays as lists, and tables without what is None."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, dict):
-        return {key: plain(one) for key, one in value.items() if one is not None}
+        return {key: _plain(one) for key, one in value.items() if one is not None}
     if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
+        return [_plain(one) for one in value]
     return value
 
 
-@dataclass(frozen=True)
-class Request:
-    """How to fit.
+def gaussian_fit(
+    radial: RadialProfile, table: GaussianSum | None, terms: int, *, shared: bool, keep_energy: bool
+) -> GaussianFit:
+    """Return the Gaussians of a profile; a table is its own fit."""
+    if table is not None:
+        return GaussianFit(table, np.zeros(3), np.zeros(3), "pointwise", shared=True)
+    target = radial.points() if radial.finite else radial.rings()
+    return fit_gaussians(target, terms, shared=shared, keep_energy=keep_energy, name=radial.name)
 
-    terms : Gaussians, 1 to 8
-    kind : what to fit besides Gaussians
-    shared : one set of widths for all channels
-    keep_energy : weights sum to the total
-    """
 
-    terms: int
-    kind: Literal["gaussian", "burley", "separable"]
-    shared: bool
-    keep_energy: bool
+def other_fit(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
+    """Return a fit of another kind than Gaussians, "burley" or "separable"."""
+    if kind == "burley":
+        return fit_burley(radial.rings())
+    return fit_separable(radial.rings()) if kind == "separable" else None
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,6 @@ class Report:
     radial : the profile
     tissue : what it belongs to, None for a table of Gaussians
     fit : Gaussians and their error
-    ring_error : (3,) of the Gaussians in the light through rings, to compare all kinds of fit by [-]
     other : a fit of another kind
     through_mm : thicknesses that light is to come through [mm]
     model_error : of the model against photons, None where it is not known
@@ -76,41 +77,20 @@ class Report:
     radial: RadialProfile
     tissue: Tissue | None
     fit: GaussianFit
-    ring_error: Floats
     other: BurleyFit | SeparableFit | None
     through_mm: tuple[float, ...]
     model_error: ModelError | None = None
     spectrum: Floats | None = None
 
-    @classmethod
-    def of(
-        cls,
-        radial: RadialProfile,
-        tissue: Tissue | None,
-        request: Request,
-        table: GaussianSum | None,
-        through_mm: tuple[float, ...],
-        model_error: ModelError | None = None,
-        spectrum: Floats | None = None,
-    ) -> Report:
-        """The report of a profile; a table that is given is taken as its own fit."""
-        target = radial.points() if radial.finite else radial.rings()
-        if table is None:
-            shared, keep_energy = request.shared, request.keep_energy
-            fit = fit_gaussians(
-                target, request.terms, shared=shared, keep_energy=keep_energy, name=radial.name
-            )
-        else:
-            fit = GaussianFit(table, np.zeros(3), np.zeros(3), "pointwise", shared=True)
-        rings = radial.rings()
-        ring_error = rings.error(fit.profile.variance_mm2, fit.profile.weight)
-        other = _other(radial, request.kind)
-        return cls(radial, tissue, fit, ring_error, other, through_mm, model_error, spectrum)
+    @property
+    def ring_error(self) -> Floats:
+        """Error of the Gaussians in the light through rings, (3,), to compare all kinds of fit by [-]."""
+        return self.radial.rings().error(self.fit.profile.variance_mm2, self.fit.profile.weight)
 
-    def as_json(self) -> dict[str, object]:
-        """Everything, in plain lists."""
-        radial, sum_ = self.radial, self.fit.profile
-        found: dict[str, object] = plain(
+    def as_json(self) -> object:
+        """Return everything, in plain lists."""
+        radial, sum_, ways = self.radial, self.fit.profile, self._through()
+        return _plain(
             {
                 "name": radial.name,
                 "model": radial.model,
@@ -132,59 +112,56 @@ class Report:
                 },
                 "model_error": asdict(self.model_error) if self.model_error else None,
                 **self._other_json(),
-                **self._through_json(),
+                "transmission": {"thickness_mm": self.through_mm, **ways} if ways else None,
                 "warnings": radial.warnings,
                 "notes": self.tissue.medium.notes if self.tissue else (),
                 "sources": radial.sources,
             }
         )
-        return found
 
     def lines(self) -> list[str]:
-        """The report to read."""
+        """Return the report to read."""
         radial, fit = self.radial, self.fit
-        lines = [f"{radial.name}, model {radial.model}", f"total      {row(radial.total)}  {self._per()}"]
+        lines = [f"{radial.name}, model {radial.model}", f"total      {_row(radial.total)}  {self._per()}"]
         if self.tissue is not None and self.tissue.rgb is None:
             for layer in self.tissue.medium.layers:
-                path = row(layer.mean_free_path_mm)
+                path = _row(layer.mean_free_path_mm)
                 lines.append(f"path       {path}  mm, reduced mean free path in {layer.name}")
         lines += ["", "variance mm2     red   green    blue"]
         for variance, weight in zip(fit.profile.variance_mm2, fit.profile.weight, strict=True):
-            lines.append(f"{variance:12.5g} {row(weight)}")
+            lines.append(f"{variance:12.5g} {_row(weight)}")
         kind = "R(r)" if fit.kind == "pointwise" else "rings"
-        lines.append(f"error      {row(fit.error)}  of {kind}, relative")
-        lines.append(f"energy     {row(fit.energy_error)}  too much or too little, relative")
+        lines.append(f"error      {_row(fit.error)}  of {kind}, relative")
+        lines.append(f"energy     {_row(fit.energy_error)}  too much or too little, relative")
         lines += self._model_lines() + self._other_lines()
         for way, colours in self._through().items():
             for thickness, colour in zip(self.through_mm, colours, strict=True):
-                lines.append(f"through    {row(colour)}  {thickness:g} mm, by its {way}")
+                lines.append(f"through    {_row(colour)}  {thickness:g} mm, by its {way}")
         lines += [f"note: {note}" for note in (self.tissue.medium.notes if self.tissue else ())]
         return lines
 
     def _model_lines(self) -> list[str]:
-        """What the model itself is off by, which no fit mends."""
+        """Return the error of the model itself, which no fit corrects."""
         error = self.model_error
         if error is None:
             return []
         where = "against photons, in rings, most within a mean free path of r = 0"
         if len(error.tissues) == 1:
-            return [f"model      {row(error.most)}  {where}"]
-        lines = [f"model      {row(error.least)}  at least, {where},"]
-        return [*lines, f"           {row(error.most)}  at most, on {', '.join(error.tissues)}"]
+            return [f"model      {_row(error.most)}  {where}"]
+        lines = [f"model      {_row(error.least)}  at least, {where},"]
+        return [*lines, f"           {_row(error.most)}  at most, on {', '.join(error.tissues)}"]
 
     def _other_lines(self) -> list[str]:
-        from dermis.optics.fits.burley import BurleyFit
-
         if self.other is None:
             return []
         if isinstance(self.other, BurleyFit):
-            lines = [f"Burley     {row(self.other.profile.shape)}  s [1/mm]"]
+            lines = [f"Burley     {_row(self.other.profile.shape)}  s [1/mm]"]
         else:
             kernel = self.other.kernel
             pairs = zip(kernel.variance_mm2, kernel.weight, strict=True)
-            lines = [f"separable  {row(v)}  mm2, weights {row(w)}" for v, w in pairs]
-        mine = f"rings      {row(self.other.error)}  its error in the light through rings"
-        return [*lines, mine, f"rings      {row(self.ring_error)}  the Gaussians'"]
+            lines = [f"separable  {_row(v)}  mm2, weights {_row(w)}" for v, w in pairs]
+        mine = f"rings      {_row(self.other.error)}  its error in the light through rings"
+        return [*lines, mine, f"rings      {_row(self.ring_error)}  the Gaussians'"]
 
     def save(self, path: Path) -> None:
         """Write the Gaussians for the renderer."""
@@ -220,15 +197,11 @@ class Report:
             "scattering_per_mm": [layer.sigma_s_prime for layer in medium.layers],
         }
         if parameters is not None:
-            from dermis.optics.pigments.spectra import WAVELENGTHS_NM
-
             found |= {"skin": asdict(parameters), "wavelength_nm": WAVELENGTHS_NM}
             found["reflectance"] = self.spectrum
         return found
 
     def _other_json(self) -> dict[str, object]:
-        from dermis.optics.fits.burley import BurleyFit, unity_parameters, unreal_parameters
-
         if self.other is None:
             return {}
         found = asdict(self.other)
@@ -238,27 +211,11 @@ class Report:
         return {"burley": found | engines}
 
     def _through(self) -> dict[str, Floats]:
-        """Light through the thicknesses, (n, 3), by each way to know it [-]."""
+        """Return the light through the thicknesses, (n, 3), by each way to compute it [-]."""
         if not self.through_mm:
             return {}
         ways = {"gaussians": through_gaussians(self.fit.profile, self.through_mm)}
         return ways if self.tissue is None else ways | {"slab": self.tissue.through(self.through_mm)}
-
-    def _through_json(self) -> dict[str, object]:
-        ways = self._through()
-        return {"transmission": {"thickness_mm": self.through_mm, **ways}} if ways else {}
-
-
-def _other(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
-    if kind == "burley":
-        from dermis.optics.fits.burley import fit_burley
-
-        return fit_burley(radial.rings())
-    if kind == "separable":
-        from dermis.optics.fits.separable import fit_separable
-
-        return fit_separable(radial.rings())
-    return None
 
 
 _INK = ("#c0392b", "#2e8b57", "#2a62b0")
@@ -268,7 +225,7 @@ _DASHES = (0, (4, 3))
 _NAMES = ("red", "green", "blue")
 _FAINTEST = 1e-5  # of the peak of r R(r): below that numbers are noise and eyes see nothing
 _UNDATED: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-"""What keeps the same plot the same file."""
+"""Metadata without dates, so that equal plots are equal files."""
 _LEAST_COUNT = 0.3  # relative standard error beyond which a ring of photons is left out
 
 
@@ -301,8 +258,6 @@ def draw_plot(path: Path, found: Report, counted: RadialProfile | None) -> None:
 
 def _spectra(axes: Axes, found: Report) -> None:
     """Reflectance by wavelength, and the layers' coefficients on an axis of their own."""
-    from dermis.optics.pigments.spectra import WAVELENGTHS_NM
-
     assert found.tissue is not None and found.spectrum is not None
     axes.plot(WAVELENGTHS_NM, found.spectrum, color="black", linewidth=1.6, label="R")
     axes.set(xlim=(400, 700), ylim=(0, 1), xlabel="wavelength [nm]", ylabel="R, of incident light")

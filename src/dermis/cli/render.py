@@ -8,12 +8,10 @@ import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from dermis.base.console import note, print_report, working_on
-from dermis.cli.options import Adapter, Json
+from dermis.cli.options import Adapter, Destination, Json
 from dermis.cli.output_options import Format, FrameLandmarks, FrameOutputs, Landmarks, Outputs
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 from dermis.scene.techniques import TECHNIQUES
@@ -33,7 +31,7 @@ def render(
     head: str = "human",
     /,
     *,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("dermis.png"),
+    output: Destination = Path("dermis.png"),
     scene: SceneOptions = DEFAULTS,
     outputs: Outputs = None,
     outputs_format: Format = None,
@@ -121,7 +119,7 @@ def render(
 
 @contextlib.contextmanager
 def _uncollected() -> Iterator[None]:
-    """No search for garbage: one picture leaves little, and a search looks through all libraries."""
+    """Disable garbage collection: one picture leaves little, and a collection scans all libraries."""
     was = gc.isenabled()
     gc.disable()
     try:
@@ -147,7 +145,7 @@ def _write(rendered: Rendered, output: Path, more: FrameOutputs, values: Mapping
 
 
 def _note_light(scene: Scene, settings: Settings, rendered: Rendered) -> None:
-    """Print what of the light is not as one may expect."""
+    """Print notes about light that is not as one may expect."""
     technique, suns = TECHNIQUES[settings.technique], rendered.suns
     if technique.on_atlas and technique.stitches and rendered.unscattered > _MOST_UNSCATTERED:
         share = f"{rendered.unscattered:.0%} of the skin's triangles"

@@ -55,7 +55,7 @@ if not TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class SceneOptions:
-    """What was typed, by the fields of the models."""
+    """Options of a scene as they were typed, by the fields of the models."""
 
     settings: SettingsOptions = field(default_factory=dict)
     skin: SkinOptions = field(default_factory=dict)
@@ -90,9 +90,9 @@ DEFAULTS = SceneOptions()
 
 
 def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
-    """The scene and its settings: those of a head or of a scene's file, with the options given on top.
+    """Return the scene and settings of a head or of a scene's file, with the given options on top.
 
-    What neither says is as in `PHOTOGRAPHED`.
+    Settings that neither states are those of `PHOTOGRAPHED`.
     """
     from dermis.scene import Scene, load_camera
 
@@ -123,7 +123,7 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
 
 
 def note_levels(name: str, given: SceneOptions, head: Head) -> None:
-    """A line on stderr about levels of subdivision that were found for the picture.
+    """Print a line on stderr about levels of subdivision that were chosen for the picture.
 
     name : of the head or of the scene's file, whose head this is
     """
@@ -138,7 +138,7 @@ def note_levels(name: str, given: SceneOptions, head: Head) -> None:
 
 
 def _check(name: str, given: SceneOptions) -> None:
-    """Refuse what cannot be before the head is loaded, which takes longer."""
+    """Refuse impossible options before the head is loaded, which takes longer."""
     from dermis.environment.panorama import panorama_file
     from dermis.optics.profiles import load_profile
 
@@ -157,13 +157,13 @@ def _check(name: str, given: SceneOptions) -> None:
 
 
 def _note_mixing(skin: Skin, settings: Settings) -> None:
-    """A line on stderr where a map of profiles changes nothing."""
+    """Print a line on stderr where a map of profiles has no effect."""
     if skin.profile_map and not TECHNIQUES[settings.technique].mixes:
         note(f"note: {settings.technique} takes the first profile alone; texture-space mixes them by the map")
 
 
 def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
-    """The file's scene, or a head's with defaults."""
+    """Return the scene of a file, or a head's scene with defaults."""
     from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import head_and_skin
     from dermis.scene.smoothness import SmoothIn
@@ -194,7 +194,7 @@ def _environment(before: Environment | None, around: Options) -> Environment | N
 def _lights(
     scene: Scene, name: str | None, environment: Environment | None, *, replaced: bool
 ) -> tuple[Light, ...]:
-    """The rig given; with an environment given and no rig none; else the scene's."""
+    """Return the given rig; no lights where only an environment is given; else the scene's lights."""
     from dermis.scene import load_lights
 
     if name is None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from dermis.base.console import print_json, print_lines, progress
-from dermis.cli.options import Adapter, Json, Options
+from dermis.cli.options import Adapter, Destination, Json, given
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def unmix(
     colour_map: Path,
     /,
     *,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("maps"),
+    output: Destination = Path("maps"),
     melanin: _Share = None,
     blood: _Share = None,
     oxygen: float | None = None,
@@ -116,19 +116,16 @@ def unmix(
 def _change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
 ) -> Change | None:
-    """What is to be recoloured, None for nothing."""
+    """Return the change of colour that was typed, None for none."""
     from dermis.apps.inverse.unmixing.unmix import Change, parse_share
     from dermis.base.quantities import number
 
-    if melanin is None and blood is None and oxygen is None and eumelanin is None:
-        return None
-    shares = {"--oxygen": oxygen, "--eumelanin": eumelanin}
-    for option, value in shares.items():
-        if value is not None:
-            number(option, value, 0.0, 1.0, "a share")
-    words = {"melanin": melanin, "blood": blood}
-    found: Options = {name: parse_share(f"--{name}", one) for name, one in words.items() if one is not None}
-    return Change(**found, oxygen=oxygen, eumelanin=eumelanin)
+    changed = given(oxygen=oxygen, eumelanin=eumelanin)
+    for name, value in changed.items():
+        number(f"--{name}", value, 0.0, 1.0, "a share")
+    for name, words in given(melanin=melanin, blood=blood).items():
+        changed[name] = parse_share(f"--{name}", words)
+    return Change(**changed) if changed else None
 
 
 def _report(found: Unmixed, written: list[Path], seconds: float, as_json: bool) -> None:

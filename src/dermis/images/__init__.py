@@ -1,1 +1,0 @@
-"""Pictures: pixels read and written, colour spaces, filters and movies."""

@@ -1,1 +1,0 @@
-"""Light in tissue: media, pigments, diffusion profiles and their fits, thin parts."""

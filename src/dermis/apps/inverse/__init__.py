@@ -1,1 +1,0 @@
-"""From pictures to skin and light: unmixing of colour maps and fits of photographs."""

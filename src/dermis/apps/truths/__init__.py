@@ -1,1 +1,0 @@
-"""Reference solutions that share no model with what they judge: path tracing, photons, surface integrals."""

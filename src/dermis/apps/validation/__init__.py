@@ -1,1 +1,0 @@
-"""How wrong and how fast the package is: accuracy, peers, engines, comparisons and benchmarks."""

@@ -24,8 +24,7 @@ _GRAB = 8.0  # logical pixels to either side of the divider within which a point
 class Controls:
     """Turns input events into steps of the undo history.
 
-    shown : what is seen, where that is another state than the history's
-
+    shown : returns the state that is seen, where that is not the history's
     light : index of the light that Shift and drag moves; an index past the last one means the environment
     """
 
@@ -112,7 +111,7 @@ class Controls:
         self.history.change(moved, gesture)
 
     def _side(self, size: Pair) -> float:
-        """What drags are measured against: the picture's height, for the atlas its shorter side."""
+        """Return the unit of drags: the picture's height, for the atlas its shorter side."""
         return max(1.0, min(size) if self.history.state.view == ATLAS else size[1])
 
     def _focus(self, event: Event, size: Pair) -> None:
@@ -168,7 +167,7 @@ class Split:
 
 
 def shifted(event: Event, left: float) -> Event:
-    """An event in the coordinates of a picture that begins so far from the window's left edge."""
+    """Return an event in the coordinates of a picture that begins at `left` in the window."""
     found = dict(event)
     if "x" in found:
         found["x"] -= left
@@ -179,14 +178,14 @@ def shifted(event: Event, left: float) -> Event:
 
 
 def _panned(state: ViewerState, right: float, down: float) -> ViewerState:
-    """The camera or the atlas moved along with the pointer."""
+    """Return the state with the camera or the atlas moved along with the pointer."""
     if state.view == ATLAS:
         return state.with_chart(state.chart.panned(right, down))
     return state.with_camera(pan(state.scene.camera, -right, down))
 
 
 def _pinch(event: Event) -> tuple[float, float, float] | None:
-    """Midpoint and distance of two fingers; None for fewer."""
+    """Return midpoint and distance of two fingers; None for fewer."""
     touches = list((event.get("touches") or {}).values())
     if len(touches) < 2:
         return None

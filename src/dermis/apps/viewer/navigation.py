@@ -157,7 +157,7 @@ def orbit_light(light: Light, camera: Camera, right: float, up: float) -> Light:
 
 
 def _same(a: Camera, b: Camera) -> bool:
-    """Whether the difference between two cameras is too small to see."""
+    """Return whether the difference between two cameras is too small to see."""
     off = [np.abs(np.subtract(getattr(a, name), getattr(b, name))).max() for name in ("position", "target")]
     off += np.abs(np.subtract(a.principal_point, b.principal_point) * b.frame_mm).tolist()
     return max(off) < 5e-4 * b.frame_mm and abs(a.frame_mm - b.frame_mm) < 5e-4 * b.frame_mm

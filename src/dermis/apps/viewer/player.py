@@ -43,6 +43,7 @@ class Player:
     motion : None for none
     clock : time [s]
 
+    is_playing : whether the motion runs
     loops : whether the motion begins again at its end
     note : what of it the head lacks, or why it cannot be played
     """
@@ -59,7 +60,7 @@ class Player:
         self._clip: Clip | None = None
         self._head: Head | None = None
         self._seconds = 0.0
-        self._playing = False
+        self.is_playing = False
         self._starting = False  # whether no picture of it has been drawn yet
         self._began: float | None = None  # by the clock, where the motion's beginning would lie
         self._shown: tuple[ViewerState, float, ViewerState] | None = None
@@ -83,20 +84,15 @@ class Player:
         return self._clip
 
     @property
-    def is_playing(self) -> bool:
-        """Whether it runs."""
-        return self._playing
-
-    @property
     def seconds(self) -> float:
         """Where in the motion it is [s]."""
-        return self._seconds if self._playing else self._history.state.seconds
+        return self._seconds if self.is_playing else self._history.state.seconds
 
     @property
     def shown(self) -> ViewerState:
         """The state of now, moved while the motion plays."""
         state = self._history.state
-        clip = self.clip if self._playing else None
+        clip = self.clip if self.is_playing else None
         if clip is None:
             return state
         if self._shown is None or self._shown[0] is not state or self._shown[1] != self._seconds:
@@ -124,15 +120,15 @@ class Player:
             return
         start = self.seconds if seconds is None else seconds
         self._seconds = 0.0 if start >= self.clip.duration_s else start
-        self._playing, self._starting, self._began = True, True, None
+        self.is_playing, self._starting, self._began = True, True, None
 
     def stop(self) -> None:
         """End without a step: the state is as it was before."""
-        self._playing, self._shown = False, None
+        self.is_playing, self._shown = False, None
 
     def pause(self) -> None:
         """Stop at the pose of now, which is one step."""
-        if self._playing:
+        if self.is_playing:
             shown = self.shown
             self.stop()
             self._history.end_gesture()
@@ -140,16 +136,16 @@ class Player:
 
     def toggle(self) -> None:
         """Play or pause."""
-        if self._playing:
+        if self.is_playing:
             self.pause()
         else:
             self.play()
 
     def advance(self) -> None:
         """Go on to the time of the clock, which begins when the first picture is there: it may take long."""
-        now, clip = self._clock(), self.clip if self._playing else None
+        now, clip = self._clock(), self.clip if self.is_playing else None
         if clip is None or self._starting:
-            self._playing, self._starting = clip is not None, False
+            self.is_playing, self._starting = clip is not None, False
             return
         if self._began is None:
             self._began = now - self._seconds

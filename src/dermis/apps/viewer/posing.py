@@ -1,4 +1,4 @@
-"""Poses made of others: what a slider, a motion and the button for rest change."""
+"""Poses of the viewer: what a slider and the button for rest change."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ AT_REST = Pose()
 
 
 def weight_of(scene: Scene, target: str) -> float:
-    """The weight of a morph target, by pose or at rest."""
+    """Return the weight of a morph target, by pose or at rest."""
     return float(_pose(scene).weights.get(target, _resting(scene.head, target)))
 
 
 def with_weight(scene: Scene, target: str, weight: float) -> Pose | None:
-    """The scene's pose with another weight of a target."""
+    """Return the scene's pose with another weight of a target."""
     weights = dict(_pose(scene).weights)
     weights.pop(target, None)
     if weight != _resting(scene.head, target):
@@ -32,7 +32,7 @@ def with_weight(scene: Scene, target: str, weight: float) -> Pose | None:
 
 
 def angles_of(scene: Scene, bone: str) -> Angles:
-    """How a bone is turned about the head's x, y and z [degrees]; of a matrix its rotation."""
+    """Return the turn of a bone about the head's x, y and z [degrees]; of a matrix its rotation."""
     given, skeleton = _pose(scene).bones.get(bone), scene.head.control.skeleton
     if given is None or skeleton is None:
         return 0.0, 0.0, 0.0
@@ -45,7 +45,7 @@ def angles_of(scene: Scene, bone: str) -> Angles:
 
 
 def with_angles(scene: Scene, bone: str, degrees: Angles) -> Pose | None:
-    """The scene's pose with a bone turned otherwise [degrees]."""
+    """Return the scene's pose with another turn of a bone [degrees]."""
     bones = dict(_pose(scene).bones)
     bones.pop(bone, None)
     if any(degrees):
@@ -54,12 +54,12 @@ def with_angles(scene: Scene, bone: str, degrees: Angles) -> Pose | None:
 
 
 def at_rest(scene: Scene) -> Pose | None:
-    """The scene's pose without expressions and turns: the person stays."""
+    """Return the scene's pose without expressions and turns; the points of the person stay."""
     return _shortest(replace(_pose(scene), weights={}, bones={}))
 
 
 def same_pose(a: Pose | Mapping[str, float] | None, b: Pose | Mapping[str, float] | None) -> bool:
-    """Whether two poses say the same; places of points are compared by identity."""
+    """Return whether two poses are equal; places of points are compared by identity."""
     if a is b:
         return True
     one, other = Pose.of(a) or AT_REST, Pose.of(b) or AT_REST
@@ -72,7 +72,7 @@ def same_pose(a: Pose | Mapping[str, float] | None, b: Pose | Mapping[str, float
 
 
 def posed_positions(scene: Scene) -> NDArray[np.floating]:
-    """(v, 3) where the corners of the scene's mesh are, as the device computes them [mm]."""
+    """Return the (v, 3) positions of the corners of the posed mesh, as the device computes them [mm]."""
     mesh, motion = scene.head.mesh, scene.motion
     if motion is None:
         return mesh.positions
@@ -84,7 +84,7 @@ def posed_positions(scene: Scene) -> NDArray[np.floating]:
 
 
 def matching(names: Sequence[str], wanted: str) -> list[str]:
-    """The names that hold some letters, large or small."""
+    """Return the names that contain some letters, in either case."""
     letters = wanted.strip().casefold()
     return [name for name in names if letters in name.casefold()]
 
@@ -94,7 +94,7 @@ def _pose(scene: Scene) -> Pose:
 
 
 def _shortest(pose: Pose) -> Pose | None:
-    """None for a pose that moves nothing."""
+    """Return a pose, None for one that moves nothing."""
     return pose if pose.weights or pose.bones or pose.positions_mm is not None else None
 
 

@@ -24,17 +24,17 @@ from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.skin import Skin
 
 HEAD_FILES = (".glb", ".obj", ".ply", ".json", ".toml")
-"""What a file that a page sends may end in: meshes, people, scenes."""
+"""Suffixes of files that a page may send: meshes, people, scenes."""
 
 _MOST_RECENT = 8
 Opened = Head | ViewerState
 
 
 class Heads:
-    """What the viewer can show, and what it is opening.
+    """Heads that the viewer can show, opened in a thread while the picture goes on.
 
     recent : paths of files opened, the last one first
-    wake : called from another thread when the next frame is to take what was opened
+    wake : called from another thread when a head was opened for the next frame
     """
 
     def __init__(self) -> None:
@@ -47,15 +47,15 @@ class Heads:
 
     @property
     def note(self) -> str:
-        """What is being opened, empty for nothing."""
+        """Message about the head that is being opened, empty for none."""
         return f"opening {self.called(self._name)} ..." if self._coming else ""
 
     def called(self, name: str) -> str:
-        """A head's name as people read it: a file's without its folder."""
+        """Return a head's name as people read it: a file's without its folder."""
         return Path(self.sent_as(name)).name
 
     def sent_as(self, name: str) -> str:
-        """What the page that sent a file calls it; the name itself for others."""
+        """Return the name that the page that sent a file gave it; the name itself for others."""
         return self._names.get(name, name)
 
     def open(self, name: str, called: str = "") -> None:
@@ -72,7 +72,7 @@ class Heads:
         self._coming.add_done_callback(lambda _: self.wake())
 
     def take(self, state: ViewerState) -> ViewerState | None:
-        """The state with what was opened in it, once; None while there is nothing.
+        """Return the state with the opened head, once; None while there is none.
 
         Raises DermisError for what cannot be opened.
         """
@@ -93,7 +93,7 @@ def _read(name: str) -> Opened:
 
 
 def _with_head(state: ViewerState, head: Head, name: str) -> ViewerState:
-    """The state with another head in the same light, posed as before where it has the same names."""
+    """Return the state with another head in the same light, posed as before where it has the same names."""
     old = state.scene.head
     alike = old.targets == head.targets and old.bones == head.bones
     pose = state.scene.pose if alike else None
@@ -103,7 +103,7 @@ def _with_head(state: ViewerState, head: Head, name: str) -> ViewerState:
 
 @lru_cache(maxsize=1)
 def built_in() -> tuple[str, ...]:
-    """Names of the heads that are there without a file or a download."""
+    """Return names of the heads that need neither a file nor a download."""
     samples = (name for name, sample in SAMPLES.items() if sample.kind == "head" and cached(name))
     return (HUMAN, *samples)
 
@@ -167,7 +167,7 @@ class Session:
         self.message = ""
 
     def tell_fault(self, what: str, error: Exception) -> None:
-        """Tell of an error that nobody foresaw, once: over the picture, and with its traceback in the log."""
+        """Report an unexpected error once: over the picture, and with its traceback in the log."""
         said = f"{what} ({type(error).__name__}: {_shortened(str(error))})"
         if said not in self._faults:
             self._faults.add(said)
@@ -196,7 +196,7 @@ class Session:
         self.message = f"loaded {path}"
 
     def take_head(self) -> None:
-        """Show the head that was opened meanwhile, if there is one, or tell why it cannot be."""
+        """Show the head that was opened meanwhile, if there is one, or the reason why it cannot be opened."""
         try:
             state = self.heads.take(self.state)
         except DermisError as error:
@@ -246,7 +246,7 @@ def _shortened(text: str) -> str:
 
 
 def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = ()) -> ViewerState:
-    """The state with the maps of a table of face regions, or without them.
+    """Return the state with the maps of a table of face regions, or without them.
 
     name : of the table, "auto" or "none"
     known : states whose heads are reused when they already have these maps

@@ -1,4 +1,4 @@
-"""What the viewer shows, as immutable data, and the undo history: every change makes a new state."""
+"""State of the viewer as immutable data, and its undo history: every change makes a new state."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ class ViewerState:
         return replace(self, chart=chart)
 
     def with_pose(self, pose: Pose | None) -> ViewerState:
-        """Move the head otherwise; None for at rest."""
+        """Replace the pose; None for at rest."""
         return self._with_scene(pose=pose)
 
     def at(self, clip: Clip, seconds: float) -> ViewerState:
@@ -168,7 +168,7 @@ class ViewerState:
 
 
 def same(a: ViewerState, b: ViewerState) -> bool:
-    """Whether two states are equal; heads are compared by identity, not by their arrays."""
+    """Return whether two states are equal; heads are compared by identity, not by their arrays."""
 
     def rest(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
@@ -180,7 +180,7 @@ def same(a: ViewerState, b: ViewerState) -> bool:
 
 
 def changed(values: P, **fields: object) -> P:
-    """A copy with other values, validated."""
+    """Return a validated copy with other values."""
     return type(values)(**(values.model_dump() | fields))
 
 
@@ -195,11 +195,8 @@ def save_state(path: Path, state: ViewerState) -> None:
     save_scene(path, state.scene, changed(state.settings, parts=parts), state.table)
 
 
-def named_state(name: str) -> ViewerState:
-    """A built-in head, a sample or a mesh file in studio light, or the scene of a TOML file.
-
-    Raises DermisError for anything else.
-    """
+def _named_state(name: str) -> ViewerState:
+    """Return a built-in head, a sample or a mesh file in studio light, or the scene of a TOML file."""
     if Path(name).suffix.lower() == ".toml":
         return load_state(Path(name))
     path = str(Path(name).resolve()) if Path(name).is_file() else name
@@ -207,7 +204,7 @@ def named_state(name: str) -> ViewerState:
 
 
 def state_of(shown: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
-    """What is to be seen first: a head or a person in studio light, a scene, or one of them by name.
+    """Return the first state of a viewer: a head or a person in studio light, a scene, or one by name.
 
     Raises DermisError for anything else.
     """
@@ -222,11 +219,11 @@ def state_of(shown: Head | Human | Scene | ViewerState | str | os.PathLike[str])
     if not isinstance(shown, str | os.PathLike):
         came = f"a {type(shown).__name__} came"
         refuse("view", "a head, a person, a scene or a name", came, "Try dermis.Human()")
-    return named_state(os.fspath(shown))
+    return _named_state(os.fspath(shown))
 
 
 def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
-    """The state that a scene file describes; the head is not loaded again if `before` has the same one.
+    """Return the state of a scene file; the head is not loaded again if `before` has the same one.
 
     Raises DermisError for a file that is not a scene.
     """
@@ -239,7 +236,7 @@ def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
 
 
 def opened(scene: Scene, settings: Settings, head: Table, rig: str) -> ViewerState:
-    """The first state of a scene: `Settings.parts` becomes the view."""
+    """Return the first state of a scene: `Settings.parts` becomes the view."""
     view = settings.parts if settings.parts in PARTS else PICTURE
     return ViewerState(scene, changed(settings, parts="all"), head, view, rig)
 

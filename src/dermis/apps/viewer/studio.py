@@ -84,7 +84,7 @@ class Pace:
             self._streak = 0
 
     def settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
-        """The settings of a frame for a window of that size."""
+        """Return the settings of a frame for a window of that size."""
         quality = self.quality if moving else QUALITY_LEVELS[0]
         width, height = (max(1, round(quality.scale * side)) for side in size)
         return changed(
@@ -137,7 +137,7 @@ class Studio:
         self._lit: tuple[ViewerState, str] | None = None
 
     def prepare(self, state: ViewerState, go_on: Callable[[], None] = lambda: None) -> None:
-        """Make what the first pictures of a state take long for, in motion and still.
+        """Make the resources and shaders of the first pictures of a state, in motion and still.
 
         go_on : called when the head's resources are there
 
@@ -161,7 +161,7 @@ class Studio:
         size: tuple[int, int],
         moving: bool,
     ) -> Images:
-        """The image of a state as `image` makes it, and that of a frozen one, None without.
+        """Return the image of a state as `image` makes it, and that of a frozen one, None without.
 
         Raises DermisError for states that cannot be rendered and when the device fails.
         """
@@ -172,7 +172,7 @@ class Studio:
         return self.image(state, camera, size, moving), image
 
     def image(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Texture:
-        """A texture of sRGB bytes, of the window's size or smaller in motion; the last one where it holds.
+        """Return a texture of sRGB bytes, of the window's size or smaller in motion, or the last one.
 
         Raises DermisError for states that cannot be rendered and when the device fails.
         """
@@ -194,7 +194,7 @@ class Studio:
     def _frozen_image(
         self, before: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
     ) -> Texture:
-        """A copy, for the renderer has one picture of each size; it is made anew when the camera moves."""
+        """Return a copy, as the renderer has one picture of a size; drawn again when the camera moves."""
         settings, frozen = self._settings(before, size, moving), self._frozen
         finest = self._settings(before, size, moving=False)
         known = frozen and frozen.state is before and frozen.camera == camera
@@ -207,12 +207,12 @@ class Studio:
         return copy
 
     def _settings(self, state: ViewerState, size: tuple[int, int], moving: bool) -> Settings:
-        """Those of a frame; the atlas as a flat picture is always the one that the settings ask for."""
+        """Return the settings of a frame; the view of the atlas always has full quality."""
         return self.pace.settings(state.settings, size, moving and state.view != ATLAS)
 
     @property
     def is_current(self) -> bool:
-        """Whether the last image is a still one, with all that its settings ask for."""
+        """Whether the last image is a still one of full quality."""
         if not self._shown:
             return False
         state, _, settings = self._shown
@@ -237,11 +237,11 @@ class Studio:
 
     @property
     def exposure(self) -> float:
-        """That of the last frame, metered or given."""
+        """Exposure of the last frame, metered or given."""
         return self.rendered.exposure if self.rendered else 1.0
 
     def read(self, image: Texture) -> NDArray[np.uint8]:
-        """(h, w, 3) bytes of an image."""
+        """Return the (h, w, 3) bytes of an image."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
     def _draw(self, state: ViewerState, side: str = "") -> Texture:
@@ -259,14 +259,14 @@ class Studio:
         return self._views.draw(state.scene, settings, state.view, side)
 
     def _shows_light_of(self, state: ViewerState, side: str) -> bool:
-        """Whether the atlas holds a state's light: then another part of it takes no frame."""
+        """Return whether the atlas holds a state's light, so that no frame is needed to show another part."""
         if self._lit is None or self._lit[1] != side:
             return False
         return same(replace(self._lit[0], chart=state.chart), state)
 
 
 def copied(device: Device, image: Texture, space: Texture | None = None) -> Texture:
-    """A texture of bytes alike.
+    """Return a copy of a texture of bytes.
 
     space : an older copy, whose place is taken when its size fits
     """
@@ -296,15 +296,15 @@ class Preparation:
 
     @property
     def is_running(self) -> bool:
-        """Whether a head is being prepared, or a frame is to take it."""
+        """Whether a head is being prepared, or waits for the next frame."""
         return self._coming is not None
 
     def forget(self) -> None:
-        """Leave what was begun, for another studio."""
+        """Drop what was begun, for another studio."""
         self._ready = self._coming = self._next = self._kept = None
 
     def picture(self, studio: Studio, state: ViewerState) -> Texture | None:
-        """The last picture while the head of a state is prepared; None when the state may be drawn.
+        """Return the last picture while the head of a state is prepared; None when the state may be drawn.
 
         Raises what stopped the preparation, once.
         """
@@ -326,7 +326,7 @@ class Preparation:
 
 
 def begun(work: Callable[[], T]) -> Future[T]:
-    """What `work` returns, made in a thread for which an interpreter that ends does not wait."""
+    """Run `work` in a thread that an interpreter that exits does not wait for; return its future result."""
     coming: Future[T] = Future()
     coming.set_running_or_notify_cancel()
 

@@ -172,17 +172,17 @@ class Viewer:
         self.panel.draw(target, self.canvas.get_logical_size(), self.canvas.get_pixel_ratio())
 
     def _panel_width(self) -> int:
-        """Of the part of the window that the panel covers [pixel]."""
+        """Return the width of the part of the window that the panel covers [pixel]."""
         width = self.panel.width(self.canvas.get_logical_size())
         return round(float(self.canvas.get_pixel_ratio()) * width)
 
     def _picture_size(self) -> tuple[int, int]:
-        """Of the part of the window beside the panel [pixel]."""
+        """Return the size of the part of the window beside the panel [pixel]."""
         width, height = self.canvas.get_physical_size()
         return max(1, width - self._panel_width()), max(1, height)
 
     def _patches(self, image: Texture, frozen: Texture | None, size: tuple[int, int]) -> list[Patch]:
-        """The live picture, and the frozen one left of the divider."""
+        """Return the live picture, and the frozen one left of the divider."""
         left = self._panel_width()
         box = left, 0, *size
         if frozen is None:
@@ -192,7 +192,7 @@ class Viewer:
         return [Patch(one, box, shown) for one, shown in sides if shown[2]]
 
     def _images(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Images:
-        """The live and the frozen picture; a state that cannot be rendered leaves the last picture."""
+        """Return the live and the frozen picture; a state that cannot be rendered leaves the last picture."""
         import wgpu
 
         session = self.session

@@ -1,4 +1,4 @@
-"""What lies on the way to the picture, shown where the picture shows it."""
+"""Views of intermediate results, drawn over the pixels that see them or as the flat atlas."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ LEVELS = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
 """Views of the light on the atlas by its layer."""
 
 LAYERS = (*LEVELS, "stretch", "thickness")
-"""What the atlas holds."""
+"""Layers of the atlas."""
 
 VIEWS = ("picture", *PARTS, *LAYERS, "shadow", "normals", ATLAS)
-"""All that can be looked at."""
+"""All views."""
 
 _INTERMEDIATE = Path(__file__).parent / "intermediate.wgsl"
 _NUMBERS = {"stretch": 1, "thickness": 2, "shadow": 3, "normals": 4}  # as in intermediate.wgsl; levels are 0
@@ -56,7 +56,7 @@ class Views:
         self._density: weakref.WeakKeyDictionary[Texture, float] = weakref.WeakKeyDictionary()
 
     def draw(self, scene: Scene, settings: Settings, view: str, side: str = "") -> Texture:
-        """A texture of bytes that shows an intermediate of the frame drawn last on a side of the divider.
+        """Return bytes that show an intermediate of the frame drawn last on a side of the divider.
 
         Raises DermisError for what the technique does not make.
         """
@@ -77,7 +77,7 @@ class Views:
         return self._computed(shader, bound, settings.size)
 
     def draw_chart(self, scene: Scene, settings: Settings, chart: Chart, side: str = "") -> Texture:
-        """A texture of bytes that shows a part of the atlas of the frame drawn last on a side of the divider.
+        """Return bytes that show a part of the atlas of the frame drawn last on a side of the divider.
 
         Raises DermisError for what the technique does not make.
         """
@@ -99,7 +99,7 @@ class Views:
         return self._image
 
     def _layer(self, inputs: Inputs, view: str, settings: Settings) -> tuple[TextureOrView, float]:
-        """The map of the atlas that a view reads, and how its numbers are scaled."""
+        """Return the map of the atlas that a view reads, and the factor of its numbers."""
         if view in LEVELS:
             level, blur = LEVELS[view], next(iter(inputs.blurs), None)
             count = len(blur.own) if blur else 0
@@ -114,7 +114,7 @@ class Views:
         return self._thickness(inputs) if view == "thickness" else self._nothing, 1.0
 
     def _exposure(self, inputs: Inputs) -> float:
-        """Of the frame drawn last."""
+        """Return the exposure of the frame drawn last."""
         meter, given = inputs.resources.post.meter, inputs.settings.exposure
         return read_meter(self._renderer.device, meter) if meter else float(given)
 
@@ -131,7 +131,7 @@ class Views:
         return draw_thickness(self._renderer.device, thin, self._thick[thin.pairs])
 
     def _mean_density(self, stretch: Texture) -> float:
-        """Geometric mean of the texels per mm."""
+        """Return the geometric mean of the texels per mm."""
         if stretch not in self._density:
             metric = download(self._renderer.device, stretch)[..., :2].astype(np.float64)
             covered = metric[(metric > 0.0).all(axis=-1)]
@@ -140,7 +140,7 @@ class Views:
 
 
 def draw_thickness(device: Device, thin: Translucency, into: Texture) -> Texture:
-    """Least depth of the flesh behind each cell of the atlas that has pairs, at most their radius [mm].
+    """Compute the least depth of flesh behind each cell of the atlas with pairs, at most their radius [mm].
 
     into : texture of the cells; those without pairs stay as they are
     """

@@ -72,7 +72,7 @@ def serve(
     *,
     secret: bool = False,
 ) -> None:
-    """Serve web pages until interrupted; they tell what is prepared until there is a picture.
+    """Serve web pages until interrupted; until there is a picture they show the stage of preparation.
 
     load : reads what is shown first and the motion that is played, in a thread
     size : of the canvas until a page reports its own

@@ -1,1 +1,0 @@
-"""Fits of diffusion profiles: sums of Gaussians, Burley's curve and separable kernels."""

@@ -1,1 +1,0 @@
-"""Skin from pigments: spectra of melanin and blood, and the media that they give."""

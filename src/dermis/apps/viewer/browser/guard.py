@@ -47,7 +47,7 @@ class _Held(_Message):
 
 
 class Pointer(_Held):
-    """Of a mouse, a pen or fingers."""
+    """Event of a mouse, a pen or fingers."""
 
     type: Literal[
         "pointer_down", "pointer_move", "pointer_up", "pointer_enter", "pointer_leave", "double_click"
@@ -61,7 +61,7 @@ class Pointer(_Held):
 
 
 class Wheel(_Held):
-    """By how much it turned, in the browser's pixels."""
+    """Turn of a wheel, in the browser's pixels."""
 
     type: Literal["wheel"]
     x: Place
@@ -72,7 +72,7 @@ class Wheel(_Held):
 
 
 class Key(_Held):
-    """By its name in browsers."""
+    """Key, by its name in browsers."""
 
     type: Literal["key_down", "key_up"]
     key: Word
@@ -88,7 +88,7 @@ class Letters(_Message):
 
 
 class Resize(_Message):
-    """Of the page: sides in logical and in physical pixels, and their ratio."""
+    """Size of the page: sides in logical and in physical pixels, and their ratio."""
 
     type: Literal["resize"]
     width: Place
@@ -99,7 +99,7 @@ class Resize(_Message):
 
 
 class Seen(_Message):
-    """Whether the page can be seen."""
+    """Whether the page is visible."""
 
     type: Literal["show", "hide"]
 
@@ -118,9 +118,9 @@ _MESSAGES: TypeAdapter[Any] = TypeAdapter(
 
 
 def checked(text: object) -> str | None:
-    """The message with nothing but what its kind has; None for one that no page sends.
+    """Return the message with the fields of its kind only; None for one that no page sends.
 
-    text : of any kind, from anyone
+    text : untrusted, of any type
     """
     if not isinstance(text, str) or len(text) > _MOST_LETTERS:
         return None
@@ -138,7 +138,7 @@ Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Message, Receive, Send], Awaitable[None]]
 
 MOST_PAGES = 8
-"""That are open at the same time."""
+"""Pages that may be open at the same time."""
 
 _SCHEMES = {"ws": "http", "wss": "https"}
 _NO_TOKEN = "This page needs its token: open the whole address that dermis view has printed."
@@ -211,7 +211,7 @@ class Guard:
 
 
 def is_local(host: str) -> bool:
-    """Whether a host name or address can be reached from this machine only."""
+    """Return whether a host name or address can be reached from this machine only."""
     if host == "localhost":
         return True
     try:

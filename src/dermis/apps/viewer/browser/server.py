@@ -84,13 +84,13 @@ STAGES = (
     "compiling shaders",
     "drawing the first picture",
 )
-"""In this order."""
+"""Stages of preparation, in this order."""
 
 _LAST_WORDS_S = 0.7  # in which pages hear why there is nothing to see
 
 
 async def shown(pages: uvicorn.Server, canvas: PageCanvas, load: Load, adapter: str) -> Viewer:
-    """The viewer on the canvas, when all is prepared; whatever stops that is told in the pages and ends them.
+    """Return the viewer on the canvas when all is prepared; a failure is shown in the pages and ends them.
 
     pages : the server, which runs
     load : reads what is shown first, in the thread
@@ -138,7 +138,7 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
-"""Of every response: the page runs its own files alone, in no frame, and nothing of it is kept."""
+"""Headers of every response: the page runs its own files only, in no frame, and is not cached."""
 
 _EVERYWHERE = "0.0.0.0", "::"
 
@@ -209,9 +209,9 @@ def server(address: Address, canvas: PageCanvas, folder: Path) -> uvicorn.Server
 def run_until(
     pages: uvicorn.Server, listener: socket.socket, begin: Callable[[], Coroutine[None, None, T]]
 ) -> T | None:
-    """Run a server until it is told to exit, and something beside it: what that returned, if it has ended.
+    """Run a server until it exits, and a coroutine beside it; return the coroutine's result, if it has ended.
 
-    Raises what it raises.
+    Raises what the coroutine raises.
     """
 
     async def run() -> T | None:

@@ -1,4 +1,4 @@
-"""Files that a page sends: one at a time, of bounded size and number, into a folder that goes at the end."""
+"""Files that a page sends: one at a time, of bounded size and number, into a temporary folder."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from dermis.apps.viewer.session import HEAD_FILES
 from dermis.base.errors import DermisError, refuse
 
 MOST_BYTES = 1 << 28
-"""Of one file."""
+"""Largest size of one file."""
 
 MOST_BYTES_IN_ALL = 1 << 30
-"""Of all files of a server."""
+"""Largest size of all files of a server."""
 
 MOST_FILES = 200
-"""Of a server."""
+"""Largest number of files of a server."""
 
 IDLE_S = 20.0
 """Within which the next piece of a file comes [s]."""
@@ -131,5 +131,5 @@ class Uploads:
 
 
 def _shown(name: str) -> str:
-    """What people see of a file's name."""
+    """Return a file's name as it is shown."""
     return "".join(letter if letter.isprintable() else "_" for letter in name)[-_MOST_LETTERS:]

@@ -215,7 +215,7 @@ def choose(
 
 
 def button(session: Session, label: str) -> bool:
-    """Whether it was pressed."""
+    """Draw a button; return whether it was pressed."""
     pressed = imgui.button(label)
     record_position(session, label)
     return bool(pressed)
@@ -278,10 +278,10 @@ SURFACE = {
     "energy": Style("energy conserved###energy", called={"none": "no", "published": "as published"}),
     "direction": Style("exit direction###direction", called={"lambertian": "Lambertian"}),
 }
-"""Of `Skin`, for its surface."""
+"""Labels of `Skin`, for its surface."""
 
 ALBEDO = {"albedo": Style("colour by###colour from", called={"map": "albedo map", "profile": "profile"})}
-"""Of `Skin`, for its profile."""
+"""Labels of `Skin`, for its profile."""
 
 TECHNIQUE = {
     "technique": Style(
@@ -297,14 +297,14 @@ TECHNIQUE = {
     "tone": Style("tone curve###tone", called={"none": "none (linear)", "neutral": "Khronos neutral"}),
     "gamma": Style(called={"right": "gamma-correct", "wrong": "not gamma-correct"}),
 }
-"""Of `Settings`."""
+"""Labels of `Settings`."""
 
 LAYER = {
     "thickness_mm": Style("thickness###thickness"),
     "absorption_per_mm": Style("absorption σ_a###absorption"),
     "scattering_per_mm": Style("scattering σ_s'###scattering"),
 }
-"""Of `TissueLayer`."""
+"""Labels of `TissueLayer`."""
 
 LIGHT = {
     "irradiance": Style("colour###irradiance"),
@@ -312,7 +312,7 @@ LIGHT = {
     "shadows": Style("casts shadows###shadows"),
     "angle_degrees": Style("angular size###angle"),
 }
-"""Of the lights."""
+"""Labels of the lights."""
 
 LIGHT_KINDS = {
     "point": "point light",

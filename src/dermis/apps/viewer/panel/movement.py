@@ -24,13 +24,13 @@ _LONG_NAME = 16  # letters beyond which the panel may be too narrow for it
 
 
 def has_expressions(session: Session) -> bool:
-    """Whether the head has morph targets or bones."""
+    """Return whether the head has morph targets or bones."""
     head = session.state.scene.head
     return bool(head.targets or head.bones)
 
 
 def can_move(session: Session) -> bool:
-    """Whether there is a motion, or what one may move."""
+    """Return whether there is a motion, or a head that one can move."""
     return has_expressions(session) or session.player.has_motion
 
 

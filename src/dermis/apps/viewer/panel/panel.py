@@ -132,11 +132,11 @@ class Panel:
         self._frames.open(device, target)
 
     def width(self, size: tuple[float, float]) -> float:
-        """Of what the panel takes from the picture in a window of that size, logical."""
+        """Return the width that the panel takes from the picture in a window of that size, logical."""
         return 0.0 if is_drawer(size) else self._reach(size)
 
     def _reach(self, size: tuple[float, float]) -> float:
-        """Of what it covers, logical; 0 when it is hidden."""
+        """Return the width that the panel covers, logical; 0 when it is hidden."""
         share, there = (_DRAWER, self.opened) if is_drawer(size) else (_MOST_OF_WINDOW, self.visible)
         return round(min(_WIDTH, share * size[0])) if there else 0.0
 
@@ -181,7 +181,7 @@ class Panel:
         self._frames.lay_out(size, lambda: self._draw_windows(size))
 
     def _shortcut(self, event: Event) -> bool:
-        """Whether a key was a shortcut of the panel."""
+        """Return whether a key was a shortcut of the panel."""
         key, session = str(event["key"]), self._session
         if {"Control", "Meta"} & set(event.get("modifiers", ())):
             if key.lower() != "s":
@@ -213,7 +213,7 @@ class Panel:
         return True
 
     def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
-        """Whether a pointer there is over the panel; Dear ImGui would know it only a frame later."""
+        """Return whether a pointer is over the panel; Dear ImGui would know it only a frame later."""
         reach = self._reach(size)
         on_button = not reach and x < self._button_end[0] and y < self._button_end[1]
         return x < reach or on_button or self._has_popup or bool(imgui.is_any_item_active())
@@ -296,6 +296,6 @@ class Panel:
 
 
 def is_drawer(size: tuple[float, float]) -> bool:
-    """Whether a window of that size is too narrow for the panel beside the picture, as a phone is."""
+    """Return whether a window of that size is too narrow for the panel beside the picture, as a phone is."""
     width, height = size
     return width < (_PHONE if height > _UPRIGHT * width else _NARROW)

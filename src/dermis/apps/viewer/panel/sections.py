@@ -83,7 +83,7 @@ def _choice(session: Session) -> None:
 
 
 def _seed_of(session: Session) -> int:
-    """Of the person shown, 0 for another head."""
+    """Return the seed of the person shown, 0 for another head."""
     word = str(session.state.head.get("name", "")).removeprefix(f"{HUMAN}:")
     return int(word) if word.isdecimal() else 0
 
@@ -174,7 +174,7 @@ def draw_talk(session: Session) -> None:
 
 
 def draw_files(session: Session) -> None:
-    """The scene file, and screenshots of any size, that of the view unless told."""
+    """Draw the scene file, and screenshots of any size, by default that of the view."""
     _, session.scene_file = imgui.input_text("scene", session.scene_file)
     if button(session, "save"):
         attempt(session, lambda: session.save(Path(session.scene_file)))

@@ -1,1 +1,0 @@
-"""Export to Blender: a script or .blend with the material, the head, its lights and camera."""

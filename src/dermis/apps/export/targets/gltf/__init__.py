@@ -1,1 +1,0 @@
-"""Export to glTF: a .glb whose skin scatters or transmits light by extensions."""

@@ -1,1 +1,0 @@
-"""Export to Mitsuba 3: a scene whose skin is a homogeneous medium."""

@@ -1,1 +1,0 @@
-"""Export to OpenPBR and Standard Surface as MaterialX documents."""

@@ -1,1 +1,0 @@
-"""Export to pbrt: a scene with skin as the material `subsurface`."""

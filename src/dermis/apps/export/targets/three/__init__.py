@@ -1,1 +1,0 @@
-"""Export to a web page with three.js."""

@@ -1,1 +1,0 @@
-"""Export to the HDRP of Unity: a DiffusionProfileSettings asset, and the maps of a head."""

@@ -1,1 +1,0 @@
-"""Export to Unreal Engine: a subsurface profile made by an editor script."""
