@@ -22,6 +22,15 @@ def test_floors_are_those_of_the_import_linter(head: str, container: str) -> Non
     assert told == [{name.strip() for name in layer.split("|")} for layer in layers]
 
 
+@pytest.mark.parametrize(("head", "folder"), [("in `frame`", "frame"), ("feature", "frame/features")])
+def test_tables_list_what_the_folders_hold(head: str, folder: str) -> None:
+    table = TEXT.partition(f"| {head} | what it ")[2].partition("\n\n")[0]
+    rows = [row.split("|")[1] for row in table.splitlines()[2:]]
+    listed = sorted(name for row in rows for name in re.findall(r"`([\w.]+)`", row))
+    entries = (ROOT / "src" / "dermis" / folder).iterdir()
+    assert listed == sorted(entry.name for entry in entries if not entry.name.startswith("__"))
+
+
 def test_files_of_the_recipes_exist() -> None:
     named = {path for path in re.findall(r"`([\w./]+/[\w.]+\.\w+)`", TEXT) if not re.search("[A-Z]{4}", path)}
     assert len(named) > 30

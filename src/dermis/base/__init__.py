@@ -1,0 +1,1 @@
+"""Small modules that all packages share: errors, registries, files on disk, reading limits, numbers."""

@@ -27,6 +27,7 @@ MODULES: Mapping[str, str] = {
     "errors": "base.errors",
     "export": "apps.export",
     "fitting": "apps.inverse.fitting",
+    "frame.outputs": "scene.outputs",
     "gallery": "apps.gallery",
     "reference": "apps.truths",
     "registry": "base.registry",

@@ -1,0 +1,1 @@
+"""Pictures: pixels read and written, colour spaces, filters and movies."""

@@ -1,0 +1,1 @@
+"""Light in tissue: media, pigments, diffusion profiles and their fits, thin parts."""

@@ -1,0 +1,1 @@
+"""How wrong and how fast the package is: accuracy, peers, engines, comparisons and benchmarks."""

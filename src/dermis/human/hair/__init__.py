@@ -1,0 +1,1 @@
+"""Hair of people: brows, lashes and head hair grown from the skin as strands."""

@@ -1,0 +1,1 @@
+"""Export to Blender: a script or .blend with the material, the head, its lights and camera."""

@@ -1,0 +1,1 @@
+"""Export to glTF: a .glb whose skin scatters or transmits light by extensions."""

@@ -1,0 +1,1 @@
+"""Export to Mitsuba 3: a scene whose skin is a homogeneous medium."""

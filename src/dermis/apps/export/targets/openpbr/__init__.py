@@ -1,0 +1,1 @@
+"""Export to OpenPBR and Standard Surface as MaterialX documents."""

@@ -1,0 +1,1 @@
+"""Export to pbrt: a scene with skin as the material `subsurface`."""

@@ -1,0 +1,1 @@
+"""Export to the HDRP of Unity: a DiffusionProfileSettings asset, and the maps of a head."""

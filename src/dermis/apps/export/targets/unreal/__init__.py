@@ -1,0 +1,1 @@
+"""Export to Unreal Engine: a subsurface profile made by an editor script."""
