@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 from cyclopts import Parameter
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from dermis.frame.observation import Landmarks as SeenLandmarks
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer
+    from dermis.images.movie import Bytes
     from dermis.mesh.head import Head
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
@@ -212,4 +213,4 @@ class MovingOutput:
                 yield lambda number, picture: writer.write(files.path(number), picture)
             return
         with MovieWriter(self.path, size, rate, DEFAULT_CRF if self.crf is None else self.crf) as movie:
-            yield lambda number, picture: movie.write(picture)
+            yield lambda _, picture: movie.write(cast("Bytes", picture))

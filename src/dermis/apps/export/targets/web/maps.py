@@ -65,7 +65,8 @@ def picture_of(texels: Halves, colours: bool) -> Picture:
 def _curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return values (256,) from the least to the largest, closer together near 0."""
     ends = np.array([values.min(), values.max()])
-    root = np.linspace(*np.sign(ends) * np.sqrt(np.abs(ends)), _STEPS)
+    first, last = np.sign(ends) * np.sqrt(np.abs(ends))
+    root = np.linspace(first, last, _STEPS)
     return np.asarray(np.sign(root) * root * root)
 
 
