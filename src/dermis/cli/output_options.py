@@ -19,12 +19,11 @@ from dermis.human.landmarks.sets import SETS
 from dermis.scene.outputs import OUTPUTS, checked_outputs
 
 if TYPE_CHECKING:
-    from dermis.base.arrays import Floats
+    from dermis.base.arrays import Bytes, Floats
     from dermis.frame.features.outputs.planes import PlaneArray
     from dermis.frame.observation import Landmarks as SeenLandmarks
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer
-    from dermis.images.movie import Bytes
     from dermis.mesh.head import Head
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
