@@ -20,7 +20,7 @@ from dermis.base.progress import preparing
 from dermis.base.reading import BROKEN, is_file, read_file, understood
 from dermis.formats.mesh_checks import UV_TOLERANCE, check_arrays, check_mesh, check_rig
 from dermis.formats.parts import Group, Part, default_unit_mm, is_gltf
-from dermis.formats.read import Origin, Up, check_options, joined, read_model, taken, upright
+from dermis.formats.read import Origin, Up, joined, read_model, taken, upright
 from dermis.formats.rig_from_file import build_rig, part_points
 from dermis.formats.size_limits import MOST_BYTES
 from dermis.mesh.geometry import compacted, weld
@@ -93,8 +93,6 @@ def load_rigged(
     """
     source = Path(path)
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
-    check_options(source, unit, v_origin, up)
-
     load = partial(_loaded, source, unit, v_origin, up, opaque, eye_groups)
     glb = source.suffix.lower() == ".glb" and is_file(source)
     data = read_file(source, "a mesh file", MOST_BYTES) if glb else b""

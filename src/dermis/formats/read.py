@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -100,16 +99,6 @@ def _part_uv(part: Part, source: Path) -> Doubles:
         came = f"{name!r} has some that are NaN, infinite or beyond {FARTHEST_UV:g}"
         refuse(source, "finite uv", came, "The file is damaged: export it again")
     return part.uv
-
-
-def check_options(source: Path, unit: float, v_origin: str, up: str) -> None:
-    """Refuse options that no file can be read with."""
-    if not (math.isfinite(unit) and unit > 0):
-        refuse(source, "a unit above 0 mm", f"{unit} came", "Set the millimetres per unit of the file")
-    if v_origin not in ("auto", "top", "bottom"):
-        refuse(source, "v_origin auto, top or bottom", f"{v_origin!r} came", "Choose one of the three")
-    if up not in ("y", "z"):
-        refuse(source, "up y or z", f"{up!r} came", "Choose one of the two")
 
 
 def read_model(source: Path) -> Model:

@@ -13,9 +13,9 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.base import atomic_write as outputs
-from dermis.base.arrays import Bytes
 from dermis.base.errors import refuse, shown_value
 from dermis.base.extras import needed
 from dermis.base.quantities import numbers, whole_number
@@ -142,7 +142,7 @@ class MovieWriter:
         self._reformatter = VideoReformatter()
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="dermis-movie")
 
-    def write(self, picture: Bytes) -> None:
+    def write(self, picture: NDArray[np.generic]) -> None:
         """Queue the next frame; waits only while the queue is full.
 
         picture : (H, W, 3) uint8 sRGB; do not change it afterwards
@@ -158,7 +158,7 @@ class MovieWriter:
         while len(self._waiting) > _WAITING or (self._waiting and self._waiting[0].done()):
             self._waiting.popleft().result()
 
-    def _encode(self, number: int, picture: Bytes) -> None:
+    def _encode(self, number: int, picture: NDArray[np.generic]) -> None:
         import av
         from av.video.reformatter import ColorRange, Colorspace
 

@@ -19,7 +19,7 @@ from dermis.base.reading import BROKEN, is_file, read_file, understood
 from dermis.formats.mesh_checks import check_arrays
 from dermis.formats.obj import obj_model
 from dermis.formats.parts import default_unit_mm
-from dermis.formats.read import Up, check_options, joined, read_model, upright
+from dermis.formats.read import Up, joined, read_model, upright
 from dermis.formats.rig_from_file import PARTED_MM
 from dermis.formats.size_limits import MOST_BYTES
 from dermis.mesh.clip import Clip
@@ -210,7 +210,6 @@ class FrameReader:
         Raises `DermisError` when it is missing, damaged or not a mesh, or has no uv.
         """
         unit = default_unit_mm(path) if self.unit_mm is None else float(self.unit_mm)
-        check_options(path, unit, "auto", self.up)
         if self._pattern is not None and self._first is not None and is_file(path):
             places = _places(read_file(path, "an OBJ file", MOST_BYTES), self._pattern)
             if places is not None:
