@@ -18,8 +18,8 @@ from web_page import FLAGS, SOFTWARE, STATE
 import dermis
 from dermis.apps.export.targets.web.build import PageRequest, page_content
 from dermis.apps.export.targets.web.maps import with_smaller_maps
-from dermis.apps.export.targets.web.page import web_page
-from dermis.apps.validation.chromium import chromium_page
+from dermis.apps.export.targets.web.target import web_page
+from dermis.apps.validation.pages import chromium_page
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.frame.capture import renderer_for

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from dermis.apps.validation.chromium import chromium_page
+from dermis.apps.validation.pages import chromium_page
 from dermis.base.command_line import run_script
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import dermis
 from dermis.apps.validation.benchmarks.cases import pose_at, rigged
 from dermis.base.command_line import run_script
 from dermis.formats.samples import cached
-from dermis.gpu.listing import ListedPass, Listing
+from dermis.gpu.graph import ListedPass, Listing
 
 PAGE = Path(__file__).parent.parent / "docs" / "frame_graph.md"
 SETTINGS, TARGETS = dermis.Settings(size=(1920, 1080), atlas=2048), 52

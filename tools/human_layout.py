@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from dermis.atlas.unwrap.charts import tidy
 from dermis.atlas.unwrap.flatten import flatten, singular_values
-from dermis.atlas.unwrap.pack import pack
 from dermis.atlas.unwrap.seams import border_sides
+from dermis.atlas.unwrap.unwrap import pack
 from dermis.mesh.geometry import halves
 
 Doubles = NDArray[np.float64]

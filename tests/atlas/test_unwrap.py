@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from dermis.atlas.raster import rasterise
 from dermis.atlas.unwrap.charts import grow, join_strays, neighbours, pieces, tidy
 from dermis.atlas.unwrap.flatten import flatten, singular_values, untangle
-from dermis.atlas.unwrap.pack import pack
 from dermis.atlas.unwrap.seams import border_sides, crossed, cut_open, faults
-from dermis.atlas.unwrap.unwrap import PADDING, Layout, unwrap
+from dermis.atlas.unwrap.unwrap import PADDING, Layout, pack, unwrap
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.mesh import Material, Mesh, build_mesh

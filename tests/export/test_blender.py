@@ -17,8 +17,8 @@ from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.blender.files import script_text, surroundings
-from dermis.apps.export.targets.blender.target import TARGET
-from dermis.apps.export.targets.blender.walks import (
+from dermis.apps.export.targets.blender.target import (
+    TARGET,
     albedo,
     burley_stretch,
     burley_within,

@@ -25,7 +25,7 @@ from dermis.apps.export.targets.gltf.volume import (
     volume_curve,
     volume_of,
 )
-from dermis.human.head_file import write_person
+from dermis.human.person_file import write_person
 from dermis.optics.tissue import load_tissue
 
 NEW = {"KHR_materials_scatter", "KHR_materials_transmission", "KHR_materials_volume"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.export.targets.pbrt.diffusion import diffusion_table
+from dermis.apps.export.targets.pbrt.target import diffusion_table
 from dermis.apps.truths.slab_mc import trace_medium
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.media import Layer, Medium

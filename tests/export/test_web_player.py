@@ -25,7 +25,7 @@ from dermis.apps.export.run import export_skin
 from dermis.apps.export.targets.pages.html import hash_of
 from dermis.apps.export.targets.web.build import PageContent, PageRequest, page_content
 from dermis.apps.export.targets.web.dials import Dial, dials_of
-from dermis.apps.export.targets.web.page import MODULES, player, web_page
+from dermis.apps.export.targets.web.target import MODULES, player, web_page
 from dermis.frame.renderer import Renderer
 
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.frame.features.atlas.stretch import draw_coarser
+from dermis.frame.features.atlas.passes import draw_coarser
 from dermis.frame.features.atlas.textures import AtlasTextures, upload_atlas
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs

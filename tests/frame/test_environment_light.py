@@ -26,7 +26,7 @@ from dermis.images.io import write_exr
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
-from dermis.specular.energy import ENERGY
+from dermis.specular.fresnel import ENERGY
 
 Floats = NDArray[np.float64]
 SIZE = 32

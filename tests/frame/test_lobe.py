@@ -20,8 +20,7 @@ from dermis.scene.lights import DirectionalLight
 from dermis.scene.skin import Skin
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import cosines
-from dermis.specular.energy import ENERGY
-from dermis.specular.fresnel import FRESNEL
+from dermis.specular.fresnel import ENERGY, FRESNEL
 from dermis.specular.kelemen import kelemen
 from dermis.specular.models import MODELS
 

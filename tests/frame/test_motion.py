@@ -17,7 +17,7 @@ from dermis import Pose
 from dermis.apps.validation.benchmarks.cases import pose_at, rigged
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.features.atlas import stretch
+from dermis.frame.features.atlas.passes import draw_stretch
 from dermis.frame.features.atlas.textures import upload_atlas
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion.levels import Blur, halvings_of, make_levels
@@ -55,7 +55,7 @@ def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light:
     upload(device, space.stacks[0], np.dstack([light, light, light, atlas.own[..., None]]))
     frame = CommandList(device)
     shape.draw(frame, made, motion)
-    stretch.draw(frame, upload_geometry(device, head.mesh, atlas, made), textures)
+    draw_stretch(frame, upload_geometry(device, head.mesh, atlas, made), textures)
     diffuse.draw(frame, space, textures, Blur(BLURRED, np.zeros((len(BLURRED), 3)), halvings))
     frame.submit()
     return [

@@ -16,7 +16,7 @@ from dermis.frame.limits import frame_bytes
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.frame.request import FrameRequest
-from dermis.gpu.listing import Listing
+from dermis.gpu.graph import Listing
 from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera

@@ -13,8 +13,9 @@ from tolerances import SHAPE, SHAPE_NORMAL, STRETCHED, WALKED
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.features.atlas import gutters, stretch
+from dermis.frame.features.atlas import gutters
 from dermis.frame.features.atlas.gutters import make_walks, with_lists
+from dermis.frame.features.atlas.passes import draw_stretch
 from dermis.frame.features.atlas.textures import Sheet, halved, upload_atlas
 from dermis.frame.features.shape import shape
 from dermis.frame.features.shape.mesh import upload_geometry
@@ -130,7 +131,7 @@ def stretched(device: Device, head: Head, atlas: Atlas, points: Floats) -> NDArr
     textures, frame = upload_atlas(device, atlas), CommandList(device)
     made = make_shape(device, shape_tables(device, head))
     shape.draw(frame, made, MotionBytes(words(points)))
-    stretch.draw(frame, upload_geometry(device, head.mesh, atlas, made), textures)
+    draw_stretch(frame, upload_geometry(device, head.mesh, atlas, made), textures)
     frame.submit()
     return download(device, textures.resources["stretch_map"])
 

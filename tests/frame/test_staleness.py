@@ -17,7 +17,7 @@ from setups import front_camera, head_of, settings_of
 
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
-from dermis.gpu.listing import Listing
+from dermis.gpu.graph import Listing
 from dermis.images.io import write_png
 from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import uv_sphere

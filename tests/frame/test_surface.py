@@ -21,8 +21,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.skin import Skin
 from dermis.specular.cosines import cosines
-from dermis.specular.energy import ENERGY
-from dermis.specular.fresnel import FRESNEL
+from dermis.specular.fresnel import ENERGY, FRESNEL
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]

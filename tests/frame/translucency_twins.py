@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.translucency.cells import Cells
-from dermis.frame.features.atlas import stretch
+from dermis.frame.features.atlas.passes import draw_stretch
 from dermis.frame.features.atlas.textures import upload_atlas
 from dermis.frame.features.shape.mesh import upload_geometry
 from dermis.frame.features.shape.shape import rest_shape, shape_tables
@@ -55,7 +55,7 @@ def surface_of(device: Device, mesh: Mesh, atlas: Atlas, positions_mm: Any = Non
     tables = shape_tables(device, head)
     shape = rest_shape(device, tables, head.positions_mm if positions_mm is None else positions_mm)
     held, frame = upload_geometry(device, mesh, atlas, shape), CommandList(device)
-    stretch.draw(frame, held, textures)
+    draw_stretch(frame, held, textures)
     frame.submit()
     return held.resources | textures.resources
 

@@ -17,7 +17,7 @@ from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
 from dermis.specular.albedo import albedo_table
 from dermis.specular.beckmann import beckmann_table
-from dermis.specular.energy import ENERGY
+from dermis.specular.fresnel import ENERGY
 
 Floats = NDArray[np.float64]
 SMOOTH = 1.6

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cffi
 import pytest
 
-from dermis.gpu import native_types
-from dermis.gpu.native_types import register_types
+from dermis.gpu import adapters as native_types
+from dermis.gpu.adapters import register_types
 
 HEADER = """
 typedef enum Colour { Red, Green, Force = 0x7FFFFFFF } Colour;

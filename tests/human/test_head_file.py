@@ -10,8 +10,8 @@ import pytest
 from gltf_rules import check_rules, khronos_issues
 
 from dermis import Human, Pose, load_head
-from dermis.human.head_file import write_person
 from dermis.human.model import MATERIALS
+from dermis.human.person_file import write_person
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 

@@ -18,7 +18,7 @@ from dermis.formats.gltf.primitives import Fibres
 from dermis.frame.features.surface.painting.painted_head import eye_pictures
 from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
-from dermis.human.head_file import write_person
+from dermis.human.person_file import write_person
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import LIMBUS_MM, EyePictures, eye_uv, profile_mm
 

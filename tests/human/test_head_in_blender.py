@@ -15,7 +15,7 @@ from dermis import Human, Pose, load_head
 from dermis.apps.truths.cycles import PYTHON_VARIABLE
 from dermis.frame.features.surface.painting.painted_head import painted_head
 from dermis.gpu import open_device
-from dermis.human.head_file import write_person
+from dermis.human.person_file import write_person
 from dermis.images.io import read_image
 from dermis.mesh.head import Head
 

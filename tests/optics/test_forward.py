@@ -9,9 +9,8 @@ from walk import fresnel, returned
 
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.optics.directions import ROWS, Directions, directional_albedo, directions, mean_of_once
-from dermis.optics.forward import forward_directions
 from dermis.optics.media import media
-from dermis.optics.slabs import NODES, doubled_slabs, leaving_deep, phase, slabs
+from dermis.optics.slabs import NODES, doubled_slabs, forward_directions, leaving_deep, phase, slabs
 from dermis.optics.thin_parts import thin_parts
 
 G = 0.8

@@ -10,7 +10,7 @@ from tolerances import FURNACE
 
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import cosines
-from dermis.specular.energy import ENERGY, Energy
+from dermis.specular.fresnel import ENERGY, Energy
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]

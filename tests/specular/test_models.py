@@ -14,8 +14,7 @@ from dermis.base import citations as cite
 from dermis.specular.beckmann import beckmann
 from dermis.specular.comparison import peak, reciprocity_error
 from dermis.specular.cosines import Cosines, cosines
-from dermis.specular.energy import ENERGY
-from dermis.specular.fresnel import FRESNEL, SKIN_F0, schlick
+from dermis.specular.fresnel import ENERGY, FRESNEL, SKIN_F0, schlick
 from dermis.specular.models import MODELS, EnergyName, FresnelName
 from dermis.specular.torrance_sparrow import smith_masking
 from dermis.specular.two_lobe import NARROW, WIDE, two_lobe_masking

@@ -207,7 +207,7 @@ def _with_maps(made: Head, files: Options) -> Head:
 def _write(
     output: Path, person: Human, made: Head, expression: dict[str, float], eyes: EyePictures | None
 ) -> int:
-    from dermis.human.head_file import write_person
+    from dermis.human.person_file import write_person
     from dermis.mesh.pose import Pose
     from dermis.scene.skin import Skin
 

@@ -25,11 +25,10 @@ from dermis.frame.features.surface.record import skin_record, surface_constants
 from dermis.frame.features.surface.texels import make_surfaces
 from dermis.frame.features.translucency.make import thin_tables, translucency_of
 from dermis.frame.features.visibility.layers import Layers, make_layers
-from dermis.frame.layout import AtlasLayout
 from dermis.frame.lights.environment import environment_record
 from dermis.frame.limits import check_limits
 from dermis.frame.request import FrameRequest
-from dermis.frame.resources import Resources
+from dermis.frame.resources import AtlasLayout, Resources
 from dermis.frame.technique import TechniqueResources
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Bindings, Constants, Device, Memo, MutableBindings, Record, Texture

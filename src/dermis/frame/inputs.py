@@ -11,9 +11,8 @@ from dermis.frame.features.diffusion.levels import Blur
 from dermis.frame.features.occlusion.moving import Look
 from dermis.frame.features.outputs.seen import PreviousScene
 from dermis.frame.features.shape.shape import MotionBytes
-from dermis.frame.layout import AtlasLayout
 from dermis.frame.projection import Triple, Views
-from dermis.frame.resources import Resources
+from dermis.frame.resources import AtlasLayout, Resources
 from dermis.gpu import Bindings, Constants, Record
 from dermis.scene.camera import Window
 from dermis.scene.settings import Settings

@@ -19,13 +19,12 @@ from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.features.shading.view import EyesSeen, camera_views, pinhole, seen_by
 from dermis.frame.features.shape.shape import MotionBytes, motion_at_rest
 from dermis.frame.inputs import Inputs
-from dermis.frame.layout import AtlasLayout
 from dermis.frame.lights import light_constants, light_parts, light_records, light_views
 from dermis.frame.lights.environment import brightest, load_surroundings, with_suns
 from dermis.frame.limits import no_room
 from dermis.frame.projection import Views, shadow_layers
 from dermis.frame.request import FrameRequest
-from dermis.frame.resources import Resources
+from dermis.frame.resources import AtlasLayout, Resources
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Constants, Device, Memo, Record
 from dermis.gpu.memo import same

@@ -1,18 +1,34 @@
-"""The resources of a frame: a collection of what its features made."""
+"""The resources of a frame: a collection of what its features made, and its atlas layouts."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from dermis.frame.features import diffusion, hair, outputs, post, shape
-from dermis.frame.features.occlusion.moving import Sky
+from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.interreflection.interreflection import Interreflection
+from dermis.frame.features.occlusion.moving import MovingOcclusion, Sky
 from dermis.frame.features.shadows.shadows import ShadowMaps
 from dermis.frame.features.shape.mesh import HeadResources
 from dermis.frame.features.surface.painting.paint import Face
+from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.features.visibility.layers import Layers
-from dermis.frame.layout import AtlasLayout
 from dermis.frame.technique import TechniqueResources
 from dermis.gpu import Constants, Record, Texture
+
+
+@dataclass(frozen=True, eq=False)
+class AtlasLayout(LitAtlas):
+    """An atlas of the head that light is spread on.
+
+    translucency : light through thin parts, None without any
+    occlusion : what updates the map of occlusion as the shape moves, None where it does not move
+    interreflection : light from skin to skin, None for none
+    """
+
+    translucency: Translucency | None = None
+    occlusion: MovingOcclusion | None = None
+    interreflection: Interreflection | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""People as small files: all the numbers that one is made from, as JSON."""
+"""People in files: their numbers as JSON, and their heads as glTF."""
 
 from __future__ import annotations
 
@@ -8,16 +8,25 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.build import SMALLEST, build_atlas
 from dermis.base.atomic_write import replacing
 from dermis.base.errors import DermisError, about, refuse, shown_value
 from dermis.base.reading import parse_json, read_text
+from dermis.formats.gltf.write import encode_head
 from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.human.published import check_targets
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eye_look import EyeLook
+from dermis.mesh.eyeball import EyePictures
+from dermis.mesh.head import Head
 
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
+_STRETCH = 1024
+"""Side of the atlas that tells how long texels are, which changes little from one to the next."""
 
 
 def numbers_of(person: Human) -> dict[str, Any]:
@@ -66,3 +75,47 @@ def _made(path: Path, kind: type[T], numbers: Any) -> T:
         return kind(**numbers)
     except DermisError as fault:
         raise DermisError(f"{path}: {fault}") from None
+
+
+def write_person(
+    path: Path,
+    person: Human,
+    head: Head,
+    *,
+    roughness: float,
+    weights: Mapping[str, float] | None = None,
+    eyes: EyePictures | None = None,
+) -> int:
+    """Write a person's head as a .glb file, whole or not at all; its length [byte].
+
+    roughness : Beckmann's m of skin without a map of it [-]
+    weights : of expressions with which the file rests
+    eyes : what its eyes look like; of one colour where None
+    """
+    notes = {"person": numbers_of(person)}
+    data = encode_head(
+        head, roughness=roughness, weights=weights, slopes=relief_slopes(head), notes=notes, eyes=eyes
+    )
+    with replacing(path) as trial:
+        trial.write_bytes(data)
+    return len(data)
+
+
+def relief_slopes(head: Head) -> NDArray[np.float32] | None:
+    """(n, n, 2) rise of a head's height map to the right and upwards, if other programs need it [-].
+
+    None where it has a map of normals, or no square height map: they need none.
+    """
+    height = head.maps.height
+    if head.maps.normal is not None or height is None:
+        return None
+    side = len(height)
+    if side != height.shape[1] or side < SMALLEST:
+        return None
+    down, right = np.gradient(height)
+    coarse = max(SMALLEST, min(side, _STRETCH))
+    stretch = build_atlas(head.mesh, coarse).stretch.astype(np.float32)
+    if side > coarse:
+        places = np.arange(side) * coarse // side
+        stretch = stretch[places][:, places] * np.float32(side / coarse)
+    return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)

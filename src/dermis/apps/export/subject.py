@@ -15,7 +15,7 @@ from dermis.base.errors import refuse, shown_value
 from dermis.base.reading import named_path
 from dermis.formats.gltf.materials import skin_pictures
 from dermis.formats.samples import SAMPLES
-from dermis.human.head_file import relief_slopes
+from dermis.human.person_file import relief_slopes
 from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

@@ -1,24 +1,28 @@
-"""Pages of the documentation and files of figures that measurements write, in a checkout of the project."""
+"""Pages of the documentation with measured tables, and the browser that opens exported pages."""
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dermis.base.atomic_write import replacing
 from dermis.base.console import print_lines
 from dermis.base.errors import refuse
+from dermis.base.extras import needed
 
 Figures = dict[str, Any]
 """A JSON object: numbers, words, lists and further objects."""
 CHECKOUT = Path(str(files("dermis"))).resolve().parents[1]
 DOCS, RESULTS = CHECKOUT / "docs", CHECKOUT / "benchmarks" / "results"
 _REMEDY = "Install the package from a clone of the project (make setup) and run this there"
+SOFTWARE_WEBGL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 def in_checkout(path: Path) -> Path:
@@ -91,3 +95,19 @@ def _rounded(value: object, digits: int) -> object:
     if isinstance(value, Mapping):
         return {str(key): _rounded(one, digits) for key, one in value.items()}
     return [_rounded(one, digits) for one in value] if isinstance(value, list | tuple) else value
+
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+
+@contextmanager
+def chromium_page(side: int, flags: Sequence[str] = SOFTWARE_WEBGL) -> Iterator[Page]:
+    """Open an empty page without a network, `side` pixels wide and high.
+
+    Raises DermisError when the package playwright is not installed.
+    """
+    with needed("playwright.sync_api", "a page in Chromium").sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=list(flags))
+        yield browser.new_page(viewport={"width": side, "height": side}, offline=True)
+        browser.close()

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dermis.frame.features.atlas import blend, gutters, stretch
+from dermis.frame.features.atlas import gutters
+from dermis.frame.features.atlas.passes import draw_blend, draw_stretch
 from dermis.frame.features.atlas.textures import MOST_HALVINGS, AtlasTextures
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion import mixture as mix
@@ -146,7 +147,7 @@ class AtlasTechnique(Technique):
             return made.scattered
         for number, (layout, blur) in enumerate(zip(layouts, inputs.blurs, strict=True)):
             into = levels.layer(0), levels.size, levels.texel, blur.scale, TEXEL_AREA
-            graph.repeat(stretch.draw, layout.head, layout.atlas)
+            graph.repeat(draw_stretch, layout.head, layout.atlas)
             if layout.walked:
                 graph.repeat(gutters.draw, layout.atlas, layout.walked.walks, layout.walked.head)
             texels.draw(graph, layout)
@@ -162,7 +163,7 @@ class AtlasTechnique(Technique):
                 mix.share(graph, layout, mixture, number)
                 graph.repeat(self.mix, levels, blur, layout.atlas, mixture, number, layout.scattered)
         if len(layouts) > 1:
-            blend.draw(graph, layouts[0], layouts[1], made.scattered)
+            draw_blend(graph, layouts[0], layouts[1], made.scattered)
         return made.scattered
 
     def fill(self, graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
@@ -212,5 +213,5 @@ class AtlasTechnique(Technique):
             combine.draw(graph, levels, alone, texture, thin.light, thin.lost)
         if len(layouts) > 1:
             first, second = (replace(one, scattered=into[k]) for k, one in enumerate(layouts))
-            blend.draw(graph, first, second, into[-1])
+            draw_blend(graph, first, second, into[-1])
         return into[-1]

@@ -15,7 +15,7 @@ import dermis
 from dermis.apps.validation.pages import data_file, print_tables, use_tests_folder
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas, cached_atlas
-from dermis.frame.features.atlas import stretch as stretched
+from dermis.frame.features.atlas import passes as stretched
 from dermis.frame.features.atlas.textures import upload_atlas
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion.levels import Blur, Levels, halvings_of, make_levels
@@ -157,7 +157,7 @@ def spread(
     frame = CommandList(device)
     head = Head("", mesh, Maps())
     shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
-    stretched.draw(frame, upload_geometry(device, mesh, atlas, shape), textures)
+    stretched.draw_stretch(frame, upload_geometry(device, mesh, atlas, shape), textures)
     diffuse.draw(frame, levels, textures, blur)
     frame.submit()
     return levels, blur

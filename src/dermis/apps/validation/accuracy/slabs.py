@@ -20,9 +20,9 @@ from dermis.optics import slabs as adding_doubling
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.directions import ROWS, directional_albedo, mean_of_once, refracted
 from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.forward import forward_directions
 from dermis.optics.media import Medium, media
 from dermis.optics.profiles import TERMS, write_profile
+from dermis.optics.slabs import forward_directions
 from dermis.scene import Skin
 
 Array = NDArray[np.float64]

@@ -12,8 +12,7 @@ from scipy.interpolate import RegularGridInterpolator
 from dermis.apps.validation.pages import print_tables
 from dermis.specular.albedo import TABLE_COSINES, TABLE_ROUGHNESSES, albedo_table, directional_albedo
 from dermis.specular.beckmann import beckmann, beckmann_table
-from dermis.specular.energy import ENERGY, Energy
-from dermis.specular.fresnel import hemispherical_reflectance, schlick
+from dermis.specular.fresnel import ENERGY, Energy, hemispherical_reflectance, schlick
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.frame.features.atlas import stretch
+from dermis.frame.features.atlas import passes as stretch
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.features.diffusion.combine import nothing
 from dermis.frame.features.diffusion.levels import Blur, Halvings, Levels
@@ -53,7 +53,7 @@ class Fragments(GpuGems3):
         """Light the atlas, let the light spread, and add it up."""
         made = inputs.resources
         for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
-            graph.repeat(stretch.draw, layout.head, layout.atlas)
+            graph.repeat(stretch.draw_stretch, layout.head, layout.atlas)
             surface_texels.draw(graph, layout)
             self._light(graph, layout, inputs.light_constants, made.diffusion.levels.layer(0), blur.scale)
             self.fill(graph, made.diffusion.levels, layout.atlas, blur)

@@ -17,8 +17,7 @@ from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.babylon.target import TOO_WIDE, spiral
-from dermis.apps.validation.chromium import chromium_page
-from dermis.apps.validation.pages import RESULTS, Figures, write_figures
+from dermis.apps.validation.pages import RESULTS, Figures, chromium_page, write_figures
 from dermis.base.errors import refuse
 
 if TYPE_CHECKING:

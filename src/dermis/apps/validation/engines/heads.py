@@ -22,9 +22,8 @@ from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.truths.metrics import relative_rmse
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
-from dermis.apps.validation.chromium import chromium_page
 from dermis.apps.validation.engines.babylon import LIBRARY, babylon_library
-from dermis.apps.validation.pages import DOCS, RESULTS, Figures, in_checkout, write_figures
+from dermis.apps.validation.pages import DOCS, RESULTS, Figures, chromium_page, in_checkout, write_figures
 from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import decode_srgb, encode_srgb

@@ -1,16 +1,14 @@
-"""The sections of the panel, from top to bottom.
-
-To add a section, write a function that draws it and add it to `SECTIONS`.
-"""
+"""Sections of the panel: light, movement, skin and the rest, in order."""
 
 from __future__ import annotations
 
 import colorsys
+import math
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from imgui_bundle import imgui, implot
@@ -18,6 +16,8 @@ from numpy.typing import NDArray
 
 from dermis.apps.viewer.controls import CAMERAS
 from dermis.apps.viewer.panel.fields import (
+    LIGHT,
+    LIGHT_KINDS,
     SURFACE,
     TECHNIQUE,
     Style,
@@ -25,26 +25,222 @@ from dermis.apps.viewer.panel.fields import (
     begin_plot,
     button,
     choose,
+    clamped,
     combo,
     draw_fields,
+    draw_rows,
     explain,
+    hold,
     record_position,
+    slider,
 )
-from dermis.apps.viewer.panel.light import draw_lights
-from dermis.apps.viewer.panel.movement import can_move, draw_expressions, draw_motion, has_expressions
 from dermis.apps.viewer.panel.skin import draw_profile, draw_surface
+from dermis.apps.viewer.posing import angles_of, at_rest, matching, weight_of, with_angles, with_weight
 from dermis.apps.viewer.session import Session, built_in
-from dermis.apps.viewer.state import ATLAS
+from dermis.apps.viewer.state import ATLAS, ViewerState, changed
 from dermis.apps.viewer.views import LAYERS, VIEWS
+from dermis.formats.samples import SAMPLES
+from dermis.scene.environment import Environment
 from dermis.scene.heads import HUMAN
-from dermis.scene.plain import choices_of, fields_under
+from dermis.scene.lights import LIGHTS, Light, SpotLight, light_presets
+from dermis.scene.plain import Range, choices_of, fields_under
 from dermis.scene.talk import COMPARISONS
 
+_CUSTOM = "custom"
+_NO_ENVIRONMENT = "none"
+_STOPS = Range(-6.0, 4.0)
+_PLACE = (-500.0, 400.0, 800.0)  # of a new light, from the upper left of the portrait [mm]
+_FADE = 0.5  # least width over which a cone fades [degrees]
+_ENVIRONMENT = {"exposure": Style("brightness")}
+_WEIGHTS, _TURNS = Range(0.0, 1.0), Range(-60.0, 60.0)
+_LONG_NAME = 16  # letters beyond which the panel may be too narrow for it
 Floats = NDArray[np.float64]
 _TOTAL = "total"
 _GOLDEN = 0.618034  # of the circle of hues between two stages, so that neighbours never look alike
 _SEEDS = 10_000
 _ENTERED = int(imgui.InputTextFlags_.enter_returns_true)
+_BUTTONS_PER_ROW = 3
+_SIDES = (256, 512, 1024, 2048, 4096)
+_SETTINGS = {
+    **TECHNIQUE,
+    "atlas": Style(options=_SIDES),
+    "shadow_size": Style("shadow map", options=_SIDES),
+    "samples": Style(options=(1, 2, 4, 8, 16)),
+    "exposure": Style(own=lambda session: session.studio.exposure),
+    "background": Style(own=lambda session: (0.2, 0.2, 0.2)),
+}
+_PICTURE = ("exposure", "tone", "bloom", "background", "background_blur")
+_NOWHERE = ("size", "parts")  # the window's, and a view
+
+
+def draw_lights(session: Session) -> None:
+    """The rig, the light that Shift and drag moves, and the environment."""
+    combo(session, "rig", session.state.rig or _CUSTOM, light_presets(), session.state.with_rig)
+    _select(session)
+    combo(session, "add", "a light", LIGHTS, lambda kind: _added(session, kind), LIGHT_KINDS)
+    lights, index = session.state.scene.lights, session.controls.light
+    if index < len(lights):
+        _light(session, index, lights[index])
+    _environment(session)
+
+
+def _added(session: Session, kind: str) -> ViewerState:
+    """The state with a light of that kind more, which is selected."""
+    places = {"position": _PLACE, "direction": tuple(-one for one in _PLACE)}
+    required = {name for name, field in LIGHTS[kind].model_fields.items() if field.is_required()}
+    told: dict[str, Any] = {name: place for name, place in places.items() if name in required}
+    lights = session.state.scene.lights
+    made = session.state.with_lights([*lights, LIGHTS[kind](**told)])
+    session.controls.light = len(lights)
+    return made
+
+
+def _select(session: Session) -> None:
+    """One radio button for each light and one for the environment."""
+    lights, controls = session.state.scene.lights, session.controls
+    for index, light in enumerate(lights):
+        if imgui.radio_button(f"{index + 1}##{light.kind}", controls.light == index):
+            controls.light = index
+        imgui.same_line()
+    if imgui.radio_button("environment##selected", controls.light >= len(lights)):
+        controls.light = len(lights)
+
+
+def _light(session: Session, index: int, light: Light) -> None:
+    """The fields of a light; its place is changed by Shift and drag."""
+    strength = max(*light.irradiance, 1e-6)
+
+    def apply(**fields: object) -> ViewerState:
+        return session.state.with_light(index, **fields)
+
+    def scale(stops: float) -> ViewerState:
+        factor = 2.0**stops * math.pi / strength
+        return apply(irradiance=tuple(factor * c for c in light.irradiance))
+
+    imgui.text_disabled(f"{LIGHT_KINDS.get(light.kind, light.kind)}, Shift and drag to move")
+    slider(session, "strength", math.log2(strength / math.pi), scale, _STOPS, "%.2f stops")
+    draw_fields(session, light, apply, LIGHT | _cone(light))
+    if button(session, "copy"):  # refused when there are too many
+        lights = session.state.scene.lights
+        attempt(session, lambda: session.change(session.state.with_lights([*lights, light])))
+        session.controls.light = len(lights)
+    imgui.same_line()
+    if button(session, "remove"):
+        rest = [one for k, one in enumerate(session.state.scene.lights) if k != index]
+        session.change(session.state.with_lights(rest))
+        session.controls.light = max(0, index - 1)
+
+
+def _cone(light: Light) -> dict[str, Style]:
+    """Ranges of a spot's cone, whose outer angle is wider than its inner one."""
+    if not isinstance(light, SpotLight):
+        return {}
+    inner, outer = Range(0.5, light.outer_degrees - _FADE), Range(light.inner_degrees + _FADE, 88.0)
+    return {"inner_degrees": Style("inner cone", inner), "outer_degrees": Style("outer cone", outer)}
+
+
+def _environment(session: Session) -> None:
+    now, with_environment = session.state.scene.environment, session.state.with_environment
+    samples = [name for name, sample in SAMPLES.items() if sample.kind == "environment"]
+
+    def take(name: str) -> ViewerState:
+        return with_environment(None if name == _NO_ENVIRONMENT else Environment(name=name))
+
+    names = (_NO_ENVIRONMENT, "uniform", *samples)
+    combo(session, "environment", now.name if now else _NO_ENVIRONMENT, names, take)
+    if now:
+        draw_fields(session, now, lambda **fields: with_environment(changed(now, **fields)), _ENVIRONMENT)
+
+
+def has_expressions(session: Session) -> bool:
+    """Return whether the head has morph targets or bones."""
+    head = session.state.scene.head
+    return bool(head.targets or head.bones)
+
+
+def can_move(session: Session) -> bool:
+    """Return whether there is a motion, or a head that one can move."""
+    return has_expressions(session) or session.player.has_motion
+
+
+def draw_expressions(session: Session) -> None:
+    """Sliders of the morph targets whose names hold what is searched for, and of the bones."""
+    head = session.state.scene.head
+    cleared = int(imgui.InputTextFlags_.escape_clears_all)
+    _, session.search = imgui.input_text_with_hint("##search", "search", session.search, cleared)
+    record_position(session, "search")
+    imgui.same_line()
+    if button(session, "rest"):
+        session.player.stop()
+        session.change(session.state.with_pose(at_rest(session.state.scene)))
+    targets, bones = matching(head.targets, session.search), matching(head.bones, session.search)
+    moved = _moved(session)
+    if targets:
+        draw_rows("targets", len(targets), lambda row: _weight(session, targets[row], moved))
+    if not (targets or bones):
+        imgui.text_disabled("there is no such name")
+    if bones:
+        is_open = imgui.tree_node_ex("bones", 0, f"bones, {len(bones)}")
+        record_position(session, "bones")
+        if is_open:
+            imgui.text_disabled("nod, turn, tilt [degrees]")
+            draw_rows("turns", len(bones), lambda row: _angles(session, bones[row], moved))
+            imgui.tree_pop()
+
+
+def draw_motion(session: Session) -> None:
+    """The motion's file, play and pause, and its time."""
+    player, clip = session.player, session.player.clip
+    _, session.motion_file = imgui.input_text("file", session.motion_file)
+    if button(session, "open"):
+        attempt(session, lambda: session.open_motion(session.motion_file))
+    if clip is not None:
+        imgui.same_line()
+        if button(session, f"{'pause' if player.is_playing else 'play'}##motion"):
+            player.toggle()
+        imgui.same_line()
+        _, player.loops = imgui.checkbox("loop", player.loops)
+        record_position(session, "loop")
+        span = Range(0.0, max(clip.duration_s, 1e-3))
+        slider(session, "time", player.seconds, player.scrubbed, span, f"%.2f of {clip.duration_s:.2f} s")
+    if player.note:
+        imgui.text_wrapped(player.note)
+
+
+def _moved(session: Session) -> frozenset[str]:
+    """Names that the motion moves at present: their sliders only show it."""
+    clip = session.player.clip if session.player.is_playing else None
+    return frozenset() if clip is None else frozenset((*clip.targets, *clip.bones))
+
+
+def _weight(session: Session, name: str, moved: frozenset[str]) -> None:
+    def put(weight: float) -> ViewerState:
+        return session.state.with_pose(with_weight(session.state.scene, name, weight))
+
+    imgui.begin_disabled(name in moved)
+    slider(session, f"{name}##target", weight_of(session.shown.scene, name), put, _WEIGHTS, "%.2f")
+    imgui.end_disabled()
+    if len(name) > _LONG_NAME:
+        explain(name)
+
+
+def _angles(session: Session, name: str, moved: frozenset[str]) -> None:
+    """Three sliders; only the one that is moved changes, however far the others are turned."""
+    now = angles_of(session.shown.scene, name)
+
+    def put(found: list[float]) -> ViewerState:
+        turned = max(range(3), key=lambda k: abs(found[k] - now[k]))
+        degrees = [*now]
+        degrees[turned] = clamped(found[turned], _TURNS)
+        x, y, z = degrees
+        return session.state.with_pose(with_angles(session.state.scene, name, (x, y, z)))
+
+    imgui.begin_disabled(name in moved)
+    result = imgui.slider_float3(f"{name}##bone", [*now], _TURNS.low, _TURNS.high, "%.0f")
+    imgui.end_disabled()
+    hold(session, f"{name}##bone", result, put)
+    if len(name) > _LONG_NAME:
+        explain(name)
 
 
 def draw_head(session: Session) -> None:
@@ -86,20 +282,6 @@ def _seed_of(session: Session) -> int:
     """Return the seed of the person shown, 0 for another head."""
     word = str(session.state.head.get("name", "")).removeprefix(f"{HUMAN}:")
     return int(word) if word.isdecimal() else 0
-
-
-_BUTTONS_PER_ROW = 3
-_SIDES = (256, 512, 1024, 2048, 4096)
-_SETTINGS = {
-    **TECHNIQUE,
-    "atlas": Style(options=_SIDES),
-    "shadow_size": Style("shadow map", options=_SIDES),
-    "samples": Style(options=(1, 2, 4, 8, 16)),
-    "exposure": Style(own=lambda session: session.studio.exposure),
-    "background": Style(own=lambda session: (0.2, 0.2, 0.2)),
-}
-_PICTURE = ("exposure", "tone", "bloom", "background", "background_blur")
-_NOWHERE = ("size", "parts")  # the window's, and a view
 
 
 class Section(NamedTuple):

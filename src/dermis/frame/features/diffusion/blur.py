@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.features.atlas import stitch
+from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion.kernels import (
     NARROW,
@@ -36,7 +36,7 @@ def draw(graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> N
     alone = len(variance_mm2) == 1 or first > NARROW
     for k, added in enumerate(_added(variance_mm2, blur.halvings), start=1):
         finer, here = blur.halvings[k - 1 : k + 1]
-        stitch.draw(graph, "diffuse", sheets[finer], source, levels.texel)
+        draw_gutters(graph, "diffuse", sheets[finer], source, levels.texel)
         if here > finer:
             source = _halved(graph, levels, source, k - 1, here)
         far = k > 1 and k - 1 in blur.steps and k not in blur.steps  # most of its width comes at once

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from dermis.base.errors import refuse
 from dermis.base.reading import named_path
 from dermis.formats.maps import share_map
-from dermis.frame.features.atlas import stitch
 from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.diffusion.levels import Levels
 from dermis.frame.programs import FLOATS, HALVES, TILE, program
 from dermis.gpu import Bindings, Device, Recorder, Texture, TextureView, make_texture, upload
@@ -110,7 +110,7 @@ def share(graph: Recorder, layout: LitAtlas, mixture: Mixture, number: int) -> N
     }
     shader = program(graph.device, "diffusion/profile_shares.wgsl", store=texel)
     graph.compute("profiles", shader, bound, into.size[:2])
-    stitch.draw(graph, "profiles", layout.atlas, into, texel)
+    draw_gutters(graph, "profiles", layout.atlas, into, texel)
 
 
 def give(graph: Recorder, levels: Levels, mixture: Mixture, number: int, other: int) -> None:

@@ -13,13 +13,12 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.mesh.maps import Maps
 from dermis.optics.flesh import aside_mm, medium_of
-from dermis.optics.forward import forward_directions
 from dermis.optics.gaussians import GaussianSum
+from dermis.optics.slabs import forward_directions
 from dermis.optics.thin_parts import across
 from dermis.scene.skin import USUAL_ROUGHNESS, Skin, lobe_name
 from dermis.specular.albedo import ROOT_OF_FIRST_ROW
-from dermis.specular.energy import ENERGY
-from dermis.specular.fresnel import SKIN_ETA, SKIN_F0
+from dermis.specular.fresnel import ENERGY, SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]

@@ -23,7 +23,7 @@ from dermis.apps.truths.cycles import camera_of
 from dermis.apps.truths.described import UNIT_MM, Described, world
 from dermis.apps.truths.lights import CYCLES, lamp
 from dermis.formats.gltf.write import encode_head
-from dermis.human.head_file import relief_slopes
+from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene

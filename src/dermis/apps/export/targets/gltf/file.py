@@ -11,8 +11,7 @@ from dermis.apps.export.subject import Subject
 from dermis.apps.export.targets.gltf.volume import colour_for
 from dermis.formats.gltf.materials import Added, colours_png
 from dermis.formats.gltf.write import encode_head
-from dermis.human.head_file import relief_slopes
-from dermis.human.person_file import numbers_of
+from dermis.human.person_file import numbers_of, relief_slopes
 from dermis.mesh.head import Head
 from dermis.scene.heads import is_person, person_of
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import floats, write_files
-from dermis.human.head_file import relief_slopes
+from dermis.human.person_file import relief_slopes
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.maps import Maps
@@ -44,6 +44,15 @@ _LONGEST = 40
 _EYE_IOR = 1.376
 _ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a word in the name
 _ROUGH_ELSE = 0.8
+INPUTS: Mapping[str, str] = {
+    "colour": "subsurface_color",
+    "roughness": "specular_roughness",
+    "specular": "specular_weight",
+    "normal": "geometry_normal",
+}
+"""Input that each map drives."""
+DISTANCES = ("subsurface_radius",)
+"""Inputs with a length [m]."""
 
 
 def input_name(shader: str, name: str) -> str:
@@ -66,15 +75,6 @@ MAPS: Mapping[str, MapKind] = {
     "normal": MapKind("vector3", "", "raw"),
     "eye": MapKind("color3", "srgb_texture", "sRGB"),
 }
-INPUTS: Mapping[str, str] = {
-    "colour": "subsurface_color",
-    "roughness": "specular_roughness",
-    "specular": "specular_weight",
-    "normal": "geometry_normal",
-}
-"""Input that each map drives."""
-DISTANCES = ("subsurface_radius",)
-"""Inputs with a length [m]."""
 
 
 @dataclass(frozen=True)
