@@ -19,8 +19,7 @@ from dermis.formats.gltf.animations import read_clip
 from dermis.formats.gltf.embedded import embedded_maps
 from dermis.formats.load import load_mesh, load_rigged
 from dermis.formats.motion.sequence import FrameReader
-from dermis.formats.mtl import read_materials
-from dermis.formats.obj import obj_maps
+from dermis.formats.obj import obj_maps, read_materials
 from dermis.images.codecs import encode_png
 
 pytestmark = pytest.mark.timeout(60)  # what takes more than linear time takes minutes

@@ -1,7 +1,7 @@
 """Adapters: which there are, their native descriptions and limits.
 
-cffi parses each new name together with all typedefs of the header, which takes some ten milliseconds, and
-a first frame asks for seventy-five. Here they are built from what cffi has already parsed.
+C types that wgpu requests by name are registered in advance: cffi parses each new name together with all
+typedefs of the header, in some ten milliseconds, and a first frame requests seventy-five.
 """
 
 from __future__ import annotations
