@@ -17,14 +17,14 @@ GATE = "HELD_UNTIL"
 
 def serve(pipe: Any, slot: Any, work: Any) -> None:
     """Serve as a worker does, but hold."""
-    gate, usual = Path(os.environ[GATE]), Worker.draw
+    gate, usual = Path(os.environ[GATE]), Worker.render_shard
 
-    def draw(worker: Worker, *given: Any) -> Any:
+    def render_shard(worker: Worker, *given: Any) -> Any:
         while any(work.out.glob("shard-*.tar")) and not gate.exists():
             time.sleep(0.01)
         return usual(worker, *given)
 
-    with patch.object(Worker, "draw", draw):
+    with patch.object(Worker, "render_shard", render_shard):
         worker_pool.serve(pipe, slot, work)
 
 
