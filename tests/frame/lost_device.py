@@ -20,8 +20,8 @@ from moving_head import write_moving_head
 from setups import settings_of
 
 from dermis.cli import main
+from dermis.frame import allocation
 from dermis.frame import renderer as renderer_module
-from dermis.frame import resources as resources_module
 from dermis.frame.features.outputs import readback
 from dermis.frame.features.surface.painting import paint
 from dermis.frame.renderer import Renderer
@@ -71,7 +71,7 @@ def open_noted(adapter: str) -> Device:
 
 def loading(renderer: Renderer) -> Any:
     renderer.forget()
-    with losing(resources_module, "upload_maps"):
+    with losing(allocation, "upload_maps"):
         return renderer.draw(scene(), DRAWN).linear()
 
 

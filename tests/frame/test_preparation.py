@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
-from dermis.frame import preparation, resources
+from dermis.frame import allocation, preparation
 from dermis.frame.features.diffusion import resources as blurred_levels
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere
@@ -31,7 +31,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def counted(*given: Any) -> Any:
         log.append(1)
-        return resources.make_resources(*given)
+        return allocation.make_resources(*given)
 
     monkeypatch.setattr(preparation, "make_resources", counted)
     return log

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from setups import bent_plane, front_camera, frontal, head_of, joined, scene_of, settings_of
 
 from dermis.base.errors import DermisError
-from dermis.frame import resources
+from dermis.frame import allocation
 from dermis.frame.renderer import Renderer, render
 from dermis.frame.seams import REMEDIES
 from dermis.gpu import CommandList, download
@@ -85,7 +85,7 @@ def test_maps_that_failed_are_read_again(monkeypatch: pytest.MonkeyPatch) -> Non
         raise MemoryError("no more of it")
 
     with monkeypatch.context() as patch:
-        patch.setattr(resources, "upload_maps", fail)
+        patch.setattr(allocation, "upload_maps", fail)
         for _ in range(2):
             with pytest.raises(DermisError, match="no more of it"):
                 renderer.draw(scene(), settings_of())
