@@ -14,7 +14,6 @@ from tolerances import LIT, OCCLUSION
 from twins import surface
 
 from dermis.atlas.build import build_atlas, cached_atlas
-from dermis.frame.features.occlusion import baked
 from dermis.frame.features.occlusion.baked import bake_occlusion, whole_map
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
@@ -126,5 +125,5 @@ def test_baked_once(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None
     scene = replace(scene_of(head, rho_s=0.0), environment=Environment(name="uniform"))
     first = seen(renderer, scene)
     renderer.forget()
-    monkeypatch.setattr(baked, "bake_occlusion", None)
+    monkeypatch.setattr("dermis.frame.features.occlusion.baked.bake_occlusion", None)
     assert np.array_equal(seen(renderer, scene), first)
