@@ -52,9 +52,10 @@ def session(number: int) -> list[int]:
     return found
 
 
-def wait_for_shards(out: Path, count: int) -> None:
+def wait_for_shards(out: Path, count: int, driver: subprocess.Popen[bytes]) -> None:
     end = time.monotonic() + _LONGEST_S
     while len(list(out.glob("shard-*.tar"))) < count:
+        assert driver.poll() is None, "the driver ended before its shards came"
         assert time.monotonic() < end, "the shards never come"
         time.sleep(0.01)
 
@@ -77,7 +78,7 @@ def test_a_killed_driver_leaves_nobody_and_is_gone_on_with(
     rng, skipped = random.Random(5), 0
     for shards in (0, 2):
         driver = started(small_folder / "spec.toml", tmp_path)
-        wait_for_shards(tmp_path, shards)
+        wait_for_shards(tmp_path, shards, driver)
         time.sleep(rng.uniform(0.0, 1.0))
         driver.kill()
         driver.communicate()
@@ -95,7 +96,7 @@ def test_one_that_is_asked_to_end_keeps_what_is_whole(
     small_folder: Path, undisturbed: Files, tmp_path: Path, number: signal.Signals
 ) -> None:
     driver = started(small_folder / "spec.toml", tmp_path / "out", tmp_path / "never")
-    wait_for_shards(tmp_path / "out", 1)
+    wait_for_shards(tmp_path / "out", 1, driver)
     # Ctrl-C reaches all that the terminal has started, not the driver alone.
     os.killpg(driver.pid, number) if number == signal.SIGINT else driver.send_signal(number)
     said, notes = driver.communicate()
@@ -108,7 +109,7 @@ def test_under_nohup_a_hangup_ends_nothing(small_folder: Path, undisturbed: File
     """Ctrl-C neither, as a shell's background job ignores it; each reaches the workers too."""
     with child_process.ignored_signals():
         driver = started(small_folder / "spec.toml", tmp_path / "out", tmp_path / "gate", subprocess.Popen)
-    wait_for_shards(tmp_path / "out", 1)
+    wait_for_shards(tmp_path / "out", 1, driver)
     for number in (signal.SIGHUP, signal.SIGINT):
         os.killpg(driver.pid, number)
     (tmp_path / "gate").touch()
