@@ -21,8 +21,8 @@ from dermis.apps.export.run import assess, export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.babylon.target import spiral_curve
+from dermis.apps.export.targets.pages.engine_page import camera_of
 from dermis.apps.export.targets.pages.html import hash_of, inline
-from dermis.apps.export.targets.pages.library_page import camera_of
 from dermis.base.errors import DermisError
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

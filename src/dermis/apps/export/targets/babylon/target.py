@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from dermis.apps.export.fitting import fit_d
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Row, Rows, floats, numbers_of
+from dermis.apps.export.targets.pages.engine_page import EnginePage, Script, surface_rows
 from dermis.apps.export.targets.pages.html import hash_of, inline
-from dermis.apps.export.targets.pages.library_page import LibraryPage, Script, surface_rows
 from dermis.optics.curve import Curve
 from dermis.optics.media import Floats
 
@@ -32,7 +32,7 @@ _CORE = "4Kbm3nj4VMzMufY0FYM9DactmO8CluLjEAe0W1BzVo7hlKEswOLkl46FLI6mxZmx"
 _LOADERS = "4FQhr/DrxLfjm5tCJq7Cs1uJIC29544DNb4rVCt4qVzXM7rw07KsDYgdH8/ayoss"
 
 
-class Babylon(LibraryPage):
+class Babylon(EnginePage):
     """Page with Babylon.js."""
 
     name = "babylon"

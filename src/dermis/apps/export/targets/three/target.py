@@ -10,8 +10,8 @@ import numpy as np
 
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Row, Rows, with_values
+from dermis.apps.export.targets.pages.engine_page import EnginePage, Script, module_url, surface_rows
 from dermis.apps.export.targets.pages.html import hash_of
-from dermis.apps.export.targets.pages.library_page import LibraryPage, Script, module_url, surface_rows
 from dermis.base.tables import read_rows
 from dermis.optics.curve import Curve
 
@@ -23,7 +23,7 @@ _IMPORTS = {
 _DEFAULT_IOR = 1.5
 
 
-class Three(LibraryPage):
+class Three(EnginePage):
     """Page with three.js."""
 
     name = "three"

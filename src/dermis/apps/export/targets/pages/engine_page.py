@@ -80,7 +80,7 @@ class Script:
 
 
 @dataclass(frozen=True)
-class LibraryPage(Target):
+class EnginePage(Target):
     """A page that draws a head with a library.
 
     installed : folder that npm has installed the library's packages into, whose files the page then holds;
@@ -98,7 +98,7 @@ class LibraryPage(Target):
     scripts: ClassVar[Mapping[str, tuple[Script, ...]]]
     """Files of the library, by version."""
 
-    def with_library(self, folder: str | Path) -> LibraryPage:
+    def with_library(self, folder: str | Path) -> EnginePage:
         """Return the same with the library inside the page."""
         return replace(self, installed=Path(folder))
 
