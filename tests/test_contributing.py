@@ -1,4 +1,4 @@
-"""What CONTRIBUTING.md says of packages and files is so."""
+"""Tables and paths of CONTRIBUTING.md against the packages and files."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("head", "container"), [("floor", "dermis"), ("floor of `apps`", "dermis.apps")])
+@pytest.mark.parametrize(("head", "container"), [("package", "dermis"), ("package in `apps`", "dermis.apps")])
 def test_floors_are_those_of_the_import_linter(head: str, container: str) -> None:
-    rows = TEXT.partition(f"| {head} | what it holds |\n|---|---|\n")[2].partition("\n\n")[0].splitlines()
-    told = [set(re.findall(r"`(\w+)`", row.split("|")[1])) for row in rows]
+    rows = TEXT.partition(f"| {head} | contents |\n|---|---|\n")[2].partition("\n\n")[0].splitlines()
+    layered = [set(re.findall(r"`(\w+)`", row.split("|")[1])) for row in rows]
     document = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contracts = document["tool"]["importlinter"]["contracts"]
     (layers,) = (one["layers"] for one in contracts if one.get("containers") == [container])
-    assert told == [{name.strip() for name in layer.split("|")} for layer in layers]
+    assert layered == [{name.strip() for name in layer.split("|")} for layer in layers]
 
 
-@pytest.mark.parametrize(("head", "folder"), [("in `frame`", "frame"), ("feature", "frame/features")])
+@pytest.mark.parametrize(("head", "folder"), [("part of `frame`", "frame"), ("feature", "frame/features")])
 def test_tables_list_what_the_folders_hold(head: str, folder: str) -> None:
-    table = TEXT.partition(f"| {head} | what it ")[2].partition("\n\n")[0]
+    table = TEXT.partition(f"| {head} | contents ")[2].partition("\n\n")[0]
     rows = [row.split("|")[1] for row in table.splitlines()[2:]]
     listed = sorted(name for row in rows for name in re.findall(r"`([\w.]+)`", row))
     entries = (ROOT / "src" / "dermis" / folder).iterdir()
