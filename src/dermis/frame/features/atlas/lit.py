@@ -12,7 +12,7 @@ from dermis.gpu import MutableBindings, Texture
 
 @dataclass(frozen=True, eq=False)
 class Walked:
-    """What gutters continue by that are walked anew for other people.
+    """Hold what gutters need that are recomputed for each person.
 
     walks : what they begin with
     head : the person's surface at rest

@@ -42,7 +42,7 @@ def kernel_table() -> NDArray[np.float32]:
     """q = w(1) / w(0) of the kernel w(n) = q^(n^2): rows by variance (1/64 step^2), columns by taps a side.
 
     A Gaussian that is sampled and cut off loses variance, a narrow one most of it. So q is solved for each
-    number of taps such that the kernel has the variance asked for.
+    number of taps such that the kernel has the requested variance.
     """
     variance = np.arange(WIDEST * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
     n = np.arange(_MOST_TAPS + 1)

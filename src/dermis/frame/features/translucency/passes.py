@@ -43,10 +43,10 @@ def draw_receivers(
     points: Buffer,
     facets: bool = False,
 ) -> None:
-    """Points, normals and metric of cells that take light.
+    """Write points, normals and metric of the cells that receive light.
 
     surface : resources of geometry.wgsl, and stretch_map of the atlas
-    asked : buffer of the places on the mesh, and how many there are
+    listed : buffer of the places on the mesh, and their number
     points : buffer to write to
     facets : whether the metric is that of the triangles, and not the stretch map's
     """
@@ -59,10 +59,10 @@ def draw_receivers(
 def draw_sources(
     graph: Recorder, surface: Bindings, cells: Cells, listed: tuple[Buffer, int], points: Buffer
 ) -> None:
-    """Centres, normals and areas of cells that give light.
+    """Write centres, normals and areas of the cells that emit light.
 
     surface : resources of geometry.wgsl, and the atlas
-    asked : buffer of the cells, and how many there are
+    listed : buffer of the cells, and their number
     points : buffer to write to
     """
     shader = program(graph.device, "translucency/translucency_sources.wgsl")

@@ -137,7 +137,7 @@ def _face(recession: float) -> bytes:
 class Resting(NamedTuple):
     """Textures of which only the finest mip is filled, a buffer of heights, and what movements add to them.
 
-    moved : None where nobody asked for it
+    moved : None unless requested
     """
 
     colour: map_mips.Mipped
@@ -152,7 +152,7 @@ def resting(device: Device, given: Given, side: int, moving: bool = False) -> Re
 
     Only what a device paints first is kept there: who draws many people rarely comes back to one.
 
-    moving : whether what movements add is asked for
+    moving : whether to include what movements add
     """
     if device.adapter.kind != "CPU":
         return painted(device, given, side)

@@ -71,7 +71,7 @@ class SearchPasses:
         }
 
     def add(self, name: str, count: int, bound: Bindings, constants: Constants = ()) -> None:
-        """A pass of a number of invocations; its shader is told of the search."""
+        """Add a pass of `count` invocations; its shader reads the parameters of the search."""
         shader = program(self.device, f"translucency/pair_search/{name}.wgsl", constants)
         record = shader.record("Search", **self._told, count=count)
         self.frame.dispatch("pair search", shader, {**bound, "search": record}, each(count))
