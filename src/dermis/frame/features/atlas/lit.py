@@ -12,7 +12,7 @@ from dermis.gpu import MutableBindings, Texture
 
 @dataclass(frozen=True, eq=False)
 class Walked:
-    """Hold what gutters need that are recomputed for each person.
+    """Inputs of the gutters that are recomputed for each person.
 
     walks : what they begin with
     head : the person's surface at rest
