@@ -14,7 +14,7 @@ from dermis.base.command_line import run_script
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "fit.md"
-TEXT = ROOT / "docs" / "fit.in.md"
+TEXT = ROOT / "docs" / "templates" / "fit.md"
 RESULTS = ROOT / "benchmarks" / "results" / "unmixing.json"
 WIDTHS = RESULTS.with_name("widths.json")
 FITTED = ROOT / "benchmarks" / "results" / "fitting.json"

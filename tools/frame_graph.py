@@ -8,6 +8,7 @@ from pathlib import Path
 
 import dermis
 from dermis.apps.validation.benchmarks.cases import pose_at, rigged
+from dermis.apps.validation.pages import template_of
 from dermis.base.command_line import run_script
 from dermis.formats.samples import cached
 from dermis.gpu.graph import ListedPass, Listing
@@ -69,7 +70,7 @@ def main(adapter: str = "auto", page: Path = PAGE) -> None:
         renderer.draw(*frame)
         marks[change] = set(renderer.graph.ran)
     page.write_text(
-        (PAGE.parent / "frame_graph.in.md")
+        template_of(PAGE)
         .read_text(encoding="utf-8")
         .format(
             head=name,

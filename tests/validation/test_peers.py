@@ -14,6 +14,7 @@ import dermis
 from dermis.apps.truths.cycles import CyclesPass
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
+from dermis.apps.validation.pages import template_of
 from dermis.apps.validation.peers import rendering, report
 from dermis.base.errors import DermisError, refuse
 from dermis.mesh.head import Head
@@ -185,8 +186,9 @@ def test_a_bias_above_ours_is_never_made_up_for(peers: Any, tmp_path: Path, caps
 def test_page_is_written_with_all_its_places_filled(
     peers: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    template = peers.PAGE.with_suffix(".in.md").read_text(encoding="utf-8")
-    (tmp_path / "peers.in.md").write_text(template, encoding="utf-8")
+    template = template_of(peers.PAGE).read_text(encoding="utf-8")
+    (tmp_path / "templates").mkdir()
+    (tmp_path / "templates" / "peers.md").write_text(template, encoding="utf-8")
     monkeypatch.setattr(report, "PAGE", tmp_path / "peers.md")
     monkeypatch.setattr(report, "FIGURES", tmp_path / "results" / "peers.json")
     monkeypatch.setattr(report, "Plan", lambda: peers.QUICK)

@@ -37,7 +37,7 @@ def test_the_picture_is_small_and_shows_all_views() -> None:
 
 
 def test_the_page_names_what_is_filled_in() -> None:
-    text = (ROOT / "docs" / "path_traced.in.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "templates" / "path_traced.md").read_text(encoding="utf-8")
     names = {name for _, name, _, _ in string.Formatter().parse(text) if name}
     assert {"rows", "right", "down", "brightness", "left", "beside", "side", "adapter"} <= names
     assert "{rows}" not in (ROOT / "docs" / "path_traced.md").read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.blender_process import PYTHON_VARIABLE as PYTHON_VARIABLE
 from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
-from dermis.apps.truths.described import UNIT_MM, Described, check_lens, cycles_looking, world
+from dermis.apps.truths.scene_description import UNIT_MM, Described, check_lens, cycles_looking, world
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.lights import lamp
 from dermis.apps.truths.mitsuba_scene import Lambertian

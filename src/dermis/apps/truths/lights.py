@@ -8,17 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.described import (
-    UNIT_MM,
-    Described,
-    Mitsuba,
-    cycles_axes,
-    cycles_light,
-    mitsuba_looking,
-    mitsuba_projector,
-    mitsuba_shape,
-    rgb,
-)
+from dermis.apps.truths.scene_description import UNIT_MM, Described, Mitsuba, cycles_axes, cycles_light, mitsuba_looking, mitsuba_projector, mitsuba_shape, rgb
 from dermis.base.errors import refuse
 from dermis.base.registry import Registry
 from dermis.scene.lights import (

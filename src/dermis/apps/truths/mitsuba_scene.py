@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.described import Described, Mitsuba, MitsubaObject, check_lens, rgb, surroundings
+from dermis.apps.truths.scene_description import Described, Mitsuba, MitsubaObject, check_lens, rgb, surroundings
 from dermis.apps.truths.lights import emitter
 from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.base.errors import refuse

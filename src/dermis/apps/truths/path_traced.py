@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.described import Mitsuba, MitsubaObject
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject
 from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     Lambertian,

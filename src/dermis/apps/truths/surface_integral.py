@@ -50,7 +50,7 @@ def integrate(points: ArrayLike, samples: IrradianceSamples, profile: Profile, e
 def _gathered(places: Floats, samples: IrradianceSamples, profile: Profile, error: float) -> Floats:
     from numba import config
 
-    from dermis.apps.truths.octree_walk import gather
+    from dermis.apps.truths.octree_gather import gather
 
     bound = (error / _ERROR_OF_BOUND) ** (2 / 3)
     tree, table = _weighed(build_tree(samples), bound / (_STRICT_BOUND * error)), tabulate(profile)

@@ -63,9 +63,14 @@ def write_page(page: Path, text: str) -> None:
         unfinished.write_text(text, encoding="utf-8")
 
 
+def template_of(page: Path) -> Path:
+    """Return the template of a page of the documentation."""
+    return page.parent / "templates" / page.name
+
+
 def fill_page(page: Path, **parts: object) -> None:
-    """Write NAME.md from NAME.in.md with its parts filled in."""
-    write_page(page, in_checkout(page.with_suffix(".in.md")).read_text(encoding="utf-8").format(**parts))
+    """Write docs/NAME.md from docs/templates/NAME.md with its parts filled in."""
+    write_page(page, in_checkout(template_of(page)).read_text(encoding="utf-8").format(**parts))
 
 
 def print_tables(tables: Mapping[str, str]) -> None:

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.truths.described import Mitsuba, MitsubaObject, rgb
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.half_space import diffuse_albedo
-from dermis.apps.truths.person.subject import Person
+from dermis.apps.truths.person.person import Person
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.mesh.geometry import triangle_areas
 from dermis.optics.media import SKIN_ETA

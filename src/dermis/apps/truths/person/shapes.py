@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.described import Described, Mitsuba, MitsubaObject, rgb
+from dermis.apps.truths.scene_description import Described, Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.mitsuba_scene import gap_of, mesh_shape, shell
 from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.apps.truths.person.medium import INDEX, PASSED
-from dermis.apps.truths.person.subject import Hairs, Paint, Person
+from dermis.apps.truths.person.person import Hairs, Paint, Person
 from dermis.mesh.eyeball import (
     LIMBUS_MM,
     SCLERA_MM,

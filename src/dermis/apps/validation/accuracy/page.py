@@ -1,4 +1,4 @@
-"""Writes docs/accuracy.md from docs/accuracy.in.md."""
+"""Writes docs/accuracy.md from docs/templates/accuracy.md."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import PathTraced, Variant
-from dermis.apps.truths.person.traced import Paint, trace_person
+from dermis.apps.truths.person.path_traced import Paint, trace_person
 from dermis.apps.validation.comparisons.truths import check_seen
 from dermis.base.errors import refuse
 from dermis.environment.panorama import UNIFORM

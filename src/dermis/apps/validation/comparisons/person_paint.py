@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.person.traced import Paint
+from dermis.apps.truths.person.path_traced import Paint
 from dermis.base.errors import refuse
 from dermis.frame.features.surface.painting import paint
 from dermis.frame.programs import program

@@ -101,7 +101,7 @@ def heat_around(
     lit : of the whole head, see `irradiance_samples`
     least_mm2 : variance below which Gaussians are integrated by straight-line distance
     """
-    from dermis.apps.truths.refine import patch_of
+    from dermis.apps.truths.surface_patch import patch_of
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface
 
     started = time.perf_counter()

@@ -17,7 +17,7 @@ from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.mitsuba.scene import BOUNDARIES, Boundary, Walked, medium_words, surface_words
 from dermis.apps.export.targets.mitsuba.target import TARGET
-from dermis.apps.truths.described import Mitsuba, MitsubaObject, rgb
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
 from dermis.apps.validation.pages import RESULTS, Figures, write_figures
 from dermis.optics.curve import Curve

@@ -20,7 +20,7 @@ from dermis.apps.export.subject import BALL_MM, Subject
 from dermis.apps.export.target import Rows, floats
 from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
 from dermis.apps.truths.cycles import camera_of
-from dermis.apps.truths.described import UNIT_MM, Described, world
+from dermis.apps.truths.scene_description import UNIT_MM, Described, world
 from dermis.apps.truths.lights import CYCLES, lamp
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import relief_slopes

@@ -23,7 +23,7 @@ from dermis.apps.export.targets.mitsuba.xml import (
     include,
     picture_file,
 )
-from dermis.apps.truths.described import Described, rgb, surroundings
+from dermis.apps.truths.scene_description import Described, rgb, surroundings
 from dermis.apps.truths.lights import MITSUBA, emitter
 from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, sensor_of
 from dermis.scene.model import Scene

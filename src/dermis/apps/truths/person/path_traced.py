@@ -7,7 +7,7 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.described import Described, Mitsuba, MitsubaObject, rgb
+from dermis.apps.truths.scene_description import Described, Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     lit_scene,
@@ -26,8 +26,8 @@ from dermis.apps.truths.path_traced import (
 )
 from dermis.apps.truths.person.medium import PASSED, VOXELS, mean_free_paths, medium_of
 from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, picture, skin_shapes
-from dermis.apps.truths.person.subject import Paint as Paint
-from dermis.apps.truths.person.subject import Person, person_of
+from dermis.apps.truths.person.person import Paint as Paint
+from dermis.apps.truths.person.person import Person, person_of
 from dermis.mesh.mesh import Material
 from dermis.scene.model import Scene
 
