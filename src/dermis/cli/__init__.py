@@ -32,9 +32,9 @@ def main() -> None:
     130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP; 2 also when stdout could not be written to, but
     not when its reader left.
     """
-    from dermis.cli.process import Interruption, Streams
+    from dermis.cli.process import Interruption, StandardStreams
 
-    with Streams() as streams, Interruption() as interruption:
+    with StandardStreams() as streams, Interruption() as interruption:
         try:
             code = _run()
             if (fault := streams.fault()) and not code:

@@ -16,9 +16,9 @@ from cyclopts import Parameter
 from dermis.base.console import note, print_report, progress, working_on
 from dermis.base.errors import refuse
 from dermis.base.quantities import number
-from dermis.cli.options import Adapter, Destination, Flag, Json, Options, Whole
-from dermis.cli.output_options import MovingOutput
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
+from dermis.cli.options import Adapter, OutputPath, Flag, Json, Options, Integer
+from dermis.cli.output_options import AnimationOutput
+from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble_scene, note_subdivision
 
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class _Take:
+class _AnimatedScene:
     """Scene moved by a clip, with frame k at k / rate.
 
     first : number of the first frame
@@ -55,13 +55,13 @@ def animate(
     /,
     *,
     motion: str | None = None,
-    output: Destination = Path("dermis.mp4"),
+    output: OutputPath = Path("dermis.mp4"),
     clip: str | None = None,
     fps: str | None = None,
     motion_fps: float | None = None,
     begin: Annotated[float | None, Parameter(name="--from")] = None,
     end: Annotated[float | None, Parameter(name="--to")] = None,
-    crf: Whole = None,
+    crf: Integer = None,
     anew: Flag = False,
     names: Flag = False,
     scene: SceneOptions = DEFAULTS,
@@ -115,19 +115,19 @@ def animate(
     if names:
         return _list_names(head, scene, as_json)
     started = time.perf_counter()
-    span, target = parse_span(begin, end, fps, motion_fps), MovingOutput(output, crf, anew)
+    span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, anew)
     target.check(scene.settings.get("size", (2, 2)))
     moving = motion_file(head, motion)
     with working_on("loading"):
-        described, settings = assemble(head, scene)
+        described, settings = assemble_scene(head, scene)
         target.check(settings.size)
-        moved = clip_of(head, described.head, moving, clip, scene.head, span)
+        moved = load_clip(head, described.head, moving, clip, scene.head, span)
         numbers, rate = span.frames(moved)
     if moved.note:
         note(f"note: {moved.note}")
-    note_levels(head, scene, described.head)
-    take = _Take(described, settings, moved, rate, numbers[0])
-    missing = target.missing(numbers, settings.size, _made_of(take, scene, head, moving))
+    note_subdivision(head, scene, described.head)
+    take = _AnimatedScene(described, settings, moved, rate, numbers[0])
+    missing = target.missing(numbers, settings.size, _frame_digest(take, scene, head, moving))
     began = time.perf_counter()
     used = _draw(take, missing, target, adapter) if missing else None
     now = time.perf_counter()
@@ -142,11 +142,11 @@ def animate(
         "seconds": round(now - started, 3),
         "frames_per_s": round(len(missing) / (now - began), 3),
     }
-    print_report(as_json, report, lambda: [_in_words(report), *filter(None, [described.head.attribution])])
+    print_report(as_json, report, lambda: [_summary_line(report), *filter(None, [described.head.attribution])])
     return 0
 
 
-def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: str) -> str:
+def _draw(take: _AnimatedScene, numbers: Sequence[int], target: AnimationOutput, adapter: str) -> str:
     """Draw and write frames; return the adapter's name."""
     from dermis.frame.renderer import Renderer
 
@@ -163,7 +163,7 @@ def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: st
     return str(renderer.device.adapter.name)
 
 
-def _exposure(take: _Take, renderer: Renderer) -> float:
+def _exposure(take: _AnimatedScene, renderer: Renderer) -> float:
     """Return the exposure of all frames: the given one, or that metered at the first frame of the motion."""
     if take.settings.exposure != "auto":
         return take.settings.exposure
@@ -173,7 +173,7 @@ def _exposure(take: _Take, renderer: Renderer) -> float:
     return found
 
 
-def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
+def _frame_digest(take: _AnimatedScene, given: SceneOptions, *files: str) -> str:
     """Return a digest that two frames of one number share if they look the same.
 
     files : head and motion as they were typed; files count with their size and time
@@ -196,7 +196,7 @@ def _file_state(name: str) -> str:
     return f"{path.resolve()} {name} {state.st_size} {state.st_mtime_ns}"
 
 
-def _in_words(report: Options) -> str:
+def _summary_line(report: Options) -> str:
     count, drawn = report["frames"], report["drawn"]
     kept = f" ({count - drawn} were there)" if drawn < count else ""
     place = f" on {report['adapter']}" if report["adapter"] else ""
@@ -206,18 +206,18 @@ def _in_words(report: Options) -> str:
 
 def _list_names(name: str, given: SceneOptions, as_json: bool) -> int:
     with working_on("loading"):
-        found = names_of(name, assemble(name, given)[0].head)
+        found = animatable_names(name, assemble_scene(name, given)[0].head)
     print_report(
         as_json, found, lambda: (f"{kind}: {', '.join(each) or 'none'}" for kind, each in found.items())
     )
     return 0
 
 
-_USUAL_RATE = 30.0
+_DEFAULT_RATE = 30.0
 
 
 @dataclass(frozen=True)
-class Span:
+class TimeSpan:
     """Times between which frames are drawn, and their rate; None where an option was left out.
 
     begin, end : seconds of the motion
@@ -236,7 +236,7 @@ class Span:
         """
         from dermis.images.movie import exact_rate
 
-        rate = self.rate or exact_rate(clip.rate or _USUAL_RATE)
+        rate = self.rate or exact_rate(clip.rate or _DEFAULT_RATE)
         first = math.ceil((self.begin or 0) * rate)
         count = clip.frame_count(float(rate))
         beyond = count if self.end is None else min(count, math.ceil(self.end * rate))
@@ -249,7 +249,7 @@ class Span:
         return range(first, beyond), rate
 
 
-def parse_span(begin: float | None, end: float | None, fps: str | None, own_rate: float | None) -> Span:
+def parse_time_span(begin: float | None, end: float | None, fps: str | None, own_rate: float | None) -> TimeSpan:
     """Return the span that was typed."""
     from dermis.images.movie import exact_rate
     from dermis.mesh.clip import LONGEST_S, check_rate
@@ -263,7 +263,7 @@ def parse_span(begin: float | None, end: float | None, fps: str | None, own_rate
         check_rate("--motion-fps", own_rate)
     # as written: the float nearest to 0.1 lies after frame 3 of 30
     exact = [None if seconds is None else Fraction(str(seconds)) for seconds in (begin, end)]
-    return Span(exact[0], exact[1], None if fps is None else exact_rate(fps, "--fps"), own_rate)
+    return TimeSpan(exact[0], exact[1], None if fps is None else exact_rate(fps, "--fps"), own_rate)
 
 
 def motion_file(name: str, motion: str | None) -> str:
@@ -279,7 +279,7 @@ def motion_file(name: str, motion: str | None) -> str:
     return own
 
 
-def clip_of(name: str, head: Head, motion: str, clip: str | None, given: Options, span: Span) -> Clip:
+def load_clip(name: str, head: Head, motion: str, clip: str | None, given: Options, span: TimeSpan) -> Clip:
     """Return the motion of a file for a head.
 
     name : of the head as it was typed
@@ -295,7 +295,7 @@ def clip_of(name: str, head: Head, motion: str, clip: str | None, given: Options
     return load_motion(motion, head, clip=clip, fps=rate, **table)
 
 
-def names_of(name: str, head: Head) -> dict[str, tuple[str, ...]]:
+def animatable_names(name: str, head: Head) -> dict[str, tuple[str, ...]]:
     """Return names of the head's morph targets and bones, and of the clips in its file."""
     from dermis.formats.gltf.animations import clip_names
     from dermis.formats.parts import is_gltf

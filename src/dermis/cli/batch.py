@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Literal
 
 from dermis.base.console import note, print_json, print_lines, print_report, working_on
 from dermis.base.errors import refuse
-from dermis.cli.options import Adapter, Flag, Json, Options, Output, Whole, given, parse_size
+from dermis.cli.options import Adapter, Flag, Json, Options, Output, Integer, given, parse_size
 
 if TYPE_CHECKING:
-    from dermis.apps.batch.run import Crew, Report
+    from dermis.apps.batch.run import WorkerPool, Report
     from dermis.apps.batch.spec import Spec
 
-_MOST_PROCESSES = 1024
+_MAX_PROCESSES = 1024
 
 
 def batch(
@@ -27,16 +27,16 @@ def batch(
     /,
     *,
     output: Output = None,
-    count: Whole = None,
+    count: Integer = None,
     size: str | None = None,
-    seed: Whole = None,
+    seed: Integer = None,
     format: Literal["webdataset", "folder"] | None = None,
     shard: str = "0/1",
     adapter: Adapter = "auto",
     adapters: str | None = None,
-    workers: Whole = None,
-    workers_per_gpu: Whole = None,
-    encoders: Whole = None,
+    workers: Integer = None,
+    workers_per_gpu: Integer = None,
+    encoders: Integer = None,
     scheduler: str | None = None,
     cluster: Path | None = None,
     keep_going: Flag = False,
@@ -98,10 +98,10 @@ def batch(
     as_json:
         Print one JSON object: counts, seconds, images/s, shards, what was skipped and what was left out.
     """
-    from dermis.apps.batch.spec import example_text, load_spec
+    from dermis.apps.batch.spec import example_toml, load_spec
 
     if example:
-        print_lines(example_text().rstrip("\n"))
+        print_lines(example_toml().rstrip("\n"))
         return 0
     part = _part(shard)
     if spec is None:
@@ -114,15 +114,15 @@ def batch(
     if output is None:
         refuse("--output", "the folder of the data set", "none was named", "Name one with -o")
     from dermis.apps.batch.run import run
-    from dermis.apps.batch.worker import Work
+    from dermis.apps.batch.worker import RunOptions
 
     if scheduler is not None or cluster is not None:
         elsewhere = given(adapters=adapters, workers=workers, workers_per_gpu=workers_per_gpu)
         crew, each = _cluster(scheduler, cluster, adapter, elsewhere), _number("--encoders", encoders, 0)
     else:
         crew, each = _crew(adapter, adapters, workers, workers_per_gpu, encoders)
-    work = Work(read, output, each or 0, keep_going)
-    with rate_of_images() as told:
+    work = RunOptions(read, output, each or 0, keep_going)
+    with image_progress() as told:
         report = run(work, crew, part, lambda now: told(now.images, now.to_draw))
     _tell(report, output, as_json)
     return 0
@@ -137,16 +137,16 @@ def _part(text: str) -> tuple[int, int]:
 
 
 def _number(option: str, value: int | None, least: int) -> int | None:
-    if value is not None and not least <= value <= _MOST_PROCESSES:
-        refuse(option, f"{least} to {_MOST_PROCESSES}", f"{value} came", "Correct it")
+    if value is not None and not least <= value <= _MAX_PROCESSES:
+        refuse(option, f"{least} to {_MAX_PROCESSES}", f"{value} came", "Correct it")
     return value
 
 
 def _crew(
     adapter: str, adapters: str | None, workers: int | None, per_gpu: int | None, encoders: int | None
-) -> tuple[Crew, int]:
+) -> tuple[WorkerPool, int]:
     """Return the processes of this machine, and how many encoders each has."""
-    from dermis.apps.batch.worker_pool import Processes, SlotRequest
+    from dermis.apps.batch.worker_pool import ProcessPool, SlotRequest
 
     if workers is not None and per_gpu is not None:
         refuse("--workers-per-gpu", "no such option beside --workers", "it came", "Leave one of them out")
@@ -158,7 +158,7 @@ def _crew(
         _number("--encoders", encoders, 0),
     )
     slots, each = request.slots()
-    return Processes(slots), each
+    return ProcessPool(slots), each
 
 
 def _numbers(adapter: str, adapters: str | None) -> tuple[int, ...]:
@@ -171,7 +171,7 @@ def _numbers(adapter: str, adapters: str | None) -> tuple[int, ...]:
     return tuple(map(int, adapters.split(",")))
 
 
-def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: Options) -> Crew:
+def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: Options) -> WorkerPool:
     from dermis.apps.batch.dask_cluster import Cluster
 
     if address is not None and file is not None:
@@ -216,15 +216,15 @@ def _dry_run(spec: Spec, adapter: str, sheet: Path, as_json: bool) -> int:
     return 0
 
 
-_EVERY_S = 30.0  # between lines of a log
-_WINDOW_S = 60.0  # that the rate is taken over
+_LOG_INTERVAL_S = 30.0  # between lines of a log
+_RATE_WINDOW_S = 60.0  # that the rate is taken over
 
 
 @contextmanager
-def rate_of_images() -> Iterator[Callable[[int, int], None]]:
+def image_progress() -> Iterator[Callable[[int, int], None]]:
     """Yield a function that takes how many images are done, of how many."""
     if not sys.stderr.isatty():
-        yield Lines(note).tell
+        yield ProgressLog(note).tell
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -236,9 +236,9 @@ def rate_of_images() -> Iterator[Callable[[int, int], None]]:
         TextColumn("{task.fields[rate]}"),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    with Progress(*columns, console=Console(stderr=True), speed_estimate_period=_WINDOW_S) as bar:
+    with Progress(*columns, console=Console(stderr=True), speed_estimate_period=_RATE_WINDOW_S) as bar:
         task = bar.add_task("", rate="", total=None)
-        pace = Pace()
+        pace = ImageRate()
 
         def tell(done: int, of: int) -> None:
             bar.update(task, completed=done, total=of, rate=f"{pace.at(done):.3g} images/s")
@@ -246,7 +246,7 @@ def rate_of_images() -> Iterator[Callable[[int, int], None]]:
         yield tell
 
 
-class Pace:
+class ImageRate:
     """Images a second over the last minute.
 
     clock : seconds
@@ -260,13 +260,13 @@ class Pace:
         """The pace with so many images done by now."""
         now = self._clock()
         self._seen.append((now, done))
-        while len(self._seen) > 2 and now - self._seen[1][0] >= _WINDOW_S:
+        while len(self._seen) > 2 and now - self._seen[1][0] >= _RATE_WINDOW_S:
             self._seen.popleft()
         began, before = self._seen[0]
         return (done - before) / (now - began) if now > began else 0.0
 
 
-class Lines:
+class ProgressLog:
     """A line every half minute, for logs.
 
     write : takes a line
@@ -274,12 +274,12 @@ class Lines:
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         self._write, self._clock = write, clock
-        self._pace, self._last = Pace(clock), clock()
+        self._pace, self._last = ImageRate(clock), clock()
 
     def tell(self, done: int, of: int) -> None:
         """So many images are done."""
         pace, now = self._pace.at(done), self._clock()
-        if now - self._last < _EVERY_S:
+        if now - self._last < _LOG_INTERVAL_S:
             return
         self._last = now
         left = f"{(of - done) / pace / 60:.0f} min left" if pace else "no time known"

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 from dermis.base.console import print_report, progress
-from dermis.cli.head_options import HEAD, FileOptions, check_head
-from dermis.cli.options import NOTHING, Adapter, Json, Output, refuse_options
+from dermis.cli.head_options import HEAD_OPTION_NAMES, FileOptions, check_head
+from dermis.cli.options import NO_OPTIONS, Adapter, Json, Output, refuse_options
 
 if TYPE_CHECKING:
     from dermis.apps.validation.benchmarks.run import Benchmark
@@ -17,7 +17,7 @@ def bench(
     *,
     preset: Literal["film", "interactive", "cpu"] | None = None,
     head: str = "auto",
-    file: FileOptions = NOTHING,
+    file: FileOptions = NO_OPTIONS,
     output: Output = None,
     adapter: Adapter = "auto",
     as_json: Json = False,
@@ -57,17 +57,17 @@ def bench(
     from dermis.base.atomic_write import check_output
     from dermis.base.extras import needed
     from dermis.formats.samples import cached
-    from dermis.gpu.adapters import fitting_adapters
+    from dermis.gpu.adapters import select_adapters
 
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
         needed("matplotlib", "the report's plots")
     name = head
     if head == "auto":
-        refuse_options(file, HEAD, "without a file", "Add --head")
+        refuse_options(file, HEAD_OPTION_NAMES, "without a file", "Add --head")
         name = "lee_perry_smith" if cached("lee_perry_smith") else "human"
     check_head(head, file)
-    software = fitting_adapters(adapter)[0][0].kind == "CPU"
+    software = select_adapters(adapter)[0][0].kind == "CPU"
     cases = PRESETS[preset or ("cpu" if software else "interactive")].cases()
     with progress("measuring") as tell:
         made = run(cases, name, adapter, tell, file)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from dermis.base.console import print_lines
-from dermis.cli.options import NOTHING, Options, options_of, refuse_options
+from dermis.cli.options import NO_OPTIONS, Options, model_options, refuse_options
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
     SettingsOptions = Options
     SkinOptions = Options
 else:
-    SettingsOptions = options_of(Settings, only=("technique", "seams", "transmission", "tone", "bloom"))
-    SkinOptions = options_of(Skin, only=("profile", "specular", "fresnel", "energy", "direction"))
+    SettingsOptions = model_options(Settings, only=("technique", "seams", "transmission", "tone", "bloom"))
+    SkinOptions = model_options(Skin, only=("profile", "specular", "fresnel", "energy", "direction"))
 
 
 def cite(
     *keys: str,
     scene: Path | None = None,
-    settings: SettingsOptions = NOTHING,
-    skin: SkinOptions = NOTHING,
+    settings: SettingsOptions = NO_OPTIONS,
+    skin: SkinOptions = NO_OPTIONS,
     against: Literal["surface-integral", "heat", "path-traced", "cycles"] | None = None,
 ) -> int:
     """Print BibTeX entries: of the given keys, or of the works behind a picture or a comparison.
@@ -56,21 +56,21 @@ def cite(
         wanted: tuple[str, ...] = keys
     elif against:
         refuse_options(options.keys() - {"technique"}, None, "beside --against", "Leave one out")
-        wanted = _of_comparison(against, settings.get("technique"))
+        wanted = _comparison_sources(against, settings.get("technique"))
     else:
-        wanted = _of_picture(scene, settings, skin)
+        wanted = _picture_sources(scene, settings, skin)
     print_lines(bibtex(wanted))
     return 0
 
 
-def _of_comparison(against: str, technique: str | None) -> tuple[str, ...]:
+def _comparison_sources(against: str, technique: str | None) -> tuple[str, ...]:
     from dermis.apps.validation.comparisons.compare import comparison_sources
     from dermis.scene.techniques import TECHNIQUES
 
     return comparison_sources(against, [technique] if technique else TECHNIQUES)
 
 
-def _of_picture(file: Path | None, settings: Options, skin: Options) -> tuple[str, ...]:
+def _picture_sources(file: Path | None, settings: Options, skin: Options) -> tuple[str, ...]:
     from dermis.scene import load_scene
     from dermis.scene.lights import studio
     from dermis.scene.sources import sources_of

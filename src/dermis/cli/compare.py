@@ -17,16 +17,16 @@ from dermis.base.errors import refuse
 from dermis.base.extras import needed
 from dermis.cli.head_options import ShapeOptions, check_head, note_eyes
 from dermis.cli.options import (
-    NOTHING,
+    NO_OPTIONS,
     Adapter,
     Json,
     Options,
     Output,
-    Whole,
+    Integer,
     check,
     given,
     option_name,
-    options_of,
+    model_options,
 )
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
@@ -35,7 +35,7 @@ from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS
 
-_BY_PATHS = ("path-traced", "cycles")
+_PATH_TRACERS = ("path-traced", "cycles")
 _SIZES = {"size": (256, 256), "atlas": 1024}
 _DIRECTION = {"direction": "that of the truth's skin"}
 
@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     SizeOptions = Options
     SkinOptions = Options
 else:
-    SizeOptions = options_of(Settings, only=_SIZES, defaults=_SIZES)
-    SkinOptions = options_of(Skin, only=("direction", "roughness"), defaults=_DIRECTION)
+    SizeOptions = model_options(Settings, only=_SIZES, defaults=_SIZES)
+    SkinOptions = model_options(Skin, only=("direction", "roughness"), defaults=_DIRECTION)
 
 
 def compare(
@@ -61,10 +61,10 @@ def compare(
     region: str | None = None,
     medium: str | None = None,
     model: ModelName | None = None,
-    sizes: SizeOptions = NOTHING,
-    skin: SkinOptions = NOTHING,
-    shape: ShapeOptions = NOTHING,
-    samples: Whole = None,
+    sizes: SizeOptions = NO_OPTIONS,
+    skin: SkinOptions = NO_OPTIONS,
+    shape: ShapeOptions = NO_OPTIONS,
+    samples: Integer = None,
     output: Output = None,
     adapter: Adapter = "auto",
     as_json: Json = False,
@@ -113,30 +113,30 @@ def compare(
     """
     words = given(against=against, techniques=techniques, light=light, region=region)
     chosen = words | given(medium=medium, model=model, samples=samples) | sizes | skin | shape
-    _check_used(what, chosen)
+    _refuse_unused_options(what, chosen)
     if what == "specular":
         check(Skin, skin)
         compare_specular(output, Skin(**skin).roughness, adapter, as_json)
     else:
-        _compare_techniques(what, shape, _choose(chosen, sizes) | {"adapter": adapter}, output, as_json)
+        _compare_techniques(what, shape, _comparison_arguments(chosen, sizes) | {"adapter": adapter}, output, as_json)
     return 0
 
 
-def _check_used(what: str, chosen: Options) -> None:
+def _refuse_unused_options(what: str, chosen: Options) -> None:
     """Refuse options that would change nothing."""
     if what == "specular":
         idle = dict.fromkeys(chosen.keys() - {"roughness"}, "surface models are compared without a head")
     else:
         idle = {"roughness": "techniques are compared without surface reflection"}
-        if chosen.get("against") not in _BY_PATHS:
-            idle["samples"] = f"only {' and '.join(_BY_PATHS)} trace paths"
-            idle["direction"] = f"only {' and '.join(_BY_PATHS)} know directions"
+        if chosen.get("against") not in _PATH_TRACERS:
+            idle["samples"] = f"only {' and '.join(_PATH_TRACERS)} trace paths"
+            idle["direction"] = f"only {' and '.join(_PATH_TRACERS)} know directions"
     for name, why in idle.items():
         if name in chosen:
             refuse(option_name(name), "no such option here", f"it came, and {why}", "Leave it out")
 
 
-def _choose(chosen: Options, sizes: Options) -> Options:
+def _comparison_arguments(chosen: Options, sizes: Options) -> Options:
     """Return the arguments for `dermis.apps.validation.comparisons.compare`."""
     from dermis.apps.validation.comparisons.scenes import usual_region
 
@@ -202,7 +202,7 @@ def _lines(made: Comparison) -> Sequence[str]:
 
 _DEGREES = (0, 30, 60, 75, 85)
 _INCIDENT = {15: "#2a62b0", 45: "#2e8b57", 75: "#c0392b"}
-_SAME_CURVE = "kelemen-direct"  # as kelemen
+_DUPLICATE_MODEL = "kelemen-direct"  # as kelemen
 _COLUMNS = 4
 _FARTHEST = 1.8  # root of the intensity over kelemen's peak; on rough skin some models pass it
 _UP = np.array([0.0, 0.0, 1.0])
@@ -220,11 +220,11 @@ def compare_specular(output: Path | None, roughness: float, adapter: str, as_jso
 def _specular_report(adapter: str) -> Options:
     """Return all findings as one object for JSON."""
     from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
-    from dermis.gpu.failures import on_device
+    from dermis.gpu.failures import run_on_device
     from dermis.specular.comparison import albedo_rows, reciprocity_error
     from dermis.specular.fresnel import FRESNEL, hemispherical_reflectance
 
-    name, cost = on_device(adapter, lambda device: (device.adapter.name, lobe_cost_ns(device)))
+    name, cost = run_on_device(adapter, lambda device: (device.adapter.name, lobe_cost_ns(device)))
     return {
         "adapter": name,
         "hemispherical_fresnel": {name: hemispherical_reflectance(curve) for name, curve in FRESNEL.items()},
@@ -274,16 +274,16 @@ def _draw_lobes_and_albedo(folder: Path, m: float) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as fault:
         refuse_output(folder, fault)
-    _save_figure(_lobes(m), folder / "lobes.png")
-    _save_figure(_albedos(m), folder / "albedo.png")
+    _save_figure(_lobe_figure(m), folder / "lobes.png")
+    _save_figure(_albedo_figure(m), folder / "albedo.png")
 
 
 def _distinct_models() -> list[str]:
     """Return names of the models that have a curve of their own."""
-    return [name for name in MODELS if name != _SAME_CURVE]
+    return [name for name in MODELS if name != _DUPLICATE_MODEL]
 
 
-def _lobes(m: float) -> Figure:
+def _lobe_figure(m: float) -> Figure:
     """Return the intensity under three lights in the plane of incidence: a polar panel for each model."""
     whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
     roots = {name: np.sqrt(_intensity(name, m) / whole) for name in _distinct_models()}
@@ -325,7 +325,7 @@ def _view_angles() -> Doubles:
     return np.radians(np.linspace(-89.9, 89.9, 1200))
 
 
-def _albedos(m: float) -> Figure:
+def _albedo_figure(m: float) -> Figure:
     """Return the directional albedo by angle, all models in one panel."""
     figure = _figure(7.2, 4.6)
     axes = figure.subplots()

@@ -36,15 +36,15 @@ def examine(wanted: str) -> Options:
     """Return all findings as one object for JSON."""
     from dermis.base.private import cache_folder
     from dermis.formats.samples import SAMPLES, cached
-    from dermis.gpu.adapters import WANTED_FEATURES, list_adapters
+    from dermis.gpu.adapters import OPTIONAL_FEATURES, list_adapters
 
     found = [
         {"number": a.number, "name": a.name, "driver": a.driver, "kind": a.kind, "backend": a.backend}
-        | {"features": {feature: feature in a.features for feature in WANTED_FEATURES}}
+        | {"features": {feature: feature in a.features for feature in OPTIONAL_FEATURES}}
         for a in list_adapters()
     ]
     return {
-        **_try_out(wanted),
+        **_test_adapter(wanted),
         "adapters": found,
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -62,7 +62,7 @@ def _version(name: str) -> str:
         return "not installed"
 
 
-def _try_out(wanted: str) -> Options:
+def _test_adapter(wanted: str) -> Options:
     """Open the adapter and draw a test frame with it."""
     from dermis.frame.renderer import Renderer
     from dermis.gpu.textures import half_store_rounding

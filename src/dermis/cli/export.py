@@ -11,7 +11,7 @@ from dermis.apps.export.registry import TARGETS
 from dermis.base.console import print_report, working_on
 from dermis.base.errors import refuse
 from dermis.cli.head_options import HeadOptions, check_head
-from dermis.cli.options import NOTHING, Adapter, Destination, Flag, Json, given
+from dermis.cli.options import NO_OPTIONS, Adapter, OutputPath, Flag, Json, given
 
 if TYPE_CHECKING:
     TargetName = str
@@ -26,7 +26,7 @@ def export(
     /,
     *,
     to: TargetName,
-    output: Destination,
+    output: OutputPath,
     version: str | None = None,
     variant: str | None = None,
     diffuse_transmission: Flag = False,
@@ -34,7 +34,7 @@ def export(
     profile: str | None = None,
     library: Path | None = None,
     map_side: int = 2048,
-    head: HeadOptions = NOTHING,
+    head: HeadOptions = NO_OPTIONS,
     adapter: Adapter = "auto",
     naive: Flag = False,
     as_json: Json = False,

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dermis.base.console import print_json, print_lines, progress
-from dermis.cli.options import Adapter, Destination, Json, Options, parse_colour
+from dermis.cli.options import Adapter, OutputPath, Json, Options, parse_colour
 
 if TYPE_CHECKING:
     from dermis.apps.inverse.fitting.result import FitResult
@@ -19,7 +19,7 @@ def fit(
     head: str = "human",
     camera: str | None = None,
     landmarks: Path | None = None,
-    output: Destination = Path("fitted"),
+    output: OutputPath = Path("fitted"),
     suns: int = 1,
     exposure: float = 1.0,
     white: str = "1,1,1",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from dermis.base.console import note, print_report, progress
-from dermis.cli.options import Adapter, Destination, Json, Whole
+from dermis.cli.options import Adapter, OutputPath, Json, Integer
 
 if TYPE_CHECKING:
     from dermis.apps.gallery.script import Picture
@@ -20,8 +20,8 @@ def gallery(
     *,
     only: Annotated[list[str] | None, Parameter(negative="", consume_multiple=True)] = None,
     head: str | None = None,
-    size: Whole = None,
-    output: Destination = Path("gallery"),
+    size: Integer = None,
+    output: OutputPath = Path("gallery"),
     adapter: Adapter = "auto",
     as_json: Json = False,
 ) -> int:

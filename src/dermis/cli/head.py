@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from dermis.base.console import print_report, working_on
 from dermis.base.errors import refuse
 from dermis.cli.head_options import parse_weights
-from dermis.cli.options import Adapter, Destination, Flag, Json, Options, Whole, given
+from dermis.cli.options import Adapter, OutputPath, Flag, Json, Options, Integer, given
 
 if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook
@@ -30,8 +30,8 @@ _Pairs = Parameter(negative="", metavar="NAME=WEIGHT,...", show_default=False)
 
 def head(
     *,
-    output: Destination = Path("head.glb"),
-    seed: Whole = None,
+    output: OutputPath = Path("head.glb"),
+    seed: Integer = None,
     african: float | None = None,
     asian: float | None = None,
     caucasian: float | None = None,
@@ -49,7 +49,7 @@ def head(
     roughness: Path | None = None,
     size: int = 1024,
     layout: Literal["own", "hm08"] = "own",
-    subdivide: Whole = None,
+    subdivide: Integer = None,
     adapter: Adapter = "auto",
     list_targets: Flag = False,
     as_json: Json = False,
@@ -128,7 +128,7 @@ def head(
     """
     from dermis.base.atomic_write import check_output
     from dermis.frame.features.surface.painting.painted_head import painted_head
-    from dermis.gpu.failures import on_device
+    from dermis.gpu.failures import run_on_device
     from dermis.human.person_file import numbers_of, write_numbers
     from dermis.human.published import human_targets
 
@@ -151,7 +151,7 @@ def head(
     with working_on("making the head"):
         made = person.head(layout=layout, **given(subdivide=subdivide))
         made = _with_maps(made, given(colour=colour, normal=normal, roughness=roughness))
-        made, eyes = on_device(adapter, lambda device: painted_head(device, made, size))
+        made, eyes = run_on_device(adapter, lambda device: painted_head(device, made, size))
         length = _write(output, person, made, resting, eyes)
     seconds, triangles = round(time.perf_counter() - started, 3), len(made.mesh.triangles)
     report |= {

@@ -9,11 +9,11 @@ from cyclopts import Parameter
 
 from dermis.base.console import note
 from dermis.base.errors import DermisError, refuse
-from dermis.cli.options import Options, check, options_of
+from dermis.cli.options import Options, check, model_options
 from dermis.mesh.eye_look import LIMITS
 from dermis.scene.head_table import HeadTable
 
-HEAD = {"specular": "specular_map", "roughness": "roughness_map"}
+HEAD_OPTION_NAMES = {"specular": "specular_map", "roughness": "roughness_map"}
 """Options by field of a [head], where their name differs."""
 _SHAPE = "unit_mm", "v_origin", "up", "opaque", "eyes", "eye_groups"
 _MAPS = "colour", "normal", "normal_y", "height", "height_mm", "specular", "roughness"
@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     ShapeOptions = Options
     FileOptions = Options
 else:
-    HeadOptions = options_of(HeadTable, without=("name",), names=HEAD)
-    ShapeOptions = options_of(HeadTable, only=_SHAPE)
-    FileOptions = options_of(HeadTable, only=(*_SHAPE, *_MAPS), names=HEAD)
+    HeadOptions = model_options(HeadTable, without=("name",), names=HEAD_OPTION_NAMES)
+    ShapeOptions = model_options(HeadTable, only=_SHAPE)
+    FileOptions = model_options(HeadTable, only=(*_SHAPE, *_MAPS), names=HEAD_OPTION_NAMES)
 
 
 def check_head(name: str, options: Options) -> None:
     """Refuse impossible options of a head."""
-    check(HeadTable, {"name": name, **options}, HEAD)
+    check(HeadTable, {"name": name, **options}, HEAD_OPTION_NAMES)
 
 
 EYE = "--eye"
 _LEAST, _MOST = LIMITS["pupil_mm"]
-EyeLooks = Annotated[
+EyeOptions = Annotated[
     list[str] | None,
     Parameter(
         name=EYE,
@@ -74,7 +74,7 @@ Weights = Annotated[
         "dermis animate HEAD --names lists them.",
     ),
 ]
-LookAt = Annotated[
+LookAtOption = Annotated[
     str | None,
     Parameter(
         name=LOOK_AT,
@@ -83,7 +83,7 @@ LookAt = Annotated[
         "centre, or camera.",
     ),
 ]
-Turns = Annotated[
+BoneAngleOptions = Annotated[
     list[str] | None,
     Parameter(
         name=BONE,
@@ -102,7 +102,7 @@ def parse_weights(words: Sequence[str], option: str = POSE) -> dict[str, float]:
     return {name: weight for name, (weight,) in _pairs(parts, 1, option, expected)}
 
 
-def parse_turns(words: Sequence[str]) -> dict[str, list[float]]:
+def parse_bone_angles(words: Sequence[str]) -> dict[str, list[float]]:
     """Return angles [degrees] by name of the bone of "head=0,25,0"."""
     return dict(_pairs(words, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"))
 
@@ -117,7 +117,7 @@ def _pairs(words: Iterable[str], count: int, option: str, expected: str) -> Iter
         yield name.strip(), numbers
 
 
-def pose_given(
+def pose_from_options(
     weights: Mapping[str, float], turns: Mapping[str, Sequence[float]], head: Head, name: str
 ) -> Pose:
     """Return the pose that was typed.
@@ -139,7 +139,7 @@ def pose_given(
     return Pose(weights, turns)
 
 
-def gaze_given(words: str, scene: Scene) -> Pose:
+def pose_with_gaze(words: str, scene: Scene) -> Pose:
     """Return the scene's pose with eyes that look at the place that was typed."""
     from dermis.scene.gaze import looking_at
 

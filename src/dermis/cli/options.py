@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from dermis.scene.plain import Plain
 
 
-def _whole(_: type, tokens: Sequence[Token]) -> int:
+def _to_int(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
 
 
-def _word(model: type[Plain], field: str, kind: object, tokens: Sequence[Token]) -> str:
+def _to_choice(model: type[Plain], field: str, kind: object, tokens: Sequence[Token]) -> str:
     """Return a word that the field takes; choices may have been registered after the command was imported."""
     from dermis.scene.plain import choices_of
 
@@ -32,15 +32,15 @@ def _word(model: type[Plain], field: str, kind: object, tokens: Sequence[Token])
     raise CoercionError(token=tokens[0], target_type=wanted)
 
 
-def _whole_or_word(words: Collection[str], _: type, tokens: Sequence[Token]) -> int | str:
+def _to_int_or_word(words: Collection[str], _: type, tokens: Sequence[Token]) -> int | str:
     return tokens[0].value if tokens[0].value in words else int(tokens[0].value)
 
 
-def _size(_: type, tokens: Sequence[Token]) -> tuple[int, int]:
+def _to_size(_: type, tokens: Sequence[Token]) -> tuple[int, int]:
     return parse_size(tokens[0].value, str(tokens[0].keyword))
 
 
-def _colour(_: type, tokens: Sequence[Token]) -> tuple[float, float, float]:
+def _to_colour(_: type, tokens: Sequence[Token]) -> tuple[float, float, float]:
     return parse_colour(tokens[0].value, str(tokens[0].keyword))
 
 
@@ -53,20 +53,20 @@ Adapter = Annotated[
         help="auto (the best), cpu (software), a part of an adapter's name, or its number as #1 (see doctor)."
     ),
 ]
-_TO = Parameter(name=("--output", "-o"))
-Output = Annotated[Path | None, _TO]
-Destination = Annotated[Path, _TO]
+_OUTPUT_NAMES = Parameter(name=("--output", "-o"))
+Output = Annotated[Path | None, _OUTPUT_NAMES]
+OutputPath = Annotated[Path, _OUTPUT_NAMES]
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
-_LENGTHS_MM = 1e-6, 1e4
+_LENGTH_RANGE_MM = 1e-6, 1e4
 Options = dict[str, Any]
 """Fields of a model by name, as they were typed."""
-NOTHING: Options = {}
+NO_OPTIONS: Options = {}
 """Options of a model when none is given."""
 # cyclopts itself would round 64.5.
-Whole = Annotated[int | None, Parameter(converter=_whole)]
+Integer = Annotated[int | None, Parameter(converter=_to_int)]
 
 
-def options_of(
+def model_options(
     model: type[Plain],
     *,
     only: Collection[str] = (),
@@ -87,9 +87,9 @@ def options_of(
 
     options: dict[str, object] = {}
     for field in only or model.model_fields:
-        kind, how = _kind(model, field)
+        kind, how = _option_type(model, field)
         if kind is not None and field not in without:
-            name, text = option_name(field, names), _help(model, field, defaults or {})
+            name, text = option_name(field, names), _option_help(model, field, defaults or {})
             if heading := heading_of(model, field):
                 how = how | {"group": Group(heading, sort_key=1)}  # after cyclopts' own groups
             options[field] = Annotated[kind, Parameter(name=name, help=text, **how)]
@@ -109,41 +109,41 @@ def option_name(field: str, names: Mapping[str, str] | None = None) -> str:
 
 def is_option(model: type[Plain], field: str) -> bool:
     """Return whether a field can be an option: it holds words or numbers, not other models."""
-    return _kind(model, field)[0] is not None
+    return _option_type(model, field)[0] is not None
 
 
-def _kind(model: type[Plain], field: str) -> tuple[Any, Options]:
+def _option_type(model: type[Plain], field: str) -> tuple[Any, Options]:
     """Return the type of a field's option, None for no option, and keywords of its `Parameter`."""
     from dermis.scene.field_errors import words_of
     from dermis.scene.plain import choices_of
 
     if choices := choices_of(model, field):
-        return Literal[choices] | str, {"converter": partial(_word, model, field), "metavar": "CHOICE"}
+        return Literal[choices] | str, {"converter": partial(_to_choice, model, field), "metavar": "CHOICE"}
     if words := words_of(model, field):
         number = model.model_fields[field].annotation in (float, int)
         shown = {"metavar": "|".join((*words, "NUMBER" if number else "COLOUR")), "show_choices": False}
         if model.model_fields[field].annotation is int:
-            return int | Literal[words], shown | {"converter": partial(_whole_or_word, words)}
+            return int | Literal[words], shown | {"converter": partial(_to_int_or_word, words)}
         return (float | Literal[words] if number else str), shown
     kind = model.model_fields[field].annotation
     kind = next((one for one in get_args(kind) if get_args(kind)[-1] is NoneType), kind)
     parts = tuple(get_args(part)[0] if get_args(part) else part for part in get_args(kind))
     known: dict[object, tuple[object, Options]] = {
-        int: (int, {"converter": _whole}),
+        int: (int, {"converter": _to_int}),
         (int, int): (
             tuple[int, int],
-            {"n_tokens": 1, "negative": "", "converter": _size, "metavar": "WIDTHxHEIGHT"},
+            {"n_tokens": 1, "negative": "", "converter": _to_size, "metavar": "WIDTHxHEIGHT"},
         ),
         (float, float, float): (
             tuple[float, float, float],
-            {"n_tokens": 1, "negative": "", "converter": _colour, "metavar": "R,G,B"},
+            {"n_tokens": 1, "negative": "", "converter": _to_colour, "metavar": "R,G,B"},
         ),
         (str, ...): (list[str], {"negative": ""}),
     }
     return (kind, {}) if kind in (bool, float, str) else known.get(parts or kind, (None, {}))
 
 
-def _help(model: type[Plain], field: str, defaults: Mapping[str, object]) -> str:
+def _option_help(model: type[Plain], field: str, defaults: Mapping[str, object]) -> str:
     """Return a field's help with its bounds, unless they are trivial, and its default."""
     from dermis.scene.field_errors import words_of
     from dermis.scene.plain import choices_of, help_of, shown, values_of
@@ -202,4 +202,4 @@ def parse_lengths(option: str, text: str) -> tuple[float, ...]:
         lengths = tuple(float(part) for part in text.split(","))
     except ValueError:
         refuse(option, "lengths in mm, such as 0.5,1,2", f"{text!r} came", "Write numbers with commas")
-    return tuple(number(option, length, *_LENGTHS_MM, "mm") for length in lengths)
+    return tuple(number(option, length, *_LENGTH_RANGE_MM, "mm") for length in lengths)

@@ -21,7 +21,7 @@ from dermis.scene.outputs import OUTPUTS, checked_outputs
 if TYPE_CHECKING:
     from dermis.base.arrays import Bytes, Floats
     from dermis.frame.features.outputs.planes import PlaneArray
-    from dermis.frame.observation import Landmarks as SeenLandmarks
+    from dermis.frame.observation import Landmarks as ProjectedLandmarks
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer
     from dermis.mesh.head import Head
@@ -124,22 +124,22 @@ class FrameLandmarks:
         if not self.names:
             return
         seen = next(renderer.observe([scene], settings, landmarks=self.names))
-        text = json.dumps(_told(seen), indent=1) + "\n"
+        text = json.dumps(_observation_json(seen), indent=1) + "\n"
         with replacing(self.path) as part:
             part.write_text(text, "utf-8")
 
 
-def _told(seen: Observation) -> dict[str, object]:
+def _observation_json(seen: Observation) -> dict[str, object]:
     camera = seen.camera
     return {
         "camera": {"K": camera.K.tolist(), "R": camera.R.tolist(), "t_mm": camera.t.tolist()},
         "head_pose": seen.head_pose.tolist(),
         "gaze": None if seen.gaze is None else seen.gaze.tolist(),
-        "landmarks": {name: _rows(one) for name, one in seen.landmarks.items()},
+        "landmarks": {name: _landmark_rows(one) for name, one in seen.landmarks.items()},
     }
 
 
-def _rows(one: SeenLandmarks) -> list[dict[str, object]]:
+def _landmark_rows(one: ProjectedLandmarks) -> list[dict[str, object]]:
     each = zip(one.names, one.pixels.tolist(), one.positions_mm.tolist(), one.visible.tolist(), strict=True)
     return [
         {"name": name, "pixel": pixel, "position_mm": place, "visible": visible}
@@ -152,7 +152,7 @@ Write = Callable[[int, "PlaneArray"], None]
 
 
 @dataclass(frozen=True)
-class MovingOutput:
+class AnimationOutput:
     """Output of a moving head, as it was typed.
 
     crf : quality of a movie; None for the usual one

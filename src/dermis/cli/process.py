@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], Any] | int | signal.Handlers | None
 
-_USES = (os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)  # of what takes the place of a closed stdin, stdout, stderr
+_OPEN_MODES = (os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)  # of what takes the place of a closed stdin, stdout, stderr
 
 
-class Streams:
+class StandardStreams:
     """Guards stdout and stderr, where they are the process's own, inside a `with` block.
 
     A closed stream is treated as one that cannot be written to. Its number is occupied, as the next file that
@@ -36,10 +36,10 @@ class Streams:
     """
 
     def __enter__(self) -> Self:
-        for number, use in enumerate(_USES):
-            _occupy(number, use)
+        for number, use in enumerate(_OPEN_MODES):
+            _reserve_descriptor(number, use)
         self._usual = sys.stdout, sys.stderr
-        self._raw: list[_Guarded] = []
+        self._raw: list[_GuardedStream] = []
         if sys.stdout is sys.__stdout__:
             sys.stdout = self._guarded(sys.stdout, 1)
         if sys.stderr is sys.__stderr__:
@@ -68,7 +68,7 @@ class Streams:
 
     def _guarded(self, usual: TextIO | None, number: int) -> TextIO:
         inner: Any = usual.buffer if usual else io.FileIO(number, "w", closefd=False)
-        raw = _Guarded(getattr(inner, "raw", inner), number)
+        raw = _GuardedStream(getattr(inner, "raw", inner), number)
         self._raw.append(raw)
         return io.TextIOWrapper(
             io.BufferedWriter(raw),
@@ -78,7 +78,7 @@ class Streams:
         )
 
 
-class _Guarded(io.RawIOBase):
+class _GuardedStream(io.RawIOBase):
     """Writes to a stream until that fails, and drops the rest.
 
     fault : the first failure
@@ -112,7 +112,7 @@ class _Guarded(io.RawIOBase):
         return self._inner.isatty()
 
 
-def _occupy(number: int, use: int) -> None:
+def _reserve_descriptor(number: int, use: int) -> None:
     """Open the null device under a stream's number if the stream is closed."""
     try:
         os.fstat(number)
@@ -126,12 +126,12 @@ def _occupy(number: int, use: int) -> None:
 
 
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-_AGAIN_S = 0.5  # a second one so late is another; programs in between send the same one twice
+_SECOND_SIGNAL_S = 0.5  # a second one so late is another; programs in between send the same one twice
 _RETRY_S = 0.02
-_TO_BE_LEFT = {"importlib", "pydantic"}  # modules half imported, and what calls back from Rust
+_UNSAFE_PACKAGES = {"importlib", "pydantic"}  # modules half imported, and what calls back from Rust
 _DRIVERS = {"wgpu", "glfw"}
 _RETRY, _END = b"\0", b"\xff"  # no signals
-_SHELLS = 128  # a shell's status of what a signal ended, less the signal's number
+_SIGNAL_EXIT_BASE = 128  # a shell's status of what a signal ended, less the signal's number
 
 
 class Interruption:
@@ -157,7 +157,7 @@ class Interruption:
             if usual in (signal.SIG_DFL, signal.default_int_handler):
                 self._usual[number] = usual
                 signal.signal(number, self._handle)
-        self._usual_hook, sys.unraisablehook = sys.unraisablehook, self._lost
+        self._usual_hook, sys.unraisablehook = sys.unraisablehook, self._on_unraisable
         self._reading, self._writing = socket.socketpair()
         self._writing.setblocking(False)
         self._before = signal.set_wakeup_fd(self._writing.fileno(), warn_on_full_buffer=False)
@@ -179,13 +179,13 @@ class Interruption:
         self._writing.close()
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        self.code = self.code or _SHELLS + number
+        self.code = self.code or _SIGNAL_EXIT_BASE + number
         if self._is_raised:
             return
         if (loop := _running_loop()) is not None:  # from one of its tasks asyncio would print it
             self._is_raised = True
             loop.call_soon_threadsafe(_interrupt)
-        elif _would_be_lost(frame):
+        elif _would_be_swallowed(frame):
             self._raise_later()
         else:
             self._is_raised = True
@@ -195,7 +195,7 @@ class Interruption:
         self._is_raised, self._is_late = False, True
         self._writing.send(_RETRY)
 
-    def _lost(self, lost: sys.UnraisableHookArgs) -> None:
+    def _on_unraisable(self, lost: sys.UnraisableHookArgs) -> None:
         """Handle an exception that Python cannot raise, as in a destructor."""
         if self.code and issubclass(lost.exc_type, KeyboardInterrupt):
             self._raise_later()
@@ -220,12 +220,12 @@ class Interruption:
                     self._sent -= 1
                 elif not asked_s:
                     asked_s = time.monotonic()
-                elif time.monotonic() - asked_s > _AGAIN_S:
-                    os._exit(_SHELLS + arrived[0])
+                elif time.monotonic() - asked_s > _SECOND_SIGNAL_S:
+                    os._exit(_SIGNAL_EXIT_BASE + arrived[0])
 
     def _send_again(self) -> None:
         self._sent += 1
-        number = self.code - _SHELLS
+        number = self.code - _SIGNAL_EXIT_BASE
         if hasattr(signal, "pthread_kill"):
             signal.pthread_kill(threading.main_thread().ident or 0, number)
         else:
@@ -247,11 +247,11 @@ def _running_loop() -> AbstractEventLoop | None:
     return loop
 
 
-def _would_be_lost(frame: FrameType | None) -> bool:
+def _would_be_swallowed(frame: FrameType | None) -> bool:
     """Return whether libraries between the frame and its callers would swallow an exception."""
     while frame is not None:
         package, name = str(frame.f_globals.get("__name__")).partition(".")[0], frame.f_code.co_name
-        if package in _TO_BE_LEFT or (package in _DRIVERS and "callback" in name):
+        if package in _UNSAFE_PACKAGES or (package in _DRIVERS and "callback" in name):
             return True
         frame = frame.f_back
     return False

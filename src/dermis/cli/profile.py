@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from dermis.base.console import note, print_json, print_lines, progress
 from dermis.base.errors import refuse
 from dermis.base.quantities import number, whole_number
-from dermis.cli.options import NOTHING, Json, Options, Output, Whole, option_name, options_of, parse_lengths
+from dermis.cli.options import NO_OPTIONS, Json, Options, Output, Integer, option_name, model_options, parse_lengths
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.scene.skin import Pigments
 
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
 
     PigmentOptions = Options
 else:
-    PigmentOptions = options_of(Pigments, names=_NAMES, defaults=_defaults())
+    PigmentOptions = model_options(Pigments, names=_NAMES, defaults=_defaults())
 
 Clamp = Literal["layer", "none"]
 Model = Literal["counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
 Flag = Annotated[bool, Parameter(negative="")]
 
-_TERMS, _PHOTONS, _MOST_PHOTONS = 6, 1_000_000, 10**10
+_TERMS, _PHOTONS, _MAX_PHOTONS = 6, 1_000_000, 10**10
 
 
 def profile(
@@ -51,12 +51,12 @@ def profile(
     model: Model | None = None,
     clamp: Clamp = "layer",
     eta: float | None = None,
-    photons: Whole = None,
-    seed: Whole = None,
+    photons: Integer = None,
+    seed: Integer = None,
     anisotropy: float = 0.0,
-    pigments: PigmentOptions = NOTHING,
+    pigments: PigmentOptions = NO_OPTIONS,
     oiliness: float | None = None,
-    fit: Whole = None,
+    fit: Integer = None,
     fit_kind: Literal["gaussian", "burley", "separable"] = "gaussian",
     variances: Literal["shared", "per-channel"] = "shared",
     keep_energy: Flag = False,
@@ -127,7 +127,7 @@ def profile(
     given = pigments | ({"oiliness": oiliness} if oiliness is not None else {})
     _check_outputs(output, plot, check)
     thicknesses = () if through is None else parse_lengths("--through", through)
-    light = _light(photons, seed, anisotropy, check or model == "montecarlo")
+    light = _tracing_options(photons, seed, anisotropy, check or model == "montecarlo")
     table = find_table(name)
     if table is not None:
         _refuse_tissue_options(name, given | {"model": model, "eta": eta, "check": check or None})
@@ -168,12 +168,12 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
         refuse("--check", "a plot to add photons to", "no --plot came", "Add --plot picture.png")
 
 
-def _light(photons: int | None, seed: int | None, anisotropy: float, traced: bool) -> Options:
+def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, traced: bool) -> Options:
     """Return the options of tracing; print a note when no photons will be traced."""
     if not traced and (photons, seed, anisotropy) != (None, None, 0.0):
         note("note: no photons are traced without --model montecarlo or --check")
     return {
-        "photons": whole_number("--photons", _PHOTONS if photons is None else photons, 1, _MOST_PHOTONS),
+        "photons": whole_number("--photons", _PHOTONS if photons is None else photons, 1, _MAX_PHOTONS),
         "seed": whole_number("--seed", seed or 0, 0, 2**63 - 1),
         "g": number("--anisotropy", anisotropy, -1.0, 1.0, "a mean cosine"),
     }
@@ -205,7 +205,7 @@ def _spectrum(tissue: Tissue, model: Model | None, clamp: Clamp) -> Floats | Non
 def _profile(tissue: Tissue, model: Model | None, clamp: Clamp, light: Options) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
-    from dermis.apps.truths.slab_mc import counted_profile
+    from dermis.apps.truths.slab_mc import monte_carlo_profile
 
     with progress("tracing photons") as report:
-        return counted_profile(tissue.medium, tissue.rgb, report=report, **light)
+        return monte_carlo_profile(tissue.medium, tissue.rgb, report=report, **light)

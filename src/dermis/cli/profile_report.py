@@ -33,14 +33,14 @@ def _row(values: Floats) -> str:
     return " ".join(f"{value:7.4f}" for value in values)
 
 
-def _plain(value: object) -> object:
+def _to_lists(value: object) -> object:
     """Return arrays as lists, and tables without what is None."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items() if one is not None}
+        return {key: _to_lists(one) for key, one in value.items() if one is not None}
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_to_lists(one) for one in value]
     return value
 
 
@@ -90,7 +90,7 @@ class Report:
     def as_json(self) -> object:
         """Return everything, in plain lists."""
         radial, sum_, ways = self.radial, self.fit.profile, self._through()
-        return _plain(
+        return _to_lists(
             {
                 "name": radial.name,
                 "model": radial.model,
@@ -218,15 +218,15 @@ class Report:
         return ways if self.tissue is None else ways | {"slab": self.tissue.through(self.through_mm)}
 
 
-_INK = ("#c0392b", "#2e8b57", "#2a62b0")
-_ABOVE: dict[str, Any] = {"frameon": False, "fontsize": 7, "loc": "lower left", "bbox_to_anchor": (0, 1)}
+_CHANNEL_COLOURS = ("#c0392b", "#2e8b57", "#2a62b0")
+_LEGEND_ABOVE: dict[str, Any] = {"frameon": False, "fontsize": 7, "loc": "lower left", "bbox_to_anchor": (0, 1)}
 _LAYERS = ("#b8860b", "#8e44ad", "#16808a", "#7f8c8d")
 _DASHES = (0, (4, 3))
 _NAMES = ("red", "green", "blue")
-_FAINTEST = 1e-5  # of the peak of r R(r): below that numbers are noise and eyes see nothing
-_UNDATED: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+_PLOT_FLOOR = 1e-5  # of the peak of r R(r): below that numbers are noise and eyes see nothing
+_DATELESS_METADATA: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata without dates, so that equal plots are equal files."""
-_LEAST_COUNT = 0.3  # relative standard error beyond which a ring of photons is left out
+_MAX_PHOTON_ERROR = 0.3  # relative standard error beyond which a ring of photons is left out
 
 
 def draw_plot(path: Path, found: Report, counted: RadialProfile | None) -> None:
@@ -240,23 +240,23 @@ def draw_plot(path: Path, found: Report, counted: RadialProfile | None) -> None:
     figure = needed("matplotlib.figure", "plots").Figure(figsize=size, dpi=160, layout="constrained")
     axes, *more = figure.subplots(1 + spectral, squeeze=False, height_ratios=[2, 1][: 1 + spectral])[:, 0]
     for below in more:
-        _spectra(below, found)
-    peak = _curves(axes, found)
+        _plot_spectra(below, found)
+    peak = _plot_curves(axes, found)
     if counted is not None:
-        peak = max(peak, _photons(axes, counted))
+        peak = max(peak, _plot_photons(axes, counted))
     axes.set(xscale="log", yscale="log", xlabel="r [mm]", ylabel="r R(r) [1/mm]")
-    axes.set(xlim=(1e-3, 30.0), ylim=(_FAINTEST * peak, 2.0 * peak))
+    axes.set(xlim=(1e-3, 30.0), ylim=(_PLOT_FLOOR * peak, 2.0 * peak))
     axes.set_title(_title(found), fontsize=10, loc="left")
     axes.grid(which="major", alpha=0.25, linewidth=0.6)
-    _legend(figure, axes)
+    _add_legend(figure, axes)
     drawn, form = BytesIO(), path.suffix.lower()[1:]
     with rc_context({"svg.hashsalt": "dermis"}):
-        figure.savefig(drawn, format=form, metadata=_UNDATED.get(form))
+        figure.savefig(drawn, format=form, metadata=_DATELESS_METADATA.get(form))
     with replacing(path) as trial:  # matplotlib itself has no clean end on a full disk
         trial.write_bytes(drawn.getvalue())
 
 
-def _spectra(axes: Axes, found: Report) -> None:
+def _plot_spectra(axes: Axes, found: Report) -> None:
     """Reflectance by wavelength, and the layers' coefficients on an axis of their own."""
     assert found.tissue is not None and found.spectrum is not None
     axes.plot(WAVELENGTHS_NM, found.spectrum, color="black", linewidth=1.6, label="R")
@@ -270,10 +270,10 @@ def _spectra(axes: Axes, found: Report) -> None:
             WAVELENGTHS_NM, layer.sigma_s_prime, color=ink, linewidth=1.0, linestyle=_DASHES, label=label
         )
     lines = [*axes.get_lines(), *right.get_lines()]
-    axes.legend(lines, [str(line.get_label()) for line in lines], ncols=5, **_ABOVE)
+    axes.legend(lines, [str(line.get_label()) for line in lines], ncols=5, **_LEGEND_ABOVE)
 
 
-def _legend(figure: Figure, axes: Axes) -> None:
+def _add_legend(figure: Figure, axes: Axes) -> None:
     """A column for each channel, below the curves."""
     entries = zip(*axes.get_legend_handles_labels(), strict=True)
     by_channel = sorted(entries, key=lambda entry: _NAMES.index(entry[1].partition(",")[0]))
@@ -282,14 +282,14 @@ def _legend(figure: Figure, axes: Axes) -> None:
     )
 
 
-def _curves(axes: Axes, found: Report) -> float:
+def _plot_curves(axes: Axes, found: Report) -> float:
     radial, fit = found.radial, found.fit.profile
     r = radial.radius_mm
     fitted = fit.radiant_exitance(r)
     peak = float((r[:, None] * fitted).max())
     if radial.standard_error is not None:
-        peak = max(peak, _photons(axes, radial))
-    for channel, (ink, name) in enumerate(zip(_INK, _NAMES, strict=True)):
+        peak = max(peak, _plot_photons(axes, radial))
+    for channel, (ink, name) in enumerate(zip(_CHANNEL_COLOURS, _NAMES, strict=True)):
         if radial.standard_error is None:
             label = f"{name}, {radial.model}"
             axes.plot(r, r * radial.reflectance[:, channel], color=ink, linewidth=1.4, label=label)
@@ -304,12 +304,12 @@ def _curves(axes: Axes, found: Report) -> float:
     return peak
 
 
-def _photons(axes: Axes, counted: RadialProfile) -> float:
+def _plot_photons(axes: Axes, counted: RadialProfile) -> float:
     r, peak = counted.radius_mm, 0.0
     error: Floats = counted.standard_error if counted.standard_error is not None else np.zeros((len(r), 3))
-    for channel, ink in enumerate(_INK):
+    for channel, ink in enumerate(_CHANNEL_COLOURS):
         R, se = counted.reflectance[:, channel], error[:, channel]
-        sure = (R > 0.0) & (se < _LEAST_COUNT * np.abs(R)) & (r > 1e-3)
+        sure = (R > 0.0) & (se < _MAX_PHOTON_ERROR * np.abs(R)) & (r > 1e-3)
         peak = max(peak, float((r * R)[sure].max(initial=0.0)))
         label = f"{_NAMES[channel]}, Monte Carlo"
         bars: dict[str, Any] = {"markersize": 2.2, "elinewidth": 0.8, "color": ink, "alpha": 0.7}

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dermis.base.console import note, print_report, working_on
-from dermis.cli.options import Adapter, Destination, Json
+from dermis.cli.options import Adapter, OutputPath, Json
 from dermis.cli.output_options import Format, FrameLandmarks, FrameOutputs, Landmarks, Outputs
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
+from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble_scene, note_subdivision
 from dermis.scene.techniques import TECHNIQUES
 
 if TYPE_CHECKING:
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
 
-_MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
+_MAX_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
 
-_MOST_CLIPPED = 0.02
+_MAX_CLIPPED = 0.02
 
 
 def render(
     head: str = "human",
     /,
     *,
-    output: Destination = Path("dermis.png"),
+    output: OutputPath = Path("dermis.png"),
     scene: SceneOptions = DEFAULTS,
     outputs: Outputs = None,
     outputs_format: Format = None,
@@ -80,12 +80,12 @@ def render(
     from dermis.gpu.memory import check_drivers
 
     check_drivers()  # before the head, which takes memory too
-    with _uncollected(), ThreadPoolExecutor(1) as beside:
+    with _gc_disabled(), ThreadPoolExecutor(1) as beside:
         opening = beside.submit(Renderer, adapter)  # its driver starts and compiles while the head loads
         with working_on("loading"):
-            described, settings = assemble(head, scene)
+            described, settings = assemble_scene(head, scene)
             marked.check(described.head)
-        note_levels(head, scene, described.head)
+        note_subdivision(head, scene, described.head)
         with working_on("rendering"):
             renderer = opening.result()
             rendered = renderer.draw(described, settings, outputs=more.names)
@@ -118,7 +118,7 @@ def render(
 
 
 @contextlib.contextmanager
-def _uncollected() -> Iterator[None]:
+def _gc_disabled() -> Iterator[None]:
     """Disable garbage collection: one picture leaves little, and a collection scans all libraries."""
     was = gc.isenabled()
     gc.disable()
@@ -147,7 +147,7 @@ def _write(rendered: Rendered, output: Path, more: FrameOutputs, values: Mapping
 def _note_light(scene: Scene, settings: Settings, rendered: Rendered) -> None:
     """Print notes about light that is not as one may expect."""
     technique, suns = TECHNIQUES[settings.technique], rendered.suns
-    if technique.on_atlas and technique.stitches and rendered.unscattered > _MOST_UNSCATTERED:
+    if technique.on_atlas and technique.stitches and rendered.unscattered > _MAX_UNSCATTERED:
         share = f"{rendered.unscattered:.0%} of the skin's triangles"
         why = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
         note(f"note: {share} are lit without scattering: {why}")
@@ -160,6 +160,6 @@ def _note_light(scene: Scene, settings: Settings, rendered: Rendered) -> None:
 
 
 def _note_clipped(rendered: Rendered) -> None:
-    if (share := rendered.clipped()) > _MOST_CLIPPED:
+    if (share := rendered.clipped()) > _MAX_CLIPPED:
         remedy = f"take less than --exposure {rendered.exposure:.3g}, or --tone neutral"
         note(f"note: {share:.0%} of the head is brighter than the picture can show: {remedy}")

@@ -13,20 +13,20 @@ from dermis.base.console import note
 from dermis.base.errors import refuse
 from dermis.cli.head_options import (
     EYE,
-    HEAD,
-    EyeLooks,
+    HEAD_OPTION_NAMES,
+    EyeOptions,
     HeadOptions,
-    LookAt,
-    Turns,
+    LookAtOption,
+    BoneAngleOptions,
     Weights,
     check_head,
-    gaze_given,
+    pose_with_gaze,
     note_eyes,
-    parse_turns,
+    parse_bone_angles,
     parse_weights,
-    pose_given,
+    pose_from_options,
 )
-from dermis.cli.options import Options, check, option_name, options_of, refuse_options
+from dermis.cli.options import Options, check, option_name, model_options, refuse_options
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, names_regions
 from dermis.scene.settings import PHOTOGRAPHED, Settings
@@ -43,13 +43,13 @@ if TYPE_CHECKING:
     EnvironmentOptions = Options
     SkinPreset = str | None
 
-AROUND = {field: f"env_{field}" for field in Environment.model_fields}
-AROUND |= {"name": "env", "rotation_degrees": "env_rotation"}
+ENVIRONMENT_OPTION_NAMES = {field: f"env_{field}" for field in Environment.model_fields}
+ENVIRONMENT_OPTION_NAMES |= {"name": "env", "rotation_degrees": "env_rotation"}
 
 if not TYPE_CHECKING:
     SkinPreset = Literal[tuple(PRESETS)] | None
-    SkinOptions, SettingsOptions = options_of(Skin), options_of(Settings, defaults=PHOTOGRAPHED)
-    EnvironmentOptions = options_of(Environment, names=AROUND)
+    SkinOptions, SettingsOptions = model_options(Skin), model_options(Settings, defaults=PHOTOGRAPHED)
+    EnvironmentOptions = model_options(Environment, names=ENVIRONMENT_OPTION_NAMES)
 
 
 @Parameter(name="*")
@@ -80,32 +80,32 @@ class SceneOptions:
         Parameter(help="portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera]."),
     ] = None
     head: HeadOptions = field(default_factory=dict)
-    eye: EyeLooks = None
+    eye: EyeOptions = None
     pose: Weights = None
-    bone: Turns = None
-    look_at: LookAt = None
+    bone: BoneAngleOptions = None
+    look_at: LookAtOption = None
 
 
 DEFAULTS = SceneOptions()
 
 
-def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
+def assemble_scene(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     """Return the scene and settings of a head or of a scene's file, with the given options on top.
 
     Settings that neither states are those of `PHOTOGRAPHED`.
     """
     from dermis.scene import Scene, load_camera
 
-    weights, turns = parse_weights(given.pose or ()), parse_turns(given.bone or ())
+    weights, turns = parse_weights(given.pose or ()), parse_bone_angles(given.bone or ())
     if given.eye:
         given = replace(given, head=given.head | {"eye": parse_weights(given.eye, EYE)}, eye=None)
     _check(name, given)
-    scene, settings = _begin(name, given)
+    scene, settings = _base_scene(name, given)
     note_eyes(scene.head, given.head.get("eyes"))
     if weights or turns:
         from dermis.mesh.pose import laid_over
 
-        scene = replace(scene, pose=laid_over(pose_given(weights, turns, scene.head, name), scene.pose))
+        scene = replace(scene, pose=laid_over(pose_from_options(weights, turns, scene.head, name), scene.pose))
     environment = _environment(scene.environment, given.around)
     made = Scene(
         scene.head,
@@ -116,13 +116,13 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
         pose=scene.pose,
     )
     if given.look_at is not None:
-        made = replace(made, pose=gaze_given(given.look_at, made))
+        made = replace(made, pose=pose_with_gaze(given.look_at, made))
     shown = Settings(**{**PHOTOGRAPHED, **settings.model_dump(exclude_unset=True), **given.settings})
-    _note_mixing(made.skin, shown)
+    _note_profile_map(made.skin, shown)
     return made, shown
 
 
-def note_levels(name: str, given: SceneOptions, head: Head) -> None:
+def note_subdivision(name: str, given: SceneOptions, head: Head) -> None:
     """Print a line on stderr about levels of subdivision that were chosen for the picture.
 
     name : of the head or of the scene's file, whose head this is
@@ -147,7 +147,7 @@ def _check(name: str, given: SceneOptions) -> None:
     check_head(name, given.head)
     check(Skin, given.skin)
     check(Settings, given.settings)
-    check(Environment, {"name": "uniform"} | given.around, AROUND)
+    check(Environment, {"name": "uniform"} | given.around, ENVIRONMENT_OPTION_NAMES)
     if "profile" in given.skin:
         load_profile(given.skin["profile"])
     for other in given.skin.get("other_profiles", ()):
@@ -156,20 +156,20 @@ def _check(name: str, given: SceneOptions) -> None:
         panorama_file(given.around["name"])
 
 
-def _note_mixing(skin: Skin, settings: Settings) -> None:
+def _note_profile_map(skin: Skin, settings: Settings) -> None:
     """Print a line on stderr where a map of profiles has no effect."""
     if skin.profile_map and not TECHNIQUES[settings.technique].mixes:
         note(f"note: {settings.technique} takes the first profile alone; texture-space mixes them by the map")
 
 
-def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
+def _base_scene(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     """Return the scene of a file, or a head's scene with defaults."""
     from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import head_and_skin
     from dermis.scene.smoothness import SmoothIn
 
     if Path(name).suffix.lower() == ".toml":
-        refuse_options(given.head, HEAD, "with a scene file", "Write it into the file's [head]")
+        refuse_options(given.head, HEAD_OPTION_NAMES, "with a scene file", "Write it into the file's [head]")
         return load_scene(Path(name), camera=given.camera, size=given.settings.get("size"))
     alike = {"regions": NO_REGIONS} if given.surface == "deck-2007" else {}
     table = HeadTable(**{"name": name, **alike, **given.head})
@@ -184,7 +184,7 @@ def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
 
 def _environment(before: Environment | None, around: Options) -> Environment | None:
     if around and before is None and "name" not in around:
-        option = option_name(next(iter(around)), AROUND)
+        option = option_name(next(iter(around)), ENVIRONMENT_OPTION_NAMES)
         refuse(option, "an environment with it", "there is none", "Add --env, or [environment] to the scene")
     if not around:
         return before

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from dermis.base.console import print_json, print_lines, progress
-from dermis.cli.options import Adapter, Destination, Json, given
+from dermis.cli.options import Adapter, OutputPath, Json, given
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def unmix(
     colour_map: Path,
     /,
     *,
-    output: Destination = Path("maps"),
+    output: OutputPath = Path("maps"),
     melanin: _Share = None,
     blood: _Share = None,
     oxygen: float | None = None,

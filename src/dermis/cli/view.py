@@ -9,8 +9,8 @@ from cyclopts import Parameter
 
 from dermis.base.console import note, print_lines, working_on
 from dermis.base.errors import refuse
-from dermis.cli.options import Adapter, Whole
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
+from dermis.cli.options import Adapter, Integer
+from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble_scene
 
 if TYPE_CHECKING:
     from dermis.apps.viewer.player import MotionFile
@@ -25,7 +25,7 @@ def view(
     /,
     *,
     browser: bool = False,
-    port: Whole = None,
+    port: Integer = None,
     host: str | None = None,
     token: Annotated[bool, Parameter(negative="")] = False,
     motion: str | None = None,
@@ -84,7 +84,7 @@ def view(
 
     window = scene.settings.get("size", _WINDOW)
     if browser:
-        serve(load, adapter, window, host or _HOST, _PORT if port is None else port, _announce, secret=token)
+        serve(load, adapter, window, host or _HOST, _PORT if port is None else port, _print_url, secret=token)
     else:
         with working_on("loading"):
             state, played = load()
@@ -95,12 +95,12 @@ def view(
 def _state(name: str, given: SceneOptions, adapter: str) -> ViewerState:
     """The scene that the options describe."""
     from dermis.apps.viewer.state import opened
-    from dermis.gpu.adapters import fitting_adapters
+    from dermis.gpu.adapters import select_adapters
     from dermis.scene.files import head_table, with_whole_names
 
     is_scene = Path(name).suffix.lower() == ".toml"
-    scene, settings = assemble(name, given)
-    if "atlas" not in given.settings and not is_scene and fitting_adapters(adapter)[0][0].kind == "CPU":
+    scene, settings = assemble_scene(name, given)
+    if "atlas" not in given.settings and not is_scene and select_adapters(adapter)[0][0].kind == "CPU":
         settings = settings.model_copy(update={"atlas": _SOFTWARE_ATLAS})
     table = head_table(Path(name)) if is_scene else with_whole_names({"name": name} | given.head, Path())
     usual = "" if is_scene else "none" if "name" in given.around else "studio"
@@ -119,7 +119,7 @@ def _motion(file: str | None, fps: float | None, state: ViewerState) -> MotionFi
     return motion
 
 
-def _announce(url: str, exposed: bool) -> None:
+def _print_url(url: str, exposed: bool) -> None:
     if exposed:
         note("warning: other machines can reach this page; who knows its address controls the viewer")
         note("warning: the connection is not encrypted: use it in a network that you trust, or a tunnel")

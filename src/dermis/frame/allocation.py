@@ -23,7 +23,7 @@ from dermis.frame.features.shape.shape import Shape
 from dermis.frame.features.surface.maps import fine_detail, upload_maps
 from dermis.frame.features.surface.record import skin_record, surface_constants
 from dermis.frame.features.surface.texels import make_surfaces
-from dermis.frame.features.translucency.make import thin_tables, translucency_of
+from dermis.frame.features.translucency.build import thin_tables, translucency_of
 from dermis.frame.features.visibility.layers import Layers, make_layers
 from dermis.frame.lights.environment import environment_record
 from dermis.frame.limits import check_limits

@@ -15,7 +15,7 @@ from dermis.frame.features import (
     shape,
     visibility,
 )
-from dermis.frame.features.outputs.seen import SeenFrame, SpreadLight
+from dermis.frame.features.outputs.stage_inputs import SeenFrame, SpreadLight
 from dermis.frame.features.surface.painting.paint import draw_expression
 from dermis.frame.inputs import Inputs
 from dermis.frame.techniques.technique import Technique

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.features.diffusion.levels import Blur
+from dermis.frame.features.diffusion.pyramid import Blur
 from dermis.frame.features.occlusion.moving import Look
-from dermis.frame.features.outputs.seen import PreviousScene
+from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shape.shape import MotionBytes
 from dermis.frame.projection import Triple, Views
 from dermis.frame.resources import AtlasLayout, Resources

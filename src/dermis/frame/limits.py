@@ -16,7 +16,7 @@ from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.request import FrameRequest
 from dermis.frame.technique import TechniqueTraits
 from dermis.gpu import Device
-from dermis.gpu.memory import OutOfMemoryError, check_memory, format_bytes, held_bytes, probed_memory
+from dermis.gpu.memory import OutOfMemoryError, allocated_bytes, check_memory, format_bytes, probe_memory
 from dermis.scene.settings import Settings
 
 _DISTANCE = 4  # bytes of a texel: distance to the edge of its chart
@@ -50,8 +50,8 @@ def no_room(error: OutOfMemoryError, device: Device, request: FrameRequest) -> O
     for one in filter(None, (error, error.__cause__)):
         traceback.clear_frames(one.__traceback__)
     needed = sum(frame_bytes(request).values())
-    found = probed_memory(device, needed)
-    most = _SHARE * (held_bytes() + found)
+    found = probe_memory(device, needed)
+    most = _SHARE * (allocated_bytes() + found)
     if needed <= most:  # and yet it did not fit: others of this process hold the rest
         most = _SHARE * found
     return OutOfMemoryError(error.expected, error.came, error.size, fitting(request, most))

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.frame.allocation import make_resources
-from dermis.frame.features.diffusion.levels import Blur, scale_of
+from dermis.frame.features.diffusion.pyramid import Blur, scale_of
 from dermis.frame.features.diffusion.profiles import Mixed, SkinProfiles
 from dermis.frame.features.hair.resources import strand_constants
 from dermis.frame.features.occlusion.moving import Anchors, Look, anchors_of, look_around, sky_record, turn_of
-from dermis.frame.features.outputs.seen import PreviousScene
+from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.features.shading.view import EyesSeen, camera_views, pinhole, seen_by
 from dermis.frame.features.shape.shape import MotionBytes, motion_at_rest

@@ -24,7 +24,7 @@ from dermis.frame.preparation import Preparation
 from dermis.frame.programs import warm_up
 from dermis.frame.rendered import Rendered, Shown
 from dermis.gpu import CommandList, Device, Graph, open_device
-from dermis.gpu.command_list import Timed
+from dermis.gpu.command_list import Timing
 from dermis.gpu.failures import ReopeningDevice
 from dermis.mesh.head import Head
 from dermis.scene.given import given_plain
@@ -84,7 +84,7 @@ class Submitter:
         self._in_flight.clear()
 
     def _submit(
-        self, inputs: Inputs, timed: Timed, anew: bool, leave: Callable[[Graph, Picture], T] | None = None
+        self, inputs: Inputs, timed: Timing, anew: bool, leave: Callable[[Graph, Picture], T] | None = None
     ) -> tuple[CommandList, T | None]:
         """Declare a frame and run its stale passes.
 
@@ -173,7 +173,7 @@ class Renderer(Submitter):
         settings: Settings | None = None,
         *,
         anew: bool = False,
-        timed: Timed = True,
+        timed: Timing = True,
         view: str = "",
         outputs: Iterable[str] = (),
         previous: Scene | None = None,
@@ -194,7 +194,7 @@ class Renderer(Submitter):
         what = Scene.of(scene), settings, view, checked_outputs(outputs), previous and Scene.of(previous)
         return self.kept_open.run(partial(self._draw, anew, timed, *what))
 
-    def _draw(self, anew: bool, timed: Timed, *what: Any) -> Rendered:
+    def _draw(self, anew: bool, timed: Timing, *what: Any) -> Rendered:
         """what : that is prepared"""
         started = time.perf_counter()
         inputs = self.prepare(*what)

@@ -2,7 +2,7 @@
 
 from dermis.gpu.adapters import Adapter, list_adapters
 from dermis.gpu.command_list import CommandList
-from dermis.gpu.dependencies import scratch
+from dermis.gpu.dependencies import mark_scratch
 from dermis.gpu.device import Device, open_device
 from dermis.gpu.graph import Graph
 from dermis.gpu.memo import Memo
@@ -49,7 +49,7 @@ __all__ = [
     "list_adapters",
     "make_texture",
     "open_device",
-    "scratch",
+    "mark_scratch",
     "texture_from",
     "upload",
     "view_of",

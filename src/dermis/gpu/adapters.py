@@ -19,7 +19,7 @@ from dermis.gpu.types import Untyped
 
 _TYPEDEF = "typedef "
 _NUMBERS = ("char", "uint8_t", "uint32_t", "uintptr_t", "intptr_t")
-WANTED_FEATURES = ("timestamp-query",)
+OPTIONAL_FEATURES = ("timestamp-query",)
 """Optional features, requested where the adapter has them; everything works without them."""
 INSTALL_HINT = "On Debian or Ubuntu: sudo apt-get install mesa-vulkan-drivers"
 DEFAULT_LIMITS = {
@@ -141,7 +141,7 @@ class Adapter:
     @property
     def missing(self) -> tuple[str, ...]:
         """Wanted features that it lacks."""
-        return tuple(f for f in WANTED_FEATURES if f not in self.features)
+        return tuple(f for f in OPTIONAL_FEATURES if f not in self.features)
 
 
 def list_adapters() -> list[Adapter]:
@@ -164,7 +164,7 @@ def list_adapters() -> list[Adapter]:
     return [replace(one, number=number) for number, one in enumerate(found)]
 
 
-def fitting_adapters(wanted: str) -> tuple[list[Adapter], str]:
+def select_adapters(wanted: str) -> tuple[list[Adapter], str]:
     """Adapters for `wanted`, the best first, and the reason for the choice.
 
     wanted : "auto", "cpu", part of a name, or "#1" for the one at that place of `list_adapters`, from 0 on
@@ -193,12 +193,12 @@ def fitting_adapters(wanted: str) -> tuple[list[Adapter], str]:
     return fitting, reason
 
 
-def alike_adapters(wanted: str) -> list[Adapter]:
+def similar_adapters(wanted: str) -> list[Adapter]:
     """The best adapter for `wanted` and those of its kind and backend, a GPU once whatever lists it too.
 
-    Raises DermisError as `fitting_adapters`.
+    Raises DermisError as `select_adapters`.
     """
-    (best, *others), _ = fitting_adapters(wanted)
+    (best, *others), _ = select_adapters(wanted)
     if best.kind == "CPU":
         return [best]
     return [best, *(one for one in others if (one.kind, one.backend) == (best.kind, best.backend))]
@@ -217,7 +217,7 @@ def check_limits(adapter: str, offered: Mapping[str, int]) -> None:
             refuse(f"adapter {adapter}", expected, f"it has {offered[name]}", remedy)
 
 
-def limits_within(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
+def device_limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
     """WebGPU's default limits; the adapter's own where it offers less or the limit is to be raised."""
     fitting = {
         name: (max if name.startswith("min-") else min)(default, offered.get(name, default))
@@ -240,7 +240,7 @@ def _describe(handle: Untyped) -> Adapter:
         driver=info["description"],
         kind=info["adapter_type"],
         backend=info["backend_type"],
-        features=tuple(f for f in WANTED_FEATURES if f in handle.features),
+        features=tuple(f for f in OPTIONAL_FEATURES if f in handle.features),
         handle=handle,
     )
 

@@ -11,12 +11,12 @@ import numpy as np
 from dermis.gpu.dependencies import Access
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram
-from dermis.gpu.readback import Fetched
+from dermis.gpu.readback import BufferReadback
 from dermis.gpu.recorder import DrawTarget, Groups, Recorder
 from dermis.gpu.types import Bindings, Buffer, Native, Texture, TextureOrView, Untyped
 from dermis.gpu.uniforms import Uniforms
 
-Timed = bool | Literal["whole"]
+Timing = bool | Literal["whole"]
 """Whether stages are timed, each in a pass of its own, or the frame as it is when nobody asks, as a whole."""
 
 Stamp = dict[str, object]
@@ -36,11 +36,11 @@ class CommandList(Recorder):
     submitted : number of the last submit, for `Device.wait`
     """
 
-    def __init__(self, device: Device, *, timed: Timed = True, uniforms: Uniforms | None = None) -> None:
+    def __init__(self, device: Device, *, timed: Timing = True, uniforms: Uniforms | None = None) -> None:
         self.device = device
         self._open: Untyped = None
         self._uniforms = uniforms or Uniforms(device)
-        self._fetched: list[Fetched] = []
+        self._fetched: list[BufferReadback] = []
         self.submitted = 0
         self._stage = ""
         self._pass: ComputePass | None = None
@@ -101,7 +101,7 @@ class CommandList(Recorder):
             (width, height, layers),
         )
 
-    def fetch(self, buffers: Sequence[Buffer], fetched: Fetched) -> None:
+    def fetch(self, buffers: Sequence[Buffer], fetched: BufferReadback) -> None:
         """Send the bytes of buffers on their way, one after the other, as the passes so far leave them."""
         self._end_pass()
         start = 0

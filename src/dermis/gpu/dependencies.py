@@ -1,4 +1,4 @@
-"""What the passes of a frame read of each other: worked out once for frames that declare the same passes."""
+"""Dependencies between the passes of a frame, from which the passes that have to run are found."""
 
 from __future__ import annotations
 
@@ -11,163 +11,170 @@ from typing import TYPE_CHECKING, TypeVar
 from dermis.gpu.types import Bindable, Resource
 
 if TYPE_CHECKING:
-    from dermis.gpu.command_list import Step
+    from dermis.gpu.command_list import Dispatch
     from dermis.gpu.device import Device
 
 R = TypeVar("R", bound=Resource)
 
-_number = count(1)
+_id = count(1)
 
-_MOST = 16  # sets of slots that are there
+_CACHED_STATES = 16  # combinations of up-to-date resources
 
 
 @dataclass(eq=False, slots=True)
-class Slot:
-    """The content of a texture, a buffer or a view of one layer.
+class ResourceState:
+    """Version of the content of a texture, a buffer or a texture view.
 
-    Contents have version numbers: equal for what the same pass made from equal inputs, 0 when unknown.
+    Equal versions are the output of the same pass from equal inputs; 0 is unknown content.
 
-    parent : of a view, the texture's slot
-    parts : of a texture, the slots of its views
-    held : the version that is there now
-    scratch : whether it only carries data between passes, so that its content after a frame does not matter
+    parent : state of the texture, for a view
+    views : states of a texture's views
+    version : version of the current content
+    scratch : whether the resource only carries data between passes, so that its content after a frame is unused
     """
 
-    parent: Slot | None = None
-    parts: list[Slot] = field(default_factory=list)
-    held: int = 0
+    parent: ResourceState | None = None
+    views: list[ResourceState] = field(default_factory=list)
+    version: int = 0
     scratch: bool = False
 
-    def sources(self, written: Container[Slot]) -> list[Slot]:
-        """Of the slots that passes wrote, those with what it holds: itself, its views, or its texture."""
-        found = [part for part in self.parts if part in written]
+    def overlapping(self, written: Container[ResourceState]) -> list[ResourceState]:
+        """Return the written states that share content with this one: itself, its views or its texture."""
+        found = [view for view in self.views if view in written]
         if self in written:
             found.append(self)
         elif self.parent is not None and self.parent in written:
             found.append(self.parent)
         return found
 
-    def hold(self, value: int) -> None:
-        """Note what is there now, in its views too; what it is a view of is no longer what it was."""
-        self.held = value
-        for part in self.parts:
-            part.held = value
+    def set_version(self, version: int) -> None:
+        """Set the version of the content and of its views; the texture of a view becomes unknown."""
+        self.version = version
+        for view in self.views:
+            view.version = version
         if self.parent is not None:
-            self.parent.held = 0
+            self.parent.version = 0
 
 
 @dataclass(eq=False, slots=True)
 class Access:
-    """What a program does with the resources bound to it.
+    """Resources that a program reads and writes under one set of bindings.
 
-    number : of this program with these resources, never given twice
-    reads, writes : slots; what is both stands in both
-    steps : dispatches of a device's frames with their bind groups, by stage, workgroups and places of records
+    id : unique number of this program with these resources
+    reads, writes : states of the resources; a resource that is both read and written is in both
+    dispatches : dispatches of earlier frames with their bind groups, by stage, workgroups and record positions
     """
 
-    number: int
-    reads: tuple[Slot, ...]
-    writes: tuple[Slot, ...]
-    steps: dict[Hashable, tuple[list[Step], object]] = field(default_factory=dict)
+    id: int
+    reads: tuple[ResourceState, ...]
+    writes: tuple[ResourceState, ...]
+    dispatches: dict[Hashable, tuple[list[Dispatch], object]] = field(default_factory=dict)
 
 
-def new_number() -> int:
-    """A number that nothing has had before."""
-    return next(_number)
+def unique_id() -> int:
+    """Return a number that has not been returned before."""
+    return next(_id)
 
 
-def scratch(device: Device, resource: R) -> R:
-    """The texture or buffer, which passes share: none runs only for what it leaves there."""
-    slot_of(device, resource).scratch = True
+def mark_scratch(device: Device, resource: R) -> R:
+    """Mark a texture or buffer as scratch: no pass runs only to keep its content up to date."""
+    resource_state(device, resource).scratch = True
     return resource
 
 
-def slot_of(device: Device, resource: Bindable) -> Slot:
-    """The slot of a texture, a buffer or a view."""
-    found = device.slots.get(resource)
+def resource_state(device: Device, resource: Bindable) -> ResourceState:
+    """Return the state of a texture, a buffer or a view, created on first use."""
+    found = device.resource_states.get(resource)
     if found is None:
         texture = getattr(resource, "texture", None)
-        found = device.slots[resource] = Slot(slot_of(device, texture) if texture is not None else None)
-        if found.parent is not None:
-            found.parent.parts.append(found)
-            found.scratch, found.held = found.parent.scratch, found.parent.held
+        parent = resource_state(device, texture) if texture is not None else None
+        found = device.resource_states[resource] = ResourceState(parent)
+        if parent is not None:
+            parent.views.append(found)
+            found.scratch, found.version = parent.scratch, parent.version
     return found
 
 
-Declared = tuple[int, tuple[Slot, ...], tuple[Slot, ...]]
-"""Of a pass the number of its access, what it reads, and what it leaves."""
+PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
+"""Access id of a pass, the resources that it reads, and those that it writes."""
 
 
 class Dependencies:
-    """Tells which of some passes, in order, have to run.
+    """Passes of a frame in order, and which of them have to run.
 
-    The version that a pass leaves follows from its key and the versions of what it reads. It is skipped while
-    its outputs hold that version, and also when no pass that runs needs them.
+    The version that a pass writes follows from its key and the versions of what it reads. A pass is skipped
+    while its outputs have that version, and when no pass that runs needs them.
     """
 
-    def __init__(self, declared: list[Declared]) -> None:
-        self.declared = declared
-        # What each pass reads, with the pass before it that left it there, if one did.
-        self._reads: list[list[tuple[int | None, Slot]]] = []
-        self._last: dict[Slot, int] = {}  # the pass that writes it last, or what overlaps it
-        self._due_of = lru_cache(_MOST)(self._find_due)
-        writers: dict[Slot, int] = {}
-        for index, (_, reads, writes) in enumerate(declared):
-            found = [one for slot in reads for one in slot.sources(writers) or [slot, *slot.parts]]
-            former = set(found).difference(writers, writes)
-            self._reads.append([(writers.get(one), one) for one in found if one in writers or one in former])
-            for slot in writes:
-                self._write(slot, index, writers)
+    def __init__(self, passes: list[PassAccess]) -> None:
+        self.passes = passes
+        # The resources that each pass reads, with the earlier pass that wrote them, if one did.
+        self._reads: list[list[tuple[int | None, ResourceState]]] = []
+        self._last_writer: dict[ResourceState, int] = {}  # of the resource, or of one that overlaps it
+        self._cached_stale = lru_cache(_CACHED_STATES)(self._find_stale)
+        writers: dict[ResourceState, int] = {}
+        for index, (_, reads, writes) in enumerate(passes):
+            found = [one for state in reads for one in state.overlapping(writers) or [state, *state.views]]
+            unwritten = set(found).difference(writers, writes)
+            self._reads.append(
+                [(writers.get(one), one) for one in found if one in writers or one in unwritten]
+            )
+            for state in writes:
+                self._add_write(state, index, writers)
 
     def versions(self, epoch: int, keys: Iterable[Hashable]) -> list[int]:
-        """What each pass leaves.
+        """Return the version that each pass writes.
 
-        keys : what that follows from besides the content that it reads
+        keys : for each pass, everything that its output depends on besides the resources that it reads
         """
-        made: list[int] = []
+        versions: list[int] = []
         for key, reads in zip(keys, self._reads, strict=True):
-            found = [slot.held if index is None else made[index] for index, slot in reads]
-            made.append(hash((epoch, key, *found)))
-        return made
+            inputs = [state.version if index is None else versions[index] for index, state in reads]
+            versions.append(hash((epoch, key, *inputs)))
+        return versions
 
-    def due(self, versions: Sequence[int]) -> list[bool]:
-        """Which passes have to run for every resource to hold what all of them together leave."""
-        return self._due_of(tuple([slot.held == versions[last] for slot, last in self._last.items()]))
+    def stale(self, versions: Sequence[int]) -> list[bool]:
+        """Return for each pass whether it has to run to bring every resource up to date."""
+        current = [state.version == versions[last] for state, last in self._last_writer.items()]
+        return self._cached_stale(tuple(current))
 
-    def _find_due(self, there: tuple[bool, ...]) -> list[bool]:
-        """The same, by whether each slot holds what the last pass leaves there."""
-        kept = {slot for slot, now in zip(self._last, there, strict=True) if now}  # unless a pass spoils it
+    def _find_stale(self, current: tuple[bool, ...]) -> list[bool]:
+        """Return the stale passes, given which resources already have their final version."""
+        valid = {state for state, now in zip(self._last_writer, current, strict=True) if now}
         while True:
-            due = self._due_with(kept)
-            ran = [writes for (*_, writes), now in zip(self.declared, due, strict=True) if now]
-            spoilt = {slot for writes in ran for slot in writes if not due[self._last[slot]]}
-            if not spoilt & kept:
-                return due
-            kept -= spoilt
+            stale = self._stale_given(valid)
+            running = [writes for (*_, writes), now in zip(self.passes, stale, strict=True) if now]
+            overwritten = {state for writes in running for state in writes if not stale[self._last_writer[state]]}
+            if not overwritten & valid:
+                return stale
+            valid -= overwritten
 
-    def _due_with(self, kept: set[Slot]) -> list[bool]:
-        due, wanted = [False] * len(self.declared), set[tuple[int | None, Slot]]()
-        for index in range(len(due) - 1, -1, -1):
-            for slot in self.declared[index][-1]:
-                last = self._last[slot] == index
-                if not (last and slot in kept) and ((last and not slot.scratch) or (index, slot) in wanted):
-                    due[index] = True
-                    wanted.update(self._reads[index])
+    def _stale_given(self, valid: set[ResourceState]) -> list[bool]:
+        """Return the passes that write an output which is not valid, or an input of such a pass."""
+        stale, needed = [False] * len(self.passes), set[tuple[int | None, ResourceState]]()
+        for index in range(len(stale) - 1, -1, -1):
+            for state in self.passes[index][-1]:
+                is_last = self._last_writer[state] == index
+                if not (is_last and state in valid) and (
+                    (is_last and not state.scratch) or (index, state) in needed
+                ):
+                    stale[index] = True
+                    needed.update(self._reads[index])
                     break
-        return due
+        return stale
 
-    def ran(self, due: Sequence[bool], versions: Sequence[int]) -> None:
-        """Note what the passes have left."""
-        for (*_, writes), now, version in zip(self.declared, due, versions, strict=True):
+    def set_versions(self, executed: Sequence[bool], versions: Sequence[int]) -> None:
+        """Set the versions of everything that the executed passes wrote."""
+        for (*_, writes), now, version in zip(self.passes, executed, versions, strict=True):
             if now:
-                for slot in writes:
-                    slot.hold(version)
+                for state in writes:
+                    state.set_version(version)
 
-    def _write(self, slot: Slot, index: int, writers: dict[Slot, int]) -> None:
-        """Note who leaves what is in a slot now, and in what overlaps it."""
-        self._last[slot] = writers[slot] = index
-        for part in slot.parts:
-            if writers.pop(part, None) is not None:  # what is read of it now is the texture's
-                self._last[part] = index
-        if slot.parent is not None and slot.parent in writers:
-            self._last[slot.parent] = index
+    def _add_write(self, state: ResourceState, index: int, writers: dict[ResourceState, int]) -> None:
+        """Register a pass as the last writer of a resource and of what overlaps it."""
+        self._last_writer[state] = writers[state] = index
+        for view in state.views:
+            if writers.pop(view, None) is not None:  # from here on, reads of the view come from the texture
+                self._last_writer[view] = index
+        if state.parent is not None and state.parent in writers:
+            self._last_writer[state.parent] = index

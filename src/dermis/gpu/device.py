@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
-from dermis.gpu.adapters import Adapter, check_limits, fitting_adapters, limits_within
+from dermis.gpu.adapters import Adapter, check_limits, device_limits, select_adapters
 from dermis.gpu.memory import allocation, check_software
 from dermis.gpu.types import Bindable, Buffer, Sampler, Untyped
 
 if TYPE_CHECKING:
     from dermis.gpu.dependencies import Slot
-    from dermis.gpu.readback import Fetched
+    from dermis.gpu.readback import BufferReadback
 
 T = TypeVar("T")
 
@@ -38,7 +38,7 @@ def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
 
     Raises DermisError when there is no such adapter or when it does not open.
     """
-    (*others, last), reason = fitting_adapters(adapter)
+    (*others, last), reason = select_adapters(adapter)
     for one in others:
         with contextlib.suppress(DermisError):  # listed, but it does not open
             return Device(one, reason, bare=bare)
@@ -49,7 +49,7 @@ class Device:
     """A logical device; devices share no state.
 
     It has WebGPU's default limits, so that a program that needs more fails on every machine alike; only the
-    largest sizes of textures and buffers are the adapter's own. It has those of `WANTED_FEATURES` that the
+    largest sizes of textures and buffers are the adapter's own. It has those of `OPTIONAL_FEATURES` that the
     adapter offers.
 
     bare : True keeps the default sizes too, and requests no feature
@@ -74,7 +74,7 @@ class Device:
             check_software()
         check_limits(adapter.name, adapter.handle.limits)
         features = [] if bare else list(adapter.features)
-        limits = limits_within(adapter.handle.limits, () if bare else _RAISED_LIMITS)
+        limits = device_limits(adapter.handle.limits, () if bare else _RAISED_LIMITS)
         try:
             self.handle: Untyped = adapter.handle.request_device_sync(
                 label="dermis", required_features=features, required_limits=limits
@@ -97,7 +97,7 @@ class Device:
         self.programs: dict[Hashable, Any] = {}  # as many types as there are kinds of programs
         self._shared: dict[str, Any] = {}  # of the types that their makers return
         self._staging: dict[int, list[Buffer]] = {}
-        self.fetching: set[Fetched] = set()
+        self.fetching: set[BufferReadback] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Sampler] = {}
 
     def shared(self, name: str, make: Callable[[], T]) -> T:

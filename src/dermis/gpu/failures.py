@@ -123,7 +123,7 @@ class LazyDevice:
         self._opened[:] = [device]
 
 
-def on_device(adapter: str, job: Callable[[Device], T]) -> T:
+def run_on_device(adapter: str, job: Callable[[Device], T]) -> T:
     """What a job returns on a device that is opened for it, and once more where it is lost.
 
     Raises DermisError as `open_device` and `ReopeningDevice.run`.

@@ -8,11 +8,11 @@ from typing import TypeVar, TypeVarTuple
 
 import numpy as np
 
-from dermis.gpu.command_list import CommandList, Timed
-from dermis.gpu.dependencies import Access, Declared, Dependencies, Slot, slot_of
+from dermis.gpu.command_list import CommandList, Timing
+from dermis.gpu.dependencies import Access, Declared, Dependencies, Slot, resource_state
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram
-from dermis.gpu.readback import Fetched
+from dermis.gpu.readback import BufferReadback
 from dermis.gpu.recorder import DrawTarget, Groups, Recorder
 from dermis.gpu.replay import Recordings
 from dermis.gpu.types import Bindable, Bindings, Buffer, TextureOrView, is_buffer, is_texture, is_view
@@ -166,7 +166,7 @@ class Graph(Recorder):
         self._passes: list[DeclaredPass] = []
         self._uniforms = Uniforms(device)
         self._known: list[Dependencies] = []
-        self._fetches: list[tuple[tuple[Buffer, ...], Fetched]] = []
+        self._fetches: list[tuple[tuple[Buffer, ...], BufferReadback]] = []
 
     def forget(self) -> None:
         """Take all content for unknown: the next frame runs every pass."""
@@ -185,7 +185,7 @@ class Graph(Recorder):
         access = program.access(resources)
         writes = access.writes
         if completes:
-            filled = slot_of(self.device, resources[completes])
+            filled = resource_state(self.device, resources[completes])
             writes = tuple(slot for slot in writes if slot is not filled)
 
         def run(frame: CommandList) -> None:
@@ -195,7 +195,7 @@ class Graph(Recorder):
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
         """Declare what the host writes, see `Recorder.write`."""
-        slot = slot_of(self.device, buffer)
+        slot = resource_state(self.device, buffer)
 
         def run(frame: CommandList) -> None:
             frame.write(stage, buffer, data)
@@ -217,20 +217,20 @@ class Graph(Recorder):
     ) -> None:
         """Declare a pass that rasterises, see `Recorder.draw`."""
         attached = (target.depth, target.colour)
-        writes = tuple(slot_of(self.device, one) for one in attached if one is not None)
+        writes = tuple(resource_state(self.device, one) for one in attached if one is not None)
 
         def run(commands: CommandList) -> None:
             commands.draw(stage, program, resources, vertices, target, indices=indices, layer=layer)
 
         access = program.access(resources)
-        taken = None if indices is None else slot_of(self.device, indices)
+        taken = None if indices is None else resource_state(self.device, indices)
         self._add(stage, program, resources, (vertices,), access, writes, run, (layer, target.far, taken))
 
     def fill(
         self, stage: str, program: FragmentProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
         """Declare a pass that fills targets, see `Recorder.fill`."""
-        writes = tuple(slot_of(self.device, one) for one in targets)
+        writes = tuple(resource_state(self.device, one) for one in targets)
 
         def run(frame: CommandList) -> None:
             frame.fill(stage, program, resources, targets)
@@ -252,13 +252,13 @@ class Graph(Recorder):
         )
         return result
 
-    def fetch(self, *buffers: Buffer) -> Fetched:
+    def fetch(self, *buffers: Buffer) -> BufferReadback:
         """The bytes of buffers, one after the other, as all the frame's passes leave them."""
-        fetched = Fetched(self.device, sum(buffer.size for buffer in buffers))
+        fetched = BufferReadback(self.device, sum(buffer.size for buffer in buffers))
         self._fetches.append((buffers, fetched))
         return fetched
 
-    def submit(self, timed: Timed = False) -> CommandList:
+    def submit(self, timed: Timing = False) -> CommandList:
         """Run what has to be run; returns the frame, which knows how long it took."""
         frame = CommandList(self.device, timed=timed, uniforms=self._uniforms)
         try:

@@ -72,7 +72,7 @@ def allocation(device: str, name: str, size: float, most: float) -> Iterator[Non
         raise OutOfMemoryError(expected, "it has none left", size) from error
 
 
-def held_bytes() -> int:
+def allocated_bytes() -> int:
     """Bytes of all textures and buffers that are not yet released."""
     import wgpu
 
@@ -103,7 +103,7 @@ def check_memory(
         refuse(option, f"a frame within {here / 1e9:.0f} GB", came, remedy(here))
 
 
-def probed_memory(device: Device, most: float) -> float:
+def probe_memory(device: Device, most: float) -> float:
     """Bytes, up to `most`, that a device has room for: found by taking them, and given back."""
     taken: list[Buffer] = []
     total, size = 0, min(int(most), device.max_storage_bytes) // 4 * 4

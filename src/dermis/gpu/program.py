@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
 from dermis.gpu.bind_groups import UNIFORM, BindGroup, ResourceCache, key_of, make_group
-from dermis.gpu.dependencies import Access, new_number, slot_of
+from dermis.gpu.dependencies import Access, new_number, resource_state
 from dermis.gpu.device import Device
 from dermis.gpu.shader_types import Binding, bindings, members_read, record_of
 from dermis.gpu.types import Bindable, Bindings, Native, Record, Untyped
@@ -99,8 +99,10 @@ class Program:
         found = self._accesses.find(key)
         if found is None:
             named = list(zip(self._others, bound, strict=True))
-            reads = tuple(slot_of(self.device, value) for one, value in named if one.holds and one.reads)
-            writes = tuple(slot_of(self.device, value) for one, value in named if one.writes)
+            reads = tuple(
+                resource_state(self.device, value) for one, value in named if one.holds and one.reads
+            )
+            writes = tuple(resource_state(self.device, value) for one, value in named if one.writes)
             found = Access(new_number(), reads, writes)
             self._accesses.keep(key, bound, found)
         return found

@@ -12,7 +12,7 @@ from dermis.gpu.device import Device
 from dermis.gpu.failures import DeviceLostError
 
 
-class Fetched:
+class BufferReadback:
     """A copy of a buffer that becomes readable when a submission is done.
 
     wgpu's own mapping makes a thread wait for the newest submission; here only the reader waits, and only for

@@ -12,7 +12,7 @@ import numpy as np
 
 from dermis.gpu.bind_groups import BindGroup
 from dermis.gpu.command_list import Step, step_of
-from dermis.gpu.dependencies import Access, Slot, new_number, slot_of
+from dermis.gpu.dependencies import Access, Slot, new_number, resource_state
 from dermis.gpu.device import Device
 from dermis.gpu.memo import field_names, is_value, same
 from dermis.gpu.program import ComputeProgram
@@ -80,7 +80,7 @@ class Recording(Recorder):
         for slot in access.reads:
             if slot not in self._writes and slot not in access.writes:
                 self._reads[slot] = None
-        filled = slot_of(self.device, resources[completes]) if completes else None
+        filled = resource_state(self.device, resources[completes]) if completes else None
         self._writes |= dict.fromkeys(slot for slot in access.writes if slot is not filled)
 
     def finish(self) -> None:

@@ -16,7 +16,7 @@ _TRIES = 5
 _UNFINISHED = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
-def unfinished_name(target: Path) -> Path:
+def temporary_path(target: Path) -> Path:
     """A hidden name beside a file or folder, for while it is being written."""
     return target.with_name(f".{target.name}-{secrets.token_hex(6)}.unfinished")
 
@@ -29,7 +29,7 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
     Raises DermisError where it cannot be written.
     """
     for tries_left in reversed(range(_TRIES)):
-        unfinished = unfinished_name(target)
+        unfinished = temporary_path(target)
         try:
             write(unfinished)
             sync(unfinished)
@@ -46,13 +46,13 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
         return
 
 
-def take_name(unfinished: Path, target: Path) -> None:
+def move_into_place(unfinished: Path, target: Path) -> None:
     """Give what is whole its name, in place of what has it: a file or a folder.
 
     Raises OSError where that fails.
     """
     if target.is_dir() and not target.is_symlink():
-        aside = unfinished_name(target)
+        aside = temporary_path(target)
         target.rename(aside)
         unfinished.rename(target)
         remove(aside)
@@ -81,7 +81,7 @@ def remove(path: Path) -> None:
         path.unlink()
 
 
-def leftovers(folder: Path) -> dict[Path, str]:
+def unfinished_files(folder: Path) -> dict[Path, str]:
     """What was left unfinished in a folder, with the name that it was to have."""
     with contextlib.suppress(OSError):
         found = {path: _UNFINISHED.fullmatch(path.name) for path in sorted(folder.iterdir())}

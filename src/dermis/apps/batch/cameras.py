@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.batch.lighting import towards
-from dermis.apps.batch.sampling import Parameters, numbers_of
+from dermis.apps.batch.lighting import direction_from_angles
+from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Motion
 from dermis.scene.camera import Camera
@@ -34,7 +34,7 @@ def face_points(head: Head, count: int = 64) -> NDArray[np.int32]:
     return np.unique(inside[(_directions(count) @ places[inside].T).argmax(axis=1)]).astype(np.int32)
 
 
-def camera_of(
+def sampled_camera(
     parameters: Parameters, head: Head, points: NDArray[np.int32], motion: Motion, aspect: float
 ) -> Camera:
     """Return the camera of an image by its parameters.
@@ -43,7 +43,7 @@ def camera_of(
     aspect : width of the picture over its height
     """
     face = head.control.some_posed(points, motion) - np.array(head.centre_mm)
-    values = numbers_of(parameters, "camera")
+    values = table_numbers(parameters, "camera")
     distance = values["distance_mm"]
     frame = values.get("frame_mm") or distance * _SENSOR_MM / values["focal_mm"]
     middle = 0.5 * (face.min(axis=0) + face.max(axis=0))
@@ -99,7 +99,7 @@ def _reach(placed: Doubles, distance: float, aim: Aim, frame_mm: float, aspect: 
 
 def _axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
     """Return the axes of a camera, rows right, up and back (3, 3), rolled clockwise about the last."""
-    back = np.array(towards(yaw_deg, pitch_deg))
+    back = np.array(direction_from_angles(yaw_deg, pitch_deg))
     yaw, roll = math.radians(yaw_deg), math.radians(roll_deg)
     right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
     pitch = math.radians(pitch_deg)
@@ -118,4 +118,4 @@ def _directions(count: int) -> NDArray[np.float32]:
     """Return directions (n, 3) on a spiral over the sphere."""
     pitches = np.degrees(np.arcsin(1.0 - 2.0 * (np.arange(count) + 0.5) / count))
     turns = 137.50776405 * np.arange(count)
-    return np.array([towards(*one) for one in zip(turns.tolist(), pitches.tolist(), strict=True)], np.float32)
+    return np.array([direction_from_angles(*one) for one in zip(turns.tolist(), pitches.tolist(), strict=True)], np.float32)

@@ -17,8 +17,8 @@ from multiprocessing.context import SpawnProcess
 from dermis.base.errors import DermisError
 
 _CONTEXT = multiprocessing.get_context("spawn")
-_BLOCKS = hasattr(signal, "pthread_sigmask")
-_ENDING_S = 1.0  # that a process may take to end after its pipe has broken
+_CAN_BLOCK_SIGNALS = hasattr(signal, "pthread_sigmask")
+_PARENT_EXIT_S = 1.0  # that a process may take to end after its pipe has broken
 _BLAS_THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 
 
@@ -27,7 +27,7 @@ class LostProcessError(DermisError):
 
 
 @dataclass(frozen=True)
-class Child:
+class ChildProcess:
     """Child process and the parent's end of the pipe to it."""
 
     process: SpawnProcess
@@ -51,17 +51,17 @@ class Child:
             return f"it was ended by signal {-code}"
 
 
-def start(target: Callable[..., None], *args: object) -> Child:
+def start(target: Callable[..., None], *args: object) -> ChildProcess:
     """Start `target(pipe, *args)` in a child process, which ends when this one does.
 
     Ctrl-C, which the terminal sends to all processes, is left to this one. NumPy has one thread in the child.
     """
     ours, theirs = _CONTEXT.Pipe()
     process = _CONTEXT.Process(target=_begin, args=(target, theirs, args))
-    with _may_start(), _without_interrupts(), _one_thread():
+    with _children_allowed(), _sigint_blocked(), _single_threaded_blas():
         process.start()
     theirs.close()  # only the child holds it now, so that our end reports its death
-    return Child(process, ours)
+    return ChildProcess(process, ours)
 
 
 def shared_bytes(size: int) -> ctypes.Array[ctypes.c_ubyte]:
@@ -72,22 +72,22 @@ def shared_bytes(size: int) -> ctypes.Array[ctypes.c_ubyte]:
 def _begin(target: Callable[..., None], pipe: Connection, args: tuple[object, ...]) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
-    threading.Thread(target=_leave_with, args=(parent.sentinel,), daemon=True).start()
+    threading.Thread(target=_exit_with_parent, args=(parent.sentinel,), daemon=True).start()
     try:
         target(pipe, *args)
     except (EOFError, ConnectionError):
-        if connection.wait([parent.sentinel], _ENDING_S):
+        if connection.wait([parent.sentinel], _PARENT_EXIT_S):
             os._exit(1)  # the pipe broke because the parent ended
         raise
 
 
-def _leave_with(sentinel: int) -> None:
+def _exit_with_parent(sentinel: int) -> None:
     connection.wait([sentinel])
     os._exit(1)
 
 
 @contextmanager
-def _may_start() -> Iterator[None]:
+def _children_allowed() -> Iterator[None]:
     """Allow children of dask's daemon processes, which multiprocessing forbids; ours end with them anyway."""
     here = multiprocessing.current_process()
     was = here.daemon
@@ -101,7 +101,7 @@ def _may_start() -> Iterator[None]:
 
 
 @contextmanager
-def _one_thread() -> Iterator[None]:
+def _single_threaded_blas() -> Iterator[None]:
     """Limit NumPy's linear algebra to one thread in children, unless the user sets a number.
 
     The default is one for each core in each process: for the small systems of a person these spin, and took
@@ -117,9 +117,9 @@ def _one_thread() -> Iterator[None]:
 
 
 @contextmanager
-def _without_interrupts() -> Iterator[None]:
+def _sigint_blocked() -> Iterator[None]:
     """Block SIGINT: a process that is started meanwhile never gets it, this one gets it afterwards."""
-    if not _BLOCKS:
+    if not _CAN_BLOCK_SIGNALS:
         yield
         return
     resource_tracker.ensure_running()  # which would let them through again when it starts

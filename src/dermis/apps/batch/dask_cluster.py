@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dermis.apps.batch.shards import Shard
-from dermis.apps.batch.worker import Work, WorkerEvent
+from dermis.apps.batch.worker import RunOptions, WorkerEvent
 from dermis.base.errors import DermisError, refuse
 from dermis.base.extras import needed
 
@@ -34,7 +34,7 @@ class Cluster:
     file: Path | None
     adapter: str = "auto"
 
-    def render(self, work: Work, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    def render(self, work: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Render the shards, each as a task, and yield an event for each.
 
         Raises DermisError where no worker is reached, where one sees another disk, and for what no worker

@@ -16,13 +16,13 @@ from typing import Self
 
 from distributed import WorkerPlugin, get_worker
 
-from dermis.apps.batch.child_processes import Child, LostProcessError, start
+from dermis.apps.batch.child_processes import ChildProcess, LostProcessError, start
 from dermis.apps.batch.shards import Shard
-from dermis.apps.batch.spec import spec_of
-from dermis.apps.batch.worker import Work, WorkerEvent, WorkerSlot, serve
+from dermis.apps.batch.spec import parse_spec
+from dermis.apps.batch.worker import RunOptions, WorkerEvent, WorkerSlot, serve
 from dermis.base.errors import DermisError, DermisWarning
 from dermis.base.private import cache_folder, make_private
-from dermis.gpu.adapters import alike_adapters
+from dermis.gpu.adapters import similar_adapters
 
 _TRIM = "MALLOC_TRIM_THRESHOLD_"
 """Set by dask's nannies so that memory is returned at once: large arrays would fault in each time."""
@@ -37,7 +37,7 @@ class _State:
     over : the run has ended, so that rendering stops
     """
 
-    child: Child | None = None
+    child: ChildProcess | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
     ends: ExitStack = field(default_factory=ExitStack)
     over: threading.Event = field(default_factory=threading.Event)
@@ -54,7 +54,7 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
     The process renders as it does without dask, whose own worker only waits for it.
 
     text, folder : of the spec; the files that it names are known by their hashes, which are in the text
-    out, encoders, keep_going : of `Work`
+    out, encoders, keep_going : of `RunOptions`
     adapter : as of `Cluster`
     """
 
@@ -66,7 +66,7 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
     adapter: str
 
     @classmethod
-    def of(cls, work: Work, adapter: str) -> Self:
+    def of(cls, work: RunOptions, adapter: str) -> Self:
         """Return the plugin of a run."""
         folder, out = work.spec.folder.resolve(), work.out.resolve()
         return cls(work.spec.text(), folder, out, work.encoders, work.keep_going, adapter)
@@ -101,7 +101,7 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
                 if state.over.is_set():
                     state.close()
 
-    def _rendered(self, child: Child, shard: Shard) -> WorkerEvent:
+    def _rendered(self, child: ChildProcess, shard: Shard) -> WorkerEvent:
         try:
             child.pipe.send(shard)
             while not self._state.over.is_set():
@@ -119,14 +119,14 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
             raise LostProcessError(f"a worker: {child.fate()}") from fault
         return WorkerEvent(refusal="the run: expected to go on, but it is over. Give the command again.")
 
-    def _start(self) -> Child:
+    def _start(self) -> ChildProcess:
         """Start the process on the adapter of this worker's rank."""
         ends = self._state.ends
-        rank = ends.enter_context(taken_rank())
-        adapters = alike_adapters(self.adapter)
-        spec = spec_of(tomllib.loads(self.text), self.folder)
+        rank = ends.enter_context(local_rank())
+        adapters = similar_adapters(self.adapter)
+        spec = parse_spec(tomllib.loads(self.text), self.folder)
         slot = WorkerSlot(f"#{adapters[rank % len(adapters)].number}")
-        child = start(serve, slot, Work(spec, self.out, self.encoders, self.keep_going))
+        child = start(serve, slot, RunOptions(spec, self.out, self.encoders, self.keep_going))
         ends.callback(child.end)
         self._state.child = child
         return child
@@ -144,7 +144,7 @@ def sees(path: str) -> bool:
 
 
 @contextmanager
-def taken_rank() -> Iterator[int]:
+def local_rank() -> Iterator[int]:
     """Yield the least number from 0 that no other process of this user holds on this host: its GPU.
 
     Held by a lock on a file, which the system releases when its process ends. Where there are no such locks,

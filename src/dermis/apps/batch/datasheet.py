@@ -13,9 +13,9 @@ from typing import TypedDict
 from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.goodness_of_fit import FitTest, fit_tests
 from dermis.apps.batch.index import statistics
-from dermis.apps.batch.output_encoding import file_kind, stored_as
-from dermis.apps.batch.shard_formats import Stamp
-from dermis.apps.batch.shards import is_there, shard_path, shards_of, stamp_of
+from dermis.apps.batch.output_encoding import file_format, storage_description
+from dermis.apps.batch.shard_formats import ShardManifest
+from dermis.apps.batch.shards import is_there, shard_path, list_shards, read_manifest
 from dermis.apps.batch.spec import Spec
 from dermis.base.tables import read_rows
 from dermis.formats.samples import SAMPLES
@@ -39,14 +39,14 @@ def write_datasheet(out: Path, spec: Spec) -> None:
     The same shards give the same bytes. Raises DermisError where the index is missing, and where nothing can
     be written.
     """
-    there = [shard for shard in shards_of(spec) if is_there(out, shard, spec)]
-    text = _readme(out, spec, [stamp_of(shard_path(out, shard, spec)) for shard in there]).encode()
+    there = [shard for shard in list_shards(spec) if is_there(out, shard, spec)]
+    text = _readme(out, spec, [read_manifest(shard_path(out, shard, spec)) for shard in there]).encode()
     description = {
         "spec": spec.digest(),
         "count": spec.count,
         "seed": spec.seed,
         "size": list(spec.size),
-        "outputs": outputs_of(spec),
+        "outputs": output_facts(spec),
         "labels": classes(spec),
         "landmarks": {name: landmark_names(name, spec) for name in spec.landmarks},
     }
@@ -55,7 +55,7 @@ def write_datasheet(out: Path, spec: Spec) -> None:
     atomic_write(out / README, lambda path: path.write_bytes(text))
 
 
-def _readme(out: Path, spec: Spec, stamps: Sequence[Stamp]) -> str:
+def _readme(out: Path, spec: Spec, stamps: Sequence[ShardManifest]) -> str:
     width, height = spec.size
     left_out = [one for stamp in stamps for one in stamp.left_out]
     images = sum(stamp.stop - stamp.first for stamp in stamps) - len(left_out)
@@ -81,10 +81,10 @@ def _readme(out: Path, spec: Spec, stamps: Sequence[Stamp]) -> str:
 
 
 def _files(spec: Spec) -> str:
-    alpha = ", with alpha" if "none" in spec.background.kind.ends else ""
+    alpha = ", with alpha" if "none" in spec.background.kind.support else ""
     outputs = [
         (f"{name}.{one['file']}", one["description"], one["unit"], one["stored"], f"{one['background']:g}")
-        for name, one in outputs_of(spec).items()
+        for name, one in output_facts(spec).items()
     ]
     rows = [
         ("png", f"picture, sRGB{alpha}", "", "8-bit PNG", ""),
@@ -117,7 +117,7 @@ def _labels(spec: Spec) -> str:
     )
 
 
-def _made_with(stamps: Sequence[Stamp]) -> str:
+def _made_with(stamps: Sequence[ShardManifest]) -> str:
     counted = Counter(tuple(sorted(stamp.made_with.items())) for stamp in stamps)
     rows = [
         (count, ", ".join(f"{name} {value}" for name, value in made))
@@ -144,15 +144,15 @@ class OutputFacts(TypedDict):
     background: float
 
 
-def outputs_of(spec: Spec) -> dict[str, OutputFacts]:
+def output_facts(spec: Spec) -> dict[str, OutputFacts]:
     """Return the facts of the files of each output."""
     found: dict[str, OutputFacts] = {}
     for name in spec.outputs:
-        output, file = OUTPUTS[name], file_kind(name, spec.encoding)
+        output, file = OUTPUTS[name], file_format(name, spec.encoding)
         step, zero = (1.0, 0) if output.levels is None or file != "png" else output.levels
         found[name] = {
             "file": file,
-            "stored": stored_as(name, spec.encoding),
+            "stored": storage_description(name, spec.encoding),
             "step": step,
             "zero": zero,
             "unit": output.unit,
@@ -186,7 +186,7 @@ def licences(spec: Spec) -> Iterator[tuple[str, str, str]]:
     yield "people: the parametric human", author, licence
     for parameter in ("person.head", "environment.name"):
         found = spec.distributions.get(parameter)
-        for name in () if found is None else map(str, found.ends):
+        for name in () if found is None else map(str, found.support):
             if name in SAMPLES:
                 yield f"{parameter} {name}", SAMPLES[name].attribution, SAMPLES[name].licence
             elif name not in _OURS and not name.startswith("human:"):

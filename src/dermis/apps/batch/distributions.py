@@ -31,7 +31,7 @@ class Distribution(ABC):
 
     @property
     @abstractmethod
-    def ends(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[Value, ...]:
         """Return the least and the greatest number, or all texts, that can be sampled."""
 
     @abstractmethod
@@ -50,7 +50,7 @@ class Constant(Distribution):
     value: Value
 
     @property
-    def ends(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[Value, ...]:
         return (self.value,)
 
     def at(self, share: float) -> Value:
@@ -73,7 +73,7 @@ class Uniform(Distribution):
         require(self.low > 0 or not self.logarithmic, "ends above 0 for log_uniform")
 
     @property
-    def ends(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[Value, ...]:
         return self.low, self.high
 
     def at(self, share: float) -> float:
@@ -97,7 +97,7 @@ class Normal(Distribution):
         require(self.sd > 0, "a standard deviation above 0")
 
     @property
-    def ends(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[Value, ...]:
         return self.mean - _WIDEST * self.sd, self.mean + _WIDEST * self.sd
 
     def at(self, share: float) -> float:
@@ -131,7 +131,7 @@ class Truncated(Distribution):
         return (float(ndtr(-high)), float(ndtr(-low))) if low > 0 else (float(ndtr(low)), float(ndtr(high)))
 
     @property
-    def ends(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[Value, ...]:
         return self.low, self.high
 
     def at(self, share: float) -> float:
@@ -158,13 +158,13 @@ class Choice(Distribution):
         require(len(self.weights) == len(self.values), f"as many weights as values ({len(self.values)})")
         require(min(self.weights) >= 0 and sum(self.weights) > 0, "weights from 0, one of them above it")
         require(
-            len({isinstance(end, str) for value in self.values for end in value.ends}) <= 1,
+            len({isinstance(end, str) for value in self.values for end in value.support}) <= 1,
             "either numbers or texts to choose from",
         )
 
     @property
-    def ends(self) -> tuple[Value, ...]:
-        found = [end for value in self.values for end in value.ends]
+    def support(self) -> tuple[Value, ...]:
+        found = [end for value in self.values for end in value.support]
         if isinstance(found[0], str):
             return tuple(dict.fromkeys(found))
         return min(found), max(found)
@@ -193,7 +193,7 @@ class Files(Distribution):
     names: tuple[str, ...] = ()
 
     @property
-    def ends(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[Value, ...]:
         return self.names
 
     def at(self, share: float) -> str:

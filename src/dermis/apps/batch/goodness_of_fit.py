@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, kolmogorov, ndtr
 
 from dermis.apps.batch.distributions import Choice, Constant, Distribution, Files, Normal, Truncated, Uniform
-from dermis.apps.batch.index import index_file
-from dermis.apps.batch.sampling import rounded
+from dermis.apps.batch.index import open_index
+from dermis.apps.batch.sampling import round_significant
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import NONE
 from dermis.human.expressions import targets_of
 
-LEAST_CHANCE = 1e-6
+MIN_P_VALUE = 1e-6
 """p-value below which the values are reported as not of the distribution."""
 _USUAL = sqrt(np.pi / 2) * np.log(2)  # mean of Kolmogorov's distribution
 _GRID = 10_000  # shares that means are taken over
@@ -51,7 +51,7 @@ class FitTest(NamedTuple):
 
     @property
     def agrees(self) -> bool:
-        return self.chance >= LEAST_CHANCE
+        return self.chance >= MIN_P_VALUE
 
 
 def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
@@ -59,7 +59,7 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
 
     People count once, however many images show them. Raises DermisError where there is no index.
     """
-    with index_file(out, "the statistics of a data set") as file:
+    with open_index(out, "the statistics of a data set") as file:
         names = set(file.schema_arrow.names)
         first: NDArray[np.int64] | slice = slice(None)
         if "person.number" in names:  # rows of the first image of each person
@@ -78,12 +78,12 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
 
 def fit_test(name: str, law: Distribution, values: Values) -> FitTest:
     """Return the test of values against the distribution that they were sampled from."""
-    if any(isinstance(end, str) for end in law.ends):
+    if any(isinstance(end, str) for end in law.support):
         return _shares_test(name, shares(law), [str(value) for value in values])
     return _numbers_test(name, law, np.sort(np.array(values, np.float64)))
 
 
-def share_below(law: Distribution, x: Array, *, closed: bool) -> Array:
+def cdf(law: Distribution, x: Array, *, closed: bool) -> Array:
     """Return the cumulative distribution at `x`: the share below, or up to it where closed."""
     match law:
         case Constant(value):
@@ -101,7 +101,7 @@ def share_below(law: Distribution, x: Array, *, closed: bool) -> Array:
                 return np.asarray((ndtr(-first) - ndtr(-z)) / (ndtr(-first) - ndtr(-last)))
             return np.asarray((ndtr(z) - ndtr(first)) / (ndtr(last) - ndtr(first)))
         case Choice(laws, weights):
-            parts = (w * share_below(one, x, closed=closed) for one, w in zip(laws, weights, strict=True))
+            parts = (w * cdf(one, x, closed=closed) for one, w in zip(laws, weights, strict=True))
             return np.asarray(sum(parts) / sum(weights))
     raise TypeError(f"{law} has no numbers")
 
@@ -119,7 +119,7 @@ def shares(law: Distribution) -> dict[str, float]:
 
 
 def _spec_test(name: str, law: Distribution, values: Values, spec: Spec) -> FitTest:
-    if name != "background.kind" or NONE not in spec.distributions["environment.name"].ends:
+    if name != "background.kind" or NONE not in spec.distributions["environment.name"].support:
         return fit_test(name, law, values)
     plain = {"environment": "gradient"}  # without an environment, see `Sampler.parameters`
     stated = defaultdict[str, float](float)
@@ -133,8 +133,8 @@ def _numbers_test(name: str, law: Distribution, values: Array) -> FitTest:
     count, near = len(values), _HALF_DIGIT * np.abs(values)
     up_to = np.searchsorted(values, values, "right") / count
     below = np.searchsorted(values, values, "left") / count
-    over = up_to - share_below(law, values + near, closed=True)
-    under = share_below(law, values - near, closed=False) - below
+    over = up_to - cdf(law, values + near, closed=True)
+    under = cdf(law, values - near, closed=False) - below
     distance = float(max(over.max(), under.max(), 0.0))
     grid: Array = np.array([law.at((k + 0.5) / _GRID) for k in range(_GRID)], np.float64)
     chance = float(kolmogorov(sqrt(count) * distance))
@@ -169,7 +169,7 @@ def _chi_square(stated: Mapping[str, float], found: Counter[str], count: int) ->
 
 
 def _moments(values: Array) -> str:
-    return f"{rounded(float(values.mean())):.5g}, {rounded(float(values.std())):.5g}"
+    return f"{round_significant(float(values.mean())):.5g}, {round_significant(float(values.std())):.5g}"
 
 
 def _column(name: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.reader import read_record, shard_files
 from dermis.apps.batch.records import RECORD, Record
-from dermis.apps.batch.shards import is_there, shard_path, shards_of
+from dermis.apps.batch.shards import is_there, shard_path, list_shards
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import refuse
 from dermis.base.extras import needed
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pyarrow
     import pyarrow.parquet
 
-INDEX = "index.parquet"
+INDEX_FILE = "index.parquet"
 NUMBERS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
 """Columns of matrices, flattened row by row, and their lengths."""
 _FIRST = "number", "key", "shard"
@@ -38,7 +38,7 @@ def write_index(out: Path, spec: Spec) -> Path:
     The same shards give the same bytes. Raises DermisError for damaged shards, where pyarrow is missing, and
     where nothing can be written.
     """
-    parquet, target = needed("pyarrow.parquet", "the index of a data set"), out / INDEX
+    parquet, target = needed("pyarrow.parquet", "the index of a data set"), out / INDEX_FILE
     schema = _schema(out, spec)
 
     def write(path: Path) -> None:
@@ -50,15 +50,15 @@ def write_index(out: Path, spec: Spec) -> Path:
     return target
 
 
-def index_file(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
+def open_index(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
     """Return the index of a data set, open to be read column by column.
 
     Raises DermisError where there is none.
     """
     parquet = needed("pyarrow.parquet", purpose)
-    if not is_file(out / INDEX):
-        refuse(out, f"a data set with {INDEX}", "it is missing", "Run dermis batch again")
-    return parquet.ParquetFile(out / INDEX)
+    if not is_file(out / INDEX_FILE):
+        refuse(out, f"a data set with {INDEX_FILE}", "it is missing", "Run dermis batch again")
+    return parquet.ParquetFile(out / INDEX_FILE)
 
 
 def statistics(out: Path) -> Iterator[tuple[str, int, str]]:
@@ -66,7 +66,7 @@ def statistics(out: Path) -> Iterator[tuple[str, int, str]]:
 
     Raises DermisError where there is no index.
     """
-    with index_file(out, "the statistics of a data set") as file:
+    with open_index(out, "the statistics of a data set") as file:
         for name in file.schema_arrow.names:
             if name not in (*_FIRST, *NUMBERS):
                 column = file.read(columns=[name]).column(0)
@@ -75,7 +75,7 @@ def statistics(out: Path) -> Iterator[tuple[str, int, str]]:
 
 def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[Row]]:
     """Yield the rows of each shard that is there and holds images; one of them is held at a time."""
-    for shard in shards_of(spec):
+    for shard in list_shards(spec):
         path = shard_path(out, shard, spec)
         if not is_there(out, shard, spec):
             continue

@@ -8,7 +8,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from dermis.apps.batch.sampling import Parameters, numbers_of
+from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec_tables import RIG
 from dermis.images.colour import luminance
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
@@ -21,27 +21,27 @@ _LAMPS = "key", "fill", "rim"
 _rgb_weights = cache(rgb_weights)
 
 
-def lights_of(parameters: Parameters) -> tuple[Light, ...]:
+def sampled_lights(parameters: Parameters) -> tuple[Light, ...]:
     """Return the lights of an image by its parameters."""
-    light = numbers_of(parameters, "light")
+    light = table_numbers(parameters, "light")
     strength, turn_deg = light["strength"], light["turn_deg"]
     if not strength:
         return ()
     if parameters["light.kind"] == RIG:
-        lamps = (numbers_of(parameters, f"light.{lamp}") for lamp in _LAMPS)
+        lamps = (table_numbers(parameters, f"light.{lamp}") for lamp in _LAMPS)
         return tuple(_lamp(lamp, turn_deg, strength) for lamp in lamps)
     presets = _preset(str(parameters["light.kind"]))
     return tuple(_rotated(one, turn_deg, strength) for one in presets)
 
 
-def towards(yaw_deg: float, pitch_deg: float) -> tuple[float, float, float]:
+def direction_from_angles(yaw_deg: float, pitch_deg: float) -> tuple[float, float, float]:
     """Return the unit vector at a yaw to the head's left of its front and a pitch above it."""
     yaw, pitch = radians(yaw_deg), radians(pitch_deg)
     return sin(yaw) * cos(pitch), sin(pitch), cos(yaw) * cos(pitch)
 
 
 @lru_cache(maxsize=64)
-def colour_of(kelvin: float) -> tuple[float, float, float]:
+def blackbody_colour(kelvin: float) -> tuple[float, float, float]:
     """Return a black body's light by Planck's law, linear Rec. 709 of luminance 1; white at 6500 K."""
     white, own = (np.expm1(_SECOND_NM_K / (WAVELENGTHS_NM * one)) for one in (_WHITE_K, kelvin))
     colour = np.maximum(_rgb_weights() @ (white / own), 0.0)
@@ -51,9 +51,9 @@ def colour_of(kelvin: float) -> tuple[float, float, float]:
 
 def _lamp(lamp: Mapping[str, float], turn_deg: float, strength: float) -> Light:
     """Return a lamp of the rig by its parameters, which face the middle of the head."""
-    x, y, z = towards(lamp["yaw_deg"] + turn_deg, lamp["pitch_deg"])
+    x, y, z = direction_from_angles(lamp["yaw_deg"] + turn_deg, lamp["pitch_deg"])
     distance, size, irradiance = lamp["distance_mm"], lamp["size_mm"], pi * strength * lamp["strength"]
-    red, green, blue = (irradiance * one for one in colour_of(lamp["kelvin"]))
+    red, green, blue = (irradiance * one for one in blackbody_colour(lamp["kelvin"]))
     position = distance * x, distance * y, distance * z
     return RectangleLight(position=position, irradiance=(red, green, blue), width_mm=size, height_mm=size)
 

@@ -18,10 +18,10 @@ from dermis.scene.outputs import OUTPUTS, Output
 Array = NDArray[Any]
 Encoding = Literal["png", "exr", "npy"]
 _NPY = b"\x93NUMPY\x01\x00"
-_MOST_HALF = 65504.0
+_MAX_HALF = 65504.0
 
 
-def file_kind(name: str, encoding: Encoding) -> str:
+def file_format(name: str, encoding: Encoding) -> str:
     """The kind of file that holds an output: png, exr or npy.
 
     encoding : png where its numbers fit into one, else as exr
@@ -33,40 +33,40 @@ def file_kind(name: str, encoding: Encoding) -> str:
     return "png" if fits and encoding == "png" else "exr"
 
 
-def stored_as(name: str, encoding: Encoding) -> str:
+def storage_description(name: str, encoding: Encoding) -> str:
     """How the numbers of an output are stored, in words."""
-    output, kind = OUTPUTS[name], file_kind(name, encoding)
+    output, kind = OUTPUTS[name], file_format(name, encoding)
     if kind == "png" and output.levels is not None:
         step, zero = output.levels
         size = f"{step:g}" if step >= 1e-3 else f"1/{1 / step:.0f}"
         return f"16-bit PNG, {f'(level - {zero})' if zero else 'level'} x {size}"
     if kind == "png":
         return "8-bit PNG"
-    bits = 8 * _stored_kind(output, encoding).itemsize
-    return f"OpenEXR, {bits}-bit floats" if kind == "exr" else f"NumPy, {_stored_kind(output, encoding).name}"
+    bits = 8 * _stored_dtype(output, encoding).itemsize
+    return f"OpenEXR, {bits}-bit floats" if kind == "exr" else f"NumPy, {_stored_dtype(output, encoding).name}"
 
 
 def encode_output(name: str, values: Array, encoding: Encoding) -> bytes:
-    """The file of an output, (h, w) or (h, w, c), of the kind that `file_kind` says.
+    """The file of an output, (h, w) or (h, w, c), of the kind that `file_format` says.
 
     Raises DermisError for numbers that are not finite.
     """
     if not np.isfinite(values).all():
         refuse(f"output {name}", "finite numbers", "others came", "Report this with the spec, please")
-    output, kind = OUTPUTS[name], file_kind(name, encoding)
+    output, kind = OUTPUTS[name], file_format(name, encoding)
     if kind == "npy":
         file = io.BytesIO()
-        stored = _stored_kind(output, encoding)
-        limited = np.clip(values, -_MOST_HALF, _MOST_HALF) if stored.itemsize == 2 else values
+        stored = _stored_dtype(output, encoding)
+        limited = np.clip(values, -_MAX_HALF, _MAX_HALF) if stored.itemsize == 2 else values
         np.save(file, np.ascontiguousarray(limited, stored), allow_pickle=False)
         return file.getvalue()
     if kind == "png":
         return encode_png(np.atleast_3d(png_levels(name, values)), quick=True)
     picture = np.atleast_3d(values)
     padded = np.pad(picture, ((0, 0), (0, 0), (0, 1))) if picture.shape[2] == 2 else picture
-    if _stored_kind(output, encoding).itemsize > 2:
+    if _stored_dtype(output, encoding).itemsize > 2:
         return encode_exr(padded.astype(np.float32))
-    return encode_exr(np.clip(padded, -_MOST_HALF, _MOST_HALF).astype(np.float16))
+    return encode_exr(np.clip(padded, -_MAX_HALF, _MAX_HALF).astype(np.float16))
 
 
 def decode_output(name: str, kind: str, data: bytes) -> Array:
@@ -101,7 +101,7 @@ def decode_png(data: bytes) -> Array:
     return decode_with_pillow(data) if picture is None else picture
 
 
-def _stored_kind(output: Output, encoding: Encoding) -> np.dtype[Any]:
+def _stored_dtype(output: Output, encoding: Encoding) -> np.dtype[Any]:
     """Of its numbers in a file, little-endian on every machine."""
     half = encoding == "png" and output.kind == "float32" and output.levels is None
     return np.dtype(np.float16 if half else output.kind).newbyteorder("<")

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from dermis.apps.batch.distributions import Constant
 from dermis.apps.batch.sampling import Parameters
-from dermis.apps.batch.scenes import SceneMaker
+from dermis.apps.batch.scenes import SceneBuilder
 from dermis.apps.batch.spec import Spec
 from dermis.frame.renderer import Renderer
 from dermis.scene.toml_text import value_text
 
 SHOWN = 16
-MOST_COUNTED = 20_000
+MAX_COUNTED = 20_000
 _COLUMNS, _SIDE, _GAP = 4, 192, 4
 _SMALL = {"atlas": 512, "shadow_size": 1024}
 _WIDEST = 60  # letters of a column
 _NUMBERS_OF_PEOPLE = "person.number", "person.seed"
-_SHORTER_WAY = 12  # values that are listed
+_MAX_VALUES = 12  # values that are listed
 
 
 class _RowFields(TypedDict):
@@ -51,14 +51,14 @@ class Row(_RowFields, total=False):
 def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[Row], NDArray[np.uint8]]:
     """Return the table of parameters of a data set, and a sheet (h, w, 3) of its first 16 pictures, sRGB.
 
-    Raises DermisError as `SceneMaker.scene` and `Renderer.draw` do.
+    Raises DermisError as `SceneBuilder.scene` and `Renderer.draw` do.
     """
     return parameter_rows(spec), contact_sheet(spec, adapter)
 
 
 def parameter_rows(spec: Spec) -> list[Row]:
     """Return a row for each parameter that varies."""
-    found = [spec.parameters(k) for k in range(min(spec.count, MOST_COUNTED))]
+    found = [spec.parameters(k) for k in range(min(spec.count, MAX_COUNTED))]
     names = dict.fromkeys(name for one in found for name in one)
     varying = [name for name in names if not isinstance(spec.distributions.get(name), Constant)]
     return [_row(spec, name, found) for name in varying if name not in _NUMBERS_OF_PEOPLE]
@@ -89,7 +89,7 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
     size = across * (width + _GAP) - _GAP, down * (height + _GAP) - _GAP
     sheet = Image.new("RGB", size, (20, 20, 20))
     draw = ImageDraw.Draw(sheet)
-    maker, renderer = SceneMaker(spec), Renderer(adapter)
+    maker, renderer = SceneBuilder(spec), Renderer(adapter)
     for k in range(count):
         picture = renderer.draw(*maker.scene(spec.parameters(k)), timed=False).srgb8()
         x, y = (k % across) * (width + _GAP), (k // across) * (height + _GAP)
@@ -116,5 +116,5 @@ def _cells(row: Row) -> tuple[str, ...]:
     if "counts" not in row:
         return *start, *(f"{one:.4g}" for one in (row["min"], row["mean"], row["max"]))
     counts = [f"{name} {count}" for name, count in row["counts"].items()]
-    more = f", and {len(counts) - _SHORTER_WAY} more" if len(counts) > _SHORTER_WAY else ""
-    return *start, ", ".join(counts[:_SHORTER_WAY]) + more
+    more = f", and {len(counts) - _MAX_VALUES} more" if len(counts) > _MAX_VALUES else ""
+    return *start, ", ".join(counts[:_MAX_VALUES]) + more

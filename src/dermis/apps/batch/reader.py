@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.batch.output_encoding import Array, decode_output, decode_png
 from dermis.apps.batch.records import PICTURE, RECORD, LandmarksRecord, Numbers, Record
-from dermis.apps.batch.shard_formats import STAMP_NAME, TarMember, tar_members
+from dermis.apps.batch.shard_formats import MANIFEST_NAME, TarMember, tar_members
 from dermis.apps.batch.shards import EXPECTED, shard_index
 from dermis.base.atomic_write import reason
 from dermis.base.errors import DermisError, refuse
@@ -137,14 +137,14 @@ def shard_files(path: Path) -> Iterator[dict[str, Files]]:
 
 
 def _by_key(path: Path, files: Files) -> dict[str, Files]:
-    if STAMP_NAME not in files:
+    if MANIFEST_NAME not in files:
         refuse(path, EXPECTED, "its end is missing", "Fetch it again, or have it drawn again")
     found: dict[str, Files] = {}
     for name, read in files.items():
         match = _FILE_NAME.fullmatch(name)
         if match:
             found.setdefault(match[1], {})[match[2]] = read
-        elif name != STAMP_NAME:
+        elif name != MANIFEST_NAME:
             came = f"it holds {name[:60]!r}"
             refuse(path, f"{EXPECTED} with files such as 000000012.png", came, "Take it out")
     return dict(sorted(found.items()))

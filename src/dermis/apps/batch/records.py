@@ -8,7 +8,7 @@ from typing import TypedDict, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.apps.batch.output_encoding import encode_output, file_kind
+from dermis.apps.batch.output_encoding import encode_output, file_format
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.spec import Spec
 from dermis.frame.observation import Observation
@@ -58,12 +58,12 @@ def encode_record(
     observation : with the outputs of the spec and a picture of sRGB bytes
 
     png : the picture, with alpha over no background
-    NAME.png, NAME.exr or NAME.npy : each output, see `output_encoding.stored_as`
+    NAME.png, NAME.exr or NAME.npy : each output, see `output_encoding.storage_description`
     json : the `Record`
     """
     found = {PICTURE: encode_png(observation.picture, quick=True)}
     for name in spec.outputs:
-        suffix = f"{name}.{file_kind(name, spec.encoding)}"
+        suffix = f"{name}.{file_format(name, spec.encoding)}"
         found[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
     record = _record(number, observation, parameters, spec)
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))

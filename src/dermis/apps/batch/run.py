@@ -11,9 +11,9 @@ from typing import Protocol
 from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.datasheet import write_datasheet
 from dermis.apps.batch.index import write_index
-from dermis.apps.batch.shards import Shard, is_there, is_whole, remove_leftovers, shards_of
+from dermis.apps.batch.shards import Shard, is_there, is_whole, remove_unfinished, list_shards
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.worker import Failure, Work, WorkerEvent
+from dermis.apps.batch.worker import Failure, RunOptions, WorkerEvent
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import notify, refuse
 from dermis.base.reading import read_text
@@ -22,10 +22,10 @@ SPEC_FILE = "spec.toml"
 """Name of the spec in the folder of its data set: another one is refused there."""
 
 
-class Crew(Protocol):
-    """Workers: `Processes` of this machine, or those of a `Cluster`."""
+class WorkerPool(Protocol):
+    """Workers: `ProcessPool` of this machine, or those of a `Cluster`."""
 
-    def render(self, work: Work, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    def render(self, work: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Render the shards, each completely or not at all, and yield events as they happen."""
         ...
 
@@ -63,8 +63,8 @@ class Report:
 
 
 def run(
-    work: Work,
-    crew: Crew,
+    work: RunOptions,
+    crew: WorkerPool,
     part: tuple[int, int] = (0, 1),
     told: Callable[[Progress], None] = lambda progress: None,
 ) -> Report:
@@ -77,14 +77,14 @@ def run(
     """
     began = time.monotonic()
     claim(work.out, work.spec)
-    every = shards_of(work.spec)
+    every = list_shards(work.spec)
     mine = every[part[0] :: part[1]]
     missing = [shard for shard in mine if not is_whole(work.out, shard, work.spec)]
-    remove_leftovers(work.out, mine)
+    remove_unfinished(work.out, mine)
     try:
         images, failed = _render(crew, work, missing, told)
     finally:
-        remove_leftovers(work.out, mine)
+        remove_unfinished(work.out, mine)
     whole = all(is_there(work.out, shard, work.spec) for shard in every)
     if whole:  # every run that sees this writes the same bytes
         write_index(work.out, work.spec)
@@ -112,7 +112,7 @@ def claim(out: Path, spec: Spec) -> None:
 
 
 def _render(
-    crew: Crew, work: Work, missing: Sequence[Shard], told: Callable[[Progress], None]
+    crew: WorkerPool, work: RunOptions, missing: Sequence[Shard], told: Callable[[Progress], None]
 ) -> tuple[int, tuple[Failure, ...]]:
     """Return the number of images in the rendered shards, and those left out of them."""
     progress = Progress(0, sum(shard.stop - shard.first for shard in missing))

@@ -35,7 +35,7 @@ _APPLIES: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...]
 """Prefixes of parameters that only some images have, and the condition for them."""
 
 
-def numbers_of(parameters: Mapping[str, float | int | str], table: str) -> dict[str, float]:
+def table_numbers(parameters: Mapping[str, float | int | str], table: str) -> dict[str, float]:
     """Return the parameters of a table that are numbers, by the rest of their names."""
     return {name: one for name, one in table_of(parameters, table).items() if not isinstance(one, str)}
 
@@ -50,7 +50,7 @@ def uniform(seed: int, number: int, name: str) -> float:
     return (whole + 0.5) / float(1 << _BITS)
 
 
-def rounded(value: float) -> float:
+def round_significant(value: float) -> float:
     """Round to six significant digits: the last ones of logarithms and roots differ between machines."""
     return float(f"{value:.6g}") + 0.0  # no -0.0
 
@@ -71,7 +71,7 @@ class Movement:
 
 
 @cache
-def mixture() -> Mapping[str, tuple[Movement, ...]]:
+def load_movements() -> Mapping[str, tuple[Movement, ...]]:
     """Return the movements by part of the face."""
     found: dict[str, tuple[Movement, ...]] = {}
     for row in read_rows(str(__package__), "mixture"):
@@ -82,14 +82,14 @@ def mixture() -> Mapping[str, tuple[Movement, ...]]:
     return found
 
 
-def mixed(share: Callable[[str], float]) -> dict[str, float]:
+def random_expression(share: Callable[[str], float]) -> dict[str, float]:
     """Return random weights, with one movement or none in each part of the face.
 
     share : uniform number in (0, 1) for a name
     """
     found: dict[str, float] = {}
     opening = 1.0
-    for part, movements in mixture().items():
+    for part, movements in load_movements().items():
         left, amount = share(f"{part}.which"), share(f"{part}.weight") ** _SCARCE
         for one in movements:
             if 0 <= left < one.chance:
@@ -101,7 +101,7 @@ def mixed(share: Callable[[str], float]) -> dict[str, float]:
     return found
 
 
-def performed(
+def expression_weights(
     weights: Weights, intensity: float, asymmetry: float, variation: float, normal: Callable[[str], float]
 ) -> dict[str, float]:
     """Return the weights of targets, 0 to 1, of an expression varied for one face; see `ExpressionTable`.
@@ -156,7 +156,7 @@ class Sampler:
 
     def _value(self, k: int, name: str, one: Distribution) -> float | str:
         value = one.at(0.5 if isinstance(one, Constant) else self._quantile(k, name))
-        return value if isinstance(value, str) else rounded(value)
+        return value if isinstance(value, str) else round_significant(value)
 
     def _quantile(self, k: int, name: str) -> float:
         """Return the share from 0 to 1 at which a parameter's distribution is read."""
@@ -176,15 +176,15 @@ class Sampler:
         """Return the weights of all morph targets that the spec can move."""
         name = str(found["expression.name"])
         if name == MIXTURE:
-            weights: Weights = mixed(lambda part: self._uniform(k, f"expression.mixture.{part}"))
+            weights: Weights = random_expression(lambda part: self._uniform(k, f"expression.mixture.{part}"))
         else:
             weights = self.expressions[name]
         intensity, asymmetry, variation = (float(found[f"expression.{dial}"]) for dial in _DIALS)
         normal = partial(self._variation, k)
-        made: dict[str, float | str] = {**performed(weights, intensity, asymmetry, variation, normal)}
+        made: dict[str, float | str] = {**expression_weights(weights, intensity, asymmetry, variation, normal)}
         for target, one in table_of(self.distributions, "pose").items():
             made |= dict.fromkeys(targets_of([target]), self._value(k, f"pose.{target}", one))
-        return {target: rounded(float(made.get(target, 0.0))) for target in self.targets}
+        return {target: round_significant(float(made.get(target, 0.0))) for target in self.targets}
 
     def _variation(self, k: int, name: str) -> float:
         return self._normal(k, f"expression.variation.{name}")
@@ -193,9 +193,9 @@ class Sampler:
     def targets(self) -> tuple[str, ...]:
         """Names of all morph targets that the spec can move, sorted."""
         names = set(table_of(self.distributions, "pose"))
-        for name in map(str, self.distributions["expression.name"].ends):
+        for name in map(str, self.distributions["expression.name"].support):
             if name == MIXTURE:
-                names |= {target for part in mixture().values() for one in part for target in one.moves}
+                names |= {target for part in load_movements().values() for one in part for target in one.moves}
             else:
                 names |= set(self.expressions[name])
         return tuple(sorted(targets_of(sorted(names))))

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dermis.apps.batch.cameras import camera_of, face_points
-from dermis.apps.batch.lighting import lights_of, towards
-from dermis.apps.batch.sampling import Parameters, numbers_of
+from dermis.apps.batch.cameras import sampled_camera, face_points
+from dermis.apps.batch.lighting import sampled_lights, direction_from_angles
+from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import ANGLES, NONE, table_of
 from dermis.base.reading import is_file
@@ -56,7 +56,7 @@ class _Person:
     skin: Skin
 
 
-class SceneMaker:
+class SceneBuilder:
     """Maker of the scenes of a data set; keeps people that may return, which changes no result."""
 
     def __init__(self, spec: Spec) -> None:
@@ -74,13 +74,13 @@ class SceneMaker:
         head, (width, height) = person.head, self.spec.size
         pose = Pose(self._weights(parameters, head), _bone_angles(_head_rotation(parameters), person.bones))
         motion = pose.motion(head.control)
-        camera = camera_of(parameters, head, person.points, motion, width / height)
+        camera = sampled_camera(parameters, head, person.points, motion, width / height)
         dials = table_of(parameters, "skin")
         if "profile" in dials:
             dials["profile"] = self._path(dials["profile"])
         scene = Scene(
             head,
-            lights=lights_of(parameters),
+            lights=sampled_lights(parameters),
             camera=camera,
             skin=person.skin.replace(**dials) if dials else person.skin,
             environment=self._environment(parameters),
@@ -120,14 +120,14 @@ class SceneMaker:
         own = self.spec.own_targets
         return {
             name: weight
-            for name, weight in numbers_of(parameters, "pose").items()
+            for name, weight in table_numbers(parameters, "pose").items()
             if weight and (name in own or name in head.control.target_index)
         }
 
     def _environment(self, parameters: Parameters) -> Environment | None:
         if parameters["environment.name"] == NONE:
             return None
-        numbers = numbers_of(parameters, "environment")
+        numbers = table_numbers(parameters, "environment")
         name = self._path(parameters["environment.name"])
         return Environment(name=name, rotation_degrees=numbers["turn_deg"], exposure=numbers["strength"])
 
@@ -158,7 +158,7 @@ def _hairs(size: tuple[int, int]) -> float:
 
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:
     """Return the rotation matrix of the head (3, 3)."""
-    turn = numbers_of(parameters, "head")
+    turn = table_numbers(parameters, "head")
     return np.array(angles_matrix((turn["pitch_deg"], turn["yaw_deg"], turn["roll_deg"])))
 
 
@@ -183,8 +183,8 @@ def _with_gaze(parameters: Parameters, head: Head, pose: Pose, camera_mm: tuple[
         return pose
     target = np.array(camera_mm)
     if parameters["gaze.at"] == ANGLES:
-        gaze = numbers_of(parameters, "gaze")
-        direction = np.array(towards(gaze["yaw_deg"], -gaze["pitch_deg"]))
+        gaze = table_numbers(parameters, "gaze")
+        direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
         target = _head_rotation(parameters) @ direction * _FAR_MM
     return looking_at(head, target, pose)
 

@@ -19,13 +19,13 @@ from dermis.base.reading import parse_json, read_file, understood
 from dermis.base.version import version
 from dermis.images.sizes import MOST_BYTES
 
-STAMP_NAME = "__whole__"
+MANIFEST_NAME = "__whole__"
 """Of the file in a shard that says so: its last one, which the library webdataset passes over."""
-MOST_STAMP_BYTES = 1 << 20
+MAX_MANIFEST_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
-class Stamp:
+class ShardManifest:
     """Record that ends a shard and proves that it is whole.
 
     spec : digest of the spec
@@ -50,7 +50,7 @@ class Stamp:
         return (json.dumps({**values, "check": check}, indent=1) + "\n").encode()
 
 
-def read_stamp(data: bytes, culprit: object) -> Stamp:
+def parse_manifest(data: bytes, culprit: object) -> ShardManifest:
     """Return the stamp of its bytes.
 
     Raises DermisError for other bytes.
@@ -65,7 +65,7 @@ def read_stamp(data: bytes, culprit: object) -> Stamp:
         whole = all(type(one) is int and one >= 0 for one in numbers)
         if not whole or not all(isinstance(text, str) for text in texts):
             raise ValueError("its values are of other kinds")
-        found = Stamp(spec, index, first, stop, left_out, sha256, dict(made))
+        found = ShardManifest(spec, index, first, stop, left_out, sha256, dict(made))
         if found.data() != data:
             raise ValueError("its hash is that of another text")
         return found
@@ -102,7 +102,7 @@ class TarWriter:
 
     def finish(self, stamp: bytes) -> None:
         """Close it with its stamp, after it has reached the disk."""
-        self.add(STAMP_NAME, stamp)
+        self.add(MANIFEST_NAME, stamp)
         self._file.write(_END)
         self._file.flush()
         os.fsync(self._file.fileno())
@@ -139,21 +139,21 @@ def tar_members(file: BinaryIO) -> Iterator[TarMember]:
         yield member
 
 
-def tar_stamp(file: BinaryIO) -> tuple[int, bytes]:
+def read_tar_manifest(file: BinaryIO) -> tuple[int, bytes]:
     """Return where the stamp of a tar file begins, and its bytes, found from the end.
 
     Raises ValueError where there is none, or other bytes follow it.
     """
     length = file.seek(0, os.SEEK_END)
-    start = max(0, length - MOST_STAMP_BYTES - 3 * _BLOCK)
+    start = max(0, length - MAX_MANIFEST_BYTES - 3 * _BLOCK)
     file.seek(start)
     tail = file.read()
-    at = tail.rfind(STAMP_NAME.encode() + b"\0")
+    at = tail.rfind(MANIFEST_NAME.encode() + b"\0")
     if at < 0 or (start + at) % _BLOCK:
         raise ValueError("it is cut off")
     member = _member(tail[at : at + _BLOCK], start + at)
     stamp = tail[member.place - start :][: member.size]
-    if tail[at:] != b"".join(_pieces(STAMP_NAME, stamp)) + _END:
+    if tail[at:] != b"".join(_pieces(MANIFEST_NAME, stamp)) + _END:
         raise ValueError("it is cut off or damaged")
     return start + at, stamp
 
@@ -204,8 +204,8 @@ class FolderWriter:
 
     def finish(self, stamp: bytes) -> None:
         """Write the stamp; files lost with the power are detected by the hash."""
-        self.add(STAMP_NAME, stamp)
-        sync(self._path / STAMP_NAME)
+        self.add(MANIFEST_NAME, stamp)
+        sync(self._path / MANIFEST_NAME)
         sync(self._path)
 
     def close(self) -> None:

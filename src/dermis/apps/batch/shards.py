@@ -10,18 +10,18 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from dermis.apps.batch.atomic_files import leftovers, remove, take_name, unfinished_name
+from dermis.apps.batch.atomic_files import unfinished_files, remove, move_into_place, temporary_path
 from dermis.apps.batch.shard_formats import (
-    MOST_STAMP_BYTES,
-    STAMP_NAME,
+    MAX_MANIFEST_BYTES,
+    MANIFEST_NAME,
     FolderWriter,
-    Stamp,
+    ShardManifest,
     TarWriter,
     folder_sha256,
     made_with,
-    read_stamp,
+    parse_manifest,
     tar_sha256,
-    tar_stamp,
+    read_tar_manifest,
 )
 from dermis.apps.batch.spec import Spec
 from dermis.base.atomic_write import refuse_output
@@ -42,7 +42,7 @@ class Shard:
     stop: int
 
 
-def shards_of(spec: Spec) -> list[Shard]:
+def list_shards(spec: Spec) -> list[Shard]:
     """Return all shards of a data set, the last one with the remaining images."""
     starts = range(0, spec.count, spec.shard_size)
     return [Shard(k, first, min(first + spec.shard_size, spec.count)) for k, first in enumerate(starts)]
@@ -59,7 +59,7 @@ def shard_index(path: Path) -> int | None:
     return int(found[1]) if found else None
 
 
-def key_of(number: int) -> str:
+def image_key(number: int) -> str:
     """Return the prefix of the names of an image's files."""
     return f"{number:09d}"
 
@@ -74,7 +74,7 @@ class ShardWriter:
 
     def __init__(self, out: Path, shard: Shard, spec: Spec, adapter: str = "") -> None:
         self._target, self._shard, self._spec = shard_path(out, shard, spec), shard, spec
-        self._unfinished, self._adapter = unfinished_name(self._target), adapter
+        self._unfinished, self._adapter = temporary_path(self._target), adapter
         self._next = shard.first
         self._written, self._left_out = 0, dict[int, str]()
 
@@ -93,7 +93,7 @@ class ShardWriter:
         self._next, self._written = number + 1, self._written + 1
         try:
             for suffix in sorted(entries):
-                self._files.add(f"{key_of(number)}.{suffix}", entries[suffix])
+                self._files.add(f"{image_key(number)}.{suffix}", entries[suffix])
         except OSError as fault:
             refuse_output(self._target, fault)
 
@@ -107,7 +107,7 @@ class ShardWriter:
         try:
             if error is None:
                 self._files.finish(self._stamp())
-                take_name(self._unfinished, self._target)
+                move_into_place(self._unfinished, self._target)
         except OSError as fault:
             refuse_output(self._target, fault)
         finally:
@@ -121,22 +121,22 @@ class ShardWriter:
             raise ValueError(f"{self._written} images and {len(self._left_out)} left out are not {shard}")
         left_out = tuple(sorted(self._left_out.items()))
         digest, made = self._files.sha256(), made_with(self._adapter)
-        stamp = Stamp(spec.digest(), shard.index, shard.first, shard.stop, left_out, digest, made).data()
-        if len(stamp) > MOST_STAMP_BYTES:
+        stamp = ShardManifest(spec.digest(), shard.index, shard.first, shard.stop, left_out, digest, made).data()
+        if len(stamp) > MAX_MANIFEST_BYTES:
             came = f"{len(left_out)} could not be made, such as: {left_out[0][1]}"
             refuse(self._target, "a shard of images most of which can be made", came, "Correct the spec")
         return stamp
 
 
-def stamp_of(path: Path) -> Stamp:
+def read_manifest(path: Path) -> ShardManifest:
     """Return the stamp of a shard; its other bytes are not read.
 
     Raises DermisError where it is not whole, as far as its end shows.
     """
     if path.is_dir():
-        return read_stamp(read_file(path / STAMP_NAME, EXPECTED, MOST_STAMP_BYTES), path)
+        return parse_manifest(read_file(path / MANIFEST_NAME, EXPECTED, MAX_MANIFEST_BYTES), path)
     with opened(path, EXPECTED) as file, understood(path, EXPECTED):
-        return read_stamp(tar_stamp(file)[1], path)
+        return parse_manifest(read_tar_manifest(file)[1], path)
 
 
 def is_there(out: Path, shard: Shard, spec: Spec) -> bool:
@@ -146,7 +146,7 @@ def is_there(out: Path, shard: Shard, spec: Spec) -> bool:
     """
     path = shard_path(out, shard, spec)
     try:
-        stamp = stamp_of(path)
+        stamp = read_manifest(path)
     except DermisError:
         return False
     if (stamp.spec, stamp.index, stamp.first, stamp.stop) != (spec.digest(), *astuple(shard)):
@@ -164,17 +164,17 @@ def is_whole(out: Path, shard: Shard, spec: Spec) -> bool:
         return False
     path = shard_path(out, shard, spec)
     with suppress(DermisError):
-        return _sha256(path) == stamp_of(path).sha256
+        return _sha256(path) == read_manifest(path).sha256
     return False
 
 
-def remove_leftovers(out: Path, shards: Collection[Shard] | None = None) -> None:
+def remove_unfinished(out: Path, shards: Collection[Shard] | None = None) -> None:
     """Remove unfinished files of killed runs.
 
     shards : that no other run works on; all where None
     """
     mine = None if shards is None else {shard.index for shard in shards}
-    for path, name in leftovers(out).items():
+    for path, name in unfinished_files(out).items():
         index = shard_index(Path(name))
         if mine is None or index is None or index in mine:
             remove(path)
@@ -183,6 +183,6 @@ def remove_leftovers(out: Path, shards: Collection[Shard] | None = None) -> None
 def _sha256(path: Path) -> str:
     """Return the hash of all files of a shard before its stamp."""
     if path.is_dir():
-        return folder_sha256(path, sorted(one.name for one in path.iterdir() if one.name != STAMP_NAME))
+        return folder_sha256(path, sorted(one.name for one in path.iterdir() if one.name != MANIFEST_NAME))
     with opened(path, EXPECTED) as file, understood(path, EXPECTED):
-        return tar_sha256(file, tar_stamp(file)[0])
+        return tar_sha256(file, read_tar_manifest(file)[0])

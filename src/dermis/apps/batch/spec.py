@@ -27,11 +27,11 @@ from dermis.scene.plain import Plain
 from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
-MOST_IMAGES = 10**9
-RENDER: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
+MAX_IMAGES = 10**9
+RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
 """Settings that a data set has where its spec says nothing."""
 _BACKGROUND = "[background]"
-ELSEWHERE = {"size": "size, above all tables", "background": _BACKGROUND, "background_blur": _BACKGROUND}
+SETTINGS_OUTSIDE_RENDER = {"size": "size, above all tables", "background": _BACKGROUND, "background_blur": _BACKGROUND}
 """Settings that [render] does not hold, and where a spec has them."""
 _Weight = Annotated[float, Field(ge=0, le=1)]
 _HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
@@ -45,7 +45,7 @@ P = TypeVar("P", bound=Plain)
 class Spec(Plain):
     """Specification of a data set."""
 
-    count: Annotated[int, Field(ge=1, le=MOST_IMAGES), Because("a billion images")] = 1000
+    count: Annotated[int, Field(ge=1, le=MAX_IMAGES), Because("a billion images")] = 1000
     """How many images."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1), Because("32 bits")] = 0
     """By which all is drawn."""
@@ -61,7 +61,7 @@ class Spec(Plain):
     """Shards as tar files, or as folders."""
     encoding: Encoding = "png"
     """Files of the outputs: png (16 bits where they suffice), exr or npy (all bits)."""
-    render: Settings = Field(default_factory=lambda: Settings(size=(512, 512), **RENDER))
+    render: Settings = Field(default_factory=lambda: Settings(size=(512, 512), **RENDER_DEFAULTS))
     """How pictures are computed; `size` and the background stand elsewhere."""
     person: tables.PersonTable = tables.PersonTable()
     """Who is seen."""
@@ -139,7 +139,7 @@ class Spec(Plain):
         """Return the canonical form: TOML of every value, which reads as the same spec."""
         values = plain_values(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
-        values["render"] = self.render.model_dump(exclude=set(ELSEWHERE), exclude_none=True)
+        values["render"] = self.render.model_dump(exclude=set(SETTINGS_OUTSIDE_RENDER), exclude_none=True)
         del values["folder"]
         return "\n".join([_HEADER, *_toml_lines("", values)])
 
@@ -169,10 +169,10 @@ def load_spec(path: str | Path, **values: object) -> Spec:
     path = named_path(path, "a spec of a data set in TOML")
     data = read_toml(path, "a spec of a data set in TOML")
     with about(path):
-        return spec_of({**data, **values}, path.parent)
+        return parse_spec({**data, **values}, path.parent)
 
 
-def spec_of(data: Mapping[str, object], folder: Path = Path()) -> Spec:
+def parse_spec(data: Mapping[str, object], folder: Path = Path()) -> Spec:
     """Return the spec of parsed TOML.
 
     folder : of the files that it names
@@ -188,15 +188,15 @@ def spec_of(data: Mapping[str, object], folder: Path = Path()) -> Spec:
     if isinstance(groups := given.get("correlated", ()), list | tuple):
         given["correlated"] = tuple(_model(tables.Correlated, "correlated", group) for group in groups)
     spec = _model(Spec, "", given | {"folder": folder})
-    ends = [end for name in _FILES if name in spec.distributions for end in spec.distributions[name].ends]
+    support = [end for name in _FILES if name in spec.distributions for end in spec.distributions[name].support]
     tables_named = (name for name in spec.landmarks if name not in SETS)
-    found = _hashes([*map(str, ends), *tables_named], folder)
+    found = _hashes([*map(str, support), *tables_named], folder)
     if spec.files:
         _check_hashes(spec.files, found)
     return spec.replace(files=found) if found else spec
 
 
-def example_text() -> str:
+def example_toml() -> str:
     """A spec with comments that can be drawn as it is."""
     return resources.files(__package__).joinpath("example.toml").read_text("utf-8")
 
@@ -204,9 +204,9 @@ def example_text() -> str:
 def _render(size: object, table: object) -> Settings:
     if not isinstance(table, Mapping):
         return _model(Settings, "render", table)
-    for key in ELSEWHERE.keys() & table.keys():
-        refuse(f"render: {key}", "it elsewhere in a spec", "it came here", f"Write it as {ELSEWHERE[key]}")
-    return _model(Settings, "render", {**RENDER, **table, "size": size})
+    for key in SETTINGS_OUTSIDE_RENDER.keys() & table.keys():
+        refuse(f"render: {key}", "it elsewhere in a spec", "it came here", f"Write it as {SETTINGS_OUTSIDE_RENDER[key]}")
+    return _model(Settings, "render", {**RENDER_DEFAULTS, **table, "size": size})
 
 
 def _model(kind: type[P], where: str, table: object) -> P:

@@ -69,14 +69,14 @@ def _check_person(sampled: Mapping[str, Distribution]) -> None:
         remedy = "Leave one out"
         refuse(given[0], "people that are drawn", f"{HEAD_NAME} names heads", remedy)
     shares = [sampled[name] for name in _ANCESTRY if name in sampled]
-    if shares and not any(min(share.ends) > 0 for share in shares):  # type: ignore[operator]
+    if shares and not any(min(share.support) > 0 for share in shares):  # type: ignore[operator]
         came = "all of them can be 0 at once"
         refuse("person", "a share of african, asian or caucasian above 0", came, "Raise the low end of one")
 
 
 def _check_expression(name: Distribution, expressions: Mapping[str, Weights]) -> None:
     known = [*expressions, MIXTURE]
-    for end in name.ends:
+    for end in name.support:
         if end not in known:
             remedy = f"Add [expressions.{end}], or correct it"
             refuse("expression: name", f"one of {', '.join(known)}", f"{end!r} came", remedy)
@@ -99,8 +99,8 @@ def _check_correlated(groups: Sequence[Correlated], sampled: Mapping[str, Distri
 
 
 def _check_light(sampled: Mapping[str, Distribution]) -> None:
-    lamps = NO_LIGHTS not in sampled["light.kind"].ends and 0.0 not in sampled["light.strength"].ends
-    around = NONE not in sampled["environment.name"].ends and 0.0 not in sampled["environment.strength"].ends
+    lamps = NO_LIGHTS not in sampled["light.kind"].support and 0.0 not in sampled["light.strength"].support
+    around = NONE not in sampled["environment.name"].support and 0.0 not in sampled["environment.strength"].support
     if not lamps and not around:
         came = "there can be neither lamps nor an environment"
         refuse("light", "some light in each image", came, "Take none or 0 out of one of both")
@@ -111,7 +111,7 @@ def _check_named(sampled: Mapping[str, Distribution], folder: Path) -> None:
     heads = [HUMAN, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]
     around = [NONE, UNIFORM, *(name for name, sample in SAMPLES.items() if sample.kind == "environment")]
     for parameter, known in ((HEAD_NAME, heads), ("environment.name", around)):
-        for name in map(str, sampled[parameter].ends if parameter in sampled else ()):
+        for name in map(str, sampled[parameter].support if parameter in sampled else ()):
             person = parameter == HEAD_NAME and name.startswith(f"{HUMAN}:")
             if name not in known and not person and not is_file(folder / name):
                 expected = f"a file in the spec's folder, or one of {', '.join(known)}"
@@ -127,7 +127,7 @@ def _check_dials(sampled: Mapping[str, Distribution]) -> None:
     known = [name for name in Skin.model_fields if name not in _NO_DIALS]
     _check_table("skin", sampled, known, Skin)
     for name, one in table_of(sampled, "pose").items():
-        if any(isinstance(end, str) or abs(end) > MOST_WEIGHT for end in one.ends):
+        if any(isinstance(end, str) or abs(end) > MOST_WEIGHT for end in one.support):
             expected = f"numbers from {-MOST_WEIGHT:g} to {MOST_WEIGHT:g}"
             refuse(f"pose: {name}", expected, f"{one.spec_value()} came", "Correct it")
 
@@ -143,7 +143,7 @@ def _check_table(
         if name not in known:
             listed = ", ".join(known) if len(known) < 40 else "those of dermis head --list-targets"
             refuse(f"{table}: {name}", f"one of {listed}", "this name is unknown", "Correct it")
-        for end in one.ends:
+        for end in one.support:
             try:
                 make(**{name: end})
             except DermisError as error:

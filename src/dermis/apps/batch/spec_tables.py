@@ -37,10 +37,10 @@ class DistributionField:
         if value is None:
             return None
         found = parse_distribution(value)
-        self.check_ends(found)
+        self.check_support(found)
         return found
 
-    def check_ends(self, found: Distribution) -> None:
+    def check_support(self, found: Distribution) -> None:
         """Raise ValueError for values that the field cannot have."""
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -57,8 +57,8 @@ class Within(DistributionField):
     def __init__(self, low: float, high: float, why: str = "") -> None:
         self.ge, self.le, self.why = low, high, why
 
-    def check_ends(self, found: Distribution) -> None:
-        if any(isinstance(end, str) or not self.ge <= end <= self.le for end in found.ends):
+    def check_support(self, found: Distribution) -> None:
+        if any(isinstance(end, str) or not self.ge <= end <= self.le for end in found.support):
             why = f" ({self.why})" if self.why else ""
             reach = "" if isinstance(found, Constant) else _REACH
             raise ValueError(f"numbers from {self.ge:.10g} to {self.le:.10g}{why}{reach}")
@@ -70,12 +70,12 @@ class OneOf(DistributionField):
     def __init__(self, known: Callable[[], Iterable[str]] | None = None) -> None:
         self.known = known
 
-    def check_ends(self, found: Distribution) -> None:
+    def check_support(self, found: Distribution) -> None:
         names = list(self.known()) if self.known else []
-        for end in found.ends:
+        for end in found.support:
             if not isinstance(end, str) or (names and end not in names):
                 raise ValueError(f"one of {', '.join(names)}" if names else "a name, or a choice of names")
-        if names and not found.ends:
+        if names and not found.support:
             raise ValueError(f"one of {', '.join(names)}, no files")
 
 

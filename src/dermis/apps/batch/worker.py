@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from dermis.apps.batch.child_processes import LostProcessError
-from dermis.apps.batch.encoder_pool import Encoded, Encoders
+from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
-from dermis.apps.batch.scenes import SceneMaker
+from dermis.apps.batch.scenes import SceneBuilder
 from dermis.apps.batch.shards import Shard, ShardWriter, is_whole
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import DermisError, DermisWarning
@@ -28,7 +28,7 @@ from dermis.gpu.failures import DeviceError
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-_ROUNDS = 16  # images between two with an environment, whose occlusion is kept
+_CACHE_FRAMES = 16  # images between two with an environment, whose occlusion is kept
 
 
 class Failure(NamedTuple):
@@ -39,7 +39,7 @@ class Failure(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Work:
+class RunOptions:
     """What a run asks of all its workers.
 
     out : folder of the data set
@@ -85,7 +85,7 @@ class WorkerEvent:
     refusal: str = ""
 
 
-class _Plan(NamedTuple):
+class _PlannedImage(NamedTuple):
     """Image to be rendered; motion is relative to the scene `before`."""
 
     number: int
@@ -101,11 +101,11 @@ class Worker:
     adapter : as of `Renderer`
     """
 
-    def __init__(self, adapter: str, work: Work) -> None:
+    def __init__(self, adapter: str, work: RunOptions) -> None:
         self._work = work
-        self._renderer = Renderer(adapter, rounds=_ROUNDS)
-        self._maker = SceneMaker(work.spec)
-        self._encoders = Encoders(work.encoders, partial(_encode, work.spec))
+        self._renderer = Renderer(adapter, rounds=_CACHE_FRAMES)
+        self._maker = SceneBuilder(work.spec)
+        self._encoders = EncoderPool(work.encoders, partial(_encode, work.spec))
         gc.freeze()  # scanning the objects that exist now took a tenth of an image's time
 
     def render_shard(self, shard: Shard, rendered: Callable[[], None] = lambda: None) -> tuple[Failure, ...]:
@@ -139,7 +139,7 @@ class Worker:
         """Yield number, observation and parameters of each image that can be rendered, in order."""
         groups = deque([deque(range(shard.first, shard.stop))])
         while groups:
-            numbers, sent = groups.popleft(), deque[_Plan]()
+            numbers, sent = groups.popleft(), deque[_PlannedImage]()
             try:
                 for observation in self._observed(self._plans(numbers, sent, failed)):
                     done = sent.popleft()
@@ -156,13 +156,13 @@ class Worker:
                     alone = [deque([plan.number]) for plan in sent]
                 groups.extendleft(reversed([*alone, numbers]))
 
-    def _plans(self, numbers: deque[int], sent: deque[_Plan], failed: list[Failure]) -> Iterator[_Plan]:
+    def _plans(self, numbers: deque[int], sent: deque[_PlannedImage], failed: list[Failure]) -> Iterator[_PlannedImage]:
         """Take numbers, and append what is sent to be rendered."""
         while numbers:
             number = numbers.popleft()
             parameters = self._work.spec.parameters(number)
             try:
-                plan = _Plan(number, parameters, *self._maker.scene(parameters), self._before(number))
+                plan = _PlannedImage(number, parameters, *self._maker.scene(parameters), self._before(number))
             except DermisError as fault:
                 if not self._work.keep_going:
                     raise DermisError(f"image {number}: {fault}") from fault
@@ -171,7 +171,7 @@ class Worker:
             sent.append(plan)
             yield plan
 
-    def _observed(self, plans: Iterable[_Plan]) -> Iterator[Observation]:
+    def _observed(self, plans: Iterable[_PlannedImage]) -> Iterator[Observation]:
         """Yield the observation of each plan, frames in flight; those without a background have alpha."""
         spec = self._work.spec
         for alpha, group in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
@@ -196,7 +196,7 @@ class Worker:
             return None
 
 
-def serve(pipe: Connection, slot: WorkerSlot, work: Work) -> None:
+def serve(pipe: Connection, slot: WorkerSlot, work: RunOptions) -> None:
     """Render the shards that come through a pipe and send events, in a worker process."""
     if slot.threads:
         os.environ["LP_NUM_THREADS"] = str(slot.threads)  # before its driver is loaded
@@ -228,5 +228,5 @@ def _forward_notes(forward: Callable[[str], None]) -> None:
     warnings.showwarning = show
 
 
-def _encode(spec: Spec, number: int, observation: Observation, parameters: Parameters) -> Encoded:
+def _encode(spec: Spec, number: int, observation: Observation, parameters: Parameters) -> EncodedImage:
     return number, encode_record(number, observation, parameters, spec)

@@ -9,15 +9,15 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import connection
 
-from dermis.apps.batch.child_processes import Child, start
+from dermis.apps.batch.child_processes import ChildProcess, start
 from dermis.apps.batch.shards import Shard
-from dermis.apps.batch.worker import Work, WorkerEvent, WorkerSlot, serve
+from dermis.apps.batch.worker import RunOptions, WorkerEvent, WorkerSlot, serve
 from dermis.base.errors import DermisError
-from dermis.gpu.adapters import Adapter, alike_adapters
+from dermis.gpu.adapters import Adapter, similar_adapters
 
-MOST_ATTEMPTS = 3
+MAX_ATTEMPTS = 3
 """Attempts at a shard before it is given up."""
-_MOST_ENCODERS = 8  # of a worker: more wait for what it renders
+_MAX_ENCODERS = 8  # of a worker: more wait for what it renders
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class SlotRequest:
         Raises DermisError when one of them is not there.
         """
         if not self.numbers:
-            return alike_adapters(self.adapter)
-        return [alike_adapters(f"#{number}")[0] for number in self.numbers]
+            return similar_adapters(self.adapter)
+        return [similar_adapters(f"#{number}")[0] for number in self.numbers]
 
     def slots(self) -> tuple[list[WorkerSlot], int]:
         """Return a slot for each worker, in turn on each adapter, and the number of encoders of each.
@@ -57,7 +57,7 @@ class SlotRequest:
         usual = max(1, cores // 2) if software else len(adapters) * self.workers_per_gpu
         workers = self.workers or usual
         threads = max(1, cores // workers) if software else 0
-        encoders = 0 if software else min(_MOST_ENCODERS, max(1, cores // workers - 1))
+        encoders = 0 if software else min(_MAX_ENCODERS, max(1, cores // workers - 1))
         slots = [WorkerSlot(f"#{adapters[k % len(adapters)].number}", threads) for k in range(workers)]
         return slots, encoders if self.encoders is None else self.encoders
 
@@ -70,12 +70,12 @@ def available_cores() -> int:
 
 
 @dataclass(frozen=True)
-class Processes:
+class ProcessPool:
     """Crew of worker processes, one for each slot."""
 
     slots: Sequence[WorkerSlot]
 
-    def render(self, work: Work, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    def render(self, work: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Render the shards and yield events as they happen.
 
         Raises DermisError for what no worker can mend, with all of them ended.
@@ -98,14 +98,14 @@ class _Process:
     """Worker process in its slot, and the shard that it renders."""
 
     slot: WorkerSlot
-    child: Child
+    child: ChildProcess
     shard: Shard
 
 
 class _Pool:
     """State of a run: the worker processes, and the shards that wait for one."""
 
-    def __init__(self, work: Work, shards: Sequence[Shard]) -> None:
+    def __init__(self, work: RunOptions, shards: Sequence[Shard]) -> None:
         self._work, self._waiting, self._begun = work, deque(shards), Counter[int]()
         self.workers: list[_Process] = []
 
@@ -129,10 +129,10 @@ class _Pool:
             raise DermisError(event.refusal)
         if event.retry:
             self._dismiss(worker)
-            if self._begun[worker.shard.index] >= MOST_ATTEMPTS:
+            if self._begun[worker.shard.index] >= MAX_ATTEMPTS:
                 expected = f"shard {worker.shard.index}: expected a worker to draw it"
                 raise DermisError(
-                    f"{expected}, but {MOST_ATTEMPTS} failed, the last one so: {event.retry}. "
+                    f"{expected}, but {MAX_ATTEMPTS} failed, the last one so: {event.retry}. "
                     "What is whole is kept; give the command again to go on."
                 )
             self._waiting.appendleft(worker.shard)

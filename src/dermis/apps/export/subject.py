@@ -98,10 +98,10 @@ class Subject:
     def eye_pictures(self) -> EyePictures | None:
         """Return what the eyes of the shape look like, painted on a device; None for a shape without eyes."""
         from dermis.frame.features.surface.painting.painted_head import eye_pictures
-        from dermis.gpu.failures import on_device
+        from dermis.gpu.failures import run_on_device
 
         eyes = self.shape.eyes
-        return None if eyes is None else on_device("auto", lambda device: eye_pictures(device, eyes.look))
+        return None if eyes is None else run_on_device("auto", lambda device: eye_pictures(device, eyes.look))
 
     def painted(self, side: int, adapter: str) -> Subject:
         """Return the subject with all maps of its head as arrays; itself where nothing has to be painted.
@@ -113,9 +113,9 @@ class Subject:
         if self.scene is None or head is None or not head.maps.painted:
             return self
         from dermis.frame.features.surface.painting.painted_head import with_painted_maps
-        from dermis.gpu.failures import on_device
+        from dermis.gpu.failures import run_on_device
 
-        made = on_device(adapter, lambda device: with_painted_maps(device, head, side))
+        made = run_on_device(adapter, lambda device: with_painted_maps(device, head, side))
         return replace(self, scene=replace(self.scene, head=made))
 
     def map_pictures(self) -> dict[str, bytes]:
@@ -193,6 +193,6 @@ def true_curve(skin: Skin, model: ModelName | None = None) -> tuple[Curve, str, 
 def _profile(tissue: Tissue, model: ModelName) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model)
-    from dermis.apps.truths.slab_mc import counted_profile
+    from dermis.apps.truths.slab_mc import monte_carlo_profile
 
-    return counted_profile(tissue.medium, tissue.rgb, _PHOTONS)
+    return monte_carlo_profile(tissue.medium, tissue.rgb, _PHOTONS)

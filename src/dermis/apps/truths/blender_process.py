@@ -11,13 +11,13 @@ from typing import NamedTuple, NoReturn
 from dermis.base.errors import refuse
 
 PYTHON_VARIABLE = "DERMIS_BLENDER_PYTHON"
-_REMEDY = (
+_INSTALL_HINT = (
     f"Set {PYTHON_VARIABLE} to a Python with bpy, kept apart since bpy wants numpy below 2: "
     'python3.11 -m venv blender && blender/bin/pip install bpy "numpy<2"'
 )
 
 
-class Errand(NamedTuple):
+class BlenderTask(NamedTuple):
     """What Blender is to do, as messages say it.
 
     who : does it
@@ -44,7 +44,7 @@ def blender_python(python: str | Path | None = None) -> Path:
 
 
 def run_blender(
-    python: Path, script: Path, arguments: Sequence[str], longest_s: float, errand: Errand
+    python: Path, script: Path, arguments: Sequence[str], longest_s: float, errand: BlenderTask
 ) -> None:
     """Run a script in Blender's Python, isolated from the modules beside it and from the user's.
 
@@ -59,10 +59,10 @@ def run_blender(
         came = f"it was ended after {longest_s:.0f} s"
         refuse(errand.who, errand.task, came, "Take fewer samples or a smaller image")
     if ran.returncode != 0:
-        _refuse_end(python, ran, errand)
+        _refuse_exit(python, ran, errand)
 
 
-def _refuse_end(python: Path, ran: subprocess.CompletedProcess[bytes], errand: Errand) -> NoReturn:
+def _refuse_exit(python: Path, ran: subprocess.CompletedProcess[bytes], errand: BlenderTask) -> NoReturn:
     said = (ran.stderr.strip() or ran.stdout.strip()).decode("utf-8", "replace").splitlines()
     last = said[-1] if said else "it said nothing"
     if "No module named" in last:
@@ -72,4 +72,4 @@ def _refuse_end(python: Path, ran: subprocess.CompletedProcess[bytes], errand: E
 
 
 def _refuse_python(came: str) -> NoReturn:
-    refuse("Cycles", "a Python that has Blender's module bpy", came, _REMEDY)
+    refuse("Cycles", "a Python that has Blender's module bpy", came, _INSTALL_HINT)

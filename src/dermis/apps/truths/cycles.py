@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.blender_process import PYTHON_VARIABLE as PYTHON_VARIABLE
-from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
-from dermis.apps.truths.scene_description import UNIT_MM, Described, check_lens, cycles_looking, world
+from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
+from dermis.apps.truths.scene_description import UNIT_MM, SceneDict, check_camera, cycles_look_at, cycles_world
 from dermis.apps.truths.half_space import diffuse_albedo
-from dermis.apps.truths.lights import lamp
+from dermis.apps.truths.lights import cycles_lamp
 from dermis.apps.truths.mitsuba_scene import Lambertian
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.base.errors import DermisError, refuse
@@ -33,9 +33,9 @@ from dermis.specular.fresnel import SKIN_ETA
 Floats = NDArray[np.float32]
 Numbers = NDArray[np.generic]
 Method = Literal["random-walk", "burley"]
-_PASSES = 4
-_ERRAND = Errand("Cycles", "to render the scene", "Try bpy 5.0, which this was made with")
-_START_S, _PATH_S = 300.0, 5e-4
+_PASS_COUNT = 4
+_TASK = BlenderTask("Cycles", "to render the scene", "Try bpy 5.0, which this was made with")
+_MAX_START_S, _MAX_PATH_S = 300.0, 5e-4
 """Time limits for the start and for each path: a hundred times what two cores took."""
 
 
@@ -61,7 +61,7 @@ class CyclesPass:
 
 def cycles_render(
     scene: Scene,
-    medium: Below,
+    medium: SkinMaterial,
     samples: int = 64,
     settings: Settings | None = None,
     *,
@@ -73,22 +73,22 @@ def cycles_render(
     samples : at least this many paths through each pixel
     """
     _check_samples(samples)
-    each = -(-int(samples) // _PASSES)
-    passes = cycles_passes(scene, medium, [each] * _PASSES, settings, method=method, python=python)
+    each = -(-int(samples) // _PASS_COUNT)
+    passes = cycles_passes(scene, medium, [each] * _PASS_COUNT, settings, method=method, python=python)
     images = np.stack([one.image for one in passes]).astype(np.float64)
     coverage = np.stack([one.coverage for one in passes]).astype(np.float64)
     return PathTraced(
         images.mean(axis=0).astype(np.float32),
-        (images.var(axis=0, ddof=1) / _PASSES).astype(np.float32),
+        (images.var(axis=0, ddof=1) / _PASS_COUNT).astype(np.float32),
         coverage.mean(axis=0).astype(np.float32),
-        each * _PASSES,
+        each * _PASS_COUNT,
         sum(one.seconds for one in passes),
     )
 
 
 def cycles_passes(
     scene: Scene,
-    medium: Below,
+    medium: SkinMaterial,
     samples: Sequence[int],
     settings: Settings | None = None,
     *,
@@ -115,7 +115,7 @@ def cycles_passes(
     if method not in FALLOFFS:
         refuse("method", f"one of {', '.join(FALLOFFS)}", f"{method!r} came", "Correct it")
     size = (settings or Settings()).size
-    described, arrays = describe(scene, medium, method, size)
+    described, arrays = describe_scene(scene, medium, method, size)
     described["passes"] = [{"samples": int(n), "seed": seed + k} for k, n in enumerate(samples)]
     interpreter = blender_python(python)
     with tempfile.TemporaryDirectory(prefix="dermis-cycles-") as name:
@@ -130,7 +130,7 @@ def _check_samples(samples: int) -> None:
         refuse("samples", "a whole number from 1", f"{samples} came", "Correct it")
 
 
-def _write_scene(folder: Path, described: Described, arrays: Mapping[str, Numbers]) -> None:
+def _write_scene(folder: Path, described: SceneDict, arrays: Mapping[str, Numbers]) -> None:
     (folder / "scene.json").write_text(json.dumps(described), encoding="utf-8")
     np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its last parameter is no array
 
@@ -141,7 +141,7 @@ def _run_cycles(python: Path, folder: Path, paths: int) -> None:
     paths : to be traced, which sets the time limit
     """
     script = Path(__file__).with_name("cycles_script.py")
-    run_blender(python, script, [str(folder)], _START_S + _PATH_S * paths, _ERRAND)
+    run_blender(python, script, [str(folder)], _MAX_START_S + _MAX_PATH_S * paths, _TASK)
 
 
 def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> list[CyclesPass]:
@@ -170,11 +170,11 @@ def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> 
 
 
 def _refuse_render(came: str) -> NoReturn:
-    refuse(_ERRAND.who, _ERRAND.task, came, _ERRAND.remedy)
+    refuse(_TASK.who, _TASK.task, came, _TASK.remedy)
 
 
 @dataclass(frozen=True)
-class Facets:
+class BeckmannSurface:
     """A surface alone, over black: a boundary of index 1.4 cut into Beckmann's facets.
 
     The head's normal map is on it.
@@ -186,7 +186,7 @@ class Facets:
 
 
 @dataclass(frozen=True, eq=False)
-class Coated:
+class PrincipledSkin:
     """Skin as a Blender user makes it: Principled, a random walk under a rough boundary of index 1.4.
 
     The head's normal map is on it. Cycles has GGX's facets there; what they reflect does not enter.
@@ -201,23 +201,23 @@ class Coated:
     roughness: float
 
 
-Below = Medium | Lambertian | Facets | Coated
+SkinMaterial = Medium | Lambertian | BeckmannSurface | PrincipledSkin
 FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 """Our names of Cycles' methods of subsurface scattering."""
 
 
-def describe(
-    scene: Scene, medium: Below, method: str, size: tuple[int, int]
-) -> tuple[Described, dict[str, Numbers]]:
+def describe_scene(
+    scene: Scene, medium: SkinMaterial, method: str, size: tuple[int, int]
+) -> tuple[SceneDict, dict[str, Numbers]]:
     """Return the contents of scene.json without the passes, and the arrays beside it."""
-    around, panorama = world(scene.environment)
+    around, panorama = cycles_world(scene.environment)
     described = {
         "materials": _materials(scene.head, medium, method),
-        "lights": [lamp(light, number) for number, light in enumerate(scene.lights, start=1)],
+        "lights": [cycles_lamp(light, number) for number, light in enumerate(scene.lights, start=1)],
         "world": around,
-        "camera": camera_of(scene),
+        "camera": cycles_camera(scene),
         "size": list(size),
-        "direct": isinstance(medium, Lambertian | Facets),
+        "direct": isinstance(medium, Lambertian | BeckmannSurface),
     }
     mesh = scene.head.mesh
     arrays: dict[str, Numbers] = {
@@ -226,9 +226,9 @@ def describe(
         "triangles": mesh.triangles,
         "material": mesh.material,
     }
-    if isinstance(medium, Facets | Coated) and scene.head.maps.normal is not None:
+    if isinstance(medium, BeckmannSurface | PrincipledSkin) and scene.head.maps.normal is not None:
         arrays |= {"uv": mesh.uv, "normal_map": _normal_map(scene.head.maps.normal)}
-    if isinstance(medium, Coated):
+    if isinstance(medium, PrincipledSkin):
         arrays |= {"uv": mesh.uv, "colour_map": medium.colour}
     return described, arrays | panorama
 
@@ -240,19 +240,19 @@ def _normal_map(slopes: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(0.5 + 0.5 * normal, np.float32)
 
 
-def _materials(head: Head, medium: Below, method: str) -> list[Described]:
-    skin = _skin(medium, method)
+def _materials(head: Head, medium: SkinMaterial, method: str) -> list[SceneDict]:
+    skin = _skin_material(medium, method)
     return [
-        {"name": material.name, **(skin if material.kind == "skin" else _diffuse(material.colour))}
+        {"name": material.name, **(skin if material.kind == "skin" else _diffuse_material(material.colour))}
         for material in head.mesh.materials
     ]
 
 
-def _diffuse(colour: Sequence[float]) -> Described:
+def _diffuse_material(colour: Sequence[float]) -> SceneDict:
     return {"method": "DIFFUSE", "colour": [float(part) for part in colour]}
 
 
-def _skin(medium: Below, method: str) -> Described:
+def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
     """Return skin with the diffuse reflectance of a half-space as colour, 4 pi mean free paths as radius.
 
     Cycles divides radii by 4 pi, and finds the walk's albedo from the colour by a fit whose inverse is
@@ -261,11 +261,11 @@ def _skin(medium: Below, method: str) -> Described:
     ball under even light returns its colour within 3 % by the walk, within 0.5 % by the profile.
     """
     if isinstance(medium, Lambertian):
-        return _diffuse(medium.albedo)
-    if isinstance(medium, Facets):
+        return _diffuse_material(medium.albedo)
+    if isinstance(medium, BeckmannSurface):
         # Blender's number is the root of Beckmann's
         return {"method": "FACETS", "roughness": float(np.sqrt(medium.roughness)), "ior": SKIN_ETA}
-    if isinstance(medium, Coated):
+    if isinstance(medium, PrincipledSkin):
         radius = [part / UNIT_MM for part in medium.radius_mm]
         return {
             "method": "COATED",
@@ -282,15 +282,15 @@ def _skin(medium: Below, method: str) -> Described:
     return {"method": FALLOFFS[method], "colour": colour, "radius": walk.tolist()}
 
 
-def camera_of(scene: Scene) -> Described:
+def cycles_camera(scene: Scene) -> SceneDict:
     """Return the camera in Cycles' units.
 
     Raises DermisError for lenses that Cycles has not.
     """
     camera = scene.camera
-    check_lens(camera, "Cycles")
+    check_camera(camera, "Cycles")
     path = np.subtract(camera.target, camera.position)
     return {
-        "to_world": cycles_looking(camera.position, path, camera.up),
+        "to_world": cycles_look_at(camera.position, path, camera.up),
         "half_tangent": camera.half_tangent,
     }

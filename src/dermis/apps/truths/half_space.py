@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.base.errors import refuse
 
 Floats = NDArray[np.float64]
-_NODES = 64
-_ROUNDS = 500
+_NODE_COUNT = 64
+_ITERATIONS = 500
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
@@ -21,10 +21,10 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
     """
     if not 0.0 <= albedo < 1.0:
         refuse("half-space", "an albedo from 0 to below 1", f"{albedo:g} came", "Correct it")
-    mu, weight = _nodes()
+    mu, weight = _gauss_legendre()
     kernel, rest = 0.5 * albedo * weight * mu, np.sqrt(1.0 - albedo)
-    H = np.ones(_NODES)
-    for _ in range(_ROUNDS):
+    H = np.ones(_NODE_COUNT)
+    for _ in range(_ITERATIONS):
         H = 0.5 * (H + 1.0 / (rest + (kernel * H / (mu[:, None] + mu)).sum(axis=1)))
     at = np.asarray(cosine, np.float64)[..., None]
     return np.asarray(1.0 / (rest + (kernel * H / (at + mu)).sum(axis=-1)))
@@ -37,7 +37,7 @@ def directional_albedo(cosine: ArrayLike, albedo: float) -> Floats:
 
 def diffuse_albedo(albedo: float) -> float:
     """Return the share of uniform light from all directions that is reflected [-]."""
-    mu, weight = _nodes()
+    mu, weight = _gauss_legendre()
     return float((2.0 * weight * mu * directional_albedo(mu, albedo)).sum())
 
 
@@ -51,7 +51,7 @@ def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: floa
     return np.asarray(albedo / (4.0 * np.pi) * H / (mu + view))
 
 
-def _nodes() -> tuple[Floats, Floats]:
+def _gauss_legendre() -> tuple[Floats, Floats]:
     """Return nodes and weights on [0, 1]."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(_NODE_COUNT)
     return 0.5 * (nodes + 1.0), 0.5 * weights

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.triangles import Floats, Index, divide, sides
+from dermis.apps.truths.triangles import Floats, Index, split_triangles, triangle_edges
 from dermis.base.errors import refuse
 from dermis.mesh.mesh import Mesh
 
 
 @dataclass(frozen=True)
-class Places:
+class MeshPoints:
     """Points on a mesh.
 
     positions : (n, 3) [mm]
@@ -31,7 +31,7 @@ class Places:
         return _interpolate(values[mesh.triangles[self.face]], self.barycentric)
 
 
-Light = Callable[[Places], Floats]
+IrradianceFunction = Callable[[MeshPoints], Floats]
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class IrradianceSamples:
 
 
 def sample_irradiance(
-    mesh: Mesh, light: Light, spacing_mm: float, finest_mm: float | None = None, contrast: float = 0.05
+    mesh: Mesh, light: IrradianceFunction, spacing_mm: float, finest_mm: float | None = None, contrast: float = 0.05
 ) -> IrradianceSamples:
     """Return samples on the skin of a mesh, whose flat triangles are subdivided, not smoothed.
 
@@ -81,22 +81,22 @@ def sample_irradiance(
     if not (spacing_mm > 0 and (finest_mm is None or 0 < finest_mm <= spacing_mm) and contrast > 0):
         came = f"{spacing_mm}, {finest_mm} and {contrast} came"
         refuse("irradiance samples", "spacing >= finest > 0 and a contrast above 0", came, "Correct them")
-    pieces = _cut_to(_skin_of(mesh), spacing_mm)
-    irradiance = light(_places(pieces))
+    pieces = _subdivide_to(_skin_triangles(mesh), spacing_mm)
+    irradiance = light(_sample_points(pieces))
     while finest_mm is not None:
-        ends, side, length = _sides(pieces)
+        ends, side, length = _edge_lengths(pieces)
         change = np.abs(irradiance[ends[:, 0]] - irradiance[ends[:, 1]]).max(axis=1)
         uneven = (length >= 2 * finest_mm) & (change > contrast * irradiance.max())
         if not uneven.any():
             break
         known = len(irradiance)
-        pieces = _bisected(pieces, side, _with_longest(side, length, uneven))
-        irradiance = np.vstack((irradiance, light(_places(pieces, known))))
-    return IrradianceSamples(_places(pieces).positions, pieces.corners, irradiance)
+        pieces = _bisect(pieces, side, _add_longest_sides(side, length, uneven))
+        irradiance = np.vstack((irradiance, light(_sample_points(pieces, known))))
+    return IrradianceSamples(_sample_points(pieces).positions, pieces.corners, irradiance)
 
 
 @dataclass(frozen=True)
-class _Pieces:
+class _Subdivision:
     """Small triangles.
 
     corners : (m, 3) of samples
@@ -119,29 +119,29 @@ def _interpolate(corners: NDArray[np.floating], barycentric: Floats) -> Floats:
     return at
 
 
-def _skin_of(mesh: Mesh) -> _Pieces:
+def _skin_triangles(mesh: Mesh) -> _Subdivision:
     kinds = np.array([material.kind == "skin" for material in mesh.materials])
     face = np.flatnonzero(kinds[mesh.material])
     if not len(face):
         refuse("irradiance samples", "a mesh with skin", "all of its materials are opaque", "Check the mesh")
     _, corners = np.unique(mesh.triangles[face], return_inverse=True)
     barycentric = np.broadcast_to(np.eye(3), (len(face), 3, 3)).copy()
-    return _Pieces(mesh, corners.reshape(-1, 3).astype(np.int64), face, barycentric)
+    return _Subdivision(mesh, corners.reshape(-1, 3).astype(np.int64), face, barycentric)
 
 
-def _cut_to(pieces: _Pieces, spacing_mm: float) -> _Pieces:
+def _subdivide_to(pieces: _Subdivision, spacing_mm: float) -> _Subdivision:
     while True:
-        _, side, length = _sides(pieces)
+        _, side, length = _edge_lengths(pieces)
         if not (length > spacing_mm).any():
             return pieces
-        pieces = _bisected(pieces, side, length > spacing_mm)
+        pieces = _bisect(pieces, side, length > spacing_mm)
 
 
-def _sides(pieces: _Pieces) -> tuple[Index, Index, Floats]:
-    return sides(_places(pieces).positions, pieces.corners)
+def _edge_lengths(pieces: _Subdivision) -> tuple[Index, Index, Floats]:
+    return triangle_edges(_sample_points(pieces).positions, pieces.corners)
 
 
-def _with_longest(side: Index, length: Floats, cut: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _add_longest_sides(side: Index, length: Floats, cut: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the edges to halve and the longest side of each of their triangles, which keeps them compact."""
     longest = np.take_along_axis(side, length[side].argmax(axis=1)[:, None], axis=1)[:, 0]
     cut = cut.copy()
@@ -150,14 +150,14 @@ def _with_longest(side: Index, length: Floats, cut: NDArray[np.bool_]) -> NDArra
     return cut
 
 
-def _bisected(pieces: _Pieces, side: Index, cut: NDArray[np.bool_]) -> _Pieces:
+def _bisect(pieces: _Subdivision, side: Index, cut: NDArray[np.bool_]) -> _Subdivision:
     """Return the pieces with these edges (e,) halved, alike for both triangles on an edge."""
     number = pieces.count + np.cumsum(cut) - 1
-    corners, source, barycentric = divide(pieces.corners, pieces.barycentric, np.where(cut, number, -1)[side])
-    return _Pieces(pieces.mesh, corners, pieces.face[source], barycentric)
+    corners, source, barycentric = split_triangles(pieces.corners, pieces.barycentric, np.where(cut, number, -1)[side])
+    return _Subdivision(pieces.mesh, corners, pieces.face[source], barycentric)
 
 
-def _places(pieces: _Pieces, first: int = 0) -> Places:
+def _sample_points(pieces: _Subdivision, first: int = 0) -> MeshPoints:
     """Return the samples from index `first` on."""
     count = pieces.count
     face, barycentric = np.empty(count, np.int64), np.empty((count, 3))
@@ -165,4 +165,4 @@ def _places(pieces: _Pieces, first: int = 0) -> Places:
     barycentric[pieces.corners] = pieces.barycentric
     face, barycentric = face[first:], barycentric[first:]
     mesh = pieces.mesh
-    return Places(_interpolate(mesh.positions[mesh.triangles[face]], barycentric), face, barycentric)
+    return MeshPoints(_interpolate(mesh.positions[mesh.triangles[face]], barycentric), face, barycentric)

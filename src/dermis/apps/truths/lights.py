@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.scene_description import UNIT_MM, Described, Mitsuba, cycles_axes, cycles_light, mitsuba_looking, mitsuba_projector, mitsuba_shape, rgb
+from dermis.apps.truths.scene_description import UNIT_MM, SceneDict, Mitsuba, camera_axes, cycles_light, mitsuba_look_at, mitsuba_projector, mitsuba_shape, rgb
 from dermis.base.errors import refuse
 from dermis.base.registry import Registry
 from dermis.scene.lights import (
@@ -22,16 +22,16 @@ from dermis.scene.lights import (
 )
 
 Floats = NDArray[np.float64]
-_FAR_MM = 2e5
+_DISTANT_MM = 2e5
 """Distance of what stands for parallel light: irradiance changes by 0.1 % in 100 mm, and single precision
 places a stripe within 0.02 mm."""
-_SPOT_SIDE = 1024
-_STRIPE_REACH = 1.25  # widths to each side: there the Gaussian is 4e-6
+_SPOT_TEXELS = 1024
+_STRIPE_HALF_EXTENT = 1.25  # widths to each side: there the Gaussian is 4e-6
 _STRIPE_TEXELS = 40, 64  # least across a width and along the length
-_MOST_STRIPE_TEXELS = 2**23
+_MAX_STRIPE_TEXELS = 2**23
 
 
-def emitter(mi: Mitsuba, light: Light, number: int) -> Described:
+def mitsuba_emitter(mi: Mitsuba, light: Light, number: int) -> SceneDict:
     """Return Mitsuba's description of a light.
 
     mi : the module, with a variant set
@@ -44,7 +44,7 @@ def emitter(mi: Mitsuba, light: Light, number: int) -> Described:
     return MITSUBA[light.kind](mi, light, f"light {number}")
 
 
-def lamp(light: Light, number: int) -> Described:
+def cycles_lamp(light: Light, number: int) -> SceneDict:
     """Return Cycles' description of a light, in its units."""
     _check_shadows(light, number, "Cycles")
     return CYCLES[light.kind](light)
@@ -56,32 +56,32 @@ def _check_shadows(light: Light, number: int, judge: str) -> None:
         refuse(f"light {number}", f"a light with shadows, for {judge}", "it has shadows = false", remedy)
 
 
-def mitsuba_point(mi: Mitsuba, light: PointLight, called: str) -> Described:
+def mitsuba_point(mi: Mitsuba, light: PointLight, called: str) -> SceneDict:
     """Return Mitsuba's point light."""
     intensity = np.multiply(light.irradiance, _distance(light) ** 2)
     return {"type": "point", "position": list(light.position), "intensity": rgb(intensity)}
 
 
-def mitsuba_spot(mi: Mitsuba, light: SpotLight, called: str) -> Described:
+def mitsuba_spot(mi: Mitsuba, light: SpotLight, called: str) -> SceneDict:
     """Return a projector: Mitsuba's own spot fades evenly in the angle, ours smoothly in its cosine."""
     steepest = np.tan(np.radians(light.outer_degrees))
-    along = steepest * ((np.arange(_SPOT_SIDE) + 0.5) / _SPOT_SIDE * 2.0 - 1.0)
+    along = steepest * ((np.arange(_SPOT_TEXELS) + 0.5) / _SPOT_TEXELS * 2.0 - 1.0)
     cosine = 1.0 / np.sqrt(1.0 + along[:, None] ** 2 + along[None, :] ** 2)
     outer, inner = (np.cos(np.radians(a)) for a in (light.outer_degrees, light.inner_degrees))
     share = _smoothstep((cosine - outer) / (inner - outer))
     slide = share[..., None] * np.multiply(light.irradiance, _distance(light) ** 2)
-    return mitsuba_projector(mi, slide, cosine, mitsuba_looking(mi, light.position, light.target), steepest)
+    return mitsuba_projector(mi, slide, cosine, mitsuba_look_at(mi, light.position, light.target), steepest)
 
 
-def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, called: str) -> Described:
+def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, called: str) -> SceneDict:
     """Return an area light of even radiance."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
-    to_world = mitsuba_looking(mi, light.position, light.target).scale(sides)
+    to_world = mitsuba_look_at(mi, light.position, light.target).scale(sides)
     given = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
     return mitsuba_shape("rectangle", np.divide(light.irradiance, given), to_world=to_world)
 
 
-def mitsuba_sphere(mi: Mitsuba, light: SphereLight, called: str) -> Described:
+def mitsuba_sphere(mi: Mitsuba, light: SphereLight, called: str) -> SceneDict:
     """Return an area light of even radiance."""
     given = np.pi * (light.radius_mm / _distance(light)) ** 2
     return mitsuba_shape(
@@ -92,7 +92,7 @@ def mitsuba_sphere(mi: Mitsuba, light: SphereLight, called: str) -> Described:
     )
 
 
-def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, called: str) -> Described:
+def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, called: str) -> SceneDict:
     """Return Mitsuba's directional light, or a far disc for a sun of some width."""
     if light.angle_degrees == 0:
         return {
@@ -102,16 +102,16 @@ def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, called: str) -> De
         }
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
     half = 0.5 * np.radians(light.angle_degrees)
-    to_world = mitsuba_looking(mi, -_FAR_MM * direction, (0.0, 0.0, 0.0)).scale(float(_FAR_MM * np.tan(half)))
+    to_world = mitsuba_look_at(mi, -_DISTANT_MM * direction, (0.0, 0.0, 0.0)).scale(float(_DISTANT_MM * np.tan(half)))
     return mitsuba_shape("disk", np.divide(light.irradiance, np.pi * np.sin(half) ** 2), to_world=to_world)
 
 
-def mitsuba_stripe(mi: Mitsuba, light: StripeLight, called: str) -> Described:
+def mitsuba_stripe(mi: Mitsuba, light: StripeLight, called: str) -> SceneDict:
     """Return a far slide projector with the stripe as its slide."""
     width, length = light.width_mm, light.length_mm
-    size = np.array([2.0 * _STRIPE_REACH * width, length])
+    size = np.array([2.0 * _STRIPE_HALF_EXTENT * width, length])
     texel = min(width / _STRIPE_TEXELS[0], length / _STRIPE_TEXELS[1])
-    texel = max(texel, float(np.sqrt(size.prod() / _MOST_STRIPE_TEXELS)))
+    texel = max(texel, float(np.sqrt(size.prod() / _MAX_STRIPE_TEXELS)))
     if width < 10.0 * texel:
         came = f"it is {length:g} mm long and {width:g} mm wide"
         refuse(called, "a stripe less slender, for path tracing", came, "Shorten it")
@@ -122,30 +122,30 @@ def mitsuba_stripe(mi: Mitsuba, light: StripeLight, called: str) -> Described:
     with np.errstate(under="ignore"):
         profile = np.exp(-2.0 * across**2)
     share = (1.0 - _smoothstep((np.abs(along) - 0.95) / 0.05))[:, None] * profile[None, :]
-    slide = share[..., None] * np.multiply(light.irradiance, _FAR_MM**2)
+    slide = share[..., None] * np.multiply(light.irradiance, _DISTANT_MM**2)
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
-    to_world = mitsuba_looking(mi, light.position - _FAR_MM * direction, light.position, light.up)
-    return mitsuba_projector(mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _FAR_MM)
+    to_world = mitsuba_look_at(mi, light.position - _DISTANT_MM * direction, light.position, light.up)
+    return mitsuba_projector(mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _DISTANT_MM)
 
 
-def cycles_point(light: PointLight) -> Described:
+def cycles_point(light: PointLight) -> SceneDict:
     """Return a point light, whose power P gives the irradiance P / 4 pi d^2."""
-    return _lamp("POINT", light)
+    return _cycles_point_light("POINT", light)
 
 
-def cycles_spot(light: SpotLight) -> Described:
+def cycles_spot(light: SpotLight) -> SceneDict:
     """Return a spot light, whose cone fades in its cosine, as ours."""
     inner, outer = (float(np.cos(np.radians(a))) for a in (light.inner_degrees, light.outer_degrees))
     size, blend = 2.0 * np.radians(light.outer_degrees), (inner - outer) / (1.0 - outer)
-    return _lamp("SPOT", light, spot_size=size, spot_blend=blend)
+    return _cycles_point_light("SPOT", light, spot_size=size, spot_blend=blend)
 
 
-def cycles_sphere(light: SphereLight) -> Described:
+def cycles_sphere(light: SphereLight) -> SceneDict:
     """Return a point light with a radius."""
-    return _lamp("POINT", light, radius_mm=light.radius_mm)
+    return _cycles_point_light("POINT", light, radius_mm=light.radius_mm)
 
 
-def cycles_rectangle(light: RectangleLight) -> Described:
+def cycles_rectangle(light: RectangleLight) -> SceneDict:
     """Return an area light, whose power P gives a surface A the radiance P / pi A."""
     width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
     given = facing_irradiance(light.width_mm, light.height_mm, _distance(light)) / (np.pi * width * height)
@@ -154,27 +154,27 @@ def cycles_rectangle(light: RectangleLight) -> Described:
     return cycles_light("AREA", light.irradiance, 1.0 / given, light.position, path, **shape)
 
 
-def cycles_directional(light: DirectionalLight) -> Described:
+def cycles_directional(light: DirectionalLight) -> SceneDict:
     """Return a sun, as wide as the light's source."""
     angle = float(np.radians(light.angle_degrees))
     return cycles_light("SUN", light.irradiance, 1.0, (0, 0, 0), light.direction, angle=angle)
 
 
-def cycles_stripe(light: StripeLight) -> Described:
+def cycles_stripe(light: StripeLight) -> SceneDict:
     """Return a far point, on whose light the script paints the stripe."""
-    across, along, forward = cycles_axes(light.direction, light.up)
-    power = 4.0 * np.pi * (_FAR_MM / UNIT_MM) ** 2
-    place = light.position - _FAR_MM * forward
+    across, along, forward = camera_axes(light.direction, light.up)
+    power = 4.0 * np.pi * (_DISTANT_MM / UNIT_MM) ** 2
+    place = light.position - _DISTANT_MM * forward
     described = cycles_light("POINT", light.irradiance, power, place, light.direction, shadow_soft_size=0.0)
     axes = {
         "forward": (-forward).tolist(),
         "across": (across / (0.5 * light.width_mm)).tolist(),
         "along": (along / (0.5 * light.length_mm)).tolist(),
     }
-    return described | {"stripe": {**axes, "distance": _FAR_MM}}
+    return described | {"stripe": {**axes, "distance": _DISTANT_MM}}
 
 
-def _lamp(kind: str, light: PointLight, *, radius_mm: float = 0.0, **given: float) -> Described:
+def _cycles_point_light(kind: str, light: PointLight, *, radius_mm: float = 0.0, **given: float) -> SceneDict:
     power = 4.0 * np.pi * (_distance(light) / UNIT_MM) ** 2
     path = np.subtract(light.target, light.position)
     round_light = {"shadow_soft_size": radius_mm / UNIT_MM, "use_soft_falloff": False}
@@ -201,7 +201,7 @@ def _smoothstep(t: Floats) -> Floats:
 
 
 # Any: each function takes its own kind of light.
-MITSUBA: Registry[Callable[[Mitsuba, Any, str], Described]] = Registry(
+MITSUBA: Registry[Callable[[Mitsuba, Any, str], SceneDict]] = Registry(
     "light of Mitsuba",
     {
         "point": mitsuba_point,
@@ -216,7 +216,7 @@ MITSUBA: Registry[Callable[[Mitsuba, Any, str], Described]] = Registry(
 """What describes a kind of light for Mitsuba, given its module with a variant set, the light and its name for
 messages."""
 
-CYCLES: Registry[Callable[[Any], Described]] = Registry(
+CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
     "light of Cycles",
     {
         "point": cycles_point,

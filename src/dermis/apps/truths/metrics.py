@@ -69,14 +69,14 @@ def relative_rmse(
     variance. Only the first term is counted, because few passes estimate v² badly: the standard error is too
     large rather than too small.
     """
-    I, T, s2 = _pixels(image, truth, mask, variance)
-    v = np.zeros_like(I) if image_variance is None else _pixels(image, truth, mask, image_variance)[2]
+    I, T, s2 = _masked_pixels(image, truth, mask, variance)
+    v = np.zeros_like(I) if image_variance is None else _masked_pixels(image, truth, mask, image_variance)[2]
     D, energy = I - T, float((T**2 - s2).sum())
     if energy <= 0:
         refuse("relative error", "a truth that is brighter than its noise", "it is not", "Trace more paths")
     E = float((D**2 - s2 - v).sum()) / energy
     U = 4 * s2 * (D + E * T) ** 2 - 2 * (1 - E) ** 2 * s2**2 + 4 * v * D**2
-    error = _added(U) / energy
+    error = _sum_standard_error(U) / energy
     E = max(E, 0.0)
     low, root, high = np.sqrt([max(E - error, 0.0), E, E + error])
     return Estimate(float(root), float(max(high - root, root - low)))
@@ -90,20 +90,20 @@ def energy_ratio(
     The ratio's relative error is that of the truth's sum, whose variance is the sum of the variances;
     channels may share paths, so their deviations are added.
     """
-    I, T, s2 = _pixels(image, truth, mask, variance)
+    I, T, s2 = _masked_pixels(image, truth, mask, variance)
     total = float(T.sum())
     if total <= 0:
         refuse("energy ratio", "a truth with light in it", "its sum is not above 0", "Check the mask")
     ratio = float(I.sum()) / total
-    return Estimate(ratio, abs(ratio) * _added(s2) / total)
+    return Estimate(ratio, abs(ratio) * _sum_standard_error(s2) / total)
 
 
-def _added(variance: Floats) -> float:
+def _sum_standard_error(variance: Floats) -> float:
     """Return an upper bound of the deviation of a sum of pixels (n, c) with correlated channels."""
     return float(np.sqrt(np.maximum(variance.sum(axis=0), 0)).sum())
 
 
-def _pixels(
+def _masked_pixels(
     image: ArrayLike, truth: ArrayLike, mask: Mask | None, variance: ArrayLike | None
 ) -> tuple[Floats, Floats, Floats]:
     """Return image, truth and variance of the pixels that count, each (n, c)."""
@@ -112,14 +112,14 @@ def _pixels(
     if I.shape != T.shape or s2.shape != T.shape or I.ndim not in (2, 3):
         came = f"{I.shape}, {T.shape} and {s2.shape} came"
         refuse("metrics", "image, truth and variance of one shape, (h, w) or (h, w, c)", came, "Align them")
-    counted = _counted(mask, T.shape[:2])
+    counted = _checked_mask(mask, T.shape[:2])
     I, T, s2 = (values.reshape(*T.shape[:2], -1)[counted] for values in (I, T, s2))
     if not (np.isfinite(I).all() and np.isfinite(T).all() and np.isfinite(s2).all() and (s2 >= 0).all()):
         refuse("metrics", "finite values and variances of 0 or more", "others came", "Mask them out")
     return I, T, s2
 
 
-def _counted(mask: Mask | None, shape: tuple[int, ...]) -> Mask:
+def _checked_mask(mask: Mask | None, shape: tuple[int, ...]) -> Mask:
     counted = np.ones(shape, bool) if mask is None else np.asarray(mask, bool)
     if counted.shape != shape or not counted.any():
         came = f"{counted.shape} with {int(counted.sum())} pixels came"
@@ -146,9 +146,9 @@ def flip(
     Source: [Andersson2020], and [Andersson2021] for high dynamic range.
     """
     evaluator = needed("flip_evaluator", "FLIP")
-    T = _shown(truth, high_dynamic_range)
-    counted = _counted(mask, T.shape[:2])
-    I = np.where(counted[..., None], _shown(image, high_dynamic_range, T.shape), T)
+    T = _checked_picture(truth, high_dynamic_range)
+    counted = _checked_mask(mask, T.shape[:2])
+    I = np.where(counted[..., None], _checked_picture(image, high_dynamic_range, T.shape), T)
     mode = "HDR" if high_dynamic_range else "LDR"
     viewing = {"ppd": float(pixels_per_degree)}
     arrays = (np.ascontiguousarray(T), np.ascontiguousarray(I))
@@ -157,7 +157,7 @@ def flip(
     return Flip(float(error[counted].mean(dtype=np.float64)), error, float(pixels_per_degree))
 
 
-def _shown(
+def _checked_picture(
     picture: ArrayLike, high_dynamic_range: bool, shape: tuple[int, ...] | None = None
 ) -> NDArray[np.float32]:
     values = np.asarray(picture, np.float32)

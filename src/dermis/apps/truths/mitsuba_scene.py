@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.scene_description import Described, Mitsuba, MitsubaObject, check_lens, rgb, surroundings
-from dermis.apps.truths.lights import emitter
-from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
+from dermis.apps.truths.scene_description import SceneDict, Mitsuba, MitsubaObject, check_camera, rgb, mitsuba_environment
+from dermis.apps.truths.lights import mitsuba_emitter
+from dermis.apps.truths.mitsuba_solid import ClosedSurface, offset_inwards, closed_skin
 from dermis.base.errors import refuse
 from dermis.base.extras import needed
 from dermis.mesh.head import Head
@@ -26,12 +26,12 @@ ROULETTE_DEPTH = 100
 """Scatterings before Russian roulette. Earlier, it leaves few paths that carry much: red on skin2 then has
 nearly twice the variance in the same time, and with few samples its mean is 1 % low."""
 _DIRECT_DEPTH = 2
-_GAP = 0.97
+_GAP_STEPS = 0.97
 """Distance between the two surfaces that stand for a face, over the step by which Mitsuba moves a ray past a
 surface so as not to hit it again. That step skips 0.01 mm of medium on a head, which makes skin with a mean
 free path of 1 mm up to 1 % darker. With two surfaces a ray inwards passes the upper one and steps over the
 lower one, a ray outwards passes the lower one and steps over the upper one: only the gap is skipped."""
-_NOTABLE_FOLD = 1e-3
+_REPORTED_FOLD = 1e-3
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def load_mitsuba() -> Mitsuba:
 
 
 @contextmanager
-def variant_of(mi: Mitsuba, name: str) -> Iterator[None]:
+def mitsuba_variant(mi: Mitsuba, name: str) -> Iterator[None]:
     """Set a variant of Mitsuba; afterwards the caller's own is set again, if there was one."""
     before = mi.variant()
     mi.set_variant(name)
@@ -82,32 +82,32 @@ def radiance_scene(
     direct = {"max_depth": _DIRECT_DEPTH} if isinstance(medium, Lambertian) else {}
     # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True, **direct}
-    return lit_scene(mi, scene, integrator, shapes, size), notes
+    return mitsuba_scene(mi, scene, integrator, shapes, size), notes
 
 
-def lit_scene(
-    mi: Mitsuba, scene: Scene, integrator: Described, shapes: Described, size: tuple[int, int]
+def mitsuba_scene(
+    mi: Mitsuba, scene: Scene, integrator: SceneDict, shapes: SceneDict, size: tuple[int, int]
 ) -> MitsubaObject:
     """Return Mitsuba's scene of some shapes, in the lights and surroundings of ours and before its camera."""
-    lights = {f"light_{k}": emitter(mi, light, k) for k, light in enumerate(scene.lights, start=1)}
+    lights = {f"light_{k}": mitsuba_emitter(mi, light, k) for k, light in enumerate(scene.lights, start=1)}
     if scene.environment is not None:
-        lights["environment"] = surroundings(mi, scene.environment)
-    sensor = sensor_of(mi, scene.camera, size)
+        lights["environment"] = mitsuba_environment(mi, scene.environment)
+    sensor = mitsuba_sensor(mi, scene.camera, size)
     return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes, **lights})
 
 
-def share_scene(mi: Mitsuba, camera: Camera, size: tuple[int, int], shapes: Described) -> MitsubaObject:
+def coverage_scene(mi: Mitsuba, camera: Camera, size: tuple[int, int], shapes: SceneDict) -> MitsubaObject:
     """Return Mitsuba's scene whose image is the share of each pixel that shapes of radiance 1 fill."""
-    sensor = sensor_of(mi, camera, size, sampler="multijitter")
+    sensor = mitsuba_sensor(mi, camera, size, sampler="multijitter")
     return mi.load_dict(
         {"type": "scene", "integrator": {"type": "path", "max_depth": 1}, "sensor": sensor, **shapes}
     )
 
 
-def sensor_of(mi: Mitsuba, camera: Camera, size: tuple[int, int], sampler: str = "independent") -> Described:
+def mitsuba_sensor(mi: Mitsuba, camera: Camera, size: tuple[int, int], sampler: str = "independent") -> SceneDict:
     """Return Mitsuba's description of a camera whose pixels are even squares."""
     width, height = size
-    check_lens(camera, "Mitsuba")
+    check_camera(camera, "Mitsuba")
     view = ([float(c) for c in v] for v in (camera.position, camera.target, camera.up))
     film = {"width": width, "height": height, "pixel_format": "rgb", "component_format": "float32"}
     return {
@@ -122,42 +122,42 @@ def sensor_of(mi: Mitsuba, camera: Camera, size: tuple[int, int], sampler: str =
     }
 
 
-def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[Described, tuple[str, ...]]:
+def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[SceneDict, tuple[str, ...]]:
     """Return skin and opaque materials of a head, about its centre, by name, and notes on them."""
     opaque = {}
-    for k in _materials(head, "opaque"):
+    for k in _materials_of_kind(head, "opaque"):
         colour = rgb(head.mesh.materials[k].colour)
-        opaque[f"material_{k}"] = _sheet(mi, head, k, bsdf=_diffuse(mi, colour))
+        opaque[f"material_{k}"] = _material_mesh(mi, head, k, bsdf=_diffuse_bsdf(mi, colour))
     if isinstance(medium, Lambertian):
-        diffuse = _diffuse(mi, rgb(medium.albedo))
-        skin = {f"skin_{k}": _sheet(mi, head, k, bsdf=diffuse) for k in _materials(head, "skin")}
+        diffuse = _diffuse_bsdf(mi, rgb(medium.albedo))
+        skin = {f"skin_{k}": _material_mesh(mi, head, k, bsdf=diffuse) for k in _materials_of_kind(head, "skin")}
         return {**skin, **opaque}, ()
-    bodies, notes = _bodies(mi, head, medium)
+    bodies, notes = _layer_interfaces(mi, head, medium)
     return {**bodies, **opaque}, notes
 
 
-def glowing_skin(mi: Mitsuba, head: Head) -> Described:
+def emissive_skin(mi: Mitsuba, head: Head) -> SceneDict:
     """Return the head with skin that shines with radiance 1 and everything else black."""
     shapes = {}
     for k, material in enumerate(head.mesh.materials):
-        given = {"bsdf": _diffuse(mi, 0.0)}
+        given = {"bsdf": _diffuse_bsdf(mi, 0.0)}
         if material.kind == "skin":
             given["emitter"] = mi.load_dict({"type": "area", "radiance": 1.0})
         if (head.mesh.material == k).any():
-            shapes[f"part_{k}"] = _sheet(mi, head, k, **given)
+            shapes[f"part_{k}"] = _material_mesh(mi, head, k, **given)
     return shapes
 
 
-def _materials(head: Head, kind: str) -> list[int]:
+def _materials_of_kind(head: Head, kind: str) -> list[int]:
     kinds = [material.kind for material in head.mesh.materials]
     return [k for k in np.unique(head.mesh.material).tolist() if kinds[k] == kind]
 
 
-def _diffuse(mi: Mitsuba, reflectance: Described | float) -> MitsubaObject:
+def _diffuse_bsdf(mi: Mitsuba, reflectance: SceneDict | float) -> MitsubaObject:
     return mi.load_dict({"type": "diffuse", "reflectance": reflectance})
 
 
-def _sheet(mi: Mitsuba, head: Head, index: int, **given: MitsubaObject) -> MitsubaObject:
+def _material_mesh(mi: Mitsuba, head: Head, index: int, **given: MitsubaObject) -> MitsubaObject:
     """Return the triangles of a material with the head's own normals."""
     mesh = head.mesh
     used, corners = np.unique(mesh.triangles[mesh.material == index], return_inverse=True)
@@ -165,34 +165,34 @@ def _sheet(mi: Mitsuba, head: Head, index: int, **given: MitsubaObject) -> Mitsu
     return mesh_shape(mi, places, corners.reshape(-1, 3), mesh.normals[used], **given)
 
 
-def _bodies(mi: Mitsuba, head: Head, medium: Medium) -> tuple[Described, tuple[str, ...]]:
+def _layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict, tuple[str, ...]]:
     """Return surfaces around the skin and around what lies below each interface between its layers."""
-    skin = skin_solid(head.mesh, head.name)
+    skin = closed_skin(head.mesh, head.name)
     skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
     notes = [f"{skin.caps} openings shut, {skin.cap_area:.0f} mm2"] if skin.caps else []
-    gap = gap_of(mi, skin)
-    media: list[MitsubaObject] = [None, *(mi.load_dict(_homogeneous(layer)) for layer in medium.layers), None]
+    gap = interface_gap_mm(mi, skin)
+    media: list[MitsubaObject] = [None, *(mi.load_dict(_homogeneous_medium(layer)) for layer in medium.layers), None]
     shapes = {}
     depth = -gap
     for k, (above, below) in enumerate(pairwise(media)):
         if np.isinf(depth).any():
             break
         for side, where in (("upper", depth), ("lower", depth + gap)):
-            surface, folded = inwards(skin, where, head.name)
-            shapes[f"face_{k}_{side}"] = shell(mi, surface, {"exterior": above, "interior": below})
-        if folded > _NOTABLE_FOLD:
+            surface, folded = offset_inwards(skin, where, head.name)
+            shapes[f"face_{k}_{side}"] = interface_mesh(mi, surface, {"exterior": above, "interior": below})
+        if folded > _REPORTED_FOLD:
             notes.append(f"{folded:.1%} of the face under layer {k} is folded")
         if k < len(medium.layers):
             depth = depth + gap + medium.layers[k].thickness_mm
     return shapes, tuple(notes)
 
 
-def gap_of(mi: Mitsuba, skin: Solid) -> Doubles:
+def interface_gap_mm(mi: Mitsuba, skin: ClosedSurface) -> Doubles:
     """Return the (p,) distance between the two surfaces of a face of a solid about the origin [mm]."""
-    return np.asarray(_GAP * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
+    return np.asarray(_GAP_STEPS * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
 
 
-def _homogeneous(layer: Layer) -> Described:
+def _homogeneous_medium(layer: Layer) -> SceneDict:
     extinction = layer.sigma_t_prime
     # Textures hold at most 1, so the largest extinction goes into the scale.
     return {
@@ -204,7 +204,7 @@ def _homogeneous(layer: Layer) -> Described:
     }
 
 
-def shell(mi: Mitsuba, solid: Solid, media: Described) -> MitsubaObject:
+def interface_mesh(mi: Mitsuba, solid: ClosedSurface, media: SceneDict) -> MitsubaObject:
     """Return a surface that only separates media: exterior and interior, None for none."""
     filled = {side: medium for side, medium in media.items() if medium is not None}
     return mesh_shape(
@@ -234,11 +234,11 @@ def mesh_shape(
     arrays = {"vertex_positions": places, "vertex_normals": normals, "vertex_texcoords": uv}
     for name, values in arrays.items():
         if values is not None:
-            parameters[name] = _flat(values, np.float32)
-    parameters["faces"] = _flat(triangles, np.uint32)
+            parameters[name] = _flattened(values, np.float32)
+    parameters["faces"] = _flattened(triangles, np.uint32)
     parameters.update()
     return mesh
 
 
-def _flat(values: Numbers, kind: type[np.generic]) -> Numbers:
+def _flattened(values: Numbers, kind: type[np.generic]) -> Numbers:
     return np.ascontiguousarray(values, dtype=kind).ravel()

@@ -14,12 +14,12 @@ from dermis.mesh.mesh import Mesh
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int32]
-_LEAST_DEPTH_MM = 0.05  # of a body of volume V and surface A: 3 V / A, a ball's radius
-_MOST_FOLDED = 0.02
+_MIN_DEPTH_MM = 0.05  # of a body of volume V and surface A: 3 V / A, a ball's radius
+_MAX_FOLDED = 0.02
 
 
 @dataclass(frozen=True)
-class Solid:
+class ClosedSurface:
     """A closed surface.
 
     positions : (p, 3) [mm]
@@ -33,7 +33,7 @@ class Solid:
     cap_area: float = 0.0
 
 
-def skin_solid(mesh: Mesh, culprit: str) -> Solid:
+def closed_skin(mesh: Mesh, culprit: str) -> ClosedSurface:
     """Return the welded skin of a mesh, each opening shut by a fan of triangles around its middle.
 
     culprit : the head's name, for messages
@@ -44,16 +44,16 @@ def skin_solid(mesh: Mesh, culprit: str) -> Solid:
     if not skin.any():
         refuse(culprit, "skin to trace", "all of its groups are opaque", "Leave a group out of opaque")
     used, triangles = np.unique(mesh.point[mesh.triangles[skin]], return_inverse=True)
-    solid = _shut(mesh.points_mm[used].astype(np.float32), triangles.reshape(-1, 3).astype(np.int32))
+    solid = _close_openings(mesh.points_mm[used].astype(np.float32), triangles.reshape(-1, 3).astype(np.int32))
     corners = solid.positions[solid.triangles].astype(np.float64)
-    depth = 3.0 * _volume(corners) / float(triangle_areas(corners).sum())
-    if depth < _LEAST_DEPTH_MM:
+    depth = 3.0 * _enclosed_volume(corners) / float(triangle_areas(corners).sum())
+    if depth < _MIN_DEPTH_MM:
         came = "it is a sheet or inside out" if depth < 0.0 else f"it is {depth:.2g} mm deep in the mean"
         refuse(culprit, "a surface with a volume behind it", came, "Close it, or turn its triangles round")
     return solid
 
 
-def inwards(solid: Solid, depth_mm: Doubles, culprit: str) -> tuple[Solid, float]:
+def offset_inwards(solid: ClosedSurface, depth_mm: Doubles, culprit: str) -> tuple[ClosedSurface, float]:
     """Move a surface inwards by a depth at each point; return it and the share that folds over.
 
     depth_mm : (p,) negative for outwards
@@ -61,12 +61,12 @@ def inwards(solid: Solid, depth_mm: Doubles, culprit: str) -> tuple[Solid, float
     Raises DermisError when more than 2 % of the surface folds over, or no volume is left. It does not notice
     thin parts whose two sides pass through one another: none may be thinner than twice the depth.
     """
-    moved = (solid.positions - depth_mm[:, None] * _mitres(solid)).astype(np.float32)
-    before, after = (_cross(places[solid.triangles]) for places in (solid.positions, moved))
+    moved = (solid.positions - depth_mm[:, None] * _mitre_vectors(solid)).astype(np.float32)
+    before, after = (_area_vectors(places[solid.triangles]) for places in (solid.positions, moved))
     area = np.linalg.norm(before, axis=1)
     folded = float(area[(before * after).sum(axis=1) <= 0.0].sum() / area.sum())
-    empty = _volume(moved[solid.triangles].astype(np.float64)) <= 0.0
-    if empty or folded > _MOST_FOLDED:
+    empty = _enclosed_volume(moved[solid.triangles].astype(np.float64)) <= 0.0
+    if empty or folded > _MAX_FOLDED:
         came = "nothing is left of it" if empty else f"{folded:.1%} of the surface folds over"
         remedy = "Trace its layers as one medium"
         where = f"a body deeper than its layers, moved {depth_mm.mean():.2g} mm inwards"
@@ -74,11 +74,11 @@ def inwards(solid: Solid, depth_mm: Doubles, culprit: str) -> tuple[Solid, float
     return replace(solid, positions=moved), folded
 
 
-def _mitres(solid: Solid) -> Doubles:
+def _mitre_vectors(solid: ClosedSurface) -> Doubles:
     """Return (p, 3) steps outwards that move the faces around a point by 1; at most 2 long."""
     points = np.arange(len(solid.positions), dtype=np.int32)
     normals = vertex_normals(solid.positions, points, solid.triangles).astype(np.float64)
-    face = _cross(solid.positions[solid.triangles])
+    face = _area_vectors(solid.positions[solid.triangles])
     face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
     corner = solid.triangles.ravel()
     along = (normals[corner] * np.repeat(face, 3, axis=0)).sum(axis=1)
@@ -87,11 +87,11 @@ def _mitres(solid: Solid) -> Doubles:
     return normals / np.maximum(cosine, 0.5)[:, None]
 
 
-def _shut(positions: Floats, triangles: Index) -> Solid:
-    open_sides = _open_sides(triangles, len(positions))
+def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
+    open_sides = _boundary_edges(triangles, len(positions))
     if not len(open_sides):
-        return Solid(positions, triangles)
-    group = _connected(open_sides)
+        return ClosedSurface(positions, triangles)
+    group = _edge_components(open_sides)
     names, opening = np.unique(group, return_inverse=True)
     middles = np.stack(
         [positions[open_sides[opening == k]].mean(axis=(0, 1)) for k in range(len(names))]
@@ -99,10 +99,10 @@ def _shut(positions: Floats, triangles: Index) -> Solid:
     apex = (len(positions) + opening).astype(np.int32)
     fan = np.column_stack((open_sides[:, 1], open_sides[:, 0], apex)).astype(np.int32)
     places = np.vstack((positions, middles))
-    return Solid(places, np.vstack((triangles, fan)), len(names), float(triangle_areas(places[fan]).sum()))
+    return ClosedSurface(places, np.vstack((triangles, fan)), len(names), float(triangle_areas(places[fan]).sum()))
 
 
-def _open_sides(triangles: Index, count: int) -> NDArray[np.int64]:
+def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:
     """Return (n, 2) directed sides that no triangle traverses the other way, as often as they lack one."""
     sides = np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])).astype(np.int64)
     low, high = sides.min(axis=1), sides.max(axis=1)
@@ -113,7 +113,7 @@ def _open_sides(triangles: Index, count: int) -> NDArray[np.int64]:
     return np.repeat(directed, np.abs(surplus), axis=0)
 
 
-def _connected(sides: NDArray[np.int64]) -> NDArray[np.int64]:
+def _edge_components(sides: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return (n,) the connected component of each side, as a number."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -125,13 +125,13 @@ def _connected(sides: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(label[a], np.int64)
 
 
-def _cross(corners: Floats) -> Doubles:
+def _area_vectors(corners: Floats) -> Doubles:
     """Return twice the area of each triangle along its normal; corners : (f, 3, 3)."""
     places = corners.astype(np.float64)
     return np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
 
 
-def _volume(corners: Doubles) -> float:
+def _enclosed_volume(corners: Doubles) -> float:
     """Return the enclosed volume [mm3]; negative when inside out."""
     about = corners - corners.mean(axis=(0, 1))
     return float((about[:, 0] * np.cross(about[:, 1], about[:, 2])).sum() / 6.0)

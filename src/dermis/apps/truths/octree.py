@@ -13,11 +13,11 @@ from dermis.mesh.geometry import triangle_areas
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_LEAF = 16  # triangles; a node with fewer is not split
-_LEVELS = 20  # of the tree; three bits each make a key of 60
+_LEAF_TRIANGLES = 16  # triangles; a node with fewer is not split
+_MAX_DEPTH = 20  # of the tree; three bits each make a key of 60
 
 
-class Tree(NamedTuple):
+class Octree(NamedTuple):
     """Nodes from the root on, each before those inside it; triangles in the order of the nodes.
 
     first, end : (n,) the node's triangles
@@ -48,26 +48,26 @@ class Tree(NamedTuple):
     area: Floats
 
 
-def build_tree(samples: IrradianceSamples) -> Tree:
+def build_octree(samples: IrradianceSamples) -> Octree:
     """Return the octree of the samples' triangles.
 
     Source: [JensenBuhler2002], with three points for each node and bounds that say when to open it.
     """
     middle = np.mean(samples.positions, axis=0)  # moments about a far origin would lose digits
     corners = (np.asarray(samples.positions, np.float64) - middle)[samples.triangles]
-    keys = _keys(corners.mean(axis=1))
+    keys = _morton_keys(corners.mean(axis=1))
     order = np.argsort(keys, kind="stable")
     corners, light = corners[order], np.asarray(samples.irradiance, np.float64)[samples.triangles[order]]
     area = triangle_areas(corners)
     first, end, skip = _nodes(keys[order])
-    centre, points, flux, spread, mismatch, offset = _three_points(corners, light, area, first, end)
+    centre, points, flux, spread, mismatch, offset = _point_approximation(corners, light, area, first, end)
     radius = np.linalg.norm(points - centre[:, None], axis=2).max(axis=1)
-    return Tree(
+    return Octree(
         first,
         end,
         skip,
         centre + middle,
-        np.maximum(radius, _radius(corners, centre, first, end)),
+        np.maximum(radius, _bounding_radius(corners, centre, first, end)),
         points + middle,
         flux,
         spread,
@@ -79,13 +79,13 @@ def build_tree(samples: IrradianceSamples) -> Tree:
     )
 
 
-def _keys(places: Floats) -> Index:
+def _morton_keys(places: Floats) -> Index:
     """Return (m,) paths down the tree: the half along z, y and x, then the half of that, and so on."""
     low = places.min(axis=0)
     size = max(float((places.max(axis=0) - low).max()), 1e-9)
-    cell = np.minimum((places - low) / size * 2**_LEVELS, 2**_LEVELS - 1).astype(np.int64)
+    cell = np.minimum((places - low) / size * 2**_MAX_DEPTH, 2**_MAX_DEPTH - 1).astype(np.int64)
     keys = np.zeros(len(places), np.int64)
-    for level in range(_LEVELS):
+    for level in range(_MAX_DEPTH):
         for axis in range(3):
             keys |= ((cell[:, axis] >> level) & 1) << (3 * level + axis)
     return keys
@@ -94,11 +94,11 @@ def _keys(places: Floats) -> Index:
 def _nodes(keys: Index) -> tuple[Index, Index, Index]:
     """Return the first triangle, end and skip of each node, for sorted keys."""
     starts, ends = [np.array([0])], [np.array([len(keys)])]
-    for level in range(_LEVELS - 1, -1, -1):
+    for level in range(_MAX_DEPTH - 1, -1, -1):
         bounds = np.flatnonzero(np.diff(keys >> (3 * level), prepend=-1, append=-1))
         parent = np.searchsorted(starts[-1], bounds[:-1], side="right") - 1
         inside = (parent >= 0) & (bounds[:-1] < ends[-1][parent])
-        inside &= ends[-1][parent] - starts[-1][parent] > _LEAF
+        inside &= ends[-1][parent] - starts[-1][parent] > _LEAF_TRIANGLES
         if not inside.any():
             break
         starts.append(bounds[:-1][inside])
@@ -108,15 +108,15 @@ def _nodes(keys: Index) -> tuple[Index, Index, Index]:
     return first, end, np.searchsorted(first, end)
 
 
-def _radius(corners: Floats, centre: Floats, first: Index, end: Index) -> Floats:
+def _bounding_radius(corners: Floats, centre: Floats, first: Index, end: Index) -> Floats:
     """Return the distance from the centre to the furthest corner of the box around each node."""
-    low = _reduce_inside(np.minimum, corners.min(axis=1), first, end)
-    high = _reduce_inside(np.maximum, corners.max(axis=1), first, end)
+    low = _reduce_nodes(np.minimum, corners.min(axis=1), first, end)
+    high = _reduce_nodes(np.maximum, corners.max(axis=1), first, end)
     radius: Floats = np.linalg.norm(np.maximum(centre - low, high - centre), axis=1)
     return radius
 
 
-def _three_points(
+def _point_approximation(
     corners: Floats, light: Floats, area: Floats, first: Index, end: Index
 ) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
     """Return centre, places, flux, spread, mismatch and offset of the nodes, as in `Tree`.
@@ -126,13 +126,13 @@ def _three_points(
     The points have the flux of each channel, its centre within their plane, and the second moments of all
     channels together, which for white light is everything up to the second order.
     """
-    flux, mean, square = _central(corners, light, area, first, end)
+    flux, mean, square = _central_moments(corners, light, area, first, end)
     centre, total = mean.pop(), np.maximum(flux.sum(axis=1), np.finfo(float).tiny)
     squares, axes = np.linalg.eigh(sum(square) / total[:, None, None])
     # A patch of surface is nearly flat: its two longer axes will do.
     lengths, axes = np.sqrt(squares[:, 1:].clip(0)), axes[..., 1:]
-    arms = np.einsum("kj,nj,naj->nka", _CIRCLE, lengths, axes)
-    parts = _shared(flux, mean, lengths, axes)
+    arms = np.einsum("kj,nj,naj->nka", _TRIANGLE_POINTS, lengths, axes)
+    parts = _point_flux(flux, mean, lengths, axes)
     safe = np.where(flux > 0, flux, np.inf)
     bounds = np.zeros((3, len(flux), 3))
     for c in range(3):
@@ -145,11 +145,11 @@ def _three_points(
     return centre, centre[:, None] + arms, parts, spread, mismatch, offset
 
 
-_ANGLE = 2 * np.pi / 3 * np.arange(3)
-_CIRCLE = np.sqrt(2) * np.column_stack((np.sin(_ANGLE), np.cos(_ANGLE)))
+_TRIANGLE_ANGLES = 2 * np.pi / 3 * np.arange(3)
+_TRIANGLE_POINTS = np.sqrt(2) * np.column_stack((np.sin(_TRIANGLE_ANGLES), np.cos(_TRIANGLE_ANGLES)))
 
 
-def _central(
+def _central_moments(
     corners: Floats, light: Floats, area: Floats, first: Index, end: Index
 ) -> tuple[Floats, list[Floats], list[Floats]]:
     """Return moments of the light in each node: of order 0, 1 and 2, by channel.
@@ -158,7 +158,7 @@ def _central(
     about the centre (n, 3, 3) of each channel.
     """
     moments = [_triangle_moments(corners, light[..., c], area) for c in range(3)]
-    sums = [[_reduce_inside(np.add, values, first, end) for values in channel] for channel in moments]
+    sums = [[_reduce_nodes(np.add, values, first, end) for values in channel] for channel in moments]
     flux = np.column_stack([channel[0] for channel in sums])
     total = flux.sum(axis=1)[:, None]
     moment = sum(channel[1] for channel in sums)
@@ -188,15 +188,15 @@ def _triangle_moments(corners: Floats, light: Floats, area: Floats) -> tuple[Flo
     return sum_light * area / 3, moment, square
 
 
-def _shared(flux: Floats, mean: list[Floats], lengths: Floats, axes: Floats) -> Floats:
+def _point_flux(flux: Floats, mean: list[Floats], lengths: Floats, axes: Floats) -> Floats:
     """Return (n, 3, 3) flux of each point and channel that keeps each channel's centre in the plane."""
     moment = np.einsum("cna,naj->ncj", np.array(mean), axes)
     tilt = np.divide(moment, lengths[:, None], where=lengths[:, None] > 1e-9, out=np.zeros_like(moment))
-    parts: Floats = (flux[:, None] + np.einsum("kj,ncj->nkc", _CIRCLE, tilt)) / 3
+    parts: Floats = (flux[:, None] + np.einsum("kj,ncj->nkc", _TRIANGLE_POINTS, tilt)) / 3
     return parts
 
 
-def _reduce_inside(operation: np.ufunc, values: Floats, first: Index, end: Index) -> Floats:
+def _reduce_nodes(operation: np.ufunc, values: Floats, first: Index, end: Index) -> Floats:
     """Return the operation over rows first to end - 1 of each node."""
     # reduceat reduces between neighbouring indices, so every other result is a node; it also needs a row
     # after the last.

@@ -13,17 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.octree import Tree
-from dermis.apps.truths.radial_table import Table
+from dermis.apps.truths.octree import Octree
+from dermis.apps.truths.radial_table import ProfileTable
 from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
 
-_DEEPEST = 20
+_MAX_SUBDIVISIONS = 20
 """Nested cuts of a triangle in four; 20 make a side a million times shorter."""
 
 
-class Pending(NamedTuple):
+class TriangleStack(NamedTuple):
     """A stack of parts of a triangle: corners (p, 3, 3) [mm], light at them (p, 3, 3), area (p,) [mm²]."""
 
     corners: Floats
@@ -32,13 +32,13 @@ class Pending(NamedTuple):
 
 
 @compiled
-def gather(points: Floats, tree: Tree, table: Table, bound: float, exitance: Floats) -> int:
+def gather_exitance(points: Floats, tree: Octree, table: ProfileTable, bound: float, exitance: Floats) -> int:
     """Add the light that leaves at each point (n, 3) to exitance (n, 3); returns how many parts were visited.
 
     bound : of the sum of all errors, over the profile's energy times the irradiance nearby [-]
     """
-    size = 3 * _DEEPEST + 4
-    pending = Pending(np.empty((size, 3, 3)), np.empty((size, 3, 3)), np.empty(size))
+    size = 3 * _MAX_SUBDIVISIONS + 4
+    pending = TriangleStack(np.empty((size, 3, 3)), np.empty((size, 3, 3)), np.empty(size))
     visits = 0
     for i in range(len(points)):
         node = 0
@@ -50,30 +50,30 @@ def gather(points: Floats, tree: Tree, table: Table, bound: float, exitance: Flo
                 continue
             if tree.skip[node] == node + 1:
                 for t in range(tree.first[node], tree.end[node]):
-                    visits += _add_triangle(points[i], t, tree, table, bound, pending, exitance[i])
+                    visits += _gather_triangle(points[i], t, tree, table, bound, pending, exitance[i])
             node += 1
     return visits
 
 
 @compiled
-def _node_is_far(point: Floats, node: int, tree: Tree, table: Table, bound: float) -> bool:
+def _node_is_far(point: Floats, node: int, tree: Octree, table: ProfileTable, bound: float) -> bool:
     distance = _distance(point, tree.centre[node, 0], tree.centre[node, 1], tree.centre[node, 2])
-    near, far = _rows(distance, tree.radius[node], table)
+    near, far = _table_rows(distance, tree.radius[node], table)
     remainder = table.curvature[near] * tree.spread[node] + table.slope[near] * tree.offset[node]
     return bool(remainder <= bound * table.share[far])
 
 
 @compiled
-def _add_node(point: Floats, node: int, tree: Tree, table: Table, exitance: Floats) -> None:
+def _add_node(point: Floats, node: int, tree: Octree, table: ProfileTable, exitance: Floats) -> None:
     for k in range(3):
         distance = _distance(point, tree.places[node, k, 0], tree.places[node, k, 1], tree.places[node, k, 2])
         red, green, blue = tree.flux[node, k, 0], tree.flux[node, k, 1], tree.flux[node, k, 2]
-        _add(distance, red, green, blue, table, exitance)
+        _add_flux(distance, red, green, blue, table, exitance)
 
 
 @compiled
-def _add_triangle(
-    point: Floats, t: int, tree: Tree, table: Table, bound: float, pending: Pending, exitance: Floats
+def _gather_triangle(
+    point: Floats, t: int, tree: Octree, table: ProfileTable, bound: float, pending: TriangleStack, exitance: Floats
 ) -> int:
     """Add a triangle's light, cut in four until its parts are far enough; returns how many were visited."""
     pending.corners[0], pending.light[0], pending.area[0] = tree.corners[t], tree.light[t], tree.area[t]
@@ -81,16 +81,16 @@ def _add_triangle(
     while count > 0:
         count -= 1
         visits += 1
-        if _part_is_far(point, pending.corners[count], table, bound) or count + 4 > len(pending.area):
-            _add_part(point, count, pending, table, exitance)
+        if _triangle_is_far(point, pending.corners[count], table, bound) or count + 4 > len(pending.area):
+            _add_midpoints(point, count, pending, table, exitance)
         else:
-            _cut(count, pending)
+            _split_triangle(count, pending)
             count += 4
     return visits
 
 
 @compiled
-def _part_is_far(point: Floats, corners: Floats, table: Table, bound: float) -> bool:
+def _triangle_is_far(point: Floats, corners: Floats, table: ProfileTable, bound: float) -> bool:
     x = (corners[0, 0] + corners[1, 0] + corners[2, 0]) / 3.0
     y = (corners[0, 1] + corners[1, 1] + corners[2, 1]) / 3.0
     z = (corners[0, 2] + corners[1, 2] + corners[2, 2]) / 3.0
@@ -99,14 +99,14 @@ def _part_is_far(point: Floats, corners: Floats, table: Table, bound: float) -> 
         square = (corners[k, 0] - x) ** 2 + (corners[k, 1] - y) ** 2 + (corners[k, 2] - z) ** 2
         total += square
         largest = max(largest, square)
-    near, far = _rows(_distance(point, x, y, z), math.sqrt(largest), table)
+    near, far = _table_rows(_distance(point, x, y, z), math.sqrt(largest), table)
     # At most the mean square distance from the middle, of linear light and of the midpoints of the sides.
     spread = (total + 2.0 * largest) / 20.0 + largest / 4.0
     return bool(table.curvature[near] * spread <= bound * table.share[far])
 
 
 @compiled
-def _add_part(point: Floats, i: int, pending: Pending, table: Table, exitance: Floats) -> None:
+def _add_midpoints(point: Floats, i: int, pending: TriangleStack, table: ProfileTable, exitance: Floats) -> None:
     """Add the midpoints of the sides: right for light times profile up to second order."""
     corners, light, scale = pending.corners[i], pending.light[i], pending.area[i] / 6.0
     for a in range(3):
@@ -115,11 +115,11 @@ def _add_part(point: Floats, i: int, pending: Pending, table: Table, exitance: F
         y = 0.5 * (corners[a, 1] + corners[b, 1])
         z = 0.5 * (corners[a, 2] + corners[b, 2])
         red, green, blue = light[a, 0] + light[b, 0], light[a, 1] + light[b, 1], light[a, 2] + light[b, 2]
-        _add(_distance(point, x, y, z), scale * red, scale * green, scale * blue, table, exitance)
+        _add_flux(_distance(point, x, y, z), scale * red, scale * green, scale * blue, table, exitance)
 
 
 @compiled
-def _cut(i: int, pending: Pending) -> None:
+def _split_triangle(i: int, pending: TriangleStack) -> None:
     """Replace part i by its four quarters, i to i + 3."""
     pending.area[i : i + 4] = 0.25 * pending.area[i]
     for values in (pending.corners, pending.light):
@@ -138,7 +138,7 @@ def _distance(point: Floats, x: float, y: float, z: float) -> float:
 
 
 @compiled
-def _rows(distance: float, radius: float, table: Table) -> tuple[int, int]:
+def _table_rows(distance: float, radius: float, table: ProfileTable) -> tuple[int, int]:
     """Rows of the table at or before the nearest and at or after the furthest point within a radius."""
     last = len(table.share) - 1
     near = int(math.sqrt(max(distance - radius, 0.0)) * table.per_root)
@@ -147,7 +147,7 @@ def _rows(distance: float, radius: float, table: Table) -> tuple[int, int]:
 
 
 @compiled
-def _add(distance: float, red: float, green: float, blue: float, table: Table, exitance: Floats) -> None:
+def _add_flux(distance: float, red: float, green: float, blue: float, table: ProfileTable, exitance: Floats) -> None:
     """Add flux times the profile, interpolated in the table."""
     at = math.sqrt(distance) * table.per_root
     row = int(at)

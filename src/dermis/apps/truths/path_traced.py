@@ -16,11 +16,11 @@ from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     Lambertian,
     check_traceable,
-    glowing_skin,
+    emissive_skin,
     load_mitsuba,
     radiance_scene,
-    share_scene,
-    variant_of,
+    coverage_scene,
+    mitsuba_variant,
 )
 from dermis.base.disk import find, keep
 from dermis.base.errors import refuse
@@ -32,14 +32,14 @@ from dermis.scene.settings import Settings
 __all__ = ["Lambertian", "PathTraced", "path_trace"]
 
 Floats = NDArray[np.float32]
-Report = Callable[[int, int], None]
+ProgressCallback = Callable[[int, int], None]
 Variant = Literal["scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"]
 
 SAMPLES_PER_PASS = 4
-_LEAST_PASSES = 2
-_MOST_SAMPLES = 2**20
-_MASK_SAMPLES = 64
-_STORE_SECONDS = 30.0
+_MIN_PASSES = 2
+_MAX_SAMPLES = 2**20
+_COVERAGE_SAMPLES = 64
+_SAVE_INTERVAL_S = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def path_trace(
     *,
     variant: Variant = "scalar_rgb",
     keep: bool = True,
-    report: Report | None = None,
+    report: ProgressCallback | None = None,
 ) -> PathTraced:
     """Return the scene with its skin filled by a medium; maps, profile and surface reflection are ignored.
 
@@ -92,24 +92,24 @@ def path_trace(
 
     Sources: [Jakob2022], [Miller2019].
     """
-    wanted = passes_for(samples)
+    wanted = pass_count(samples)
     check_traceable(medium)
     mi, size = load_mitsuba(), (settings or Settings()).size
     form = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH}"
     key = scene_key(scene, medium, size, form) if keep else None
-    return mean_of_passes(
+    return render_passes(
         mi,
         variant,
         wanted,
         size,
         key,
         lambda: radiance_scene(mi, scene, medium, size),
-        lambda: share_scene(mi, scene.camera, size, glowing_skin(mi, scene.head)),
+        lambda: coverage_scene(mi, scene.camera, size, emissive_skin(mi, scene.head)),
         report,
     )
 
 
-def mean_of_passes(
+def render_passes(
     mi: Mitsuba,
     variant: Variant,
     wanted: int,
@@ -117,19 +117,19 @@ def mean_of_passes(
     key: str | None,
     radiance: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
     share: Callable[[], MitsubaObject],
-    report: Report | None,
+    report: ProgressCallback | None,
 ) -> PathTraced:
     """Return the mean of as many passes as wanted, those that are kept on disk included.
 
     key : name of the kept passes; None to keep none
     radiance, share : make the scenes of the radiance, with notes, and of the share of skin in each pixel
     """
-    passes = kept_passes(key, size) if key else None
+    passes = load_passes(key, size) if key else None
     if passes is None or passes.count < wanted:
-        with variant_of(mi, variant):
+        with mitsuba_variant(mi, variant):
             built, notes = radiance()
             if passes is None:
-                mask = np.array(mi.render(share(), spp=_MASK_SAMPLES), np.float32)[..., 0]
+                mask = np.array(mi.render(share(), spp=_COVERAGE_SAMPLES), np.float32)[..., 0]
                 passes = Passes.none(size, np.clip(mask, 0.0, 1.0), notes)
             add_passes(mi, built, passes, wanted, key, report)
     return PathTraced(
@@ -142,18 +142,18 @@ def mean_of_passes(
     )
 
 
-def passes_for(samples: int) -> int:
+def pass_count(samples: int) -> int:
     """Return the number of passes for at least so many samples.
 
     Raises DermisError for none and for too many.
     """
-    if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MOST_SAMPLES):
-        refuse("samples", f"a whole number from 1 to {_MOST_SAMPLES}", f"{samples} came", "Correct it")
-    return max(_LEAST_PASSES, -(-samples // SAMPLES_PER_PASS))
+    if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MAX_SAMPLES):
+        refuse("samples", f"a whole number from 1 to {_MAX_SAMPLES}", f"{samples} came", "Correct it")
+    return max(_MIN_PASSES, -(-samples // SAMPLES_PER_PASS))
 
 
 def add_passes(
-    mi: Mitsuba, built: MitsubaObject, passes: Passes, wanted: int, key: str | None, report: Report | None
+    mi: Mitsuba, built: MitsubaObject, passes: Passes, wanted: int, key: str | None, report: ProgressCallback | None
 ) -> None:
     """Add passes of Mitsuba's scene up to the number wanted; with a key those done are stored in any case."""
     stored = time.perf_counter()
@@ -165,17 +165,17 @@ def add_passes(
             passes.add(image, ended - began)
             if report is not None:
                 report(passes.count, wanted)
-            if key and ended - stored > _STORE_SECONDS and passes.count < wanted:
-                store_passes(key, passes)
+            if key and ended - stored > _SAVE_INTERVAL_S and passes.count < wanted:
+                save_passes(key, passes)
                 stored = ended
     finally:
         if key and passes.count > 0:
-            store_passes(key, passes)
+            save_passes(key, passes)
 
 
 Doubles = NDArray[np.float64]
-_FOLDER = "path-traced"
-_FORM = 1  # raise when the same scene is traced in another way
+_CACHE_FOLDER = "path-traced"
+_CACHE_VERSION = 1  # raise when the same scene is traced in another way
 
 
 @dataclass
@@ -215,7 +215,7 @@ class Passes:
         self.spread = self.spread + before * (image - self.mean)
 
 
-def digest_surroundings(digest: hashlib._Hash, scene: Scene) -> None:
+def hash_lighting(digest: hashlib._Hash, scene: Scene) -> None:
     """Add camera, lights and environment of a scene to a hash."""
     for part in (scene.camera, *scene.lights, *filter(None, [scene.environment])):
         digest.update(f"{type(part).__name__} {part.model_dump_json()}".encode())
@@ -228,8 +228,8 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
 
     form : versions, and how it is traced
     """
-    digest = hashlib.sha256(f"{_FORM} {form} {size} {scene.head.centre_mm}".encode())
-    digest_surroundings(digest, scene)
+    digest = hashlib.sha256(f"{_CACHE_VERSION} {form} {size} {scene.head.centre_mm}".encode())
+    hash_lighting(digest, scene)
     mesh = scene.head.mesh
     digest.update(repr([(material.kind, material.colour) for material in mesh.materials]).encode())
     for array in (mesh.positions, mesh.normals, mesh.point, mesh.triangles, mesh.material):
@@ -243,9 +243,9 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
     return digest.hexdigest()[:40]
 
 
-def kept_passes(key: str, size: tuple[int, int]) -> Passes | None:
+def load_passes(key: str, size: tuple[int, int]) -> Passes | None:
     """Return the passes of that name, or None when there are none that can be read."""
-    found = find(_FOLDER, key, ("mean", "spread", "mask", "notes", "count", "seconds"))
+    found = find(_CACHE_FOLDER, key, ("mean", "spread", "mask", "notes", "count", "seconds"))
     if found is None or found["mean"].shape != (size[1], size[0], 3):
         return None
     notes = tuple(str(note) for note in found["notes"])
@@ -253,6 +253,6 @@ def kept_passes(key: str, size: tuple[int, int]) -> Passes | None:
     return Passes(*moments, notes, int(found["count"]), float(found["seconds"]))
 
 
-def store_passes(key: str, passes: Passes) -> None:
+def save_passes(key: str, passes: Passes) -> None:
     """Keep passes under a name; the disk may fail without harm, and a file is whole or not there."""
-    keep(_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})
+    keep(_CACHE_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})

@@ -15,13 +15,13 @@ from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
-Words = NDArray[np.uint64]
+RandomState = NDArray[np.uint64]
 
 MAX_EVENTS = 100_000
 """Scatterings and faces after which a photon is given up: without absorption some would walk forever."""
 
 
-class Stack(NamedTuple):
+class LayerStack(NamedTuple):
     """Layers with air on both sides (layers + 2,), and the depths of the faces (layers + 1,)."""
 
     eta: Floats
@@ -48,7 +48,7 @@ class Tally(NamedTuple):
 
 
 @compiled
-def next_word(rng: Words) -> np.uint64:
+def next_uint64(rng: RandomState) -> np.uint64:
     """Return 64 random bits by xoshiro256++; advances the state rng (4,).
 
     Source: [BlackmanVigna2021].
@@ -66,9 +66,9 @@ def next_word(rng: Words) -> np.uint64:
 
 
 @compiled
-def uniform(rng: Words) -> float:
+def uniform(rng: RandomState) -> float:
     """Return a number strictly between 0 and 1, so that its logarithm is finite and not 0."""
-    return ((next_word(rng) >> np.uint64(12)) + 0.5) * 2.0**-52
+    return ((next_uint64(rng) >> np.uint64(12)) + 0.5) * 2.0**-52
 
 
 @compiled
@@ -91,7 +91,7 @@ def refract(cosine: float, eta: float) -> tuple[float, float]:
 
 
 @compiled
-def deflect(x: float, y: float, z: float, g: float, rng: Words) -> tuple[float, float, float]:
+def deflect(x: float, y: float, z: float, g: float, rng: RandomState) -> tuple[float, float, float]:
     """Return the unit direction (x, y, z) after scattering by Henyey and Greenstein's phase function.
 
     g : mean cosine of the deflection [-]
@@ -118,23 +118,23 @@ def deflect(x: float, y: float, z: float, g: float, rng: Words) -> tuple[float, 
 
 
 @compiled
-def _ring(x: float, y: float, edges2: Floats) -> int:
+def _ring_index(x: float, y: float, edges2: Floats) -> int:
     """Return the ring between squared edges (n + 1,) that contains a point; n beyond the last edge."""
     return int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
 
 
 @compiled
-def _leave(x: float, y: float, upward: bool, scatterings: int, edges2: Floats, tally: Tally) -> None:
+def _tally_exit(x: float, y: float, upward: bool, scatterings: int, edges2: Floats, tally: Tally) -> None:
     if scatterings == 0:
         tally.unscattered[0 if upward else 1] += 1
     elif upward:
-        tally.reflected[_ring(x, y, edges2)] += 1
+        tally.reflected[_ring_index(x, y, edges2)] += 1
     else:
-        tally.transmitted[_ring(x, y, edges2)] += 1
+        tally.transmitted[_ring_index(x, y, edges2)] += 1
 
 
 @compiled
-def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
+def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Tally) -> None:
     """Follow one photon that entered straight down on the axis until it leaves or is absorbed."""
     x = y = z = ux = uy = 0.0
     uz = 1.0
@@ -164,7 +164,7 @@ def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
             uz = -uz
             continue
         if beyond == 0 or beyond > bottom:
-            _leave(x, y, upward, scatterings, edges2, tally)
+            _tally_exit(x, y, upward, scatterings, edges2, tally)
             return
         ux, uy, uz = eta * ux, eta * uy, math.copysign(cosine, uz)
         layer = beyond
@@ -172,7 +172,7 @@ def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
 
 
 @compiled
-def walk_batch(photons: int, stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
+def trace_photons(photons: int, stack: LayerStack, edges2: Floats, rng: RandomState, tally: Tally) -> None:
     """Add the fates of this many photons to the tally.
 
     Source: [Wang1995], except that absorption takes a photon whole or not at all.
@@ -182,4 +182,4 @@ def walk_batch(photons: int, stack: Stack, edges2: Floats, rng: Words, tally: Ta
     # 0.97 times. That gain is small for skin, and whole photons are counts: they conserve energy exactly, add
     # up alike in any order, and have binomial errors.
     for _ in range(photons):
-        _walk(stack, edges2, rng, tally)
+        _trace_photon(stack, edges2, rng, tally)

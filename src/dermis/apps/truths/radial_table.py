@@ -12,11 +12,11 @@ from dermis.base.errors import refuse
 
 Floats = NDArray[np.float64]
 
-ROWS = 8192
+TABLE_ROWS = 8192
 """Of the table, in even steps of the square root of the radius: linear interpolation errs by 5e-6."""
 
-_TAIL = 1e-12  # of a Gaussian's peak, where it ends
-_FAR_SHARE = 0.2  # of the permitted error, spread over a slowly falling tail so that far nodes stay closed
+_GAUSSIAN_CUTOFF = 1e-12  # of a Gaussian's peak, where it ends
+_FAR_ERROR_FRACTION = 0.2  # of the permitted error, spread over a slowly falling tail so that far nodes stay closed
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class GaussianSum:
     @property
     def end_mm(self) -> float:
         """Radius beyond which the profile is 0 [mm]."""
-        return float(np.sqrt(-2 * np.log(_TAIL) * np.max(self.variance_mm2)))
+        return float(np.sqrt(-2 * np.log(_GAUSSIAN_CUTOFF) * np.max(self.variance_mm2)))
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
         """Return R, dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
@@ -91,7 +91,7 @@ class RadialTable:
 Profile = GaussianSum | RadialTable
 
 
-class Table(NamedTuple):
+class ProfileTable(NamedTuple):
     """A profile by the square root of the radius, `per_root` rows for 1 mm^(1/2).
 
     R : (rows, 3) profile [mm^-2], 0 in the last row
@@ -107,7 +107,7 @@ class Table(NamedTuple):
     share: Floats
 
 
-def tabulate(profile: Profile) -> Table:
+def tabulate_profile(profile: Profile) -> ProfileTable:
     """Return the table of a profile.
 
     A patch of second moment m about its centre, replaced by a point there, errs by up to m times the
@@ -115,7 +115,7 @@ def tabulate(profile: Profile) -> Table:
     (Lagrange), so the permitted error is shared out that way.
     """
     end = profile.end_mm
-    root = np.linspace(0.0, np.sqrt(end), ROWS)
+    root = np.linspace(0.0, np.sqrt(end), TABLE_ROWS)
     r = root**2
     # The second derivative across the radius is R'/r, which tends to R'' on the axis.
     off_axis = np.maximum(r, r[1])
@@ -124,14 +124,14 @@ def tabulate(profile: Profile) -> Table:
     lit = energy > 0
     if not lit.any():
         refuse("profile", "light in at least one channel", "it is 0 everywhere", "Correct it")
-    slope = _bound(np.abs(dR), energy, lit)
+    slope = _upper_bound(np.abs(dR), energy, lit)
     bend = np.maximum(np.abs(ddR), np.abs(dR) / off_axis[:, None])
-    curvature = _bound(0.5 * bend, energy, lit)
+    curvature = _upper_bound(0.5 * bend, energy, lit)
     R[-1] = 0.0
-    return Table((ROWS - 1) / np.sqrt(end), np.ascontiguousarray(R), slope, curvature, _share(curvature, r))
+    return ProfileTable((TABLE_ROWS - 1) / np.sqrt(end), np.ascontiguousarray(R), slope, curvature, _error_density(curvature, r))
 
 
-def _bound(values: Floats, energy: Floats, lit: NDArray[np.bool_]) -> Floats:
+def _upper_bound(values: Floats, energy: Floats, lit: NDArray[np.bool_]) -> Floats:
     """Return (rows,) the largest value of any channel from each radius on; 0 in the last row."""
     largest = np.max(values[:, lit] / energy[lit], axis=1)
     bound: Floats = np.maximum.accumulate(largest[::-1])[::-1].copy()
@@ -139,12 +139,12 @@ def _bound(values: Floats, energy: Floats, lit: NDArray[np.bool_]) -> Floats:
     return bound
 
 
-def _share(curvature: Floats, r: Floats) -> Floats:
+def _error_density(curvature: Floats, r: Floats) -> Floats:
     ideal = np.sqrt(curvature)
     ideal /= _plane_integral(ideal[:, None], r)[0]
     reach = r[-1] / 4
     far = 1 / (np.pi * reach**2 * (1 + (r / reach) ** 2) ** 2)
-    share: Floats = (1 - _FAR_SHARE) * ideal + _FAR_SHARE * far
+    share: Floats = (1 - _FAR_ERROR_FRACTION) * ideal + _FAR_ERROR_FRACTION * far
     return share
 
 

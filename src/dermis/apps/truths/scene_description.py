@@ -14,7 +14,7 @@ from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 
 Floats = NDArray[np.float64]
-Described = dict[str, Any]
+SceneDict = dict[str, Any]
 """What Mitsuba loads or JSON holds: numbers, words, lists, Mitsuba's objects and further dictionaries."""
 Mitsuba = Any
 """The module mitsuba with a variant set, which ships no types; or the exporter that writes XML instead."""
@@ -28,7 +28,7 @@ UNIT_MM = 100.0
 _TO_CYCLES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-def check_lens(camera: Camera, who: str) -> None:
+def check_camera(camera: Camera, who: str) -> None:
     """Refuse a camera that only this package has."""
     if camera.principal_point != (0.5, 0.5) or camera.pixel_aspect != 1.0:
         expected = f"a principal point in the middle and square pixels, for {who}"
@@ -36,12 +36,12 @@ def check_lens(camera: Camera, who: str) -> None:
         refuse("camera", expected, came, "Render with such a camera, and crop or resample the picture")
 
 
-def rgb(values: Iterable[float]) -> Described:
+def rgb(values: Iterable[float]) -> SceneDict:
     """Return three numbers, linear Rec. 709, as Mitsuba reads them."""
     return {"type": "rgb", "value": [float(value) for value in values]}
 
 
-def mitsuba_looking(
+def mitsuba_look_at(
     mi: Mitsuba, origin: Vector, target: Vector, up: Vector = (0.0, 1.0, 0.0)
 ) -> MitsubaObject:
     """Return the transform to world space, with +Z from the origin to the target and Y upwards."""
@@ -51,7 +51,7 @@ def mitsuba_looking(
     return mi.ScalarTransform4f().look_at(*([float(c) for c in v] for v in (origin, target, up)))
 
 
-def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> Described:
+def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> SceneDict:
     """Return a shape that emits light, and neither shadows nor reflects other light."""
     return {
         "type": kind,
@@ -63,7 +63,7 @@ def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> Descri
 
 def mitsuba_projector(
     mi: Mitsuba, intensity: Floats, cosine: Floats, to_world: MitsubaObject, half_tangent: float
-) -> Described:
+) -> SceneDict:
     """Return a projector with an intensity (h, w, 3) through each texel of a slide [irradiance mm2].
 
     cosine : (h, w) of the angle from the axis
@@ -86,15 +86,15 @@ def mitsuba_projector(
     }
 
 
-def cycles_looking(place: Vector, forward: Vector, up: Vector = (0.0, 1.0, 0.0)) -> list[list[float]]:
+def cycles_look_at(place: Vector, forward: Vector, up: Vector = (0.0, 1.0, 0.0)) -> list[list[float]]:
     """Return the matrix to world in Cycles' units of an object that looks along -Z with Y upwards."""
-    right, above, ahead = cycles_axes(forward, up)
+    right, above, ahead = camera_axes(forward, up)
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([right, above, -ahead, np.asarray(place, np.float64) / UNIT_MM])
     return [[float(value) for value in row] for row in matrix]
 
 
-def cycles_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
+def camera_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
     """Return unit vectors to the right, upwards and ahead."""
     ahead = np.asarray(forward, np.float64) / np.linalg.norm(forward)
     right = np.cross(ahead, up)
@@ -106,7 +106,7 @@ def cycles_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
 
 def cycles_light(
     kind: str, irradiance: Vector, factor: float, place: Vector, forward: Vector, **given: float | str
-) -> Described:
+) -> SceneDict:
     """Return a light of Cycles whose energy is the irradiance times a factor."""
     strength = float(max(irradiance))
     colour = [float(part) / strength for part in irradiance] if strength > 0.0 else [0.0, 0.0, 0.0]
@@ -114,17 +114,17 @@ def cycles_light(
     fields = {
         name: float(value) if isinstance(value, np.floating) else value for name, value in fields.items()
     }
-    return {"type": kind, "set": fields, "to_world": cycles_looking(place, forward)}
+    return {"type": kind, "set": fields, "to_world": cycles_look_at(place, forward)}
 
 
-def surroundings(mi: Mitsuba, environment: Environment) -> Described:
+def mitsuba_environment(mi: Mitsuba, environment: Environment) -> SceneDict:
     """Return Mitsuba's description of light from all around."""
     if environment.name == UNIFORM:
         return {"type": "constant", "radiance": rgb(np.full(3, environment.exposure))}
     panorama = environment.exposure * load_panorama(environment.name)
     # Mitsuba's pictures begin where ours have their middle.
     to_world = np.eye(4)
-    to_world[:3, :3] = (np.diag([-1.0, 1.0, -1.0]) @ _turn(environment)).T
+    to_world[:3, :3] = (np.diag([-1.0, 1.0, -1.0]) @ _rotation(environment)).T
     return {
         "type": "envmap",
         "bitmap": mi.Bitmap(_with_poles(panorama).astype(np.float32)),
@@ -132,19 +132,19 @@ def surroundings(mi: Mitsuba, environment: Environment) -> Described:
     }
 
 
-def world(environment: Environment | None) -> tuple[Described, dict[str, NDArray[np.float32]]]:
+def cycles_world(environment: Environment | None) -> tuple[SceneDict, dict[str, NDArray[np.float32]]]:
     """Return Cycles' description of an environment, and the panorama that goes with it."""
     if environment is None:
         return {"strength": 0.0}, {}
-    described: Described = {"strength": environment.exposure}
+    described: SceneDict = {"strength": environment.exposure}
     if environment.name == UNIFORM:
         return described, {}
     # Cycles' panoramas have their middle at +X and their top at +Z; ours at -Z and +Y.
-    described["turn"] = (_TO_CYCLES @ _turn(environment)).tolist()
+    described["turn"] = (_TO_CYCLES @ _rotation(environment)).tolist()
     return described, {"panorama": load_panorama(environment.name).astype(np.float32)}
 
 
-def _turn(environment: Environment) -> Floats:
+def _rotation(environment: Environment) -> Floats:
     angle = np.radians(environment.rotation_degrees)
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]])

@@ -18,22 +18,22 @@ from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
 from dermis.optics.radial import RadialProfile, light_beyond, ring_edges
 
 if TYPE_CHECKING:
-    from dermis.apps.truths.photon import Counts, Stack, Tally
+    from dermis.apps.truths.photon import Counts, LayerStack, Tally
 
 
-Report = Callable[[int, int], None]
+ProgressCallback = Callable[[int, int], None]
 
-BATCHES = 64
+BATCH_COUNT = 64
 """Each has its own random numbers, so the result does not depend on how many run at once."""
 
 MAX_PHOTONS = 10**10
 
-_MOST_SEED = 2**63 - 1
-_AT_ONCE = 20_000  # photons between two checks for Ctrl-C
-_NOTABLE_LOSS = 1e-3
+_MAX_SEED = 2**63 - 1
+_PHOTONS_PER_CALL = 20_000  # photons between two checks for Ctrl-C
+_REPORTED_LOSS = 1e-3
 
 
-def default_edges() -> Floats:
+def default_ring_edges() -> Floats:
     """Return edges of a disc of 0.001 mm and 92 rings, each 12 % wider than the last, to 40 mm [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
 
@@ -43,7 +43,7 @@ def trace_slab(
     photons: int = 1_000_000,
     seed: int = 0,
     edges_mm: Floats | None = None,
-    report: Report | None = None,
+    report: ProgressCallback | None = None,
 ) -> SlabResult:
     """Trace a pencil beam at normal incidence through a stack of layers in air.
 
@@ -55,10 +55,10 @@ def trace_slab(
 
     Source: [Wang1995].
     """
-    photons = _check(layers, photons, seed)
-    edges = default_edges() if edges_mm is None else _checked_edges(edges_mm)
-    tally = _trace(_stack(layers), photons, seed, edges, report)
-    return _shares(tally, photons, edges, layers[0].eta)
+    photons = _checked_photons(layers, photons, seed)
+    edges = default_ring_edges() if edges_mm is None else _checked_edges(edges_mm)
+    tally = _trace_batches(_layer_stack(layers), photons, seed, edges, report)
+    return _slab_result(tally, photons, edges, layers[0].eta)
 
 
 def trace_medium(
@@ -67,13 +67,13 @@ def trace_medium(
     seed: int = 0,
     g: float = 0.0,
     edges_mm: Floats | None = None,
-    report: Report | None = None,
+    report: ProgressCallback | None = None,
 ) -> list[SlabResult]:
     """Run `trace_slab` for each channel of a medium, with independent random numbers.
 
     g : mean cosine of the deflection in all layers; scattering is the reduced coefficient over 1 - g [-]
     """
-    check_mean_cosine(g)
+    check_anisotropy(g)
     results: list[SlabResult] = []
 
     def part(done: int, of: int) -> None:
@@ -81,12 +81,12 @@ def trace_medium(
             report(len(results) * of + done, medium.channels * of)
 
     for i in range(medium.channels):
-        layers = [_layer(layer, i, g, medium.eta) for layer in medium.layers]
+        layers = [_scattering_layer(layer, i, g, medium.eta) for layer in medium.layers]
         results.append(trace_slab(layers, photons, seed + i, edges_mm, part))
     return results
 
 
-def counted_profile(
+def monte_carlo_profile(
     medium: Medium,
     rgb: Floats | None = None,
     photons: int = 1_000_000,
@@ -123,29 +123,29 @@ def counted_profile(
         standard_error=np.sqrt(weights**2 @ error**2).T,
         total_error=np.sqrt(weights**2 @ total_error**2),
         incident=rgb is not None,
-        warnings=(*light_beyond(weights @ totals, ring_energy), *_losses(runs)),
+        warnings=(*light_beyond(weights @ totals, ring_energy), *_unfinished_warnings(runs)),
         sources=(*medium.sources, "Wang1995"),
     )
 
 
-def _losses(runs: Sequence[SlabResult]) -> list[str]:
+def _unfinished_warnings(runs: Sequence[SlabResult]) -> list[str]:
     lost = max(run.per_entering.unfinished for run in runs)
-    if lost < _NOTABLE_LOSS:
+    if lost < _REPORTED_LOSS:
         return []
     return [f"{lost:.1%} of the light was given up after very many scatterings: the total lacks it"]
 
 
-def _layer(layer: Layer, channel: int, g: float, eta: float) -> ScatteringLayer:
+def _scattering_layer(layer: Layer, channel: int, g: float, eta: float) -> ScatteringLayer:
     sigma_s = float(layer.sigma_s_prime[channel]) / (1.0 - g)
     return ScatteringLayer(float(layer.sigma_a[channel]), sigma_s, layer.thickness_mm, g, eta)
 
 
-def _check(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:
+def _checked_photons(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:
     if not layers:
         refuse("slab", "at least one layer", "none came", "Add one")
     if np.isinf([layer.thickness_mm for layer in layers[:-1]]).any():
         refuse("slab", "an infinite thickness in the last layer only", "another has it", "Correct it")
-    whole_number("seed", seed, 0, _MOST_SEED)
+    whole_number("seed", seed, 0, _MAX_SEED)
     return whole_number("photons", photons, 1, int(MAX_PHOTONS))
 
 
@@ -158,13 +158,13 @@ def _checked_edges(edges_mm: ArrayLike) -> Floats:
     return edges
 
 
-def _stack(layers: Sequence[ScatteringLayer]) -> Stack:
-    from dermis.apps.truths.photon import Stack
+def _layer_stack(layers: Sequence[ScatteringLayer]) -> LayerStack:
+    from dermis.apps.truths.photon import LayerStack
 
     def with_air(air: float, values: list[float]) -> Floats:
         return np.array([air, *values, air])
 
-    return Stack(
+    return LayerStack(
         eta=with_air(1.0, [layer.eta for layer in layers]),
         sigma_t=with_air(0.0, [layer.sigma_t for layer in layers]),
         albedo=with_air(0.0, [layer.albedo for layer in layers]),
@@ -173,10 +173,10 @@ def _stack(layers: Sequence[ScatteringLayer]) -> Stack:
     )
 
 
-def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report | None) -> Tally:
+def _trace_batches(stack: LayerStack, photons: int, seed: int, edges: Floats, report: ProgressCallback | None) -> Tally:
     from numba import config
 
-    from dermis.apps.truths.photon import Tally, walk_batch
+    from dermis.apps.truths.photon import Tally, trace_photons
 
     stop = Event()
 
@@ -184,27 +184,27 @@ def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report 
         lengths = (len(edges), len(edges), 2, len(stack.eta) - 2, 1)
         tally = Tally(*(np.zeros(length, np.int64) for length in lengths))
         rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
-        for done in range(0, size, _AT_ONCE):
+        for done in range(0, size, _PHOTONS_PER_CALL):
             if stop.is_set():
                 break
-            walk_batch(min(_AT_ONCE, size - done), stack, edges**2, rng, tally)
+            trace_photons(min(_PHOTONS_PER_CALL, size - done), stack, edges**2, rng, tally)
         return tally
 
-    sizes = [photons * (i + 1) // BATCHES - photons * i // BATCHES for i in range(BATCHES)]
+    sizes = [photons * (i + 1) // BATCH_COUNT - photons * i // BATCH_COUNT for i in range(BATCH_COUNT)]
     tallies = []
     # The compiled walk releases the GIL, so threads share the work.
     with ThreadPoolExecutor(config.NUMBA_NUM_THREADS) as pool:
         try:
-            for tally in pool.map(trace, sizes, np.random.SeedSequence(seed).spawn(BATCHES)):
+            for tally in pool.map(trace, sizes, np.random.SeedSequence(seed).spawn(BATCH_COUNT)):
                 tallies.append(tally)
                 if report is not None:
-                    report(len(tallies), BATCHES)
+                    report(len(tallies), BATCH_COUNT)
         finally:
             stop.set()  # otherwise the pool would wait for batches that are no longer wanted
     return Tally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
 
 
-def _shares(tally: Tally, photons: int, edges: Floats, eta: float) -> SlabResult:
+def _slab_result(tally: Tally, photons: int, edges: Floats, eta: float) -> SlabResult:
     from dermis.apps.truths.photon import refract
 
     specular = refract(1.0, 1.0 / eta)[0]
@@ -240,7 +240,7 @@ def _shares(tally: Tally, photons: int, edges: Floats, eta: float) -> SlabResult
     )
 
 
-def check_mean_cosine(g: float) -> None:
+def check_anisotropy(g: float) -> None:
     """Raises DermisError for a mean cosine that no phase function has."""
     if not -1.0 < g < 1.0:
         refuse("scattering", "a mean cosine between -1 and 1", f"{g:g} came", "Correct it")
@@ -272,7 +272,7 @@ class ScatteringLayer:
         if np.isinf(self.thickness_mm) and self.sigma_t == 0.0:
             came = "it neither absorbs nor scatters"
             refuse(culprit, "an infinite layer to stop light", came, "Give it a thickness")
-        check_mean_cosine(self.g)
+        check_anisotropy(self.g)
         if not 1.0 <= self.eta <= 2.5:
             refuse(culprit, "an index of refraction from 1 to 2.5", f"{self.eta:g} came", "Correct it")
 

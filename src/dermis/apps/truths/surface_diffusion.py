@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.truths.triangles import Floats, Index, sides
+from dermis.apps.truths.triangles import Floats, Index, triangle_edges
 from dermis.base.errors import refuse
 from dermis.mesh.geometry import sum_at
 from dermis.mesh.mesh import Mesh
@@ -21,7 +21,7 @@ from dermis.mesh.mesh import Mesh
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-STEPS = 12
+STEPS_PER_LEVEL = 12
 """Time steps for each level: the peak of a diffused point is then within 0.2 % of the limit."""
 EDGES_PER_SIGMA = 2.0
 MARGIN_SIGMAS = 4.0
@@ -36,7 +36,7 @@ def diffuse_on_surface(
     triangles: ArrayLike,
     values: ArrayLike,
     variances_mm2: Sequence[float] | Floats,
-    steps: int = STEPS,
+    steps: int = STEPS_PER_LEVEL,
 ) -> Floats:
     """Return `values` blurred along the surface by a Gaussian of each variance, (k, n, c).
 
@@ -54,61 +54,61 @@ def diffuse_on_surface(
 
     Source: [Bank1985] for TR-BDF2, [BobenkoSpringborn2007] for the Laplacian.
     """
-    places, corners = _surface(positions, triangles)
-    given = _values(values, len(places))
-    added = np.diff(_rising(variances_mm2), prepend=0.0)
-    _check_resolved(places, corners, variances_mm2, steps)
-    mass, stiffness = mass_and_stiffness(delaunay(intrinsic(places, corners)), len(places))
+    places, corners = _checked_surface(positions, triangles)
+    given = _checked_values(values, len(places))
+    added = np.diff(_checked_variances(variances_mm2), prepend=0.0)
+    _check_resolution(places, corners, variances_mm2, steps)
+    mass, stiffness = mass_and_stiffness(delaunay(intrinsic_triangulation(places, corners)), len(places))
     levels = [given]
     for variance in added:
-        levels.append(_diffused(mass, stiffness, levels[-1], float(variance), steps))
+        levels.append(_diffuse(mass, stiffness, levels[-1], float(variance), steps))
     return np.stack(levels[1:])
 
 
-def welded(mesh: Mesh) -> tuple[Floats, Index]:
+def welded_surface(mesh: Mesh) -> tuple[Floats, Index]:
     """Return positions (p, 3) [mm] without duplicates, and the triangles (f, 3) among them in their order."""
     return mesh.points_mm, mesh.point[mesh.triangles].astype(np.int64)
 
 
 def vertex_areas(positions: ArrayLike, triangles: ArrayLike) -> Floats:
     """Return the area of each vertex (n,) [mm2]; diffusion keeps the sum of values times areas."""
-    places, corners = _surface(positions, triangles)
-    surface = delaunay(intrinsic(places, corners))
+    places, corners = _checked_surface(positions, triangles)
+    surface = delaunay(intrinsic_triangulation(places, corners))
     thirds = np.repeat(surface.areas() / 3, 3)
     return sum_at(surface.corners.ravel(), thirds[:, None], len(places))[:, 0]
 
 
 def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
     """Return the length of the longest edge [mm]."""
-    places, corners = _surface(positions, triangles)
-    return float(sides(places, corners)[2].max())
+    places, corners = _checked_surface(positions, triangles)
+    return float(triangle_edges(places, corners)[2].max())
 
 
-def resolved(variances_mm2: Sequence[float] | Floats, edge_mm: float) -> NDArray[np.bool_]:
+def resolved_levels(variances_mm2: Sequence[float] | Floats, edge_mm: float) -> NDArray[np.bool_]:
     """Return the levels (k,) that edges allow: those that add a sigma of two edges to the last allowed.
 
     variances_mm2 : (k,) rising, above 0 [mm2]
     edge_mm : the longest edge, see `longest_edge_mm`
     """
     least, last, allowed = (EDGES_PER_SIGMA * edge_mm) ** 2, 0.0, []
-    for variance in _rising(variances_mm2):
+    for variance in _checked_variances(variances_mm2):
         allowed.append(bool(variance - last >= least * (1 - 1e-9)))
         last = float(variance) if allowed[-1] else last
     return np.array(allowed)
 
 
-def edge_for(variances_mm2: Sequence[float] | Floats) -> float:
+def max_edge_mm(variances_mm2: Sequence[float] | Floats) -> float:
     """Return longest edge that allows all levels [mm]: half the smallest standard deviation that one adds."""
-    least = float(np.diff(_rising(variances_mm2), prepend=0.0).min())
+    least = float(np.diff(_checked_variances(variances_mm2), prepend=0.0).min())
     return float(np.sqrt(least)) / EDGES_PER_SIGMA
 
 
-def margin_for(variances_mm2: Sequence[float] | Floats) -> float:
+def patch_margin_mm(variances_mm2: Sequence[float] | Floats) -> float:
     """Return the margin of a patch beyond its radius [mm]: four standard deviations of the widest level."""
-    return MARGIN_SIGMAS * float(np.sqrt(_rising(variances_mm2)[-1]))
+    return MARGIN_SIGMAS * float(np.sqrt(_checked_variances(variances_mm2)[-1]))
 
 
-def _diffused(mass: csc_array, stiffness: csc_array, values: Floats, variance: float, steps: int) -> Floats:
+def _diffuse(mass: csc_array, stiffness: csc_array, values: Floats, variance: float, steps: int) -> Floats:
     """Return `values` after the time variance/2."""
     step = variance / 2 / steps
     solve = _factorised((mass + (_GAMMA / 2 * step) * stiffness).tocsc())
@@ -130,7 +130,7 @@ def _factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
     return factors.solve
 
 
-def _surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats, Index]:
+def _checked_surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats, Index]:
     places, corners = np.asarray(positions, dtype=np.float64), np.asarray(triangles, dtype=np.int64)
     shaped = places.shape == (len(places), 3) and corners.shape == (len(corners), 3) and len(corners) > 0
     if not (shaped and np.isfinite(places).all() and 0 <= corners.min() <= corners.max() < len(places)):
@@ -141,7 +141,7 @@ def _surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats, Index]
     return places, corners
 
 
-def _values(values: ArrayLike, count: int) -> Floats:
+def _checked_values(values: ArrayLike, count: int) -> Floats:
     given = np.asarray(values, dtype=np.float64)
     if not (given.ndim == 2 and len(given) == count and np.isfinite(given).all()):
         came = f"an array of shape {given.shape} came, or numbers that are not finite"
@@ -149,22 +149,22 @@ def _values(values: ArrayLike, count: int) -> Floats:
     return given
 
 
-def _rising(variances_mm2: Sequence[float] | Floats) -> Floats:
+def _checked_variances(variances_mm2: Sequence[float] | Floats) -> Floats:
     variances = np.asarray(variances_mm2, dtype=np.float64)
     if not (variances.ndim == 1 and len(variances) and (np.diff(variances, prepend=0.0) > 0).all()):
         refuse("surface diffusion", "variances above 0 that rise", f"{variances.tolist()} came", "Sort them")
     return variances
 
 
-def _check_resolved(places: Floats, corners: Index, variances: Sequence[float] | Floats, steps: int) -> None:
+def _check_resolution(places: Floats, corners: Index, variances: Sequence[float] | Floats, steps: int) -> None:
     if steps < 1:
         refuse("surface diffusion", "at least one step of time", f"{steps} came", "Choose 8 or more")
     longest = longest_edge_mm(places, corners)
-    allowed = resolved(variances, longest)
+    allowed = resolved_levels(variances, longest)
     if not allowed.all():
         fine = ", ".join(f"{variance:g}" for variance in np.asarray(variances)[allowed]) or "none of them"
         came = f"one of {longest:.3g} mm came, which allows of the variances {fine}"
-        expected = f"edges of at most {edge_for(variances):.3g} mm, half of the least sigma that a level adds"
+        expected = f"edges of at most {max_edge_mm(variances):.3g} mm, half of the least sigma that a level adds"
         refuse(
             "surface diffusion", expected, came, "Refine the surface (refine_patch) or ask for wider levels"
         )
@@ -205,7 +205,7 @@ class Triangulation:
         return cotangents
 
 
-def intrinsic(positions: Floats, triangles: Index) -> Triangulation:
+def intrinsic_triangulation(positions: Floats, triangles: Index) -> Triangulation:
     """Return triangles by edge lengths; all edges grow by the same tiny amount if one is degenerate.
 
     positions : (n, 3) [mm]
@@ -213,7 +213,7 @@ def intrinsic(positions: Floats, triangles: Index) -> Triangulation:
 
     Source: [SharpCrane2020], intrinsic mollification.
     """
-    _, side, length = sides(positions, triangles)
+    _, side, length = triangle_edges(positions, triangles)
     slack = length[side].sum(axis=1) - 2 * length[side].max(axis=1)
     missing = max(0.0, _SLACK * float(length.mean()) - float(slack.min()))
     return Triangulation(triangles, side, length + missing)
@@ -229,18 +229,18 @@ def delaunay(given: Triangulation) -> Triangulation:
     """
     corners, side, length = given.corners.copy(), given.side.copy(), given.length.copy()
     now = Triangulation(corners, side, length)
-    flippable = _between_two(corners, side, len(length))
+    flippable = _interior_edges(corners, side, len(length))
     # Each flip lowers the Dirichlet energy of every function on the surface, so this ends.
     for _ in range(_MAX_SWEEPS):
         weight = sum_at(side.ravel(), now.cotangents().reshape(-1, 1), len(length))[:, 0]
         bad = flippable & (weight < -_COCIRCULAR)
         if not bad.any():
             break
-        _flip(now, _apart(side, bad, weight))
+        _flip_edges(now, _independent_flips(side, bad, weight))
     return now
 
 
-def _between_two(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
+def _interior_edges(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
     """Return edges (e,) shared by two triangles of the same orientation."""
     forward = (corners < np.roll(corners, -1, axis=1)).ravel()
     uses = np.bincount(side.ravel(), minlength=count)
@@ -249,7 +249,7 @@ def _between_two(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
     return shared
 
 
-def _apart(side: Index, bad: NDArray[np.bool_], weight: Floats) -> Index:
+def _independent_flips(side: Index, bad: NDArray[np.bool_], weight: Floats) -> Index:
     """Return bad edges no two of which share a triangle, as indices (2, m) of their sides in `side.ravel()`.
 
     Each triangle votes for its worst edge. Edges with both votes are taken; the worst of all is among them.
@@ -267,21 +267,21 @@ def _apart(side: Index, bad: NDArray[np.bool_], weight: Floats) -> Index:
     return pairs
 
 
-def _flip(now: Triangulation, pairs: Index) -> None:
+def _flip_edges(now: Triangulation, pairs: Index) -> None:
     """Flip each edge ab between triangles abc and bad to cd, in place."""
     (left, i), (right, j) = (np.divmod(place, 3) for place in pairs)
     a, b, c = (now.corners[left, (i + k) % 3] for k in range(3))
     d = now.corners[right, (j + 2) % 3]
     ab, bc, ca = (now.side[left, (i + k) % 3] for k in range(3))
     ad, db = (now.side[right, (j + k) % 3] for k in (1, 2))
-    along_c, up_c = _apex(now.length[ab], now.length[ca], now.length[bc])
-    along_d, down_d = _apex(now.length[ab], now.length[ad], now.length[db])
+    along_c, up_c = _apex_coordinates(now.length[ab], now.length[ca], now.length[bc])
+    along_d, down_d = _apex_coordinates(now.length[ab], now.length[ad], now.length[db])
     now.length[ab] = np.hypot(along_c - along_d, up_c + down_d)
     now.corners[left], now.side[left] = np.column_stack((c, d, b)), np.column_stack((ab, db, bc))
     now.corners[right], now.side[right] = np.column_stack((d, c, a)), np.column_stack((ab, ca, ad))
 
 
-def _apex(base: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
+def _apex_coordinates(base: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
     """Return the position of the apex along the base, from the end at side `first`, and its height [mm]."""
     along = (base**2 + first**2 - second**2) / (2 * base)
     return along, np.sqrt(np.maximum(first**2 - along**2, 0))

@@ -7,24 +7,24 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.truths.irradiance_samples import IrradianceSamples, Places, sample_irradiance
-from dermis.apps.truths.octree import Tree, build_tree
-from dermis.apps.truths.radial_table import GaussianSum, Profile, RadialTable, tabulate
+from dermis.apps.truths.irradiance_samples import IrradianceSamples, MeshPoints, sample_irradiance
+from dermis.apps.truths.octree import Octree, build_octree
+from dermis.apps.truths.radial_table import GaussianSum, Profile, RadialTable, tabulate_profile
 from dermis.base.errors import refuse
 
-__all__ = ["GaussianSum", "IrradianceSamples", "Places", "RadialTable", "integrate", "sample_irradiance"]
+__all__ = ["GaussianSum", "IrradianceSamples", "SurfacePoints", "RadialTable", "integrate_exitance", "sample_irradiance"]
 
 Floats = NDArray[np.float64]
 
-_AT_ONCE = 1024  # points between two checks for Ctrl-C
-_ERROR_OF_BOUND = 1e-3
+_POINTS_PER_CALL = 1024  # points between two checks for Ctrl-C
+_ERROR_AT_UNIT_BOUND = 1e-3
 """Error at a bound of 1, by quadrature of waves, spheres, bumps and the scan. The remainders that three
 points leave are of third order in the size of a patch, their bound of second."""
-_STRICT_BOUND = 50.0
+_UNCANCELLED_FACTOR = 50.0
 """Where channels are lit differently, the remainders are of second order and cancel less well."""
 
 
-def integrate(points: ArrayLike, samples: IrradianceSamples, profile: Profile, error: float = 1e-3) -> Floats:
+def integrate_exitance(points: ArrayLike, samples: IrradianceSamples, profile: Profile, error: float = 1e-3) -> Floats:
     """Return radiant exitance (n, 3), the integral of R(|x - y|) E(y) dA over the surface.
 
     points : (n, 3) x, on the surface [mm]
@@ -44,21 +44,21 @@ def integrate(points: ArrayLike, samples: IrradianceSamples, profile: Profile, e
         refuse("points", "finite positions (n, 3) in mm", f"{places.shape} came", "Correct them")
     if not 1e-5 <= error <= 0.05:
         refuse("error", "a share from 1e-5 to 0.05", f"{error} came", "0.001 is enough for pictures")
-    return _gathered(places, samples, profile, error)
+    return _gather_in_threads(places, samples, profile, error)
 
 
-def _gathered(places: Floats, samples: IrradianceSamples, profile: Profile, error: float) -> Floats:
+def _gather_in_threads(places: Floats, samples: IrradianceSamples, profile: Profile, error: float) -> Floats:
     from numba import config
 
-    from dermis.apps.truths.octree_gather import gather
+    from dermis.apps.truths.octree_gather import gather_exitance
 
-    bound = (error / _ERROR_OF_BOUND) ** (2 / 3)
-    tree, table = _weighed(build_tree(samples), bound / (_STRICT_BOUND * error)), tabulate(profile)
+    bound = (error / _ERROR_AT_UNIT_BOUND) ** (2 / 3)
+    tree, table = _weighted_bounds(build_octree(samples), bound / (_UNCANCELLED_FACTOR * error)), tabulate_profile(profile)
     exitance = np.zeros_like(places)
-    parts = [slice(i, i + _AT_ONCE) for i in range(0, len(places), _AT_ONCE)]
+    parts = [slice(i, i + _POINTS_PER_CALL) for i in range(0, len(places), _POINTS_PER_CALL)]
 
     def fill(part: slice) -> None:
-        gather(places[part], tree, table, bound, exitance[part])
+        gather_exitance(places[part], tree, table, bound, exitance[part])
 
     # The compiled loop releases the GIL, so threads share the work.
     pool = ThreadPoolExecutor(config.NUMBA_NUM_THREADS)
@@ -70,6 +70,6 @@ def _gathered(places: Floats, samples: IrradianceSamples, profile: Profile, erro
     return exitance
 
 
-def _weighed(tree: Tree, strictness: float) -> Tree:
+def _weighted_bounds(tree: Octree, strictness: float) -> Octree:
     """Return the tree with the errors that do not cancel multiplied by `strictness`."""
     return tree._replace(spread=tree.spread + strictness * tree.mismatch, offset=strictness * tree.offset)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.truths.surface_diffusion import edge_for, margin_for, welded
-from dermis.apps.truths.triangles import Floats, Index, divide, sides
+from dermis.apps.truths.surface_diffusion import max_edge_mm, patch_margin_mm, welded_surface
+from dermis.apps.truths.triangles import Floats, Index, split_triangles, triangle_edges
 from dermis.base.errors import refuse
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.mesh import Mesh
 
-MOST_TRIANGLES = 8_000_000
-_ROUNDING = 1e-9
+MAX_TRIANGLES = 8_000_000
+_BARYCENTRIC_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Patch:
         while len(left):
             child = first[left] + turn
             inside = np.einsum("mi,mij->mj", barycentric[left], inverse[child])
-            hit = inside.min(axis=1) >= -_ROUNDING
+            hit = inside.min(axis=1) >= -_BARYCENTRIC_TOLERANCE
             found[left[hit]], weights[left[hit]] = order[child[hit]], inside[hit]
             turn += 1
             left = left[~hit]
@@ -79,7 +79,7 @@ class Patch:
         return sum((weights[:, k, None] * values[..., corners[:, k], :] for k in range(3)), np.zeros(()))
 
 
-def patch_of(
+def mesh_patch(
     mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2: Sequence[float] | Floats
 ) -> Patch:
     """Return the patch of a mesh, its uv seams welded, on which light of these variances can be diffused.
@@ -89,8 +89,8 @@ def patch_of(
 
     Short edges over a wide margin are costly: give narrow and wide levels patches of their own.
     """
-    edge_mm, margin_mm = edge_for(variances_mm2), margin_for(variances_mm2)
-    return refine_patch(*welded(mesh), centre_mm, radius_mm, edge_mm, margin_mm)
+    edge_mm, margin_mm = max_edge_mm(variances_mm2), patch_margin_mm(variances_mm2)
+    return refine_patch(*welded_surface(mesh), centre_mm, radius_mm, edge_mm, margin_mm)
 
 
 def refine_patch(
@@ -121,22 +121,22 @@ def refine_patch(
     parent = np.arange(len(corners))
     weights = np.broadcast_to(np.eye(3), (len(corners), 3, 3)).copy()
     while True:
-        near = _near(places[corners], centre, radius_mm + margin_mm, edge_mm)
+        near = _triangles_in_reach(places[corners], centre, radius_mm + margin_mm, edge_mm)
         corners, parent, weights = corners[near], parent[near], weights[near]
-        ends, side, length = sides(places, corners)
+        ends, side, length = triangle_edges(places, corners)
         long = length > edge_mm
         if not long.any():
             break
         middle = np.full(len(ends), -1)
         middle[long] = len(places) + np.arange(int(long.sum()))
         places = np.vstack((places, places[ends[long]].mean(axis=1)))
-        corners, source, weights = divide(corners, weights, middle[side], places)
+        corners, source, weights = split_triangles(corners, weights, middle[side], places)
         parent = parent[source]
     used, compact = np.unique(corners, return_inverse=True)
     return Patch(places[used], compact.reshape(-1, 3), parent, weights, centre, float(radius_mm))
 
 
-def _near(corners: Floats, centre: Floats, reach: float, edge_mm: float) -> NDArray[np.bool_]:
+def _triangles_in_reach(corners: Floats, centre: Floats, reach: float, edge_mm: float) -> NDArray[np.bool_]:
     """Return triangles (f,) that may have a point within reach, by the ball around their middle.
 
     Raises DermisError when there is none, or when those wholly within reach will become too many: a triangle
@@ -150,7 +150,7 @@ def _near(corners: Floats, centre: Floats, reach: float, edge_mm: float) -> NDAr
         refuse("patch", "surface around its centre", f"there is none at {centre.tolist()}", "Move the centre")
     within = triangle_areas(corners[distance + size <= reach]).sum()
     count = within / (np.sqrt(3) / 4 * edge_mm**2)
-    if count > MOST_TRIANGLES:
-        came = f"edges of {edge_mm:g} mm make more than {MOST_TRIANGLES}"
+    if count > MAX_TRIANGLES:
+        came = f"edges of {edge_mm:g} mm make more than {MAX_TRIANGLES}"
         refuse("patch", "a few million triangles", came, "Take longer edges or a smaller radius")
     return near

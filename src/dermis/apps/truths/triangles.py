@@ -10,7 +10,7 @@ from dermis.mesh.geometry import edges
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_PIECES = (
+_SPLIT_PATTERNS = (
     [[0, 1, 2]],
     [[0, 3, 2], [3, 1, 2]],
     [[3, 1, 4], [0, 3, 4], [0, 4, 2]],
@@ -23,7 +23,7 @@ With 2, a quadrilateral is left over: the last entry cuts it along the other dia
 """
 
 
-def sides(positions: Floats, corners: Index) -> tuple[Index, Index, Floats]:
+def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Floats]:
     """Return ends (e, 2) of the edges, the edge of each triangle's side (f, 3), and lengths (e,) [mm].
 
     positions : (n, 3) [mm]
@@ -34,7 +34,7 @@ def sides(positions: Floats, corners: Index) -> tuple[Index, Index, Floats]:
     return ends, of_side.reshape(3, -1).T, length
 
 
-def divide(
+def split_triangles(
     corners: Index, weights: Floats, middle: Index, positions: Floats | None = None
 ) -> tuple[Index, Index, Floats]:
     """Return the triangles (m, 3) after halving, which one each was cut from (m,), and its weights (m, 3, 3).
@@ -56,9 +56,9 @@ def divide(
     if positions is not None:
         diagonals = positions[vertices[:, [0, 3]]] - positions[vertices[:, [4, 2]]]
         first_longer = np.subtract(*np.square(diagonals).sum(axis=2).T) > 0
-        case = np.where((count == 2) & first_longer, len(_PIECES) - 1, count)
+        case = np.where((count == 2) & first_longer, len(_SPLIT_PATTERNS) - 1, count)
     pieces = []
-    for number, pattern in enumerate(_PIECES):
+    for number, pattern in enumerate(_SPLIT_PATTERNS):
         chosen = np.flatnonzero(case == number)
         cut = vertices[chosen][:, pattern].reshape(-1, 3), apart[chosen][:, pattern].reshape(-1, 3, 3)
         pieces.append((cut[0], np.repeat(chosen, len(pattern)), cut[1]))

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.photon import MAX_EVENTS, Words, deflect, refract, uniform
+from dermis.apps.truths.photon import MAX_EVENTS, RandomState, deflect, refract, uniform
 from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
@@ -18,7 +18,7 @@ Counts = NDArray[np.int64]
 
 
 @compiled
-def _walk(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: Words) -> float:
+def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: RandomState) -> float:
     """Return the exit x of a photon that entered straight down at x [mm]; NaN if it is absorbed."""
     z = ux = uy = 0.0
     uz = 1.0
@@ -48,8 +48,8 @@ def _walk(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: Words) -> 
 
 
 @compiled
-def count_crossings(
-    photons: int, sigma_t: Floats, albedo: Floats, eta: float, edges_mm: Floats, rng: Words, tally: Counts
+def tally_exits(
+    photons: int, sigma_t: Floats, albedo: Floats, eta: float, edges_mm: Floats, rng: RandomState, tally: Counts
 ) -> None:
     """Add to tally (n, n) where photons leave, by bins of where they enter and leave; as many into each.
 
@@ -59,12 +59,12 @@ def count_crossings(
     width = (edges_mm[-1] - edges_mm[0]) / bins
     for start in range(bins):
         for _ in range(photons):
-            end = _walk(edges_mm[0] + (start + uniform(rng)) * width, sigma_t, albedo, eta, rng)
+            end = _trace_photon(edges_mm[0] + (start + uniform(rng)) * width, sigma_t, albedo, eta, rng)
             if edges_mm[0] <= end < edges_mm[-1]:
                 tally[start, int((end - edges_mm[0]) / width)] += 1
 
 
-def exchange(
+def strip_transfer(
     sigma_a: Floats, sigma_s_prime: Floats, edges_mm: Floats, photons: int, seed: int = 0, eta: float = 1.4
 ) -> Floats:
     """Return (n, n) shares of light entering each strip, straight down, that leave from each strip [-].
@@ -80,5 +80,5 @@ def exchange(
     sigma_t = np.asarray(sigma_a, np.float64) + sigma_s_prime
     tally = np.zeros((len(edges_mm) - 1,) * 2, np.int64)
     rng = np.random.SeedSequence(seed).generate_state(4, np.uint64).astype(np.uint64)
-    count_crossings(photons, sigma_t, sigma_s_prime / sigma_t, eta, edges_mm, rng, tally)
+    tally_exits(photons, sigma_t, sigma_s_prime / sigma_t, eta, edges_mm, rng, tally)
     return np.asarray(tally / photons)

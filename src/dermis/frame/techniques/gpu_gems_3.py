@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dermis.frame.features.atlas.textures import AtlasTextures
-from dermis.frame.features.diffusion.levels import Blur, Halvings, Levels, make_levels
+from dermis.frame.features.diffusion.pyramid import Blur, Halvings, Levels, make_levels
 from dermis.frame.programs import HALVES, program
 from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique

@@ -11,7 +11,7 @@ from dermis.frame.features.atlas.passes import draw_blend, draw_stretch
 from dermis.frame.features.atlas.textures import MOST_HALVINGS, AtlasTextures
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion import mixture as mix
-from dermis.frame.features.diffusion.levels import Blur, Halvings, Levels, halvings_of, make_levels
+from dermis.frame.features.diffusion.pyramid import Blur, Halvings, Levels, halvings_of, make_levels
 from dermis.frame.features.diffusion.mixture import Mixture
 from dermis.frame.features.irradiance import irradiance
 from dermis.frame.features.irradiance.irradiance import TEXEL_AREA

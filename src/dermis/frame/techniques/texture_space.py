@@ -9,7 +9,7 @@ import numpy as np
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion.kernels import lead_up
-from dermis.frame.features.diffusion.levels import Blur, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, Levels
 from dermis.frame.features.irradiance.irradiance import fine_levels
 from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique

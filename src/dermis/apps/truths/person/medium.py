@@ -18,30 +18,30 @@ from dermis.scene.camera import Camera
 Doubles = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-PASSED = 0.98
+COAT_TRANSMITTANCE = 0.98
 """Share of light that the coat lets through, see `skin.coat`; the medium makes up for it."""
-INDEX = SKIN_ETA
+COAT_INDEX = SKIN_ETA
 VOXELS = 96
 """Along the longest side of the grid of colours."""
-_MARGIN, _LEAST_MM = 0.75, 25.0  # of the grid: over the height of the picture; least half of its side
-_DEEP_MM = 3.0  # from the surface, to which places have its colour
-_DENSE = 3.0  # samples of the surface for the square of a voxel's side
-_MOST_COLOUR = 0.97
-_LEAST_ROOT = 0.01
+_GRID_MARGIN, _MIN_HALF_SIDE_MM = 0.75, 25.0  # of the grid: over the height of the picture; least half of its side
+_COLOUR_DEPTH_MM = 3.0  # from the surface, to which places have its colour
+_SAMPLES_PER_VOXEL = 3.0  # samples of the surface for the square of a voxel's side
+_MAX_COLOUR = 0.97
+_MIN_ROOT = 0.01
 _PHOTONS = 40_000
 
 
 @cache
-def _scattering() -> tuple[Doubles, Doubles]:
+def _albedo_table() -> tuple[Doubles, Doubles]:
     """Return albedos of half-spaces, and the roots of their single-scattering absorption, in even steps."""
-    root = np.linspace(1.0, _LEAST_ROOT, 32)
+    root = np.linspace(1.0, _MIN_ROOT, 32)
     return np.array([diffuse_albedo(float(1.0 - one**2)) for one in root]), root
 
 
-def single_albedo(colour: ArrayLike) -> Doubles:
+def single_scattering_albedo(colour: ArrayLike) -> Doubles:
     """Return the single-scattering albedo of half-spaces of a colour under uniform light [-]."""
-    total, root = _scattering()
-    wanted = np.clip(np.asarray(colour, np.float64) / PASSED, 0.0, _MOST_COLOUR)
+    total, root = _albedo_table()
+    wanted = np.clip(np.asarray(colour, np.float64) / COAT_TRANSMITTANCE, 0.0, _MAX_COLOUR)
     return np.asarray(1.0 - np.interp(wanted, total, root) ** 2)
 
 
@@ -50,12 +50,12 @@ def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
 
     By photons, which fall in at right angles.
     """
-    pairs = zip(single_albedo(colour), np.asarray(distance_mm, np.float64), strict=True)
-    return np.array([distance / _mean_distance(round(float(albedo), 4)) for albedo, distance in pairs])
+    pairs = zip(single_scattering_albedo(colour), np.asarray(distance_mm, np.float64), strict=True)
+    return np.array([distance / _mean_offset(round(float(albedo), 4)) for albedo, distance in pairs])
 
 
 @cache
-def _mean_distance(albedo: float) -> float:
+def _mean_offset(albedo: float) -> float:
     """Return the mean lateral offset of exit points, in mean free paths."""
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 400.0, 120)])
     layer = ScatteringLayer(1.0 - albedo, albedo, eta=1.0)
@@ -63,11 +63,11 @@ def _mean_distance(albedo: float) -> float:
     return float((found * 0.5 * (edges[1:] + edges[:-1])).sum() / found.sum())
 
 
-def medium_of(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: Doubles) -> MitsubaObject:
+def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: Doubles) -> MitsubaObject:
     """Return Mitsuba's medium below the skin, exact in colour where the camera looks."""
     extinction = 1.0 / mean_free_path_mm
-    low, high = _box(person, camera)
-    grid = single_albedo(colours_in(person, low, high, VOXELS)).astype(np.float32)
+    low, high = _grid_box(person, camera)
+    grid = single_scattering_albedo(colour_grid(person, low, high, VOXELS)).astype(np.float32)
     to_world = mi.ScalarTransform4f().translate([float(c) for c in low])
     return mi.load_dict(
         {
@@ -85,24 +85,24 @@ def medium_of(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: Do
     )
 
 
-def _box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
+def _grid_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
     """Return two corners of the part of the head in the picture; beyond it colours are constant."""
-    reach = max(_MARGIN * camera.frame_mm, _LEAST_MM)
-    skin = person.mesh.positions[np.unique(_skin(person))]
+    reach = max(_GRID_MARGIN * camera.frame_mm, _MIN_HALF_SIDE_MM)
+    skin = person.mesh.positions[np.unique(_skin_triangles(person))]
     middle = np.array(camera.target, np.float64)
-    low = np.maximum(skin.min(axis=0) - _DEEP_MM, middle - reach)
-    high = np.minimum(skin.max(axis=0) + _DEEP_MM, middle + reach)
+    low = np.maximum(skin.min(axis=0) - _COLOUR_DEPTH_MM, middle - reach)
+    high = np.minimum(skin.max(axis=0) + _COLOUR_DEPTH_MM, middle + reach)
     return low, np.maximum(high, low + 1.0)
 
 
-def _skin(person: Person) -> NDArray[np.int32]:
+def _skin_triangles(person: Person) -> NDArray[np.int32]:
     """Return (f, 3) triangles of skin."""
     mesh = person.mesh
     kinds = np.array([one.kind == "skin" for one in mesh.materials])
     return np.asarray(mesh.triangles[kinds[mesh.material]])
 
 
-def colours_in(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doubles:
+def colour_grid(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doubles:
     """Return (z, y, x, 3) colours of the nearest skin in even cells of a box, deeper inside the mean of all.
 
     low, high : (3,) corners of the box [mm]
@@ -112,14 +112,14 @@ def colours_in(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doub
 
     side = float((high - low).max()) / voxels
     count = np.maximum(np.ceil((high - low) / side).astype(int), 1)
-    places, colour = _samples(person, low, high, side)
+    places, colour = _skin_samples(person, low, high, side)
     grid = np.tile(colour.mean(axis=0) if len(colour) else np.full(3, 0.5), (*count[::-1], 1))
     if not len(places):
         return grid
     cell = np.clip(((places - low) / (high - low) * count).astype(int), 0, count - 1)
     near = np.zeros(count[::-1], bool)
     near[cell[:, 2], cell[:, 1], cell[:, 0]] = True
-    near = binary_dilation(near, iterations=max(2, int(np.ceil(_DEEP_MM / side))))
+    near = binary_dilation(near, iterations=max(2, int(np.ceil(_COLOUR_DEPTH_MM / side))))
     wanted = np.argwhere(near)
     middles = low + (wanted[:, ::-1] + 0.5) / count * (high - low)
     _, nearest = cKDTree(places).query(middles, k=min(4, len(places)))
@@ -127,14 +127,14 @@ def colours_in(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doub
     return grid
 
 
-def _samples(person: Person, low: Doubles, high: Doubles, side: float) -> tuple[Doubles, Doubles]:
+def _skin_samples(person: Person, low: Doubles, high: Doubles, side: float) -> tuple[Doubles, Doubles]:
     """Return places on the skin in a box (n, 3) and their colours (n, 3), the same each time."""
-    mesh, triangles = person.mesh, _skin(person)
+    mesh, triangles = person.mesh, _skin_triangles(person)
     corners = mesh.positions[triangles].astype(np.float64)
-    inside = ((corners.max(axis=1) >= low - _DEEP_MM) & (corners.min(axis=1) <= high + _DEEP_MM)).all(axis=1)
+    inside = ((corners.max(axis=1) >= low - _COLOUR_DEPTH_MM) & (corners.min(axis=1) <= high + _COLOUR_DEPTH_MM)).all(axis=1)
     triangles, corners = triangles[inside], corners[inside]
     rng = np.random.default_rng(0)
-    many = rng.poisson(_DENSE * triangle_areas(corners) / side**2) + 1
+    many = rng.poisson(_SAMPLES_PER_VOXEL * triangle_areas(corners) / side**2) + 1
     of = np.repeat(np.arange(len(triangles)), many)
     weights = rng.dirichlet((1.0, 1.0, 1.0), len(of))
     places = np.einsum("nk,nkc->nc", weights, corners[of])

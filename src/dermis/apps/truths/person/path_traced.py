@@ -7,36 +7,36 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.scene_description import Described, Mitsuba, MitsubaObject, rgb
+from dermis.apps.truths.scene_description import SceneDict, Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
-    lit_scene,
+    mitsuba_scene,
     load_mitsuba,
     mesh_shape,
-    share_scene,
+    coverage_scene,
 )
 from dermis.apps.truths.path_traced import (
     SAMPLES_PER_PASS,
     PathTraced,
-    Report,
+    ProgressCallback,
     Variant,
-    digest_surroundings,
-    mean_of_passes,
-    passes_for,
+    hash_lighting,
+    render_passes,
+    pass_count,
 )
-from dermis.apps.truths.person.medium import PASSED, VOXELS, mean_free_paths, medium_of
-from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, picture, skin_shapes
-from dermis.apps.truths.person.person import Paint as Paint
-from dermis.apps.truths.person.person import Person, person_of
+from dermis.apps.truths.person.medium import COAT_TRANSMITTANCE, VOXELS, mean_free_paths, skin_medium
+from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, mitsuba_texture, skin_shapes
+from dermis.apps.truths.person.person import SkinTextures as Paint
+from dermis.apps.truths.person.person import Person, posed_person
 from dermis.mesh.mesh import Material
 from dermis.scene.model import Scene
 
-_FORM = "person 1"  # raise when the same person is traced in another way
-_SALIVA, _TONGUE = 0.12, 0.25
-_WET_INDEX = 1.4
+_CACHE_VERSION = "person 1"  # raise when the same person is traced in another way
+_SALIVA_ROUGHNESS, _TONGUE_ROUGHNESS = 0.12, 0.25
+_SALIVA_INDEX = 1.4
 
 
-def trace_person(
+def path_trace_person(
     scene: Scene,
     paint: Paint,
     distance_mm: NDArray[np.float64],
@@ -46,7 +46,7 @@ def trace_person(
     *,
     variant: Variant = "scalar_rgb",
     keep: bool = True,
-    report: Report | None = None,
+    report: ProgressCallback | None = None,
 ) -> PathTraced:
     """Return the person of a scene as painted, its skin's profile and surface lobe aside.
 
@@ -61,18 +61,18 @@ def trace_person(
 
     Sources: [Jakob2022], [Miller2019], [Chiang2016].
     """
-    wanted, mi = passes_for(samples), load_mitsuba()
-    person, path = person_of(scene, paint), mean_free_paths(colour, distance_mm)
-    form = f"{_FORM} {mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH} {PASSED} {VOXELS} {size}"
+    wanted, mi = pass_count(samples), load_mitsuba()
+    person, path = posed_person(scene, paint), mean_free_paths(colour, distance_mm)
+    form = f"{_CACHE_VERSION} {mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {VOXELS} {size}"
     key = person_key(scene, person, path, form) if keep else None
-    return mean_of_passes(
+    return render_passes(
         mi,
         variant,
         wanted,
         size,
         key,
         lambda: person_scene(mi, scene, person, path, size),
-        lambda: share_scene(mi, scene.camera, size, _glowing(mi, person)),
+        lambda: coverage_scene(mi, scene.camera, size, _emissive_head(mi, person)),
         report,
     )
 
@@ -85,16 +85,16 @@ def person_scene(
     size: tuple[int, int],
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
     """Return Mitsuba's scene whose image is the radiance, and notes on what was done to the head."""
-    medium = medium_of(mi, person, scene.camera, mean_free_path_mm)
+    medium = skin_medium(mi, person, scene.camera, mean_free_path_mm)
     shapes, notes = skin_shapes(mi, person, medium)
-    shapes |= eye_shapes(mi, person) | _opaque_shapes(mi, person)
+    shapes |= eye_shapes(mi, person) | _opaque_parts(mi, person)
     for number, hairs in enumerate(person.hairs):
         shapes |= hair_shapes(mi, hairs, f"hairs_{number}")
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
-    return lit_scene(mi, scene, integrator, shapes, size), notes
+    return mitsuba_scene(mi, scene, integrator, shapes, size), notes
 
 
-def _opaque_shapes(mi: Mitsuba, person: Person) -> Described:
+def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
     """Return parts that are neither skin nor eyes: teeth and tongue under saliva, others matte."""
     shapes = {}
     mesh = person.mesh
@@ -103,30 +103,30 @@ def _opaque_shapes(mi: Mitsuba, person: Person) -> Described:
         if material.kind == "skin" or k in person.eye_materials or not len(chosen):
             continue
         used, corners = np.unique(chosen, return_inverse=True)
-        bsdf = mi.load_dict(_wet(mi, person, material))
+        bsdf = mi.load_dict(_opaque_bsdf(mi, person, material))
         place, normals, uv = mesh.positions[used], mesh.normals[used], mesh.uv[used]
         shapes[f"part_{k}"] = mesh_shape(mi, place, corners.reshape(-1, 3), normals, uv, bsdf=bsdf)
     return shapes
 
 
-def _wet(mi: Mitsuba, person: Person, material: Material) -> Described:
+def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
     if material.part is None:
         return {"type": "diffuse", "reflectance": rgb(material.colour)}
     tongue = material.part == "tongue"
     upper, lower = person.paint.teeth
     colour = (
-        rgb(material.colour) if tongue else picture(mi, upper if material.part == "upper teeth" else lower)
+        rgb(material.colour) if tongue else mitsuba_texture(mi, upper if material.part == "upper teeth" else lower)
     )
     return {
         "type": "roughplastic",
         "distribution": "beckmann",
-        "alpha": _TONGUE if tongue else _SALIVA,
-        "int_ior": _WET_INDEX,
+        "alpha": _TONGUE_ROUGHNESS if tongue else _SALIVA_ROUGHNESS,
+        "int_ior": _SALIVA_INDEX,
         "diffuse_reflectance": colour,
     }
 
 
-def _glowing(mi: Mitsuba, person: Person) -> Described:
+def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
     """Return the head with radiance 1 and without hairs."""
     glow, mesh = mi.load_dict({"type": "area", "radiance": 1.0}), person.mesh
     return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=glow)}
@@ -138,7 +138,7 @@ def person_key(scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float
     form : versions, and how it is traced
     """
     digest = hashlib.sha256(f"{form} {person.paint.reach_mm} {person.eye_materials}".encode())
-    digest_surroundings(digest, scene)
+    hash_lighting(digest, scene)
     digest.update(repr(person.mesh.materials).encode())
     for array in (*person.arrays(), mean_free_path_mm):
         digest.update(f"{array.shape} {array.dtype}".encode())

@@ -17,7 +17,7 @@ Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Paint:
+class SkinTextures:
     """Pictures of what a person looks like, linear Rec. 709, row 0 at v = 0.
 
     colour, roughness : (n, n, 3), (n, n) of the skin by its uv [-]
@@ -43,7 +43,7 @@ class Paint:
 
 
 @dataclass(frozen=True, eq=False)
-class Hairs:
+class HairFibres:
     """Round fibres in space.
 
     knots_mm : (n, k, 3) from root to tip, from the head's centre
@@ -68,8 +68,8 @@ class Person:
     mesh: Mesh
     eyes: Doubles
     eye_materials: tuple[int, ...]
-    hairs: tuple[Hairs, ...]
-    paint: Paint
+    hairs: tuple[HairFibres, ...]
+    paint: SkinTextures
 
     def arrays(self) -> Iterator[NDArray[np.generic]]:
         """Yield all arrays of the person."""
@@ -81,7 +81,7 @@ class Person:
         yield from self.paint.arrays()
 
 
-def person_of(scene: Scene, paint: Paint) -> Person:
+def posed_person(scene: Scene, paint: SkinTextures) -> Person:
     """Return the head of a scene in its pose.
 
     Raises DermisError for a head without eyes of true shape.
@@ -102,7 +102,7 @@ def person_of(scene: Scene, paint: Paint) -> Person:
         quads=mesh.quads,
     )
     hairs = tuple(
-        Hairs(strands.places_mm(mesh, points), strands.radius_mm, strands.absorption)
+        HairFibres(strands.places_mm(mesh, points), strands.radius_mm, strands.absorption)
         for strands in (head.strands, head.hair)
         if strands is not None and len(strands)
     )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 import dermis
-from dermis.apps.truths.cycles import Coated, Facets, cycles_passes
+from dermis.apps.truths.cycles import PrincipledSkin, BeckmannSurface, cycles_passes
 from dermis.apps.validation.accuracy.person import sheet_bytes
 from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_figures, write_figures
 from dermis.atlas.build import build_atlas
@@ -132,7 +132,7 @@ def traced(scene: Scene, settings: Settings, kinds: tuple[tuple[float, float], .
     """
     picture = np.zeros(settings.size[::-1], np.float32)
     for share, roughness in kinds:
-        (passed,) = cycles_passes(scene, Facets(roughness), [PATHS], settings)
+        (passed,) = cycles_passes(scene, BeckmannSurface(roughness), [PATHS], settings)
         picture += share * passed.image[..., 1]
     return picture
 
@@ -171,7 +171,7 @@ def of_frame(renderer: dermis.Renderer, scene: Scene) -> Look:
     return Look(picture, float(surface.sum() / picture.sum()))
 
 
-def of_cycles(scene: Scene, skin: Coated) -> Look:
+def of_cycles(scene: Scene, skin: PrincipledSkin) -> Look:
     """Return the scene by Cycles; a second pass with black skin shows what the surface reflects."""
     settings = Settings(size=(SIDE, SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
@@ -195,7 +195,7 @@ def bumpy(head: Head) -> Head:
     return replace(head, maps=replace(head.maps, normal=relief, height=None))
 
 
-def coated(head: Head) -> Coated:
+def coated(head: Head) -> PrincipledSkin:
     """Return Cycles' skin of a head: its colours, and the mean offset of exit points of the frame's profile.
 
     By Burley's profile that is 2.5 d, d the mean free path over a factor of the colour.
@@ -205,7 +205,7 @@ def coated(head: Head) -> Coated:
     spread_mm = (profile.weight * np.sqrt(0.5 * np.pi * profile.variance_mm2[:, None])).sum(axis=0)
     walk_mm = spread_mm / 2.5 * (1.9 - colour + 3.5 * (colour - 0.8) ** 2)
     red, green, blue = (float(part) for part in 4.0 * np.pi * walk_mm)
-    return Coated(reduced(head.maps.colour), (red, green, blue), ROUGHNESS)
+    return PrincipledSkin(reduced(head.maps.colour), (red, green, blue), ROUGHNESS)
 
 
 def looks_of(renderer: dermis.Renderer, title: str) -> dict[str, list[Look]]:

@@ -18,7 +18,7 @@ from dermis.atlas.build import build_atlas, cached_atlas
 from dermis.frame.features.atlas import passes as stretched
 from dermis.frame.features.atlas.textures import upload_atlas
 from dermis.frame.features.diffusion import blur as diffuse
-from dermis.frame.features.diffusion.levels import Blur, Levels, halvings_of, make_levels
+from dermis.frame.features.diffusion.pyramid import Blur, Levels, halvings_of, make_levels
 from dermis.frame.features.shape.mesh import upload_geometry
 from dermis.frame.features.shape.shape import rest_shape, shape_tables
 from dermis.frame.programs import usual_texel
@@ -119,7 +119,7 @@ def constant_light(device: Device) -> float:
 
 
 def surface_tables(adapter: str) -> dict[str, str]:
-    """Return the tables of curvature and seams by their names in docs/techniques.in.md."""
+    """Return the tables of curvature and seams by their names in docs/templates/techniques.md."""
     use_tests_folder()
     renderer = dermis.Renderer(adapter)
     curved = [first_harmonic(renderer, radius) for radius in RADII_MM]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.slab_mc import counted_profile, trace_medium
+from dermis.apps.truths.slab_mc import monte_carlo_profile, trace_medium
 from dermis.apps.validation.pages import print_tables
 from dermis.optics.diffusion.models import Model, cut, through_gaussians, through_slab
 from dermis.optics.diffusion.multipole import Clamp
@@ -52,7 +52,7 @@ def models_table() -> str:
 
 def _rows(name: str, tissue: Tissue) -> Iterator[str]:
     photons = PHOTONS if tissue.rgb is None else SPECTRAL_PHOTONS
-    truth = counted_profile(tissue.medium, tissue.rgb, photons, seed=1)
+    truth = monte_carlo_profile(tissue.medium, tissue.rgb, photons, seed=1)
     assert truth.total_error is not None
     certain = " ".join(f"{value:.4f}" for value in truth.total)
     doubt = float((truth.total_error / truth.total).max())
@@ -78,7 +78,7 @@ def counted_table() -> str:
     for name in ("skin1", "skin2"):
         for eta in (1.0, SKIN_ETA):
             tissue = Tissue(media()[name].with_eta(eta))
-            truth = counted_profile(tissue.medium, photons=PHOTONS, seed=1)
+            truth = monte_carlo_profile(tissue.medium, photons=PHOTONS, seed=1)
             for model in ("counted", "layered"):
                 profile = tissue.profile(model)
                 total = " ".join(f"{100 * one:+.2f}" for one in profile.total / truth.total - 1.0)

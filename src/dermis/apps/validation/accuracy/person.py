@@ -1,4 +1,4 @@
-"""The package's human beside the same person path-traced: docs/path_traced.md from docs/path_traced.in.md.
+"""The package's human beside the same person path-traced: docs/path_traced.md from docs/templates/path_traced.md.
 
 Paths are kept on disk as they are traced: a run that was interrupted continues where it stopped.
 """

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.truths.surface_integral import GaussianSum as Profile
-from dermis.apps.truths.surface_integral import integrate
+from dermis.apps.truths.surface_integral import integrate_exitance
 from dermis.apps.validation.comparisons.compare import subject_of
 from dermis.apps.validation.comparisons.scenes import usual_region
 from dermis.apps.validation.comparisons.truths import (
@@ -46,7 +46,7 @@ PLACES: dict[str, dict[str, tuple[str, ...]]] = {
 
 
 def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
-    """Return the tables by their names in docs/techniques.in.md."""
+    """Return the tables by their names in docs/templates/techniques.md."""
     found: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
     for light in LIGHTS:
         with subject_of(head, light, usual_region(light), "skin1", settings, adapter, "layered") as subject:
@@ -96,7 +96,7 @@ def even_light(subject: Subject) -> Floats:
     seen = surface_points(subject.renderer, subject.scene, subject.settings)
     profile = Profile(subject.profile.weight / subject.profile.albedo, subject.profile.variance_mm2)
     image = np.ones((*seen.mask.shape, 3))
-    image[seen.mask] = integrate(positions(subject, seen), evenly, profile)
+    image[seen.mask] = integrate_exitance(positions(subject, seen), evenly, profile)
     return image
 
 

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 import dermis
 from dermis.apps.truths import surface_integral
-from dermis.apps.truths.irradiance_samples import Places
+from dermis.apps.truths.irradiance_samples import MeshPoints
 from dermis.apps.validation.pages import print_tables
 from dermis.gpu import download
 from dermis.mesh.head import Head
@@ -63,14 +63,14 @@ def scattered(
 def summed(mesh: Mesh, way: Array, places: Array, spacing: float) -> Array:
     """Return light at places by the profile of straight-line distance, summed over the surface."""
 
-    def light(at: Places) -> Array:
+    def light(at: MeshPoints) -> Array:
         normals = at.interpolate(mesh, mesh.normals)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         return np.repeat(np.maximum(normals @ -way, 0.0)[:, None], 3, axis=1)
 
     profile = surface_integral.GaussianSum(BLURRED.weight, BLURRED.variance_mm2)
     samples = surface_integral.sample_irradiance(mesh, light, spacing)
-    return surface_integral.integrate(places, samples, profile, 0.002)
+    return surface_integral.integrate_exitance(places, samples, profile, 0.002)
 
 
 def slabs(renderer: dermis.Renderer) -> str:
@@ -91,7 +91,7 @@ def slabs(renderer: dermis.Renderer) -> str:
 def across_air(mesh: Mesh, way: Array, places: Array, normals: Array) -> Array:
     """Return the red light of the sum whose straight path crosses air."""
 
-    def light(at: Places) -> Array:
+    def light(at: MeshPoints) -> Array:
         turned = at.interpolate(mesh, mesh.normals)
         return np.repeat(np.maximum(turned @ -way, 0.0)[:, None], 3, axis=1)
 

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from dermis.base.errors import DermisError
-from dermis.frame.features.diffusion.levels import Blur, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, Levels
 from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.inputs import Inputs

@@ -9,7 +9,7 @@ import numpy as np
 from dermis.frame.features.atlas import passes as stretch
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.features.diffusion.combine import nothing
-from dermis.frame.features.diffusion.levels import Blur, Halvings, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, Halvings, Levels
 from dermis.frame.features.surface import texels as surface_texels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.features.translucency import passes as translucency_weights

@@ -13,9 +13,9 @@ from dermis.apps.validation.benchmarks.cases import FRAGMENTS, Case, scenes_of, 
 from dermis.apps.validation.benchmarks.floor import moved_by, stage_bytes
 from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
 from dermis.frame.renderer import Renderer
-from dermis.gpu.command_list import Timed
+from dermis.gpu.command_list import Timing
 from dermis.gpu.failures import gpu_failures
-from dermis.gpu.memory import held_bytes
+from dermis.gpu.memory import allocated_bytes
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -110,7 +110,7 @@ def _measured(renderer: Renderer, case: Case, head: Head, folder: Path, rate: fl
         _floor(stage_bytes(moved), gpu_ms, rate),
         python_ms,
         image_ms,
-        held_bytes() / 1e6,
+        allocated_bytes() / 1e6,
     )
 
 
@@ -133,8 +133,8 @@ def stage_ms(
 ) -> dict[str, float]:
     """Median device time of each stage, and of the whole frame as "total" [ms]; scenes as in `row_ms`."""
     software = renderer.device.adapter.kind == "CPU"
-    ways: tuple[Timed, ...] = (True,) if software else (True, "whole")
-    drawn: dict[Timed, list[dict[str, float]]] = {way: [] for way in ways}
+    ways: tuple[Timing, ...] = (True,) if software else (True, "whole")
+    drawn: dict[Timing, list[dict[str, float]]] = {way: [] for way in ways}
     for _ in range(effort.timed):
         for way in ways:
             row_ms(renderer, scenes, effort.between, settings)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import PathTraced, Variant
-from dermis.apps.truths.person.path_traced import Paint, trace_person
+from dermis.apps.truths.person.path_traced import Paint, path_trace_person
 from dermis.apps.validation.comparisons.truths import check_seen
 from dermis.base.errors import refuse
 from dermis.environment.panorama import UNIFORM
@@ -130,7 +130,7 @@ def traced(
     assert colour is not None  # painted people have one
     weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
     distance = (weight * width[:, None]).sum(axis=0) / weight.sum(axis=0)
-    return trace_person(
+    return path_trace_person(
         scene, paint, distance, colour, size, samples, variant=variant, keep=keep, report=report
     )
 

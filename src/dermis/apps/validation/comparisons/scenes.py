@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from dermis.apps.truths.slab_mc import counted_profile
+from dermis.apps.truths.slab_mc import monte_carlo_profile
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.optics.gaussians import GaussianSum
@@ -122,5 +122,5 @@ def gaussians_of(body: Medium, model: ModelName | None = None) -> GaussianSum:
     Raises DermisError for a medium that has no tables.
     """
     if model == "montecarlo":
-        return fit_radial(counted_profile(body, photons=_PHOTONS), body.name)
+        return fit_radial(monte_carlo_profile(body, photons=_PHOTONS), body.name)
     return fit_radial(Tissue(body).profile(model), body.name)

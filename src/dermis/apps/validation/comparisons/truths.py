@@ -101,7 +101,7 @@ def heat_around(
     lit : of the whole head, see `irradiance_samples`
     least_mm2 : variance below which Gaussians are integrated by straight-line distance
     """
-    from dermis.apps.truths.surface_patch import patch_of
+    from dermis.apps.truths.surface_patch import mesh_patch
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface
 
     started = time.perf_counter()
@@ -111,7 +111,7 @@ def heat_around(
     places = positions(subject, seen)
     middle = np.array(place) + subject.scene.head.centre_mm
     centre = places[np.linalg.norm(places - middle, axis=1).argmin()]
-    patch = patch_of(subject.scene.head.mesh, centre, radius_mm, variances[~narrow])
+    patch = mesh_patch(subject.scene.head.mesh, centre, radius_mm, variances[~narrow])
     entered = _entered(subject, *patch.vertex_places())
     levels = diffuse_on_surface(patch.positions, patch.triangles, entered, variances[~narrow])
     fine, weights = patch.find(seen.triangle, seen.barycentric)
@@ -121,7 +121,7 @@ def heat_around(
     exitance += _straight(places[on], lit, weight[narrow], variances[narrow])
     mask = seen.mask.copy()
     mask[seen.mask] = on
-    judged = SurfacePoints(mask, seen.triangle[on], seen.barycentric[on])
+    judged = MeshPoints(mask, seen.triangle[on], seen.barycentric[on])
     straight = f"{narrow.sum()} Gaussians under {least_mm2:g} mm2 by straight lines"
     made = _by_pixel(judged, exitance, started, f"{radius_mm:g} mm around the middle; {straight}")
     return replace(made, through=False)
@@ -129,9 +129,9 @@ def heat_around(
 
 def irradiance_samples(subject: Subject) -> IrradianceSamples:
     """Return the light that enters all of the skin, sampled as finely as the truths need it."""
-    from dermis.apps.truths.irradiance_samples import Places, sample_irradiance
+    from dermis.apps.truths.irradiance_samples import MeshPoints, sample_irradiance
 
-    def light(places: Places) -> Floats:
+    def light(places: MeshPoints) -> Floats:
         return _entered(subject, places.face, places.barycentric)
 
     return sample_irradiance(subject.scene.head.mesh, light, _SPACING_MM, _FINEST_MM)
@@ -180,21 +180,21 @@ def _entered(subject: Subject, triangle: NDArray[np.int64], barycentric: Floats)
 def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
     """Return (n, 3) radiant exitance at points by Gaussians of the straight-line distance."""
     from dermis.apps.truths.surface_integral import GaussianSum as Profile
-    from dermis.apps.truths.surface_integral import integrate
+    from dermis.apps.truths.surface_integral import integrate_exitance
 
     if not len(variance_mm2):
         return np.zeros_like(points)
-    return integrate(points, lit, Profile(weight, variance_mm2))
+    return integrate_exitance(points, lit, Profile(weight, variance_mm2))
 
 
-def positions(subject: Subject, seen: SurfacePoints) -> Floats:
+def positions(subject: Subject, seen: MeshPoints) -> Floats:
     """Return (n, 3) where rays through the pixels' centres meet the head [mm]."""
     mesh = subject.scene.head.mesh
     corners = mesh.positions[mesh.triangles[seen.triangle]].astype(np.float64)
     return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))
 
 
-def _by_pixel(seen: SurfacePoints, exitance: Floats, started: float, note: str) -> Truth:
+def _by_pixel(seen: MeshPoints, exitance: Floats, started: float, note: str) -> Truth:
     image = np.zeros((*seen.mask.shape, 3))
     image[seen.mask] = exitance / np.pi
     return Truth(

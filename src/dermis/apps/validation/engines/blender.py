@@ -15,7 +15,7 @@ from PIL import Image
 from dermis.apps.export.fitting import deviation, fit_d
 from dermis.apps.export.subject import subject_of
 from dermis.apps.export.targets.blender.target import TARGET
-from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
+from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
 from dermis.apps.validation.engines.heads import TEXELS, Floats, compared, drawn, rendered
 from dermis.apps.validation.pages import DOCS, RESULTS, Figures, read_figures, write_figures
 from dermis.base.console import print_lines
@@ -35,7 +35,7 @@ SEEDS = 2  # pictures of each channel, whose difference tells the noise
 SIDE, PATHS, SHOTS = 192, 32, 2  # of heads
 SHOWN, SHOWN_SAMPLES = 320, 48
 METHODS_OF = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
-ERRAND = Errand("Cycles", "to render a half-lit plane", "See what it said")
+ERRAND = BlenderTask("Cycles", "to render a half-lit plane", "See what it said")
 
 
 def blender(python_45: Path, python_52: Path, *parts: Part) -> None:

@@ -21,7 +21,7 @@ from scipy.ndimage import distance_transform_edt, maximum_filter
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, subject_of
 from dermis.apps.truths.metrics import relative_rmse
-from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
+from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
 from dermis.apps.validation.engines.babylon import LIBRARY, babylon_library
 from dermis.apps.validation.pages import DOCS, RESULTS, Figures, chromium_page, in_checkout, write_figures
 from dermis.base.console import print_lines
@@ -99,7 +99,7 @@ def in_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
 def in_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
     """Return the exported scene by several seeds, with the alpha of ours."""
     mi = load_mitsuba()
-    with TemporaryDirectory() as place, variant_of(mi, "scalar_rgb"):
+    with TemporaryDirectory() as place, mitsuba_variant(mi, "scalar_rgb"):
         folder = Path(place) / "head"
         export_skin(subject, "mitsuba", folder)
         scene = mi.load_file(str(folder / "scene.xml"), width=SIDE, height=SIDE, samples=MITSUBA_SAMPLES)

@@ -18,7 +18,7 @@ from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.mitsuba.scene import BOUNDARIES, Boundary, Walked, medium_words, surface_words
 from dermis.apps.export.targets.mitsuba.target import TARGET
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
-from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
+from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
 from dermis.apps.validation.pages import RESULTS, Figures, write_figures
 from dermis.optics.curve import Curve
 
@@ -137,7 +137,7 @@ def mitsuba(*, samples: int = 32000, output: Path = FIGURES, variant: str = "sca
     """
     mi = load_mitsuba()
     found = []
-    with variant_of(mi, variant):
+    with mitsuba_variant(mi, variant):
         for name, boundaries in SKINS.items():
             subject = subject_of(name)
             found += [one(mi, subject, boundary, samples) for boundary in boundaries]

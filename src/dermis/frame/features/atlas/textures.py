@@ -122,7 +122,7 @@ def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Texture], **mor
     if not len(sheet.gutter):
         return AtlasTextures(resources, **more)
     beyond = np.concatenate([sheet.source.view(np.uint32), sheet.gutter.astype(np.uint32)], axis=1)
-    gathered = scratch(device, device.space(_LIGHT * len(beyond)))
+    gathered = mark_scratch(device, device.space(_LIGHT * len(beyond)))
     gutter = device.buffer(beyond, "STORAGE")
     return AtlasTextures(resources, gutter_texels=sheet.gutter, gutter=gutter, gathered=gathered, **more)
 

@@ -18,7 +18,7 @@ from dermis.frame.features.diffusion.kernels import (
     WIDEST,
     kernel_table,
 )
-from dermis.frame.features.diffusion.levels import Blur, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, Levels
 from dermis.frame.programs import TILE, program
 from dermis.gpu import ComputeProgram, Device, MutableBindings, Recorder, Texture, TextureOrView
 from dermis.gpu.textures import texture_from

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.frame.features.diffusion.levels import Blur, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, Levels
 from dermis.frame.programs import FLOATS, TILE, program
 from dermis.gpu import Bindings, ComputeProgram, Device, Recorder, Texture, TextureOrView, make_texture
 from dermis.optics.gaussians import MOST_GAUSSIANS

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.features.diffusion.levels import SHARP, halvings_of
+from dermis.frame.features.diffusion.pyramid import SHARP, halvings_of
 
 Floats = NDArray[np.float64]
 ROWS_PER_UNIT = 64

@@ -14,7 +14,7 @@ from dermis.base.reading import named_path
 from dermis.formats.maps import share_map
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.features.atlas.passes import draw_gutters
-from dermis.frame.features.diffusion.levels import Levels
+from dermis.frame.features.diffusion.pyramid import Levels
 from dermis.frame.programs import FLOATS, HALVES, TILE, program
 from dermis.gpu import Bindings, Device, Recorder, Texture, TextureView, make_texture, upload
 from dermis.gpu.textures import view_of
@@ -108,7 +108,7 @@ def share(graph: Recorder, layout: LitAtlas, mixture: Mixture, number: int) -> N
         "share_map": mixture.shares_over_uv,
         "stored": into,
     }
-    shader = program(graph.device, "diffusion/profile_shares.wgsl", store=texel)
+    shader = program(graph.device, "diffusion/profile_blend_weights.wgsl", store=texel)
     graph.compute("profiles", shader, bound, into.size[:2])
     draw_gutters(graph, "profiles", layout.atlas, into, texel)
 
@@ -116,7 +116,7 @@ def share(graph: Recorder, layout: LitAtlas, mixture: Mixture, number: int) -> N
 def give(graph: Recorder, levels: Levels, mixture: Mixture, number: int, other: int) -> None:
     """Fill the first of another profile's levels with the light that enters where the skin has it."""
     given, device = mixture.given[other], graph.device
-    shader = program(device, "diffusion/profile_given.wgsl", (("OTHER", other),), levels.texel, levels.texel)
+    shader = program(device, "diffusion/profile_entering.wgsl", (("OTHER", other),), levels.texel, levels.texel)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
     light = {"source": levels.layer(0), "stored": given.layer(0)}
     bound: Bindings = {**light, "linear": linear, "shares": mixture.shares[number]}

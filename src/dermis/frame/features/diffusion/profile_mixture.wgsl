@@ -1,10 +1,10 @@
 // The light that leaves skin of mixed profiles: half by what the skin is where light leaves, half by what it is where it enters.
-//#include "packed_shares.wgsl"
+//#include "packed_blend_weights.wgsl"
 
 override OTHERS: u32; // profiles besides the first
 
 @group(0) @binding(0) var sums: texture_2d_array<f32>; // of the first profile; for each other, how it differs, both ways
-@group(0) @binding(1) var shares: texture_2d<f32>; // as profile_shares.wgsl stores them
+@group(0) @binding(1) var shares: texture_2d<f32>; // as profile_blend_weights.wgsl stores them
 @group(0) @binding(2) var mixed: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(16, 16)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.textures import AtlasTextures
-from dermis.frame.features.diffusion.levels import Blur, Halvings, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, Halvings, Levels
 from dermis.frame.features.diffusion.mixture import Mixture, make_mixture, upload_shares
 from dermis.frame.request import FrameRequest
 from dermis.frame.technique import ProfileSplit

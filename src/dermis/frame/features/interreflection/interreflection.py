@@ -125,14 +125,14 @@ def _space(
 ) -> LinkSpace:
     places, bounces, cells = buffers
     leaving, around, *patches = (
-        scratch(device, device.space(_TEXEL * (places[1] // SAMPLES))) for _ in range(4)
+        mark_scratch(device, device.space(_TEXEL * (places[1] // SAMPLES))) for _ in range(4)
     )
     return LinkSpace(
         places=places,
         bounces=bounces,
         cells=cells,
         occluded=occluded,
-        emitted=scratch(device, device.space(2 * _TEXEL * places[1])),
+        emitted=mark_scratch(device, device.space(2 * _TEXEL * places[1])),
         leaving=leaving,
         around=around,
         patches=(patches[0], patches[1]),
@@ -150,7 +150,7 @@ def draw(graph: Recorder, lit: Bindings, made: Interreflection, constants: Const
     Source: [Goral1984].
     """
     shader, (space, albedo) = (
-        program(graph.device, "interreflection/interreflection_places.wgsl", constants),
+        program(graph.device, "interreflection/interreflection_points.wgsl", constants),
         made,
     )
     (places, count), footprint = space.places, 2.0 / (SIDE * SAMPLES**0.5)

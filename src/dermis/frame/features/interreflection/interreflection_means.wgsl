@@ -3,7 +3,7 @@
 
 //#fill const SAMPLES: u32 = {linked_samples}u; // places of a patch
 
-@group(0) @binding(0) var<storage, read> emitted: array<vec4f>; // as interreflection_places.wgsl has them
+@group(0) @binding(0) var<storage, read> emitted: array<vec4f>; // as interreflection_points.wgsl has them
 @group(0) @binding(1) var<storage, read_write> leaving: array<vec4f>; // light, and the share of light from everywhere that enters
 @group(0) @binding(2) var<storage, read_write> around: array<vec4f>; // light that leaves where 1 arrives from everywhere
 

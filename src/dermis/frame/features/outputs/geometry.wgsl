@@ -1,5 +1,5 @@
 // Outputs of the mesh: where the centre of each pixel meets it.
-//#include "each_seen.wgsl"
+//#include "each_hit.wgsl"
 
 //#include <geometry_outputs>
 //#each geometry_outputs: override {NAME}_FIRST: u32 = UNASKED;

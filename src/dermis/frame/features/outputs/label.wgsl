@@ -1,5 +1,5 @@
 // What the centre of each pixel shows, as a class: a part of the mesh, or the hairs over it.
-//#include "each_seen.wgsl"
+//#include "each_hit.wgsl"
 
 override FIELDS: u32 = 0u; // distances that each vertex has
 override HAIRS: bool = false; // whether hairs are drawn

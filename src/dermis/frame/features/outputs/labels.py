@@ -8,7 +8,7 @@ import numpy as np
 
 from dermis.frame.features.hair.resources import has_strands
 from dermis.frame.features.outputs.planes import Planes, fill, stage_program
-from dermis.frame.features.outputs.seen import SeenFrame
+from dermis.frame.features.outputs.stage_inputs import SeenFrame
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Bindings, Buffer, Device, Memo, MutableBindings, Recorder, Texture
 from dermis.human.labels.classes import class_number, label_classes

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse, shown_value
-from dermis.frame.features.outputs.seen import SeenFrame
+from dermis.frame.features.outputs.stage_inputs import SeenFrame
 from dermis.frame.programs import each, program
 from dermis.gpu import Buffer, Device, Recorder, Texture
 from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landmark_points

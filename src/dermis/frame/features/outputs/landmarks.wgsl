@@ -1,6 +1,6 @@
 // Where landmarks are, and whether the picture shows them.
 //#include "each.wgsl"
-//#include "seen.wgsl"
+//#include "surface_hit.wgsl"
 
 override TOLERANCE_MM: f32; // by which the mesh may lie before a landmark that is seen
 

@@ -10,7 +10,7 @@ import numpy as np
 from dermis.base.errors import DermisError, refuse
 from dermis.frame.features.diffusion.combine import make_sum
 from dermis.frame.features.outputs.planes import Planes, fill, stage_program
-from dermis.frame.features.outputs.seen import SeenFrame
+from dermis.frame.features.outputs.stage_inputs import SeenFrame
 from dermis.frame.features.shading.shade import nothing_apart
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.programs import each, program
@@ -89,7 +89,7 @@ def draw_light(graph: Recorder, planes: Planes, space: LightSpace, seen: SeenFra
         fill(graph, planes, add, {"below": below, "leaving": leaving})
     if "translucent" in planes.channels:
         through = seen.through(space.through)
-        take = program(graph.device, "outputs/through.wgsl", planes.first("translucent"))
+        take = program(graph.device, "outputs/transmitted.wgsl", planes.first("translucent"))
         fill(graph, planes, take, seen.bound(take, centres) | {"through": through})
 
 

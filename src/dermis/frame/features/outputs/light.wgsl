@@ -1,6 +1,6 @@
 // Outputs of light: what the centre of each pixel shows, by the parts of the picture's own shading.
 //#include "shading/shading.wgsl"
-//#include "seen.wgsl"
+//#include "surface_hit.wgsl"
 //#include "planes.wgsl"
 
 //#include <light_outputs>

@@ -1,5 +1,5 @@
 // How far the points that pixels see have moved in the picture since the scene before.
-//#include "each_seen.wgsl"
+//#include "each_hit.wgsl"
 
 //#include <motion_outputs>
 //#each motion_outputs: override {NAME}_FIRST: u32 = UNASKED;

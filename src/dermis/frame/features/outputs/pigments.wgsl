@@ -1,7 +1,7 @@
 // Pigments of the skin that the centre of each pixel sees, as shares of the volume.
-//#include "seen_footprint.wgsl"
+//#include "hit_footprint.wgsl"
 //#include "surface/skin.wgsl"
-//#include "each_seen.wgsl"
+//#include "each_hit.wgsl"
 
 //#include <pigments_outputs>
 //#each pigments_outputs: override {NAME}_FIRST: u32 = UNASKED;

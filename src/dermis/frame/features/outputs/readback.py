@@ -15,7 +15,7 @@ from dermis.frame.features.outputs.resources import Resources
 from dermis.frame.features.post.picture import Picture, encoding_of
 from dermis.frame.programs import program
 from dermis.gpu import Buffer, Device, Graph, MutableBindings
-from dermis.gpu.readback import Fetched
+from dermis.gpu.readback import BufferReadback
 from dermis.scene.settings import Settings
 
 PictureArray = NDArray[Any]  # callers choose the dtype
@@ -36,7 +36,7 @@ class Readback:
     outputs : that come with it, None for none
     """
 
-    fetched: Fetched
+    fetched: BufferReadback
     size: tuple[int, int]
     kind: type[np.uint8] | type[np.float32]
     channels: int

@@ -11,7 +11,7 @@ from dermis.frame.features.outputs.labels import draw_labels
 from dermis.frame.features.outputs.landmarks import draw_landmarks
 from dermis.frame.features.outputs.planes import Planes, fill, stage_program
 from dermis.frame.features.outputs.resources import Resources
-from dermis.frame.features.outputs.seen import SeenFrame
+from dermis.frame.features.outputs.stage_inputs import SeenFrame
 from dermis.frame.features.shading.view import rays_of
 from dermis.frame.features.shape import shape
 from dermis.frame.features.visibility.layers import draw_layers

@@ -1,7 +1,7 @@
 // Outputs of the surface with its relief, at the centre of each pixel.
-//#include "seen_footprint.wgsl"
+//#include "hit_footprint.wgsl"
 //#include "surface/skin.wgsl"
-//#include "each_seen.wgsl"
+//#include "each_hit.wgsl"
 
 //#include <surface_outputs>
 //#each surface_outputs: override {NAME}_FIRST: u32 = UNASKED;

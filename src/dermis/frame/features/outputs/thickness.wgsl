@@ -1,6 +1,6 @@
 // How thick the flesh is below what the centre of each pixel sees.
 //#include "bilinear.wgsl"
-//#include "each_seen.wgsl"
+//#include "each_hit.wgsl"
 
 //#include <thickness_outputs>
 //#each thickness_outputs: override {NAME}_FIRST: u32 = UNASKED;

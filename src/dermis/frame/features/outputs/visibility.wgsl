@@ -1,6 +1,6 @@
 // Share of each light that reaches what the centre of each pixel sees, past the head and its hairs.
 //#include "shading/shading.wgsl"
-//#include "seen.wgsl"
+//#include "surface_hit.wgsl"
 //#include "planes.wgsl"
 
 //#each visibility_outputs: override {NAME}_FIRST: u32 = UNASKED;

@@ -3,7 +3,7 @@
 //#include "bilinear.wgsl"
 //#include "surface/skin.wgsl"
 //#include "environment.wgsl"
-//#include "visibility/seen_point.wgsl"
+//#include "visibility/ray_hit.wgsl"
 //#include "exposure.wgsl"
 
 const COLOUR: u32 = 0u;

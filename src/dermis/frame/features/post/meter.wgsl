@@ -1,7 +1,7 @@
 // The meter's points, a grid over the picture: light that falls on the skin that is seen there, and how bright it is shown.
 //#include "irradiance/lighting.wgsl"
 //#include "occlusion/open_sky.wgsl"
-//#include "visibility/seen_point.wgsl"
+//#include "visibility/ray_hit.wgsl"
 
 //#fill const METER_SIDE: u32 = {meter_side}u; // points along each side of the grid
 const LUMINANCE: vec3f = vec3f(0.2126, 0.7152, 0.0722); // of linear Rec. 709

@@ -6,7 +6,7 @@
 //#include "lids.wgsl"
 //#include "footprint.wgsl"
 //#include "pre_integrated.wgsl"
-//#include "diffusion/packed_shares.wgsl"
+//#include "diffusion/packed_blend_weights.wgsl"
 //#include "irradiance/fine_light.wgsl"
 
 override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture

@@ -12,7 +12,7 @@ SURFACE_BYTES = 32
 
 def make_surfaces(device: Device, side: int) -> Texture:
     """A texture for positions, normals, colours and gloss: two layers, as packed_surface.wgsl packs them."""
-    return scratch(device, make_texture(device, (side, side), "rgba32uint", layers=2, name="atlas's surface"))
+    return mark_scratch(device, make_texture(device, (side, side), "rgba32uint", layers=2, name="atlas's surface"))
 
 
 def draw(graph: Recorder, layout: LitAtlas) -> None:

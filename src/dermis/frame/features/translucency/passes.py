@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.translucency.cells import Cells
 from dermis.frame.features.atlas.lit import LitAtlas
-from dermis.frame.features.diffusion.levels import Blur, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, Levels
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.lights.records import oblique
 from dermis.frame.programs import each, program
@@ -112,7 +112,7 @@ def draw_slants(graph: Recorder, layout: LitAtlas, thin: Translucency, constants
 
     constants : pipeline constants of the lights
     """
-    shader = program(graph.device, "translucency/translucency_slants.wgsl", oblique(constants))
+    shader = program(graph.device, "translucency/translucency_directions.wgsl", oblique(constants))
     count = thin.pairs.sources[1]
     bound: Bindings = {
         **layout.lit,

@@ -1,6 +1,6 @@
 // Light that comes through thin parts, summed where it leaves: a team of invocations for each receiver.
-//#include "light_words.wgsl"
-//#include "pair_words.wgsl"
+//#include "packed_light.wgsl"
+//#include "packed_pair.wgsl"
 
 override SIZE: u32 = 128u; // invocations of a workgroup
 override TEAM: u32 = 32u; // invocations of a receiver: a power of two up to SIZE
@@ -14,7 +14,7 @@ struct Receiver {
 
 @group(0) @binding(0) var<storage, read> receivers: array<Receiver>; // those with most pairs first
 @group(0) @binding(1) var<storage, read> weights: array<vec2u>; // source and depth, and the share of its light, as in translucency_weights.wgsl
-@group(0) @binding(2) var<storage, read> gathered: array<vec4u>; // light, and what passes deep slabs of it, as in light_words.wgsl
+@group(0) @binding(2) var<storage, read> gathered: array<vec4u>; // light, and what passes deep slabs of it, as in packed_light.wgsl
 @group(0) @binding(3) var transmitted: texture_storage_2d<rgba32float, write>;
 
 var<workgroup> part: array<vec3f, SIZE>;

@@ -1,6 +1,6 @@
 // Light that comes through thin parts, gathered where it enters.
 //#include "bilinear.wgsl"
-//#include "light_words.wgsl"
+//#include "packed_light.wgsl"
 //#include "translucent_pair.wgsl"
 
 struct Entering {
@@ -13,8 +13,8 @@ struct Entering {
 @group(0) @binding(0) var<uniform> entering: Entering;
 @group(0) @binding(1) var levels: texture_2d_array<f32>;
 @group(0) @binding(2) var<storage, read> source_points: array<Source>;
-@group(0) @binding(3) var<storage, read> slants: array<vec2u>; // as translucency_slants.wgsl has them
-@group(0) @binding(4) var<storage, read_write> gathered: array<vec4u>; // light, and what passes deep slabs of it, as in light_words.wgsl
+@group(0) @binding(3) var<storage, read> slants: array<vec2u>; // as translucency_directions.wgsl has them
+@group(0) @binding(4) var<storage, read_write> gathered: array<vec4u>; // light, and what passes deep slabs of it, as in packed_light.wgsl
 
 const SIZE: u32 = 64u; // of a workgroup
 

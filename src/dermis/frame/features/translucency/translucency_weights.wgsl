@@ -1,6 +1,6 @@
 // How much light passes through the flesh between translucent pairs, beyond what the blurs carry round.
 //#include "translucent_pair.wgsl"
-//#include "pair_words.wgsl"
+//#include "packed_pair.wgsl"
 
 override COUNT: u32 = 8u; // Gaussians; as a constant, so that software adapters unroll the loop
 override SLABS: bool = false; // whether a table says what passes each thickness; else a Gaussian of the straight distance does
@@ -20,7 +20,7 @@ struct Weighing {
 @group(0) @binding(1) var<storage, read> pairs: array<u32>; // three words: source, receiver, offset in the map [1/8 texel]
 @group(0) @binding(2) var<storage, read> receiver_points: array<Receiver>;
 @group(0) @binding(3) var<storage, read> source_points: array<Source>;
-@group(0) @binding(4) var<storage, read_write> weights: array<vec2u>; // source and depth as in pair_words.wgsl; share of its light, as encoded says
+@group(0) @binding(4) var<storage, read_write> weights: array<vec2u>; // source and depth as in packed_pair.wgsl; share of its light, as encoded says
 // Weights of what passes: COUNT of each row, evenly spaced by the root of the thickness; the first's w: how deep it is, as
 // pair_word takes it. Not among the uniforms, where invocations that read different rows would take turns.
 @group(0) @binding(5) var<storage, read> passing: array<vec4f>;

@@ -18,10 +18,10 @@ from dermis.apps import truths
 from dermis.apps.export.scene_parts import known_lights
 from dermis.apps.export.subject import BALL_MM, Subject
 from dermis.apps.export.target import Rows, floats
-from dermis.apps.truths.blender_process import Errand, blender_python, run_blender
-from dermis.apps.truths.cycles import camera_of
-from dermis.apps.truths.scene_description import UNIT_MM, Described, world
-from dermis.apps.truths.lights import CYCLES, lamp
+from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
+from dermis.apps.truths.cycles import cycles_camera
+from dermis.apps.truths.scene_description import UNIT_MM, SceneDict, cycles_world
+from dermis.apps.truths.lights import CYCLES, cycles_lamp
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -40,7 +40,7 @@ _UNIT_M = UNIT_MM * M
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 _AWAY_MM, _FRAME_MM = 1100.0, 140.0  # of the camera before a ball
 _LENGTHS = ("shadow_soft_size", "size", "size_y")
-_ERRAND = Errand(
+_ERRAND = BlenderTask(
     "Blender",
     "to make the scene",
     "Name a Python whose bpy is of the version asked for, or write a folder and run its script in Blender",
@@ -83,7 +83,7 @@ def write_scene(subject: Subject, rows: Rows, place: Path, method: str, versions
     return _write(subject, described, place / SCRIPT, HEAD)
 
 
-def _described(subject: Subject, rows: Rows, method: str, versions: Versions) -> Described:
+def _described(subject: Subject, rows: Rows, method: str, versions: Versions) -> SceneDict:
     skin = subject.skin
     values = {row.name: row.value for row in rows if row.name != "Subsurface Method"}
     inputs = {name: list(one) if isinstance(one, tuple) else one for name, one in values.items()}
@@ -103,7 +103,7 @@ def _described(subject: Subject, rows: Rows, method: str, versions: Versions) ->
     }
 
 
-def _write(subject: Subject, described: Described, script: Path, head: str) -> list[Path]:
+def _write(subject: Subject, described: SceneDict, script: Path, head: str) -> list[Path]:
     """Write the script and the files that it reads beside it."""
     files, scene = [script], subject.scene
     if scene is None:
@@ -157,7 +157,7 @@ def _before_ball(ball: Head) -> Scene:
     return Scene(ball, camera=Camera(position=(0.0, 0.0, _AWAY_MM), frame_mm=_FRAME_MM))
 
 
-def surroundings(scene: Scene, centre_mm: ArrayLike) -> tuple[Described, NDArray[np.float32] | None]:
+def surroundings(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArray[np.float32] | None]:
     """Return lights, camera and world for the script, and their panorama.
 
     centre_mm : (3,) about which they are placed
@@ -166,9 +166,9 @@ def surroundings(scene: Scene, centre_mm: ArrayLike) -> tuple[Described, NDArray
     """
     centre = np.array(centre_mm) * M
     known = known_lights(scene.lights, CYCLES, "Blender")
-    lights = [_light(lamp(light, number), centre) for number, light in enumerate(known, start=1)]
-    camera = camera_of(scene)
-    around, panorama = world(scene.environment)
+    lights = [_light(cycles_lamp(light, number), centre) for number, light in enumerate(known, start=1)]
+    camera = cycles_camera(scene)
+    around, panorama = cycles_world(scene.environment)
     if "turn" in around:
         around["turn"] = (np.array(around["turn"]) @ _UPRIGHT[:3, :3].T).tolist()
         around["panorama"] = PANORAMA
@@ -187,7 +187,7 @@ def _placed(to_world: ArrayLike, centre: Floats) -> list[list[float]]:
     return [[float(value) for value in row] for row in _UPRIGHT @ matrix]
 
 
-def _light(described: Described, centre: Floats) -> Described:
+def _light(described: SceneDict, centre: Floats) -> SceneDict:
     fields = dict(described["set"])
     fields |= {name: fields[name] * _UNIT_M for name in _LENGTHS if name in fields}
     if described["type"] != "SUN":

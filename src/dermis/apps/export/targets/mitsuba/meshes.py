@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.scene_parts import ply
 from dermis.apps.export.targets.mitsuba.xml import Words
-from dermis.apps.truths.mitsuba_scene import gap_of
-from dermis.apps.truths.mitsuba_solid import inwards, skin_solid
+from dermis.apps.truths.mitsuba_scene import interface_gap_mm
+from dermis.apps.truths.mitsuba_solid import offset_inwards, closed_skin
 from dermis.frame.baking import baked_colours
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
@@ -29,10 +29,10 @@ def surfaces(words: Words, head: Head) -> dict[str, bytes]:
     Raises DermisError when the skin encloses no volume.
     """
     mesh, centre = head.mesh, np.array(head.centre_mm, np.float32)
-    solid = skin_solid(mesh, head.name)
+    solid = closed_skin(mesh, head.name)
     solid = replace(solid, positions=(solid.positions - centre).astype(np.float32))
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
-    outer, _ = inwards(solid, -gap_of(words, solid), head.name)
+    outer, _ = offset_inwards(solid, -interface_gap_mm(words, solid), head.name)
     used, corners = np.unique(mesh.triangles[skin], return_inverse=True)
     of_solid = np.unique(mesh.point[used], return_inverse=True)[1]  # as the solid's points are numbered
     given = mesh.normals[used], mesh.uv[used]

@@ -23,9 +23,9 @@ from dermis.apps.export.targets.mitsuba.xml import (
     include,
     picture_file,
 )
-from dermis.apps.truths.scene_description import Described, rgb, surroundings
-from dermis.apps.truths.lights import MITSUBA, emitter
-from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, sensor_of
+from dermis.apps.truths.scene_description import SceneDict, rgb, mitsuba_environment
+from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
+from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, mitsuba_sensor
 from dermis.scene.model import Scene
 from dermis.specular.fresnel import SKIN_ETA
 
@@ -92,7 +92,7 @@ def scene_files(
         yield picture_file(index), exr("light", np.asarray(values, np.float32))
 
 
-def medium_words(medium: Walked) -> Described:
+def medium_words(medium: Walked) -> SceneDict:
     """Return a homogeneous medium [mm]; colours are at most 1, the largest extinction is the scale."""
     extinction = np.asarray(medium.sigma_t)
     return {
@@ -106,8 +106,8 @@ def medium_words(medium: Walked) -> Described:
 
 
 def surface_words(
-    boundary: Boundary, passing: Described | None = None, roughness: float | Described = 0.3
-) -> Described:
+    boundary: Boundary, passing: SceneDict | None = None, roughness: float | SceneDict = 0.3
+) -> SceneDict:
     """Return the surface of the skin, as light meets it from outside.
 
     passing : share that a refracting surface lets pass each way, a texture; None for all
@@ -117,7 +117,7 @@ def surface_words(
     if boundary == "matched":
         mirror = {"type": "roughconductor", "material": "none", **rough}
         return {"type": "mask", "opacity": REFLECTED, "bsdf": mirror, "id": "skin_surface"}
-    index: Described = {"int_ior": SKIN_ETA, "ext_ior": 1.0}
+    index: SceneDict = {"int_ior": SKIN_ETA, "ext_ior": 1.0}
     if passing is not None:
         index["specular_transmittance"] = passing
     if boundary == "smooth":
@@ -125,7 +125,7 @@ def surface_words(
     return {"type": "roughdielectric", "id": "skin_surface", **rough, **index}
 
 
-def _below(dimmed: bool) -> Described:
+def _below(dimmed: bool) -> SceneDict:
     """Return a matched surface for light from below: it dims what leaves, by the skin's lightness."""
     if not dimmed:
         return {"type": "null", "id": "skin_below"}
@@ -141,16 +141,16 @@ def _frame(
     picture : width, height [pixel], samples of each
     """
     sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
-    sensor = sensor_of(words, scene.camera, picture[:2])
+    sensor = mitsuba_sensor(words, scene.camera, picture[:2])
     sensor["film"] |= {"width": Given("integer", "width"), "height": Given("integer", "height")}
     sensor["sampler"]["sample_count"] = Given("integer", "samples")
     # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
-    parts: list[Described] = [integrator, sensor]
+    parts: list[SceneDict] = [integrator, sensor]
     lights = known_lights(scene.lights, MITSUBA, "Mitsuba")
-    parts += [emitter(words, light, k) for k, light in enumerate(lights, start=1)]
+    parts += [mitsuba_emitter(words, light, k) for k, light in enumerate(lights, start=1)]
     if scene.environment is not None:
-        parts.append(surroundings(words, scene.environment))
+        parts.append(mitsuba_environment(words, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
     plain = {"type": "principled", "roughness": _WET, "eta": SKIN_ETA, "base_color": colour}
     for index in looks.opaque:
@@ -181,5 +181,5 @@ def _opaque_file(index: int) -> str:
     return f"meshes/material_{index}.ply"
 
 
-def _texture(name: str) -> Described:
+def _texture(name: str) -> SceneDict:
     return {"type": "bitmap", "filename": f"textures/{name}.exr", "raw": True}

@@ -1,13 +1,13 @@
 // Where in the map each receiver finds the light of its sources: the nearest place that blurs reach, in the chart or its gutter.
 //#include "translucency/translucent_pair.wgsl"
-//#include "map_places.wgsl"
+//#include "map_positions.wgsl"
 //#include "atlas/reach.wgsl"
 //#include "each.wgsl"
 //#include "search.wgsl"
 
 @group(0) @binding(3) var<storage, read> receiver_points: array<Receiver>;
 @group(0) @binding(4) var<storage, read> source_points: array<Source>;
-@group(0) @binding(5) var<storage, read> copies: array<u32>; // of sources with pairs, as copies.wgsl has them
+@group(0) @binding(5) var<storage, read> copies: array<u32>; // of sources with pairs, as gutter_copies.wgsl has them
 @group(0) @binding(7) var<storage, read> number_of_source: array<u32>; // among those with pairs
 @group(0) @binding(8) var<storage, read> number_of_receiver: array<u32>;
 @group(0) @binding(9) var<storage, read_write> pairs: array<u32>; // three words: source, receiver, offset [1/8 texel]

@@ -23,7 +23,7 @@ Index = NDArray[np.int64]
 _MOST_BLOCKS = 40  # along a side
 _BOUNDS_BYTES = 48  # as in bounds.wgsl
 _LISTED: Constants = (("LISTED", 1),)
-_COPIES = 8  # in gutters, of each source at most, as in map_places.wgsl
+_COPIES = 8  # in gutters, of each source at most, as in map_positions.wgsl
 _PAIR_BYTES = 12
 
 
@@ -31,9 +31,9 @@ _PAIR_BYTES = 12
 class CellTables:
     """What all searches on an atlas read of its cells, as buffers.
 
-    every : all tiles, as facing.wgsl reads them
+    every : all tiles, as tile_pairs.wgsl reads them
     triangle_first, triangles : as tiles.wgsl reads them
-    gutters : as copies.wgsl reads it
+    gutters : as gutter_copies.wgsl reads it
     """
 
     every: Buffer
@@ -213,10 +213,10 @@ def looks(passes: SearchPasses, places: Places) -> tuple[Bindings, int]:
 
 
 def draw_copies(passes: SearchPasses, cells: Cells, source: Index, bound: Bindings) -> Buffer:
-    """Buffer of the places in gutters that show sources, as copies.wgsl writes it.
+    """Buffer of the places in gutters that show sources, as gutter_copies.wgsl writes it.
 
     source : (n,) cells
-    bound : what copies.wgsl reads besides
+    bound : what gutter_copies.wgsl reads besides
     """
     side, ranges = cells.side, list[Index]()
     y, x = np.divmod(source, side)
@@ -288,7 +288,7 @@ def _listed(
 
     number : (r,) pairs of each receiver
     seen : what hits.wgsl has read and written
-    bound : what copies.wgsl and offsets.wgsl read besides
+    bound : what gutter_copies.wgsl and offsets.wgsl read besides
     """
     device, sources, first = passes.device, len(places.source), starts(number)
     count, begins = int(first[-1]), passes.upload(first)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.translucency.cells import Cells, divide
 from dermis.base.progress import preparing
-from dermis.frame.features.diffusion.levels import LEAST_WEIGHT
+from dermis.frame.features.diffusion.pyramid import LEAST_WEIGHT
 from dermis.frame.features.surface import record as surface
 from dermis.frame.features.translucency.pair_search.search import (
     CellTables,
@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 _REACH, _FARTHEST_MM = 4.0, 40.0  # standard deviations of the widest Gaussian, beyond all pairs
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
 _WIDTHS = 4  # whose pairs are kept
-_ONE = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, as light_words.wgsl has it
+_ONE = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, as packed_light.wgsl has it
 _COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 
 
@@ -147,7 +147,7 @@ def pairs_from(device: Device, cells: Cells, found: Found) -> PairBuffers:
         pairs=found.pairs,
         count=int(found.first[-1]),
         sums=device.buffer(_sums(cells, found), "STORAGE"),
-        light=scratch(device, _unlit(device, cells.surface)),
+        light=mark_scratch(device, _unlit(device, cells.surface)),
         lost=_unlit(device, cells.surface),
     )
 
@@ -205,10 +205,10 @@ def _unweighed(device: Device, surface: Bindings, pairs: PairBuffers) -> Translu
     return Translucency(
         pairs=pairs,
         surface=surface,
-        receiver_points=scratch(device, space(device, receivers, RECEIVER_BYTES)),
+        receiver_points=mark_scratch(device, space(device, receivers, RECEIVER_BYTES)),
         source_points=space(device, sources, SOURCE_BYTES),
         weights=space(device, pairs.count, 8),
-        gathered=scratch(device, space(device, sources, 16)),
-        slants=scratch(device, space(device, sources, 8)),
+        gathered=mark_scratch(device, space(device, sources, 16)),
+        slants=mark_scratch(device, space(device, sources, 8)),
         evenly=device.buffer(np.tile(_ONE, (max(sources, 1), 2)), "STORAGE"),
     )

@@ -75,7 +75,7 @@ class SeenFrame:
     through: Callable[[tuple[Texture, ...]], Texture]
 
     def bound(self, shader: ComputeProgram, centres: Texture) -> MutableBindings:
-        """Return the shading's resources with the record Look of seen.wgsl.
+        """Return the shading's resources with the record Look of surface_hit.wgsl.
 
         centres : texture of the triangles at the pixels' centres
         """

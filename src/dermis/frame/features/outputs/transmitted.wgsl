@@ -1,6 +1,6 @@
 // Light that crossed thin parts: what arrives of it below each pixel's centre, times the share that leaves towards the eye.
 //#include "bilinear.wgsl"
-//#include "seen.wgsl"
+//#include "surface_hit.wgsl"
 //#include "planes.wgsl"
 
 override TRANSLUCENT_FIRST: u32 = UNASKED;

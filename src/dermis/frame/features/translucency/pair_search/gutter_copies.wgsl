@@ -1,6 +1,6 @@
 // Where gutters show each source: the middle of each patch of texels that copy its texel or one beside it.
 //#include "translucency/translucent_pair.wgsl"
-//#include "map_places.wgsl"
+//#include "map_positions.wgsl"
 //#include "each.wgsl"
 //#include "search.wgsl"
 

@@ -4,7 +4,7 @@
 override LISTED: bool = false; // whether they are written down
 
 @group(0) @binding(3) var<storage, read> tiles: array<Bounds>;
-@group(0) @binding(4) var<storage, read> near: array<u32>; // blocks, as near.wgsl has them
+@group(0) @binding(4) var<storage, read> near: array<u32>; // blocks, as block_pairs.wgsl has them
 @group(0) @binding(5) var<storage, read> asked: array<vec2u>; // tile, and where its list begins
 @group(0) @binding(6) var<storage, read_write> facing: array<u32>; // counts, or lists
 

@@ -1,7 +1,7 @@
 // How much of the light that enters where sources lie passes deep slabs: over that of uniform light of which as much comes back.
 //#include "irradiance/lighting.wgsl"
 //#include "irradiance/texels_beside.wgsl"
-//#include "light_words.wgsl"
+//#include "packed_light.wgsl"
 //#include "translucent_source.wgsl"
 
 struct Slanted {
@@ -10,7 +10,7 @@ struct Slanted {
 
 @group(0) @binding(31) var<uniform> slanted: Slanted;
 @group(0) @binding(32) var<storage, read> source_points: array<Source>;
-@group(0) @binding(33) var<storage, read_write> slants: array<vec2u>; // as in light_words.wgsl
+@group(0) @binding(33) var<storage, read_write> slants: array<vec2u>; // as in packed_light.wgsl
 
 const SIZE: u32 = 64u; // of a workgroup
 

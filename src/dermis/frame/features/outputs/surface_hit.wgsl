@@ -1,5 +1,5 @@
 // What the centre of a pixel sees of the mesh.
-//#include "visibility/seen_point.wgsl"
+//#include "visibility/ray_hit.wgsl"
 
 struct Look {
     rays: Rays,

@@ -4,7 +4,7 @@
 
 override OTHER: u32; // which of the other profiles, from 0
 
-@group(0) @binding(1) var shares: texture_2d<f32>; // as profile_shares.wgsl stores them
+@group(0) @binding(1) var shares: texture_2d<f32>; // as profile_blend_weights.wgsl stores them
 
 @compute @workgroup_size(16, 16)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -1,5 +1,5 @@
 // How much of the maps a pixel shows.
-//#include "seen.wgsl"
+//#include "surface_hit.wgsl"
 //#include "shading/footprint.wgsl"
 
 // Of the whole pixel.

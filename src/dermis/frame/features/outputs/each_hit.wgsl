@@ -1,5 +1,5 @@
 // The entry of stages that read the mesh at pixel centres: what they put there is their own function put_seen.
-//#include "seen.wgsl"
+//#include "surface_hit.wgsl"
 //#include "planes.wgsl"
 
 @compute @workgroup_size(8, 8)

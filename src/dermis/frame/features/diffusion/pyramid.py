@@ -88,7 +88,7 @@ def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> Le
         make_texture(device, (size >> times,) * 2, texel, layers=len(levels), name="blurred light")
         for times, levels in enumerate(held)
     )
-    between = scratch(
+    between = mark_scratch(
         device, make_texture(device, (size, size), texel, mips=len(held), name="light between two blurs")
     )
     return Levels(stacks, tuple(levels.start for levels in held), between, size, texel)
