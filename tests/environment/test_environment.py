@@ -16,16 +16,16 @@ from dermis.environment.panorama import (
     load_panorama,
     mean_radiance,
     panorama_file,
-    resampled,
+    resample,
     solid_angles,
     split_suns,
 )
 from dermis.environment.prefilter import (
     HEIGHT,
     ROUGHNESSES,
-    mirror_kernel,
+    isotropic_kernel,
+    isotropic_lobe,
     prefilter,
-    round_lobe,
 )
 from dermis.images.colour import luminance
 from dermis.images.io import write_exr, write_png
@@ -70,7 +70,7 @@ def test_the_middle_lies_behind_the_head_and_the_right_at_its_left() -> None:
 def test_resampling_keeps_the_light(height: int) -> None:
     """All of it, and where it is: the mean of radiance times direction."""
     radiance = with_lamp(room(), (0.3, 0.8, 0.2), 50.0)
-    made = resampled(radiance.astype(np.float32), height)
+    made = resample(radiance.astype(np.float32), height)
     assert made.shape == (height, 2 * height, 3)
     assert np.allclose(mean_radiance(made), mean_radiance(radiance), rtol=1e-6)
     for axis in range(3):
@@ -78,7 +78,7 @@ def test_resampling_keeps_the_light(height: int) -> None:
             mean_radiance(part * directions(*part.shape[:2])[..., axis, None]) for part in (made, radiance)
         )
         assert np.abs(pull - exact).max() < 2e-3 * mean_radiance(radiance).max()
-    assert np.array_equal(resampled(made, height), made)
+    assert np.array_equal(resample(made, height), made)
 
 
 @pytest.mark.parametrize(("height", "kept"), [(1, 256), (127, 256), (300, 300), (521, 512)])
@@ -169,7 +169,7 @@ def test_reflections_are_the_plain_mean(lamps: tuple[str, Floats], layer: int) -
     towards, mirror = directions(256, 512), directions(HEIGHT, 2 * HEIGHT)
     for y, x in [(0, 3), (20, 70), (64, 128), (90, 200)]:
         cosine = np.clip(towards @ mirror[y, x], -1, 1)
-        weight = np.where(cosine > 0, round_lobe(np.arccos(np.maximum(cosine, 0)), m), 0.0)
+        weight = np.where(cosine > 0, isotropic_lobe(np.arccos(np.maximum(cosine, 0)), m), 0.0)
         total = summed(np.ones_like(radiance), mirror[y, x], weight)
         exact = summed(radiance, mirror[y, x], weight) / total
         assert (
@@ -187,7 +187,7 @@ def test_uniform_light_is_uniform() -> None:
 
 def test_kernels_are_too_smooth_to_ring() -> None:
     for m in ROUGHNESSES:
-        factors = mirror_kernel(float(m))
+        factors = isotropic_kernel(float(m))
         assert (
             factors[0] == pytest.approx(1.0) and abs(factors[-1]) < 1e-3 and np.abs(factors).max() < 1 + 1e-9
         )

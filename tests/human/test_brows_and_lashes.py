@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis import Human, Pose
-from dermis.human.hair.grown import Skin
+from dermis.human.hair.skin_surface import SkinSurface
 from dermis.mesh.head import Head
 
 Floats = NDArray[np.float64]
@@ -56,8 +56,8 @@ def test_hairs_are_of_their_usual_size(index: int) -> None:
 def test_brows_lie_on_the_skin(index: int) -> None:
     head = grown(index)
     brows = knots(head)[~lashes(head)]
-    foot, normal = Skin(head.mesh).foot(brows.reshape(-1, 3))
-    over = ((brows.reshape(-1, 3) - foot) * normal).sum(axis=1).reshape(brows.shape[:2])
+    project, normal = SkinSurface(head.mesh).project(brows.reshape(-1, 3))
+    over = ((brows.reshape(-1, 3) - project) * normal).sum(axis=1).reshape(brows.shape[:2])
     assert (over[:, 3:] > 0.0).mean() > 0.99 and over.max() < 2.0
     assert over[:, 0].max() < 0.1  # none floats: they begin at the skin
     assert (np.sign(brows[:, 0, 0]) > 0).mean() == pytest.approx(0.5, abs=0.05)

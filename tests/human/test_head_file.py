@@ -11,7 +11,7 @@ from gltf_rules import check_rules, khronos_issues
 
 from dermis import Human, Pose, load_head
 from dermis.human.model import MATERIALS
-from dermis.human.person_file import write_person
+from dermis.human.person_file import write_person_glb
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
@@ -23,7 +23,7 @@ FACE_MM = -60.0  # points above it, from the eyes, follow the head alone or the 
 
 
 def written(folder: Path, head: Head, **more: object) -> Path:
-    write_person(folder / "person.glb", PERSON, head, roughness=0.3, **more)  # type: ignore[arg-type]
+    write_person_glb(folder / "person.glb", PERSON, head, roughness=0.3, **more)  # type: ignore[arg-type]
     return folder / "person.glb"
 
 

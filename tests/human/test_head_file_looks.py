@@ -14,11 +14,11 @@ from gltf_rules import check_rules, khronos_issues
 
 from dermis import DermisError, Human, Pose, load_head
 from dermis.formats.gltf.document import Document
-from dermis.formats.gltf.primitives import Fibres
+from dermis.formats.gltf.primitives import FibreTubes
 from dermis.frame.features.surface.painting.painted_head import eye_pictures
 from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
-from dermis.human.person_file import write_person
+from dermis.human.person_file import write_person_glb
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import LIMBUS_MM, EyePictures, eye_uv, profile_mm
 
@@ -35,7 +35,7 @@ def pictures(device: Device) -> EyePictures:
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory, pictures: EyePictures) -> Path:
     file = tmp_path_factory.mktemp("looks") / "person.glb"
-    write_person(file, PERSON, PERSON.head(subdivide=0), roughness=0.3, eyes=pictures)
+    write_person_glb(file, PERSON, PERSON.head(subdivide=0), roughness=0.3, eyes=pictures)
     return file
 
 
@@ -92,7 +92,7 @@ def test_eyes_have_their_pictures_and_a_coat(path: Path, pictures: EyePictures) 
 def test_hairs_are_closed_tubes_of_the_hairs_width() -> None:
     head = PERSON.head(subdivide=0)
     assert head.strands is not None
-    fibres = Fibres.of(head.strands, head.mesh, 100_000, 5)
+    fibres = FibreTubes.of(head.strands, head.mesh, 100_000, 5)
     places, normals = fibres.placed(head.mesh.points_mm)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
     rings = places.reshape(len(head.strands), -1, 3)[:, :3]
@@ -103,7 +103,7 @@ def test_hairs_are_closed_tubes_of_the_hairs_width() -> None:
     edges = np.sort(fibres.triangles()[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, count = np.unique(edges, axis=0, return_counts=True)
     assert set(count) == {1, 2} and (count == 1).sum() == 3 * len(head.strands)  # open at the root alone
-    few = Fibres.of(head.strands, head.mesh, 100, 5)
+    few = FibreTubes.of(head.strands, head.mesh, 100, 5)
     total = len(head.strands) * head.strands.radius_mm[:100, 0]
     np.testing.assert_allclose(100 * few.strands.radius_mm[:, 0], total, rtol=1e-5)
     own, wide = head.strands, few.strands
@@ -115,7 +115,7 @@ def test_hairs_are_as_light_as_their_pigment() -> None:
     def colour(look: HairLook) -> np.ndarray:
         head = Human(hair=look).head(subdivide=0)
         assert head.strands is not None
-        return np.asarray(Fibres.of(head.strands, head.mesh, 5000, 5).colours()[0].mean(axis=(0, 1)))
+        return np.asarray(FibreTubes.of(head.strands, head.mesh, 5000, 5).colours()[0].mean(axis=(0, 1)))
 
     black, brown, blond = (colour(HairLook(eumelanin=e, pheomelanin=0.0)) for e in (8.0, 1.3, 0.3))
     assert black.max() < 0.01 < brown[0] < 0.05 < blond[0] < 0.3

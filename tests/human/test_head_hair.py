@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from dermis import Human, Pose
 from dermis.base.errors import DermisError
-from dermis.human.hair import groom, hairy_skin
-from dermis.human.hair.grown import Skin
+from dermis.human.hair import density, groom
 from dermis.human.hair.head_hair import MOST_PER_CM2
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.rooting import Rooting
-from dermis.human.skin.surface import average
+from dermis.human.hair.root_finder import RootFinder
+from dermis.human.hair.skin_surface import SkinSurface
+from dermis.human.skin.surface import average_surface
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Strands
 
 Floats = NDArray[np.float64]
-ALL = np.ones(len(average()[0]), bool)
+ALL = np.ones(len(average_surface()[0]), bool)
 LOOKS = {
     "cropped": HairLook(style="cropped"),
     "short": HairLook(style="short", length_mm=32.0, beard_mm=10.0),
@@ -60,9 +60,9 @@ def test_the_same_seed_has_the_same_hair() -> None:
 
 def test_roots_are_as_dense_as_is_said() -> None:
     mesh, rng = Human().head(subdivide=0).mesh, np.random.default_rng(0)
-    found = hairy_skin.rooted(mesh, hairy_skin.Where(everywhere, ALL), 40.0, rng)
+    found = density.sample_roots(mesh, density.HairDensity(everywhere, ALL), 40.0, rng)
     quads, count = np.unique(found.quad, return_counts=True)
-    area = hairy_skin.areas_cm2(mesh, quads.astype(np.int64))
+    area = density.quad_areas_cm2(mesh, quads.astype(np.int64))
     assert count.sum() / area.sum() == pytest.approx(40.0, rel=0.02)
     large = area > np.percentile(area, 70)
     assert count[large] / area[large] == pytest.approx(np.full(large.sum(), 40.0), rel=0.5)
@@ -76,7 +76,7 @@ def test_fewer_hairs_stand_for_all_there_are(density: float) -> None:
     top = place[:, 1] > 85.0
     quads = np.unique(strands.roots.quad[top])
     inside = np.isin(strands.roots.quad, quads)
-    area = hairy_skin.areas_cm2(head.mesh, quads.astype(np.int64)).sum()
+    area = density.quad_areas_cm2(head.mesh, quads.astype(np.int64)).sum()
     assert strands.radius_mm[inside, 0].sum() / area == pytest.approx(
         0.034 * MOST_PER_CM2 * density, rel=0.05
     )
@@ -95,7 +95,7 @@ def test_a_share_of_hairs_covers_as_much_as_all() -> None:
 @pytest.mark.parametrize("style", LOOKS)
 def test_no_hair_grows_on_ears_lips_and_face(style: str) -> None:
     head = grown(style)
-    assert not np.isin(hair(head).roots.quad, hairy_skin._bare()).any()
+    assert not np.isin(hair(head).roots.quad, density._hairless_quads()).any()
     x, y, z = knots(head)[:, 0].T
     assert not ((np.abs(x) < 40) & (y < 55) & (y > -35) & (z > 0)).any()  # forehead, eyes, nose
     if LOOKS[style].beard_mm == 0.0:
@@ -107,8 +107,8 @@ def test_no_hair_enters_the_head(style: str) -> None:
     head = Human(sex=1.0, hair=LOOKS[style]).head(subdivide=2)
     places = knots(head)
     some = places[:: max(1, len(places) // 4000)]
-    foot, normal = Skin(head.mesh).foot(some.reshape(-1, 3))
-    over = ((some.reshape(-1, 3) - foot) * normal).sum(axis=1).reshape(some.shape[:2])
+    project, normal = SkinSurface(head.mesh).project(some.reshape(-1, 3))
+    over = ((some.reshape(-1, 3) - project) * normal).sum(axis=1).reshape(some.shape[:2])
     assert np.abs(over[:, 0]).max() < 1.2  # they begin at the skin
     assert (over[:, 1:] > -0.5).mean() > 0.995 and np.percentile(over[:, 1:], 0.1) > -1.0
 
@@ -129,19 +129,21 @@ def test_it_moves_with_the_head_and_stays_with_the_face() -> None:
     assert np.median(moved[chin]) > 5.0 and moved[still[:, 0, 1] > 60].max() < 0.5
 
 
-@pytest.mark.parametrize("where", [hairy_skin.scalp(0.0), hairy_skin.scalp(0.8), hairy_skin.beard()])
-def test_no_hair_is_lost_where_none_is_looked_for(where: hairy_skin.Where) -> None:
+@pytest.mark.parametrize(
+    "where", [density.scalp_density(0.0), density.scalp_density(0.8), density.beard_density()]
+)
+def test_no_hair_is_lost_where_none_is_looked_for(where: density.HairDensity) -> None:
     mesh = Human().head(subdivide=0).mesh
     both = where, where._replace(near=ALL)
-    some, every = (hairy_skin.rooted(mesh, one, 60.0, np.random.default_rng(0)) for one in both)
+    some, every = (density.sample_roots(mesh, one, 60.0, np.random.default_rng(0)) for one in both)
     assert not where.near.all() and len(some.quad) > 1000
     assert np.array_equal(some.place, every.place) and np.array_equal(some.quad, every.quad)
 
 
 @pytest.mark.parametrize("seed", [2, 11, 30])
 def test_hair_lies_as_if_all_skin_counted(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    def every(rooting: Rooting, _: bool) -> NDArray[np.int64]:
-        return np.arange(len(rooting.drawn.positions))
+    def every(root_finder: RootFinder, _: bool) -> NDArray[np.int64]:
+        return np.arange(len(root_finder.drawn.positions))
 
     person = Human.drawn(seed, hair={"beard_mm": 12.0, "style": "short", "length_mm": 45.0})
     some = person.head(hairs=0.1)
@@ -154,7 +156,7 @@ def test_hair_lies_as_if_all_skin_counted(monkeypatch: pytest.MonkeyPatch, seed:
 def test_recession_bares_temples_and_crown() -> None:
     temple, crown = np.array([[33.0, 75.0, -12.0, -50.0]]), np.array([[0.0, 95.0, -122.0, -50.0]])
     middle = np.array([[0.0, 100.0, -50.0, -50.0]])
-    full, thin = hairy_skin.scalp(0.0).amount, hairy_skin.scalp(1.0).amount
+    full, thin = density.scalp_density(0.0).amount, density.scalp_density(1.0).amount
     assert full(temple) > 0.4 > 0.05 > thin(temple)
     assert full(crown) > 0.95 and thin(crown) < 0.3 and thin(middle) > 0.9 * full(middle)
 
@@ -191,6 +193,6 @@ def test_what_is_no_hair_is_refused(bad: dict[str, object]) -> None:
 
 def test_places_on_the_average_person_are_below_the_crown() -> None:
     """The edge of the breast, too, which its file stores as far above."""
-    places = hairy_skin.told()[:, :3]
+    places = density.average_points()[:, :3]
     assert places[:, 1].max() < 130.0 and places[:, 1].min() < -330.0
     assert (knots(grown("cropped"))[:, 0, 1] > -110.0).all()

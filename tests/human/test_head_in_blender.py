@@ -15,7 +15,7 @@ from dermis import Human, Pose, load_head
 from dermis.apps.truths.cycles import PYTHON_VARIABLE
 from dermis.frame.features.surface.painting.painted_head import painted_head
 from dermis.gpu import open_device
-from dermis.human.person_file import write_person
+from dermis.human.person_file import write_person_glb
 from dermis.images.io import read_image
 from dermis.mesh.head import Head
 
@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("blender")
     device = open_device(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
     painted, eyes = painted_head(device, PERSON.head(), 512)
-    write_person(made / "person.glb", PERSON, painted, roughness=0.3, eyes=eyes)
+    write_person_glb(made / "person.glb", PERSON, painted, roughness=0.3, eyes=eyes)
     command = [os.environ[PYTHON_VARIABLE], str(SCRIPT), str(made / "person.glb"), str(made)]
     apart = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     run = subprocess.run(command, capture_output=True, text=True, timeout=300, env=apart)

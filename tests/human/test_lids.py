@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from dermis import Human
 from dermis.human import lids
-from dermis.human.lids import axes, conformed, conformed_targets
-from dermis.human.model import _sockets, human_head
-from dermis.human.movement import expressions
-from dermis.human.published import places_mm
+from dermis.human.lids import fit_lid_targets, fit_lids, gaze_axes
+from dermis.human.makehuman import morphed_points_mm
+from dermis.human.model import _sockets, build_head
+from dermis.human.movement import expression_targets
 from dermis.human.skin.surface import lid_rings
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm, clearance_mm
 from dermis.mesh.head import Head
@@ -47,7 +47,7 @@ def person_of(seed: int | None) -> Human:
 @cache
 def head_of(seed: int | None) -> Head:
     person = person_of(seed)
-    return subdivide_head(human_head(person.weights(), Maps(), "own", person.iris), 1)
+    return subdivide_head(build_head(person.weights(), Maps(), "own", person.iris), 1)
 
 
 def rings(seed: int | None, weights: Mapping[str, float]) -> tuple[Floats, Floats]:
@@ -106,7 +106,7 @@ def test_closed_lids_meet(seed: int | None) -> None:
 @pytest.mark.parametrize("seed", PEOPLE)
 def test_seen_from_the_front_the_opening_stays_as_published(seed: int | None) -> None:
     person = person_of(seed)
-    places = places_mm(person.weights())
+    places = morphed_points_mm(person.weights())
     head = head_of(seed)
     crest = lid_rings()[..., CREST]
     off = head.positions_mm[crest] - places[crest]
@@ -117,8 +117,8 @@ def test_seen_from_the_front_the_opening_stays_as_published(seed: int | None) ->
 def test_skin_far_from_the_eyes_stays_where_it_is() -> None:
     from dermis.human.model import _sockets
 
-    places = places_mm({})
-    moved = np.abs(conformed(places, _sockets(places)) - places).max(axis=1)
+    places = morphed_points_mm({})
+    moved = np.abs(fit_lids(places, _sockets(places)) - places).max(axis=1)
     middle = places[lid_rings()].reshape(2, -1, 3).mean(axis=1)
     far = np.linalg.norm(places[:, None] - middle, axis=-1).min(axis=1)
     assert moved[far > 32].max() == 0.0 and moved.max() > 2.0
@@ -139,13 +139,13 @@ def test_lids_follow_who_has_another_head() -> None:
 
 def test_targets_are_corrected_wherever_they_move_a_lid() -> None:
     """As if both eyes were gone over for each, also for blinks, which move the other eye's inner corner."""
-    places = places_mm(Human.drawn(3).weights())
+    places = morphed_points_mm(Human.drawn(3).weights())
     sockets = _sockets(places)
-    found, resting = conformed_targets(places, sockets), conformed(places, sockets)
-    targets = expressions()
+    found, resting = fit_lid_targets(places, sockets), fit_lids(places, sockets)
+    targets = expression_targets()
     for name in ("eyeBlinkLeft", "eyeLookOutRight", "eyeLookUpLeft", "eyeWideRight"):
         part, moved = targets.of(targets.index[name]), places.copy()
         point = targets.point[part]
         moved[point] += targets.delta_mm[part]
-        drawn = conformed(moved, sockets, "Blink" in name, axes().get(name, lids.AHEAD))
+        drawn = fit_lids(moved, sockets, "Blink" in name, gaze_axes().get(name, lids.FORWARD))
         assert found[part] == pytest.approx((drawn - resting)[point], abs=1e-5)

@@ -12,8 +12,8 @@ import dermis
 from dermis import DermisError, Human, Pose
 from dermis.atlas.build import build_atlas
 from dermis.atlas.unwrap.flatten import singular_values
+from dermis.human.makehuman import mesh_point_count
 from dermis.human.model import MATERIALS
-from dermis.human.published import count
 from dermis.human.skin import face
 from dermis.human.skin.painted import PaintedMaps
 from dermis.images.codecs import encode_png
@@ -50,7 +50,7 @@ def test_people_between_two_lie_between_them() -> None:
     """Seen from the middle between the eyes, as all of them are."""
     young, middle, old = (Human(age=age).positions_mm for age in (25, 57.5, 90))
     off = np.abs(0.5 * (young + old) - middle)
-    assert (off[: count()].max(axis=1) < 1e-3).mean() > 0.85
+    assert (off[: mesh_point_count()].max(axis=1) < 1e-3).mean() > 0.85
     assert off.max() < 0.15  # eyeballs stay round, and lids are drawn onto each person's own
     assert np.abs(old - young).max() > 3.0
 
@@ -157,7 +157,7 @@ def test_it_is_loaded_by_name(head: Head) -> None:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"age": 20}, "age: expected a number from 25 to 90, but 20 came"),
+        ({"age": 20}, "age: expected a number from 25 to 90, but got 20"),
         ({"sex": float("nan")}, "sex: expected a number"),
         ({"african": 0, "asian": 0, "caucasian": 0}, "ancestry: expected a share"),
         ({"targets": {"nose/nose-hump-incr": 9.0}}, "expected a number from -2 to 2"),
@@ -200,6 +200,11 @@ def test_levels_that_cannot_be_are_refused() -> None:
 
 
 def test_sizes_of_tables_are_theirs() -> None:
-    folds = face.folds()
-    tables = {"zones": face.zones(), "folds": folds.curves, "knots": folds.knots, "edges": face.hairline()}
-    assert face.sizes() == {name: len(table) for name, table in tables.items()}
+    folds = face.fold_curves()
+    tables = {
+        "zones": face.zone_table(),
+        "folds": folds.curves,
+        "knots": folds.knots,
+        "edges": face.hairline_heights(),
+    }
+    assert face.table_sizes() == {name: len(table) for name, table in tables.items()}

@@ -11,13 +11,13 @@ import pytest
 
 from dermis import Human, load_head
 from dermis.base.errors import DermisError
-from dermis.human.person_file import read_person, write_numbers
+from dermis.human.person_file import read_person, write_person_json
 
 
 @pytest.mark.parametrize("seed", [0, 7, 12])
 def test_the_same_person_comes_back(tmp_path: Path, seed: int) -> None:
     person = Human.drawn(seed)
-    write_numbers(tmp_path / "one.json", person)
+    write_person_json(tmp_path / "one.json", person)
     found = read_person(tmp_path / "one.json")
     assert np.array_equal(found.positions_mm, person.positions_mm)
     assert (found.look, found.iris) == (person.look, person.iris)
@@ -29,7 +29,7 @@ def test_what_is_left_out_is_as_usual(tmp_path: Path) -> None:
 
 
 def test_it_is_a_head(tmp_path: Path) -> None:
-    write_numbers(tmp_path / "one.json", Human(age=70))
+    write_person_json(tmp_path / "one.json", Human(age=70))
     head = load_head(tmp_path / "one.json")
     assert np.array_equal(head.positions_mm, Human(age=70).positions_mm)
     assert head.eyes is not None and head.strands is not None
@@ -52,6 +52,6 @@ def test_what_is_no_person_is_refused(tmp_path: Path, text: str) -> None:
 
 
 def test_numbers_are_plain(tmp_path: Path) -> None:
-    write_numbers(tmp_path / "one.json", Human.drawn(3))
+    write_person_json(tmp_path / "one.json", Human.drawn(3))
     told: dict[str, Any] = json.loads((tmp_path / "one.json").read_text())["person"]
     assert told["skin"]["melanin"] == Human.drawn(3).look.melanin and isinstance(told["targets"], dict)

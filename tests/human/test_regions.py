@@ -13,20 +13,20 @@ import pytest
 
 from dermis.atlas.build import build_atlas
 from dermis.base.errors import DermisError
-from dermis.cli.scene_options import SceneOptions, assemble
+from dermis.cli.scene_options import SceneOptions, assemble_scene
 from dermis.human.person import Human
 from dermis.human.regions import apply
-from dermis.human.regions.apply import soften, with_regions, with_usual_regions
+from dermis.human.regions.apply import gaussian_mean, with_default_regions, with_regions
 from dermis.human.regions.average import (
-    AVERAGE,
+    AVERAGE_HUMAN,
     average_head,
     average_skin,
-    human_regions,
-    landmark_points,
-    parts,
+    classify_surface,
+    landmark_indices,
+    part_quads,
 )
-from dermis.human.regions.labels import average_landmarks, known_landmarks, label_texels, to_average
-from dermis.human.regions.zones import REGIONS, RegionTable, load_table
+from dermis.human.regions.labels import average_landmarks, known_landmarks, label_texels, warp_to_average
+from dermis.human.regions.region_table import REGIONS, RegionTable, load_region_table
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
@@ -83,8 +83,8 @@ def test_landmarks_lie_in_their_regions(name: str, sample_folder: Path) -> None:
     places = known_landmarks(head)
     assert places is not None
     points = np.array(list(places.values())) + np.array(head.centre_mm)
-    carried = to_average(head, places, points)
-    labels = human_regions(carried, average_skin().quads(carried))
+    carried = warp_to_average(head, places, points)
+    labels = classify_surface(carried, average_skin().quads(carried))
     found = {place: REGIONS[label] for place, label in zip(places, labels, strict=True)}
     wrong = {
         place: region
@@ -96,7 +96,7 @@ def test_landmarks_lie_in_their_regions(name: str, sample_folder: Path) -> None:
 
 @pytest.mark.parametrize("name", [SCAN, *MAKEHUMAN])
 def test_all_regions_are_there_on_both_sides_alike(name: str, sample_folder: Path) -> None:
-    right, left = _areas(_head(name, sample_folder), load_table("default"))
+    right, left = _areas(_head(name, sample_folder), load_region_table("default"))
     assert (np.minimum(left, right) > 50).all(), dict(zip(REGIONS, left, strict=True))
     np.testing.assert_allclose(left, right, rtol=0.25)
 
@@ -108,7 +108,7 @@ def test_the_average_human_is_carried_onto_itself() -> None:
     object.__setattr__(mesh, "positions", points.astype(np.float32))
     head = Head("the average", mesh, Maps())
     shifted = {name: tuple(np.array(place) - head.centre_mm) for name, place in places.items()}
-    np.testing.assert_allclose(to_average(head, shifted, points), points, atol=0.01)
+    np.testing.assert_allclose(warp_to_average(head, shifted, points), points, atol=0.01)
 
 
 def test_landmarks_of_the_human_are_pairs_in_their_places() -> None:
@@ -135,22 +135,22 @@ def test_landmarks_of_the_human_are_pairs_in_their_places() -> None:
 def test_landmarks_of_the_human_lie_on_its_outer_skin() -> None:
     mesh = average_head().mesh
     seen = np.flatnonzero(mesh.material == 0)
-    outer = seen[~np.isin(seen // 2, parts()["mouth"])]
-    assert set(landmark_points().values()) <= set(mesh.point[mesh.triangles[outer]].ravel().tolist())
+    outer = seen[~np.isin(seen // 2, part_quads()["mouth"])]
+    assert set(landmark_indices().values()) <= set(mesh.point[mesh.triangles[outer]].ravel().tolist())
 
 
 @pytest.mark.parametrize(
-    ("person", "unlike"), [(AVERAGE, 0.05), (Human(sex=1, age=80), 0.05), (Human.drawn(4), 0.25)]
+    ("person", "unlike"), [(AVERAGE_HUMAN, 0.05), (Human(sex=1, age=80), 0.05), (Human.drawn(4), 0.25)]
 )
 def test_people_have_all_regions_on_both_sides(person: Human, unlike: float) -> None:
-    right, left = _areas(person.head(), load_table("default"))
+    right, left = _areas(person.head(), load_region_table("default"))
     assert (np.minimum(left, right) > 300).all(), dict(zip(REGIONS, left, strict=True))
     np.testing.assert_allclose(left, right, rtol=unlike)
 
 
 def test_a_place_of_the_human_has_one_region_in_all_its_meshes() -> None:
     """Layouts, levels of subdivision and people differ; landmarks stay in their regions."""
-    wanted = _at_landmarks(AVERAGE.head(), 512)
+    wanted = _at_landmarks(AVERAGE_HUMAN.head(), 512)
     wrong = {
         place: region
         for place, region in wanted.items()
@@ -158,7 +158,7 @@ def test_a_place_of_the_human_has_one_region_in_all_its_meshes() -> None:
     }
     assert not wrong
     person = Human(asian=1, african=0, caucasian=0, sex=0, age=30)
-    heads = [AVERAGE.head(layout="hm08"), AVERAGE.head(subdivide=0), person.head(subdivide=2)]
+    heads = [AVERAGE_HUMAN.head(layout="hm08"), AVERAGE_HUMAN.head(subdivide=0), person.head(subdivide=2)]
     for head in heads:
         found = _at_landmarks(head, 2048)
         same = [found[place] == region for place, region in wanted.items()]
@@ -170,7 +170,7 @@ def _at_landmarks(head: Head, size: int) -> dict[str, str]:
     from scipy.spatial import cKDTree
 
     atlas = build_atlas(head.mesh, size)
-    labels = label_texels(head, atlas, load_table("default"))
+    labels = label_texels(head, atlas, load_region_table("default"))
     points = atlas.interpolate(head.mesh, head.mesh.positions)[atlas.coverage] - np.array(head.centre_mm)
     places = known_landmarks(head)
     assert places is not None
@@ -184,16 +184,16 @@ def test_parts_are_what_the_tool_finds(sample_folder: Path, monkeypatch: pytest.
     import human_parts
 
     found = human_parts.parts(sample_folder / "heads" / "human" / "masks")
-    assert found.keys() == parts().keys()
+    assert found.keys() == part_quads().keys()
     for name, quads in found.items():
-        np.testing.assert_array_equal(parts()[name], quads)
+        np.testing.assert_array_equal(part_quads()[name], quads)
 
 
 def test_a_head_with_labels_keeps_them() -> None:
     region = np.array([[3, 3], [6, 9]], np.uint8).repeat(32, axis=0).repeat(32, axis=1)
     head = Head("card", _quad(), Maps(region=region))
     atlas = build_atlas(head.mesh, 64)
-    labels = label_texels(head, atlas, load_table("default"))
+    labels = label_texels(head, atlas, load_region_table("default"))
     np.testing.assert_array_equal(labels, region[atlas.coverage])
 
 
@@ -217,7 +217,7 @@ def test_landmarks_of_another_head_are_refused(tmp_path: Path) -> None:
     for text, message in (
         ("\n".join(flat), "they lie in one plane"),
         ("\n".join(rows), "off the nearest corner"),
-        ("horn,0,0,0", "'horn' came"),
+        ("horn,0,0,0", "got 'horn'"),
         ("nose tip,0,0,0", "at least 10"),
         ("nose tip,a,0,0", "cannot be understood"),
     ):
@@ -229,7 +229,7 @@ def test_landmarks_of_another_head_are_refused(tmp_path: Path) -> None:
 def test_soft_maps_stay_within_the_table_and_have_no_edge(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(apply, "SIZE", 256)
     region = np.repeat(np.array([[3, 9]], np.uint8), 64, axis=1).repeat(128, axis=0)
-    table = load_table("default")
+    table = load_region_table("default")
     head, rho_s = apply.with_regions(Head("card", _quad(), Maps(region=region)), table)
     m, strength = head.maps.roughness, head.maps.specular
     assert m is not None and strength is not None
@@ -268,14 +268,14 @@ def test_fine_detail_of_the_own_map_stays_and_its_level_goes(monkeypatch: pytest
 def test_softening_keeps_constants_and_does_not_mix_what_is_far() -> None:
     points = np.random.default_rng(1).uniform(0, 60, (4000, 3))
     far = (points[:, 0] > 30).astype(float)
-    soft = soften(points, np.column_stack((np.full(4000, 0.3), far)), 2.0)
+    soft = gaussian_mean(points, np.column_stack((np.full(4000, 0.3), far)), 2.0)
     np.testing.assert_allclose(soft[:, 0], 0.3, rtol=1e-12)
     beyond = np.abs(points[:, 0] - 30) > 12
     np.testing.assert_allclose(soft[beyond, 1], far[beyond], atol=1e-12)
 
 
 def test_the_default_table_is_called_what_it_is() -> None:
-    table = load_table("default")
+    table = load_region_table("default")
     assert table.values.shape == (10, 2)
     text = (Path(apply.__file__).parent / "default.toml").read_text(encoding="utf-8")
     assert "ARTIST'S VALUES, NOT MEASURED" in text
@@ -300,22 +300,25 @@ def test_tables_that_cannot_be_are_refused(
     good = (Path(apply.__file__).parent / "default.toml").read_text(encoding="utf-8")
     file = tmp_path / "regions.toml"
     file.write_text(good)
-    np.testing.assert_array_equal(load_table(file).values, load_table("default").values)
+    np.testing.assert_array_equal(load_region_table(file).values, load_region_table("default").values)
     file.write_text(change(good))
     with pytest.raises(DermisError, match=message):
-        load_table(file)
+        load_region_table(file)
 
 
 def test_the_command_refuses_before_it_loads() -> None:
     with pytest.raises(DermisError, match=r"nowhere.toml: expected default, or regions in TOML"):
-        assemble("nobody.obj", SceneOptions(head={"regions": "nowhere.toml"}))
+        assemble_scene("nobody.obj", SceneOptions(head={"regions": "nowhere.toml"}))
     with pytest.raises(DermisError, match="--rho-s: expected one or the other"):
-        assemble("nobody.obj", SceneOptions(head={"regions": "default"}, skin={"rho_s": 0.2}))
+        assemble_scene("nobody.obj", SceneOptions(head={"regions": "default"}, skin={"rho_s": 0.2}))
 
 
 def test_the_command_gives_the_scan_its_regions(sample_folder: Path) -> None:
-    scene, _ = assemble(SCAN, SceneOptions(head={"regions": "default"}))
-    low, high = load_table("default").values.min(axis=0), load_table("default").values.max(axis=0)
+    scene, _ = assemble_scene(SCAN, SceneOptions(head={"regions": "default"}))
+    low, high = (
+        load_region_table("default").values.min(axis=0),
+        load_region_table("default").values.max(axis=0),
+    )
     roughness, specular = scene.head.maps.roughness, scene.head.maps.specular
     assert roughness is not None and specular is not None
     assert low[0] - 1e-6 <= roughness.min() and roughness.max() <= high[0] + 1e-6
@@ -345,13 +348,13 @@ def test_known_heads_have_the_usual_regions_and_others_none(sample_folder: Path)
     np.testing.assert_array_equal(known.maps.roughness, np.float32(wanted.maps.roughness))
     np.testing.assert_array_equal(known.maps.specular, alike.maps.specular)  # the scan's own
     bare = replace(alike, maps=Maps())
-    table, usual = with_regions(bare)[0].maps, with_usual_regions(bare).maps
+    table, usual = with_regions(bare)[0].maps, with_default_regions(bare).maps
     np.testing.assert_array_equal(usual.specular, np.float32(table.specular))
-    assert with_usual_regions(known) is known  # a map says the roughness
+    assert with_default_regions(known) is known  # a map says the roughness
     stranger = replace(alike, name="nobody")
-    assert with_usual_regions(stranger) is stranger
+    assert with_default_regions(stranger) is stranger
     tiny = replace(alike, mesh=replace(alike.mesh, positions=0.1 * alike.mesh.positions))
-    assert with_usual_regions(tiny) is tiny  # of that name, but its landmarks are not there
-    scene, _ = assemble(SCAN, SceneOptions(surface="deck-2007"))
+    assert with_default_regions(tiny) is tiny  # of that name, but its landmarks are not there
+    scene, _ = assemble_scene(SCAN, SceneOptions(surface="deck-2007"))
     assert scene.head.maps.roughness is None
     assert (scene.skin.specular, scene.skin.rho_s) == ("kelemen", 0.18)

@@ -11,7 +11,7 @@ from dermis.base.errors import DermisError
 from dermis.environment.panorama import solid_angles
 from dermis.images.io import write_exr
 from dermis.scene.environment import Environment
-from dermis.scene.light_stage import light_stage, stage_weights
+from dermis.scene.light_stage import light_stage, light_stage_weights
 
 
 def test_lights_are_evenly_around() -> None:
@@ -28,7 +28,7 @@ def test_weights_are_the_light_from_the_turned_surroundings(tmp_path: Path) -> N
     write_exr(tmp_path / "spot.exr", sky)
     around = Environment(name=str(tmp_path / "spot.exr"), rotation_degrees=90.0, exposure=2.0)
     lights = light_stage(32)
-    weights = stage_weights(lights, around)
+    weights = light_stage_weights(lights, around)
     assert np.allclose(weights.sum(axis=0), 2.0 * (sky * solid_angles(256, 512)[..., None]).sum(axis=(0, 1)))
     brightest = -np.array(lights[int(weights[:, 0].argmax())].direction)
     assert brightest @ (0.0, 0.0, -1.0) > 0.9  # counter-clockwise seen from above

@@ -19,17 +19,17 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.scene import Environment, Skin
 from dermis.scene.camera import Camera
-from dermis.scene.field_errors import Because, ImpossibleError, bounds_of, number_fields
+from dermis.scene.field_errors import BoundsReason, InvalidFieldsError, field_bounds, numeric_fields
 from dermis.scene.files import PoseTable
+from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.lights import LIGHTS
-from dermis.scene.plain import Plain
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, TissueLayer
 
 PLACE = {"position": (0, 0, 900)}
 THIRD = (0.1, 0.1, 0.1)
-NEEDED: dict[type[Plain], dict[str, Any]] = {
+NEEDED: dict[type[FrozenModel], dict[str, Any]] = {
     **{LIGHTS[kind]: PLACE for kind in LIGHTS},
     **{LIGHTS[kind]: {"direction": (0, 0, -1)} for kind in ("directional", "stripe")},
     Camera: PLACE,
@@ -46,7 +46,7 @@ NONE = [np.nan, np.inf, -np.inf, 1e308, -1e308, HUGE, 10**5000, True, "1", 1j, [
 LEAST = 5e-324  # which is 0 in single precision
 
 
-def _models(kind: type[Plain] = Plain) -> Iterator[type[Plain]]:
+def _models(kind: type[FrozenModel] = FrozenModel) -> Iterator[type[FrozenModel]]:
     """All but those of data sets, whose numbers are distributions with bounds of their own (tests/batch)."""
     for one in kind.__subclasses__():
         ours = one.__module__.startswith("dermis.") and not one.__module__.startswith("dermis.apps.batch.")
@@ -59,7 +59,7 @@ def test_no_model_is_left_out() -> None:
     assert set(_models()) == set(NEEDED)
 
 
-def _made(model: type[Plain], field: str, value: Any) -> Any:
+def _made(model: type[FrozenModel], field: str, value: Any) -> Any:
     """A model with the value as its field's number, in each place of a list or under a name."""
     kind = model.model_fields[field].annotation
     count = len(get_args(kind)) if getattr(kind, "__origin__", None) is tuple else 0
@@ -68,31 +68,31 @@ def _made(model: type[Plain], field: str, value: Any) -> Any:
     return model(**{**NEEDED[model], field: (value,) * count if count else value})
 
 
-NUMBERS = [(model, field) for model in NEEDED for field in number_fields(model)]
+NUMBERS = [(model, field) for model in NEEDED for field in numeric_fields(model)]
 IDS = [f"{model.__name__}.{field}" for model, field in NUMBERS]
 
 
 @pytest.mark.parametrize(("model", "field"), NUMBERS, ids=IDS)
-def test_what_is_no_number_of_a_model_is_refused(model: type[Plain], field: str) -> None:
+def test_what_is_no_number_of_a_model_is_refused(model: type[FrozenModel], field: str) -> None:
     for value in NONE:
-        if isinstance(value, str) and number_fields(model)[field]:  # a word may stand for it
+        if isinstance(value, str) and numeric_fields(model)[field]:  # a word may stand for it
             continue
-        with pytest.raises(ImpossibleError, match=rf"^{model.__name__}: {field}"):
+        with pytest.raises(InvalidFieldsError, match=rf"^{model.__name__}: {field}"):
             _made(model, field, value)
 
 
 @pytest.mark.parametrize(("model", "field"), NUMBERS, ids=IDS)
-def test_a_number_of_a_model_has_a_range_with_a_reason(model: type[Plain], field: str) -> None:
+def test_a_number_of_a_model_has_a_range_with_a_reason(model: type[FrozenModel], field: str) -> None:
     info = model.model_fields[field]
     kind = get_args(info.annotation)
-    if bounds_of(info) == (None, None):
+    if field_bounds(info) == (None, None):
         info = FieldInfo.from_annotation(kind[-1])
-    low, high = bounds_of(info)
+    low, high = field_bounds(info)
     assert low is not None and high is not None and np.isfinite(np.float32([low, high])).all()
-    assert (low, high) == (0, 1) or any(isinstance(one, Because) for one in info.metadata)
+    assert (low, high) == (0, 1) or any(isinstance(one, BoundsReason) for one in info.metadata)
     assert low <= 0 or np.float32(low) > 0
     if low > 0:
-        with pytest.raises(ImpossibleError):
+        with pytest.raises(InvalidFieldsError):
             _made(model, field, LEAST)
 
 

@@ -10,7 +10,7 @@ from dermis.scene.skin import Skin
 
 
 def profile(person: Human) -> GaussianSum:
-    return SkinProfiles().of(skin_of(person))
+    return SkinProfiles().profile(skin_of(person))
 
 
 def mean_square_mm2(sum_of: GaussianSum) -> float:

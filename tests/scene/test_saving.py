@@ -19,6 +19,7 @@ from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_scene
+from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.lights import (
     DirectionalLight,
     PointLight,
@@ -28,8 +29,7 @@ from dermis.scene.lights import (
     StripeLight,
 )
 from dermis.scene.model import Scene
-from dermis.scene.plain import Plain
-from dermis.scene.saving import save_scene, scene_toml
+from dermis.scene.saving import save_scene, scene_text
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 
@@ -116,7 +116,7 @@ SETTINGS = Settings(
 @pytest.mark.parametrize(
     "plain", [CAMERA, SKIN, PIGMENTS, ROOM, SETTINGS, *LIGHTS], ids=lambda p: type(p).__name__
 )
-def test_no_field_here_has_its_default(plain: Plain) -> None:
+def test_no_field_here_has_its_default(plain: FrozenModel) -> None:
     """Or the round trip below would not tell whether it was saved."""
     fixed = {"kind", "angle_degrees"} if isinstance(plain, StripeLight) else {"kind"}
     for name in type(plain).model_fields.keys() - fixed:
@@ -193,5 +193,5 @@ def test_a_pose_that_cannot_be_names_file_and_key(tmp_path: Path, table: str, wo
 
 @pytest.mark.parametrize("name", ['a"b\\c.obj', "tab\tline\n.obj", "delete\x7f.obj", "é\u2028ø.obj"])
 def test_odd_file_names_come_back(name: str) -> None:
-    text = scene_toml(Scene(HEAD), Settings(), {"name": name})
+    text = scene_text(Scene(HEAD), Settings(), {"name": name})
     assert tomllib.loads(text)["head"]["name"] == name

@@ -9,7 +9,7 @@ import pytest
 from small_head import HEIGHT_MM, write_head
 
 from dermis.base.errors import DermisError
-from dermis.human.regions.zones import REGIONS
+from dermis.human.regions.region_table import REGIONS
 from dermis.images.io import write_png
 from dermis.scene import (
     Camera,

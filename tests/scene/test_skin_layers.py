@@ -8,61 +8,61 @@ import pytest
 from dermis.base.errors import DermisError
 from dermis.frame.features.diffusion.profiles import SkinProfiles
 from dermis.optics.profiles import load_profile
-from dermis.scene.field_errors import ImpossibleError
+from dermis.scene.field_errors import InvalidFieldsError
 from dermis.scene.skin import Pigments, Skin, TissueLayer
-from dermis.scene.tissue import layers_of, tissue_of
+from dermis.scene.tissue import skin_tissue, tissue_layers
 
 
 def with_layers(name: str, **fields: object) -> Skin:
     """A medium whose first layer has other values."""
-    first, *rest = layers_of(Skin(profile=name))
+    first, *rest = tissue_layers(Skin(profile=name))
     changed = TissueLayer(**(first.model_dump() | fields))
     return Skin(profile=name, layers=(changed, *rest))
 
 
 def test_a_medium_s_own_layers_give_its_own_profile() -> None:
-    layers = layers_of(Skin(profile="dj3"))
+    layers = tissue_layers(Skin(profile="dj3"))
     assert [layer.name for layer in layers] == ["epidermis", "upper dermis", "bloody dermis"]
     assert layers[-1].thickness_mm is None
-    own = SkinProfiles().of(Skin(profile="dj3", layers=layers))
+    own = SkinProfiles().profile(Skin(profile="dj3", layers=layers))
     assert own.weight == pytest.approx(load_profile("dj3").weight)
 
 
 def test_a_layer_that_absorbs_more_red_returns_less_of_it() -> None:
-    plain = SkinProfiles().of(with_layers("dj3")).albedo
-    darker = SkinProfiles().of(with_layers("dj3", absorption_per_mm=(2.0, 0.21, 0.5))).albedo
+    plain = SkinProfiles().profile(with_layers("dj3")).albedo
+    darker = SkinProfiles().profile(with_layers("dj3", absorption_per_mm=(2.0, 0.21, 0.5))).albedo
     assert darker[0] < 0.6 * plain[0] and darker[1:] == pytest.approx(plain[1:], rel=0.02)
 
 
 def test_a_thicker_epidermis_is_fitted_near_what_a_fresh_fit_finds() -> None:
     profiles = SkinProfiles()
-    profiles.of(with_layers("dj3", thickness_mm=0.30))
-    near = profiles.of(with_layers("dj3", thickness_mm=0.32))
-    fresh = SkinProfiles().of(with_layers("dj3", thickness_mm=0.32))
+    profiles.profile(with_layers("dj3", thickness_mm=0.30))
+    near = profiles.profile(with_layers("dj3", thickness_mm=0.32))
+    fresh = SkinProfiles().profile(with_layers("dj3", thickness_mm=0.32))
     assert near.albedo == pytest.approx(fresh.albedo, rel=2e-3)
     radii = [0.1, 0.5, 2.0]
-    assert near.within(radii) == pytest.approx(fresh.within(radii), rel=1e-2, abs=1e-3)
+    assert near.energy_within(radii) == pytest.approx(fresh.energy_within(radii), rel=1e-2, abs=1e-3)
 
 
 def test_skins_that_take_turns_are_fitted_once() -> None:
     profiles = SkinProfiles()
     pair = with_layers("dj3"), Skin(profile="light", pigments=Pigments(structure="biospec"))
-    first = [profiles.of(skin) for skin in pair]
-    assert all(profiles.of(skin) is fit for skin, fit in zip(pair, first, strict=True))
+    first = [profiles.profile(skin) for skin in pair]
+    assert all(profiles.profile(skin) is fit for skin, fit in zip(pair, first, strict=True))
 
 
 def test_structures_have_their_layers() -> None:
     skins = (Skin(profile="light", pigments=Pigments(structure=name)) for name in ("dj2006", "biospec"))
-    counts = [len(tissue_of(skin).medium.layers) for skin in skins]
+    counts = [len(skin_tissue(skin).medium.layers) for skin in skins]
     assert counts == [2, 4]
-    assert layers_of(Skin(profile="light")) == ()
+    assert tissue_layers(Skin(profile="light")) == ()
 
 
 @pytest.mark.parametrize("profile", ["light", "gpu-gems-3"])
 def test_what_is_no_medium_takes_no_layers(profile: str) -> None:
-    layers = layers_of(Skin(profile="skin1"))
+    layers = tissue_layers(Skin(profile="skin1"))
     with pytest.raises(DermisError, match=profile):
-        SkinProfiles().of(Skin(profile=profile, layers=layers))
+        SkinProfiles().profile(Skin(profile=profile, layers=layers))
 
 
 @pytest.mark.parametrize(
@@ -70,12 +70,12 @@ def test_what_is_no_medium_takes_no_layers(profile: str) -> None:
     [{"thickness_mm": 0.0}, {"absorption_per_mm": (-1.0, 0.0, 0.0)}, {"scattering_per_mm": (0.0, 1.0, 1.0)}],
 )
 def test_impossible_layers_are_refused(fields: dict[str, object]) -> None:
-    with pytest.raises(ImpossibleError, match=next(iter(fields))):
+    with pytest.raises(InvalidFieldsError, match=next(iter(fields))):
         with_layers("dj3", **fields)
 
 
 def test_only_the_last_layer_is_endless() -> None:
-    layers = layers_of(Skin(profile="skin1")) * 2
+    layers = tissue_layers(Skin(profile="skin1")) * 2
     with pytest.raises(DermisError, match="infinite in the last layer only"):
-        tissue_of(Skin(profile="skin1", layers=layers))
-    assert np.isinf(tissue_of(Skin(profile="skin1", layers=layers[:1])).medium.layers[0].thickness_mm)
+        skin_tissue(Skin(profile="skin1", layers=layers))
+    assert np.isinf(skin_tissue(Skin(profile="skin1", layers=layers[:1])).medium.layers[0].thickness_mm)

@@ -10,12 +10,19 @@ from small_head import write_head
 
 import dermis
 from dermis.base.errors import DermisError
-from dermis.cli.scene_options import SceneOptions, assemble, note_levels
+from dermis.cli.scene_options import SceneOptions, assemble_scene, note_subdivision
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera, portrait
-from dermis.scene.smoothness import LIMIT_PX, MOST_TRIANGLES, Silhouette, SmoothIn, silhouette, smooth_levels
+from dermis.scene.smoothness import (
+    MAX_DEVIATION_PX,
+    MAX_SMOOTH_TRIANGLES,
+    Silhouette,
+    SmoothIn,
+    silhouette,
+    smooth_levels,
+)
 
 RADIUS_MM, SIDES = 120.0, 24
 SIZES = {64: 0, 256: 1, 1024: 2}
@@ -37,13 +44,13 @@ def test_a_regular_polygon_is_off_its_circle_by_what_geometry_says() -> None:
     found = seen(head, from_above, 1000)
     scale = 1000 / 300.0
     assert np.allclose(found.length_px, 2 * RADIUS_MM * np.sin(np.pi / SIDES) * scale, rtol=0.01)
-    assert np.allclose(found.off_px, RADIUS_MM * (1 - np.cos(np.pi / SIDES)) * scale, rtol=0.02)
+    assert np.allclose(found.deviation_px, RADIUS_MM * (1 - np.cos(np.pi / SIDES)) * scale, rtol=0.02)
 
 
 def test_most_of_the_outline_counts_by_its_length() -> None:
     found = Silhouette(np.array([90.0, 4.0, 6.0]), np.array([0.5, 2.0, 9.0]))
-    assert found.coarseness_px == 0.5
-    assert Silhouette(np.zeros(0), np.zeros(0)).coarseness_px == 0.0
+    assert found.typical_deviation_px == 0.5
+    assert Silhouette(np.zeros(0), np.zeros(0)).typical_deviation_px == 0.0
 
 
 @pytest.mark.parametrize("side", SIZES)
@@ -62,7 +69,7 @@ def test_fine_heads_stay_as_they_are_and_none_gets_too_large() -> None:
     assert smooth_levels(1e3, 1000) == 3
     for triangles in (5_000, 50_000, 80_000, 500_000):
         levels = smooth_levels(1e3, triangles)
-        assert levels == 0 or triangles * 4**levels <= MOST_TRIANGLES
+        assert levels == 0 or triangles * 4**levels <= MAX_SMOOTH_TRIANGLES
     assert smooth_levels(1e3, 80_000) == 0
 
 
@@ -72,7 +79,7 @@ def test_an_outline_that_was_coarse_is_smooth(tmp_path: Path) -> None:
         seen(head, portrait(head), 1024)
         for head in (dermis.load_head(path, subdivide=0), dermis.load_head(path))
     )
-    assert coarse.coarseness_px > 2 * LIMIT_PX > 2 * smooth.coarseness_px
+    assert coarse.typical_deviation_px > 2 * MAX_DEVIATION_PX > 2 * smooth.typical_deviation_px
     assert coarse.length_px.max() > 70
     assert smooth.length_px.max() < 25
 
@@ -83,7 +90,7 @@ def test_a_head_alone_is_made_for_a_portrait(tmp_path: Path) -> None:
     assert plain.levels == 0
     assert dermis.load_head(path).levels == SmoothIn()(plain) > 0
     assert dermis.load_head(path, subdivide=2).levels == 2
-    with pytest.raises(DermisError, match="subdivide: expected auto or 0 to 3 levels, but 'most' came"):
+    with pytest.raises(DermisError, match="subdivide: expected auto or 0 to 3 levels, but got 'most'"):
         dermis.load_head(path, subdivide="most")  # type: ignore[arg-type]
 
 
@@ -101,8 +108,8 @@ def test_options_and_files_say_what_picture_it_is_for(
     def levels(name: Path, side: int | None = None, **head: object) -> int:
         sized = {"background": (0, 0, 0)} | ({"size": (side, side)} if side else {})
         given = SceneOptions(settings=sized, head=head)
-        made = assemble(str(name), given)[0].head
-        note_levels(str(name), given, made)
+        made = assemble_scene(str(name), given)[0].head
+        note_subdivision(str(name), given, made)
         return made.levels
 
     assert levels(scene) == levels(path, 64) == 0

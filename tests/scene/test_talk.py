@@ -8,10 +8,10 @@ import pytest
 from small_head import write_head
 
 import dermis
-from dermis.scene.plain import Plain, fields_under, heading_of, help_of
+from dermis.scene.frozen_model import FrozenModel, field_heading, field_help, fields_under
 from dermis.scene.talk import COMPARISONS
 
-FIELDS: dict[type[Plain], list[str]] = {
+FIELDS: dict[type[FrozenModel], list[str]] = {
     dermis.Skin: ["specular_colour", "energy"],
     dermis.Settings: ["stretch", "seams", "seam_colour", "gamma"],
 }
@@ -28,10 +28,10 @@ gamma = "wrong"
 
 
 @pytest.mark.parametrize("kind", FIELDS)
-def test_they_are_listed_under_their_heading(kind: type[Plain]) -> None:
+def test_they_are_listed_under_their_heading(kind: type[FrozenModel]) -> None:
     assert fields_under(COMPARISONS, kind) == FIELDS[kind]
-    assert {heading_of(kind, name) for name in kind.model_fields} == {"", COMPARISONS}
-    assert all(help_of(kind, name) for name in FIELDS[kind])
+    assert {field_heading(kind, name) for name in kind.model_fields} == {"", COMPARISONS}
+    assert all(field_help(kind, name) for name in FIELDS[kind])
     text = kind.__doc__ or ""
     _, parameters, comparisons = text.split("\n----")
     assert parameters.rstrip("-").endswith(COMPARISONS)

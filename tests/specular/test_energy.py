@@ -10,7 +10,7 @@ from tolerances import FURNACE
 
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import cosines
-from dermis.specular.fresnel import ENERGY, Energy
+from dermis.specular.fresnel import ENERGY, EnergyModel
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
@@ -24,16 +24,16 @@ def mean_albedo(m: float, model: str = "kelemen") -> float:
     return float(w @ (directional_albedo(mu, m, MODELS[model].lobe) * mu))
 
 
-def furnace(energy: Energy, views: Floats, m: float, rho_s: float, model: str = "kelemen") -> Floats:
+def furnace(energy: EnergyModel, views: Floats, m: float, rho_s: float, model: str = "kelemen") -> Floats:
     rho = directional_albedo(views, m, MODELS[model].lobe)
-    return energy.furnace(rho, mean_albedo(m, model), rho_s)
+    return energy.furnace_radiance(rho, mean_albedo(m, model), rho_s)
 
 
 def test_published_use_loses_what_others_measured() -> None:
     """Strength 0.18, m = 0.3: 0.96 over the surface and 0.85 at grazing angles, against 0.99 when divided."""
     ends = furnace(ENERGY["published"], np.array([1.0, 0.05]), 0.3, 0.18)
     assert ends == pytest.approx([0.96, 0.85], abs=0.005)
-    divided = furnace(Energy(1.0, returned=False), np.array([1.0, 0.05]), 0.3, 0.18)
+    divided = furnace(EnergyModel(1.0, returned=False), np.array([1.0, 0.05]), 0.3, 0.18)
     assert divided == pytest.approx([0.99, 0.99], abs=0.005)
 
 
@@ -49,7 +49,7 @@ def test_full_energy_gives_back_all_of_the_light(model: str, m: float) -> None:
     table, mean = twins.surface_albedo(VIEWS, m, model)
     for rho_s in (0.18, 1.0):
         entered = 1.0 - rho_s * mean_albedo(m, model)
-        out = rho_s * rho + entered * ENERGY["full"].leaves(table, mean, rho_s)
+        out = rho_s * rho + entered * ENERGY["full"].exitance_factor(table, mean, rho_s)
         assert out.max() < 1.0 + FURNACE
         assert abs((out * VIEWS).sum() / VIEWS.sum() - 1.0) < FURNACE
 
@@ -66,8 +66,10 @@ def test_furnace_light_by_light(model: str, view: float) -> None:
     )
     eye = np.array([np.sqrt(1 - view**2), 0.0, view])
     mirrored = rho_s * MODELS[model].lobe(cosines(Z, light, eye), m)
-    entering = energy.enters(directional_albedo(mu, m, MODELS[model].lobe), rho_s)[:, None]
-    leaving = energy.leaves(directional_albedo(view, m, MODELS[model].lobe), mean_albedo(m, model), rho_s)
+    entering = energy.entering_fraction(directional_albedo(mu, m, MODELS[model].lobe), rho_s)[:, None]
+    leaving = energy.exitance_factor(
+        directional_albedo(view, m, MODELS[model].lobe), mean_albedo(m, model), rho_s
+    )
     out = 2 * np.pi * ((mirrored + entering * leaving / np.pi) * mu[:, None]).mean()
     assert out == pytest.approx(1.0, abs=0.005)
 
@@ -76,9 +78,9 @@ def test_dark_skin_gets_no_lighter_than_its_own_colour() -> None:
     """What the surface throws back inside comes out dimmed by the skin once, as all that enters does."""
     m, rho_s, colour = 0.3, 1.0, 0.2
     rho, mean = directional_albedo(VIEWS, m), mean_albedo(m)
-    below = (1 - rho_s * mean) * colour * ENERGY["full"].leaves(rho, mean, rho_s)
+    below = (1 - rho_s * mean) * colour * ENERGY["full"].exitance_factor(rho, mean, rho_s)
     assert (below * VIEWS).sum() / VIEWS.sum() == pytest.approx(colour * (1 - mean), rel=0.002)
 
 
 def test_the_published_term_stops_at_nothing() -> None:
-    assert ENERGY["published"].enters(0.5, 1.0) == 0.0
+    assert ENERGY["published"].entering_fraction(0.5, 1.0) == 0.0

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from dermis.base import citations as cite
 from dermis.specular.hair import (
-    ROUGH_ALONG,
+    LONGITUDINAL_ROUGHNESS,
     absorption_per_mm,
     attenuations,
     fibre,
     logistic,
     longitudinal,
-    scattered,
+    scattering,
 )
 
 Floats = NDArray[np.float64]
@@ -29,11 +29,11 @@ def bands(count: int, low: float, high: float) -> tuple[Floats, float]:
     return low + step * (np.arange(count) + 0.5), step
 
 
-def albedo(sin_o: float, depth: Floats, roughness: float = ROUGH_ALONG) -> Floats:
+def albedo(sin_o: float, depth: Floats, roughness: float = LONGITUDINAL_ROUGHNESS) -> Floats:
     """(3,) what comes back under light from all around."""
     (sines, ds), (phi, dphi) = bands(2000, -1, 1), bands(180, -np.pi, np.pi)
     i, p = np.meshgrid(sines, phi, indexing="ij")
-    return np.asarray(scattered(i, sin_o, p, depth, fibre(roughness)).sum(axis=(0, 1)) * ds * dphi)
+    return np.asarray(scattering(i, sin_o, p, depth, fibre(roughness)).sum(axis=(0, 1)) * ds * dphi)
 
 
 @pytest.mark.parametrize("angle", ANGLES)
@@ -70,7 +70,7 @@ def test_left_and_right_are_alike() -> None:
     rng = np.random.default_rng(1)
     (i, o), phi = rng.uniform(-0.99, 0.99, (2, 300)), rng.uniform(-np.pi, np.pi, 300)
     depth = np.array([0.2, 0.5, 1.0])
-    assert np.allclose(scattered(i, o, phi, depth, fibre()), scattered(i, o, -phi, depth, fibre()))
+    assert np.allclose(scattering(i, o, phi, depth, fibre()), scattering(i, o, -phi, depth, fibre()))
 
 
 def test_pigments_colour_hair() -> None:
@@ -84,4 +84,4 @@ def test_pigments_colour_hair() -> None:
 
 
 def test_sources_are_in_the_bibliography() -> None:
-    assert {"Marschner2003", "dEon2011", "Chiang2016"} <= cite.keys()
+    assert {"Marschner2003", "dEon2011", "Chiang2016"} <= cite.citation_keys()

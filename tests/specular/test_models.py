@@ -43,7 +43,7 @@ def test_names_are_the_same_everywhere_and_in_one_order() -> None:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_sources_are_in_the_bibliography(name: str) -> None:
-    assert MODELS[name].sources and set(MODELS[name].sources) <= cite.keys()
+    assert MODELS[name].sources and set(MODELS[name].sources) <= cite.citation_keys()
 
 
 @pytest.mark.parametrize("m", [0.1, 0.2, 0.3, 0.4, 0.5])

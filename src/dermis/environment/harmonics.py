@@ -41,7 +41,7 @@ def analyse(radiance: Floats, degree: int) -> list[Complex]:
     height, width = radiance.shape[:2]
     weighted = radiance * (_row_weights(height) * 2.0 * np.pi / width)[:, None, None]
     around = np.fft.rfft(weighted, axis=1)
-    table = _table(height, degree)
+    table = _legendre_table(height, degree)
     return [
         table[m] @ (around[:, m] * np.exp(-1j * m * _first_azimuth(width)))
         if m < around.shape[1]
@@ -57,16 +57,16 @@ def zonal(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
 
     Source: the Funk-Hecke theorem, as in [RamamoorthiHanrahan2001].
     """
-    theta = _nodes()
+    theta = _kernel_angles()
     measure = np.pi**2 / _KERNEL_NODES * np.sin(theta)
-    return np.asarray(_polynomials(degree) @ (kernel(theta) * measure))
+    return np.asarray(_kernel_polynomials(degree) @ (kernel(theta) * measure))
 
 
 def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
     """The panorama (height, 2 height, c) of the coefficients, each degree multiplied by its factor."""
     width = 2 * height
     degree = len(factors) - 1
-    table = _table(height, degree)
+    table = _legendre_table(height, degree)
     around = np.zeros((height, width // 2 + 1, coefficients[0].shape[1]), complex)
     for m in range(min(degree, width // 2 - 1) + 1):
         scaled = coefficients[m] * factors[m:, None]
@@ -75,19 +75,19 @@ def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Flo
 
 
 @lru_cache(maxsize=2)  # of panoramas that are read and of those that are made: 51 kB a row at degree 112
-def _table(height: int, degree: int) -> list[Floats]:
+def _legendre_table(height: int, degree: int) -> list[Floats]:
     """Functions of all orders at the rows of a panorama."""
     return legendre(_polar_cosines(height), degree, degree + 1)
 
 
 @lru_cache(maxsize=1)
-def _polynomials(degree: int) -> Floats:
+def _kernel_polynomials(degree: int) -> Floats:
     """(degree + 1, n) Legendre's at the nodes of kernels."""
-    (functions,) = legendre(np.cos(_nodes()), degree, orders=1)
+    (functions,) = legendre(np.cos(_kernel_angles()), degree, orders=1)
     return np.asarray(functions * np.sqrt(4.0 * np.pi / (2.0 * np.arange(degree + 1) + 1.0))[:, None])
 
 
-def _nodes() -> Floats:
+def _kernel_angles() -> Floats:
     """(n,) angles at which kernels are read."""
     return np.asarray(0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES)
 

@@ -17,16 +17,16 @@ from dermis.images.io import read_image
 Floats = NDArray[np.float64]
 UNIFORM = "uniform"
 """Name of the panorama with radiance 1 everywhere."""
-_LEAST_ROWS, _MOST_ROWS = 256, 512
+_MIN_ROWS, _MAX_ROWS = 256, 512
 """Fewer are split, as texel sums stand for integrals; more are averaged: the narrowest lobe spans 16."""
-_BRIGHTEST = 1e12  # far beyond any sun; keeps single precision on the device from overflowing
-MOST_SUNS = 4
-_PEAK = 32.0  # times the mean radiance: what is brighter may belong to a sun
-_NEAR_DEGREES = 8.0
-_LEAST_SHARE = 0.05  # of the irradiance that the mean radiance gives
+_MAX_RADIANCE = 1e12  # far beyond any sun; keeps single precision on the device from overflowing
+MAX_SUNS = 4
+_PEAK_FACTOR = 32.0  # times the mean radiance: what is brighter may belong to a sun
+_CLUSTER_DEGREES = 8.0
+_MIN_SUN_FRACTION = 0.05  # of the irradiance that the mean radiance gives
 
 
-def load_panorama(name: str, most_rows: int = _MOST_ROWS) -> Floats:
+def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
     """(h, w, 3) radiance, linear Rec. 709; the picture's middle is -Z, its right +X, its top +Y.
 
     name : a sample, a file (.hdr, .exr), or "uniform"
@@ -36,21 +36,21 @@ def load_panorama(name: str, most_rows: int = _MOST_ROWS) -> Floats:
     """
     path = panorama_file(name)
     if path is None:
-        return np.ones((_LEAST_ROWS, 2 * _LEAST_ROWS, 3))
+        return np.ones((_MIN_ROWS, 2 * _MIN_ROWS, 3))
     image = read_image(path)
     if image.dtype != np.float32:
-        came, remedy = f"it is a picture of {image.dtype.name}", "Take its .hdr or .exr version"
-        refuse(name, "a picture of radiance (.hdr, .exr)", came, remedy)
+        actual, advice = f"it is a picture of {image.dtype.name}", "Take its .hdr or .exr version"
+        refuse(name, "a picture of radiance (.hdr, .exr)", actual, advice)
     rgb = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3]
     low, high = float(rgb.min()), float(rgb.max())
-    if low < 0 or not 0 < high <= _BRIGHTEST:
-        expected = f"radiance from 0 to {_BRIGHTEST:g}, not all of it 0"
+    if low < 0 or not 0 < high <= _MAX_RADIANCE:
+        expected = f"radiance from 0 to {_MAX_RADIANCE:g}, not all of it 0"
         refuse(name, expected, f"it is from {low:g} to {high:g}", "Export it again")
     height, width = rgb.shape[:2]
     if width != 2 * height:
-        came, remedy = f"it is {width}x{height}", "Export it as latitude and longitude"
-        refuse(name, "a picture twice as wide as high", came, remedy)
-    return resampled(rgb.astype(np.float32, copy=False), min(max(height, _LEAST_ROWS), most_rows))
+        actual, advice = f"it is {width}x{height}", "Export it as latitude and longitude"
+        refuse(name, "a picture twice as wide as high", actual, advice)
+    return resample(rgb.astype(np.float32, copy=False), min(max(height, _MIN_ROWS), max_rows))
 
 
 def directions(height: int, width: int) -> Floats:
@@ -74,7 +74,7 @@ def mean_radiance(radiance: Floats) -> Floats:
     return np.asarray((radiance * solid_angles(height, width)[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi))
 
 
-def resampled(radiance: NDArray[np.floating], height: int) -> Floats:
+def resample(radiance: NDArray[np.floating], height: int) -> Floats:
     """The panorama as (height, 2 height, 3): means over each texel's solid angle, whatever the sizes."""
     rows, columns = radiance.shape[:2]
     ours, theirs = (-np.cos(np.linspace(0.0, np.pi, n + 1)) for n in (rows, height))
@@ -83,13 +83,13 @@ def resampled(radiance: NDArray[np.floating], height: int) -> Floats:
     return _means(upright.swapaxes(0, 1), ours, theirs).swapaxes(0, 1)
 
 
-def _means(values: NDArray[np.floating], edges: Floats, wanted: Floats) -> Floats:
-    """Means over the intervals `wanted`, along the first axis, of values constant over `edges`."""
-    first = np.clip(np.searchsorted(edges, wanted[:-1], "right") - 1, 0, len(values) - 1)
-    after = np.clip(np.searchsorted(edges, wanted[1:], "left"), 1, len(values))
+def _means(values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
+    """Means over the intervals `target_edges`, along the first axis, of values constant over `edges`."""
+    first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(values) - 1)
+    after = np.clip(np.searchsorted(edges, target_edges[1:], "left"), 1, len(values))
     means = np.empty((len(first), *values.shape[1:]))
     for k, (a, b) in enumerate(zip(first, after, strict=True)):
-        share = np.diff(np.clip(edges[a : b + 1], wanted[k], wanted[k + 1]))
+        share = np.diff(np.clip(edges[a : b + 1], target_edges[k], target_edges[k + 1]))
         means[k] = np.tensordot(share / share.sum(), values[a:b], 1)
     return means
 
@@ -105,8 +105,8 @@ def panorama_file(name: str) -> Path | None:
     if sample is None:
         if not is_file(name):
             known = ", ".join([*_sample_names(), UNIFORM])
-            expected, came = f"an .hdr or .exr file or one of {known}", "it is neither"
-            refuse(f"environment {name!r}", expected, came, "Check the name")
+            expected, actual = f"an .hdr or .exr file or one of {known}", "it is neither"
+            refuse(f"environment {name!r}", expected, actual, "Check the name")
         return Path(name)
     if sample.kind != "environment":
         known = ", ".join(_sample_names())
@@ -143,45 +143,47 @@ def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
     """
     mean = float(luminance(mean_radiance(radiance)))
     brightness = np.asarray(luminance(radiance), np.float64)
-    above = brightness > _PEAK * mean
-    towards = directions(*radiance.shape[:2])[above]
+    above = brightness > _PEAK_FACTOR * mean
+    directions_to_peak = directions(*radiance.shape[:2])[above]
     weight = np.broadcast_to(solid_angles(*radiance.shape[:2]), above.shape)[above]
-    keep = _PEAK * mean / brightness[above]
-    light = radiance[above] * ((1.0 - keep) * weight)[:, None]
-    left, suns = np.ones(len(keep)), list[Sun]()
-    for inside in sorted(_clusters(brightness[above], towards, weight), key=lambda c: -_strength(light[c])):
-        if len(suns) == MOST_SUNS or _strength(light[inside]) < _LEAST_SHARE * np.pi * mean:
+    kept_fraction = _PEAK_FACTOR * mean / brightness[above]
+    light = radiance[above] * ((1.0 - kept_fraction) * weight)[:, None]
+    remaining, suns = np.ones(len(kept_fraction)), list[Sun]()
+    for inside in sorted(
+        _clusters(brightness[above], directions_to_peak, weight), key=lambda c: -_luminance_sum(light[c])
+    ):
+        if len(suns) == MAX_SUNS or _luminance_sum(light[inside]) < _MIN_SUN_FRACTION * np.pi * mean:
             break
-        suns.append(_sun(light[inside], towards[inside], weight[inside]))
-        left[inside] = keep[inside]
-    rest = radiance.copy()
-    rest[above] *= left[:, None]
-    return rest, suns
+        suns.append(_fit_sun(light[inside], directions_to_peak[inside], weight[inside]))
+        remaining[inside] = kept_fraction[inside]
+    remainder = radiance.copy()
+    remainder[above] *= remaining[:, None]
+    return remainder, suns
 
 
-def _strength(light: Floats) -> float:
+def _luminance_sum(light: Floats) -> float:
     return float(luminance(light.sum(axis=0)))
 
 
-def _sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
+def _fit_sun(light: Floats, directions_to_peak: Floats, weight: Floats) -> Sun:
     """One light for the texels of a peak (n, 3), as wide as an even disc with the same mean square."""
     grey = np.asarray(luminance(light), np.float64)
-    middle = grey @ towards
+    middle = grey @ directions_to_peak
     solid_angle = grey.sum() ** 2 / (grey**2 / weight).sum()
     return Sun(middle / np.linalg.norm(middle), light.sum(axis=0), float(np.sqrt(solid_angle / np.pi)))
 
 
-def _clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
+def _clusters(brightness: Floats, directions_to_peak: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
     """Bright texels (n,) sorted into peaks: those around the middle of those around the brightest left."""
-    near = np.cos(np.radians(_NEAR_DEGREES))
-    left = np.ones(len(brightness), bool)
+    near = np.cos(np.radians(_CLUSTER_DEGREES))
+    remaining = np.ones(len(brightness), bool)
     clusters = []
-    while left.any():
-        peak = np.where(left, brightness, 0.0).argmax()
-        around = left & (towards @ towards[peak] > near)
-        middle = weight[around] @ towards[around]
-        inside = left & (towards @ middle > near * np.linalg.norm(middle))
+    while remaining.any():
+        peak = np.where(remaining, brightness, 0.0).argmax()
+        around = remaining & (directions_to_peak @ directions_to_peak[peak] > near)
+        middle = weight[around] @ directions_to_peak[around]
+        inside = remaining & (directions_to_peak @ middle > near * np.linalg.norm(middle))
         inside[peak] = True
-        left &= ~inside
+        remaining &= ~inside
         clusters.append(inside)
     return clusters

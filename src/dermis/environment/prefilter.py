@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.progress import preparing
+from dermis.base.progress import logged_step
 from dermis.environment.harmonics import analyse, synthesise, zonal
 from dermis.environment.panorama import Sun, load_panorama, split_suns
 from dermis.specular.beckmann import beckmann
@@ -20,7 +20,7 @@ HEIGHT = 192
 _DEGREE = 160  # the smoothest lobe multiplies this degree by 2e-4: hardly any ringing around lamps
 
 
-def round_lobe(theta: Floats, m: float) -> Floats:
+def isotropic_lobe(theta: Floats, m: float) -> Floats:
     """Weight of light at an angle from the mirror direction, seen along the normal [1/sr, up to a factor].
 
     theta : [rad], 0 to pi / 2
@@ -34,7 +34,7 @@ def round_lobe(theta: Floats, m: float) -> Floats:
         return np.asarray(beckmann(half, m) * np.cos(theta) / half**2)
 
 
-def reflection_numbers() -> dict[str, float]:
+def reflection_constants() -> dict[str, float]:
     """Numbers that environment.wgsl fills in."""
     return {
         "reflections": len(ROUGHNESSES),
@@ -55,7 +55,7 @@ class Prefiltered:
     suns: tuple[Sun, ...]
 
 
-@preparing("filtering the environment")
+@logged_step("filtering the environment")
 def prefilter(name: str) -> Prefiltered:
     """A panorama's layers and suns. It takes a quarter of a second, so nothing is kept on disk.
 
@@ -68,12 +68,12 @@ def prefilter(name: str) -> Prefiltered:
     """
     radiance, suns = split_suns(load_panorama(name))
     coefficients = analyse(radiance, _DEGREE)
-    kernels = [zonal(np.cos, _DEGREE), *(mirror_kernel(float(m)) for m in ROUGHNESSES)]
+    kernels = [zonal(np.cos, _DEGREE), *(isotropic_kernel(float(m)) for m in ROUGHNESSES)]
     layers = [synthesise(coefficients, factors, HEIGHT) for factors in kernels]
     return Prefiltered(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
 
 
-def mirror_kernel(m: float) -> Floats:
+def isotropic_kernel(m: float) -> Floats:
     """(161,) factors of the round lobe of roughness m, with the sum 1 over the sphere."""
-    factors = zonal(lambda theta: round_lobe(theta, m), _DEGREE)
+    factors = zonal(lambda theta: isotropic_lobe(theta, m), _DEGREE)
     return np.asarray(factors / factors[0])

@@ -8,7 +8,7 @@ from functools import cache
 from importlib import resources
 
 from dermis.base.registry import Registry
-from dermis.human.published import FACE_UNITS, moves
+from dermis.human.makehuman import EXPRESSION_PREFIX, target_deltas
 
 Weights = Mapping[str, float]
 SIDES = "Left", "Right"
@@ -23,20 +23,22 @@ def expression(name: str) -> dict[str, float]:
 
     Raises DermisError for an unknown name.
     """
-    return {target: weight for one, weight in EXPRESSIONS[name].items() for target in sided(one)}
+    return {target: weight for one, weight in EXPRESSIONS[name].items() for target in expand_sides(one)}
 
 
-def targets_of(names: Iterable[str]) -> tuple[str, ...]:
+def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
     """Return targets by name; "mouthSmile" is two of them, left and right."""
-    return tuple(dict.fromkeys(target for name in names for target in sided(name)))
+    return tuple(dict.fromkeys(target for name in names for target in expand_sides(name)))
 
 
-def sided(name: str) -> tuple[str, ...]:
+def expand_sides(name: str) -> tuple[str, ...]:
     """Return both targets of a pair, or the target itself."""
-    return tuple(f"{name}{side}" for side in SIDES) if f"{name}Left" in _arkit() else (name,)
+    return tuple(f"{name}{side}" for side in SIDES) if f"{name}Left" in _arkit_names() else (name,)
 
 
 @cache
-def _arkit() -> frozenset[str]:
-    names = moves().names
-    return frozenset(name.removeprefix(FACE_UNITS) for name in names if name.startswith(FACE_UNITS))
+def _arkit_names() -> frozenset[str]:
+    names = target_deltas().names
+    return frozenset(
+        name.removeprefix(EXPRESSION_PREFIX) for name in names if name.startswith(EXPRESSION_PREFIX)
+    )

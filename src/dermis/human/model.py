@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human import lids, teeth
-from dermis.human import lids as globes
-from dermis.human.hair.rooting import Rooting, eye_middles
-from dermis.human.lids import conformed_targets
-from dermis.human.movement import expressions, gaze, skeleton
-from dermis.human.published import Points, count, data, places_mm
+from dermis.human.hair.root_finder import RootFinder, eye_centres
+from dermis.human.lids import fit_lid_targets
+from dermis.human.makehuman import Points, mesh_point_count, model_data, morphed_points_mm
+from dermis.human.movement import expression_targets, gaze_turns, skeleton
 from dermis.mesh import eyeball
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
@@ -29,29 +28,29 @@ from dermis.mesh.subdivide import Refinement, refinement
 Layout = Literal["own", "hm08"]
 Index = NDArray[np.int64]
 
-THANKS = "MakeHuman community, CC0"
-_EYE, _TOOTH, _TONGUE = (0.85, 0.83, 0.8), (0.7, 0.66, 0.56), (0.45, 0.16, 0.14)
+CREDIT = "MakeHuman community, CC0"
+_EYE_COLOUR, _TOOTH_COLOUR, _TONGUE_COLOUR = (0.85, 0.83, 0.8), (0.7, 0.66, 0.56), (0.45, 0.16, 0.14)
 LEFT_EYE, RIGHT_EYE = "helper-l-eye", "helper-r-eye"
 MATERIALS = {
     "body": Material("skin"),
-    LEFT_EYE: Material("left eye", "opaque", _EYE),
-    RIGHT_EYE: Material("right eye", "opaque", _EYE),
-    "helper-upper-teeth": Material("upper teeth", "opaque", _TOOTH, "upper teeth"),
-    "helper-lower-teeth": Material("lower teeth", "opaque", _TOOTH, "lower teeth"),
-    "helper-tongue": Material("tongue", "opaque", _TONGUE, "tongue"),
+    LEFT_EYE: Material("left eye", "opaque", _EYE_COLOUR),
+    RIGHT_EYE: Material("right eye", "opaque", _EYE_COLOUR),
+    "helper-upper-teeth": Material("upper teeth", "opaque", _TOOTH_COLOUR, "upper teeth"),
+    "helper-lower-teeth": Material("lower teeth", "opaque", _TOOTH_COLOUR, "lower teeth"),
+    "helper-tongue": Material("tongue", "opaque", _TONGUE_COLOUR, "tongue"),
     "cap": Material("cut", "opaque", (0.02, 0.02, 0.02)),
 }
 """Groups of quads, and what they are."""
-_SHARE = 1 / 6
-MEAN = {
-    f"macrodetails/{people}-{sex}-young": _SHARE
+_EQUAL_WEIGHT = 1 / 6
+MEAN_WEIGHTS = {
+    f"macrodetails/{people}-{sex}-young": _EQUAL_WEIGHT
     for people in ("african", "asian", "caucasian")
     for sex in ("female", "male")
 }
 """Weights of the person whom atlas and tables are made for, and whose brows are where the artist has them."""
 
 
-class _Laid(NamedTuple):
+class _LayoutFaces(NamedTuple):
     """The faces of a layout, the same for all people.
 
     point : (v,) of each vertex
@@ -66,69 +65,72 @@ class _Laid(NamedTuple):
     material: Index
 
 
-def human_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: EyeLook) -> Head:
+def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: EyeLook) -> Head:
     """The head of a person, see `Human.head`.
 
     weights : of published targets
     """
-    places, laid = places_mm(weights), _laid(layout)
-    sockets = _sockets(places)
-    (left, left_centre), (right, right_centre) = map(globes.placed, sockets)
-    points = np.concatenate([lids.conformed(places, sockets)[: count()], left, right])
+    points_mm, faces = morphed_points_mm(weights), _layout_faces(layout)
+    sockets = _sockets(points_mm)
+    (left, left_centre), (right, right_centre) = map(lids.place_eyeball, sockets)
+    points = np.concatenate([lids.fit_lids(points_mm, sockets)[: mesh_point_count()], left, right])
     mesh = build_mesh(
-        points[laid.point],
-        laid.uv,
-        halves(laid.quads),
-        np.repeat(laid.material, 2),
+        points[faces.point],
+        faces.uv,
+        halves(faces.quads),
+        np.repeat(faces.material, 2),
         tuple(MATERIALS.values()),
-        point=laid.point,
-        quads=np.arange(2 * len(laid.quads)).reshape(-1, 2),
+        point=faces.point,
+        quads=np.arange(2 * len(faces.quads)).reshape(-1, 2),
     )
-    bones = skeleton(places[count() :], (left_centre, right_centre), len(left))
-    moved = replace(expressions(), delta_mm=conformed_targets(places, sockets))
+    bones = skeleton(points_mm[mesh_point_count() :], (left_centre, right_centre), len(left))
+    moved = replace(expression_targets(), delta_mm=fit_lid_targets(points_mm, sockets))
     apex, back, _ = eyeball.marks()
-    contact = lids.contact(count(), len(left), apex, back)
-    rig = Rig(points.astype(np.float32), moved, bones, turns=gaze(), contact=contact)
-    return Head("human", mesh, maps, THANKS, rig, _eyes(eyes))
+    contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
+    rig = Rig(points.astype(np.float32), moved, bones, turns=gaze_turns(), contact=contact)
+    return Head("human", mesh, maps, CREDIT, rig, _eyes(eyes))
 
 
-def control_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
+def control_points_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
     """(p, 3) where the control points of a person lie, see `Human.positions_mm` [mm]."""
-    places = places_mm(weights)
-    sockets = _sockets(places)
-    balls = [globes.placed(eye)[0] for eye in sockets]
-    return np.concatenate([lids.conformed(places, sockets)[: count()], *balls]).astype(np.float32)
+    points_mm = morphed_points_mm(weights)
+    sockets = _sockets(points_mm)
+    balls = [lids.place_eyeball(eye)[0] for eye in sockets]
+    return np.concatenate([lids.fit_lids(points_mm, sockets)[: mesh_point_count()], *balls]).astype(
+        np.float32
+    )
 
 
-def _sockets(places: Points) -> tuple[lids.Socket, lids.Socket]:
+def _sockets(points_mm: Points) -> tuple[lids.EyeSocket, lids.EyeSocket]:
     """The left and the right eye."""
-    left, right = (lids.socket(places[_ball(name)]) for name in (LEFT_EYE, RIGHT_EYE))
+    left, right = (lids.fit_socket(points_mm[_published_eyeball(name)]) for name in (LEFT_EYE, RIGHT_EYE))
     return left, right
 
 
 @cache
-def _ball(name: str) -> Index:
+def _published_eyeball(name: str) -> Index:
     """Points of a published ball."""
-    found = data()
+    found = model_data()
     group = list(map(str, found["group_names"])).index(name)
     return np.unique(found["quads"][found["group"] == group]).astype(np.int64)
 
 
 def _eyes(look: EyeLook) -> Eyes:
-    size = len(globes.globe()[0])
+    size = len(lids.eyeball_mesh()[0])
     apex, back, side = (
-        np.array([count() + mark, count() + size + mark], np.int32) for mark in eyeball.marks()
+        np.array([mesh_point_count() + mark, mesh_point_count() + size + mark], np.int32)
+        for mark in eyeball.marks()
     )
     material = np.array([list(MATERIALS).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
     return Eyes(apex, back, side, material, look)
 
 
 @cache
-def _laid(layout: Layout) -> _Laid:
+def _layout_faces(layout: Layout) -> _LayoutFaces:
     uv, quads, corner, material = _quads(layout)
     both = np.stack([quads, corner], axis=-1).reshape(-1, 2)
     pairs, vertex = np.unique(both, axis=0, return_inverse=True)
-    return _Laid(pairs[:, 0], uv[pairs[:, 1]], vertex.reshape(-1, 4), material)
+    return _LayoutFaces(pairs[:, 0], uv[pairs[:, 1]], vertex.reshape(-1, 4), material)
 
 
 def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
@@ -136,7 +138,7 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
 
     uv (u, 2), points of quads (q, 4), their corners in uv (q, 4), and what they are made of (q,).
     """
-    found = data()
+    found = model_data()
     if layout == "own":
         uv, corner = found["uv"].astype(np.float64), found["quads_uv"].astype(np.int64)
     else:  # which has no cut
@@ -144,17 +146,17 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
     names = [str(found["group_names"][group]) for group in found["group"][: len(corner)]]
     stays = np.array([name not in (LEFT_EYE, RIGHT_EYE) for name in names])
     material = np.array([list(MATERIALS).index(name) for name in names])
-    ball, quads = globes.globe()
+    ball, quads = lids.eyeball_mesh()
     size, points = len(ball), found["quads"][: len(corner)].astype(np.int64)
     for upper, name in ((True, "helper-upper-teeth"), (False, "helper-lower-teeth")):
-        own, places = teeth.layout(upper)
+        own, points_mm = teeth.layout(upper)
         those = np.array(names) == name
         corner[those] = len(uv) + np.searchsorted(own, points[those])
-        uv = np.concatenate([uv, places])
+        uv = np.concatenate([uv, points_mm])
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return (
         np.concatenate([uv, eyeball.layout()]),
-        np.concatenate([points[stays], count() + quads, count() + size + quads]),
+        np.concatenate([points[stays], mesh_point_count() + quads, mesh_point_count() + size + quads]),
         np.concatenate([corner[stays], len(uv) + quads, len(uv) + quads]),
         np.concatenate([material[stays], *eyes]),
     )
@@ -170,10 +172,10 @@ class Template:
     """
 
     head: Head
-    rooting: Rooting
+    root_finder: RootFinder
     refinement: Refinement | None
 
-    def shaped(self, plain: Head) -> Head:
+    def refine_head(self, plain: Head) -> Head:
         """A person's head on the finer mesh, drawn by the template's atlas and tables.
 
         plain : before any subdivision, of the same layout
@@ -189,10 +191,10 @@ def template(layout: Layout, levels: int) -> Template:
 
     levels : of subdivision
     """
-    head = plain = human_head(MEAN, Maps(), layout, EyeLook())
+    head = plain = build_head(MEAN_WEIGHTS, Maps(), layout, EyeLook())
     found = refinement(plain.mesh, levels) if levels else None
     if found is not None:
         rig = replace(plain.control, stencils=found.stencils)
         head = replace(plain, mesh=found.mesh(plain.mesh), rig=rig, levels=levels)
     mean_mm = plain.control.positions_mm.astype(np.float64)
-    return Template(head, Rooting(plain.mesh, mean_mm, eye_middles(plain.mesh), head.mesh), found)
+    return Template(head, RootFinder(plain.mesh, mean_mm, eye_centres(plain.mesh), head.mesh), found)

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.published import FACE_UNITS, Points, data, moves
+from dermis.human.makehuman import EXPRESSION_PREFIX, Points, model_data, target_deltas
 from dermis.mesh.rig import MorphTargets, Skeleton, Turn
 
-_BEGINS: dict[str, tuple[str, str, float]] = {  # a joint, or how far on the way between two
+_BONE_ORIGINS: dict[str, tuple[str, str, float]] = {  # a joint, or how far on the way between two
     "spine": ("neck", "neck", 0.0),
     "clavicle.L": ("l-clavicle", "l-clavicle", 0.0),
     "clavicle.R": ("r-clavicle", "r-clavicle", 0.0),
@@ -25,43 +25,47 @@ _BEGINS: dict[str, tuple[str, str, float]] = {  # a joint, or how far on the way
 _PARENTS = {"neck02": "neck01", "neck03": "neck02", "head": "neck03"}
 _PARENTS |= dict.fromkeys(("jaw", "eye.L", "eye.R"), "head")
 _PARENTS |= dict.fromkeys(("neck01", "clavicle.L", "clavicle.R"), "spine")
-_ACROSS, _UP, _DOWN = 28.0, 20.0, 22.0  # degrees that an eye turns by at a weight of 1
-_GAZE = {
-    "In": (0.0, -_ACROSS, 0.0),
-    "Out": (0.0, _ACROSS, 0.0),
-    "Up": (-_UP, 0.0, 0.0),
-    "Down": (_DOWN, 0.0, 0.0),
+_SIDEWAYS_DEGREES, _UP_DEGREES, _DOWN_DEGREES = (
+    28.0,
+    20.0,
+    22.0,
+)  # degrees that an eye turns by at a weight of 1
+_GAZE_ANGLES = {
+    "In": (0.0, -_SIDEWAYS_DEGREES, 0.0),
+    "Out": (0.0, _SIDEWAYS_DEGREES, 0.0),
+    "Up": (-_UP_DEGREES, 0.0, 0.0),
+    "Down": (_DOWN_DEGREES, 0.0, 0.0),
 }
 """Of the left eye, which is on the side of +X; the right one turns across the other way."""
 
 
-def gaze() -> tuple[Turn, ...]:
+def gaze_turns() -> tuple[Turn, ...]:
     """The turns of the eyes that ARKit's eyeLook targets make."""
     return tuple(
-        Turn(f"eyeLook{way}{name}", f"eye.{name[0]}", (x, side * y, z))
+        Turn(f"eyeLook{direction}{name}", f"eye.{name[0]}", (x, side * y, z))
         for name, side in (("Left", 1.0), ("Right", -1.0))
-        for way, (x, y, z) in _GAZE.items()
+        for direction, (x, y, z) in _GAZE_ANGLES.items()
     )
 
 
 @cache
-def expressions() -> MorphTargets:
-    """The ARKit blend shapes of the skin, the teeth and the tongue; eyeballs turn by `gaze` instead."""
-    moved, names, rows = moves(), list[str](), list[NDArray[np.intp]]()
+def expression_targets() -> MorphTargets:
+    """The ARKit blend shapes of the skin, the teeth and the tongue; eyeballs turn by `gaze_turns` instead."""
+    moved, names, rows = target_deltas(), list[str](), list[NDArray[np.intp]]()
     for index, name in enumerate(moved.names):
-        if name.startswith(FACE_UNITS):
+        if name.startswith(EXPRESSION_PREFIX):
             part = np.arange(*moved.first[index : index + 2])
-            names.append(name.removeprefix(FACE_UNITS))
-            rows.append(part[_moving()[moved.point[part]]])
+            names.append(name.removeprefix(EXPRESSION_PREFIX))
+            rows.append(part[_moved_points()[moved.point[part]]])
     first, chosen = np.cumsum([0, *map(len, rows)]), np.concatenate(rows)
     point, delta_mm = moved.point[chosen].astype(np.int32), moved.delta_mm[chosen]
     return MorphTargets(tuple(names), first.astype(np.int32), point, delta_mm)
 
 
 @cache
-def _moving() -> NDArray[np.bool_]:
+def _moved_points() -> NDArray[np.bool_]:
     """(n,) whether expressions move a point: not joints and not eyeballs."""
-    found = data()
+    found = model_data()
     balls = [index for index, name in enumerate(found["group_names"]) if str(name).endswith("-eye")]
     moving = np.ones(len(found["positions_mm"]), bool)
     moving[len(moving) - len(found["joint_names"]) :] = False
@@ -69,33 +73,35 @@ def _moving() -> NDArray[np.bool_]:
     return moving
 
 
-def skeleton(joint_mm: Points, centres: tuple[Points, Points], globe: int) -> Skeleton:
+def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int) -> Skeleton:
     """Spine, clavicles, a neck of three bones, head, jaw and eyes.
 
     joint_mm : (j, 3) the person's joints [mm]
     centres : (3,) of the left and the right eyeball, which turn about them [mm]
     globe : points of an eyeball; those of the left one come after the published ones, then those of the right
     """
-    found = data()
+    found = model_data()
     names = tuple(map(str, found["bone_names"]))
     joints = dict(zip(map(str, found["joint_names"]), joint_mm, strict=True))
     joints |= dict(zip(("l-eye", "r-eye"), centres, strict=True))
-    begin = np.array([(1 - t) * joints[a] + t * joints[b] for a, b, t in (_BEGINS[name] for name in names)])
+    origins_mm = np.array(
+        [(1 - t) * joints[a] + t * joints[b] for a, b, t in (_BONE_ORIGINS[name] for name in names)]
+    )
     parent = np.array([names.index(_PARENTS[n]) if n in _PARENTS else -1 for n in names], np.int32)
     local, bind = (np.tile(np.eye(4), (len(names), 1, 1)) for _ in range(2))
-    local[:, :3, 3] = begin - np.where(parent[:, None] >= 0, begin[parent], 0.0)
-    bind[:, :3, 3] = -begin
-    bone, weight = _influences(tuple(names.index(name) for name in ("eye.L", "eye.R")), globe)
+    local[:, :3, 3] = origins_mm - np.where(parent[:, None] >= 0, origins_mm[parent], 0.0)
+    bind[:, :3, 3] = -origins_mm
+    bone, weight = _skin_weights(tuple(names.index(name) for name in ("eye.L", "eye.R")), eyeball_size)
     return Skeleton(names, parent, local, bind, np.eye(4), bone, weight)
 
 
 @cache
-def _influences(eyes: tuple[int, ...], globe: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+def _skin_weights(eyes: tuple[int, ...], eyeball_size: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """(p, 4) bones of all points and their weights: an eyeball follows its own alone."""
-    found = data()
-    shares = found["weight"].astype(np.float32)
-    own = np.zeros((2 * globe, shares.shape[1]), np.float32)
+    found = model_data()
+    weights = found["weight"].astype(np.float32)
+    own = np.zeros((2 * eyeball_size, weights.shape[1]), np.float32)
     own[:, 0] = 1.0
     bone = np.concatenate([found["bone"], np.zeros_like(own)]).astype(np.int32)
-    bone[len(shares) :, 0] = np.repeat(eyes, globe)
-    return bone, np.concatenate([shares / shares.sum(axis=1, keepdims=True), own])
+    bone[len(weights) :, 0] = np.repeat(eyes, eyeball_size)
+    return bone, np.concatenate([weights / weights.sum(axis=1, keepdims=True), own])

@@ -11,26 +11,39 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.errors import refuse, shown_value
-from dermis.base.quantities import check_numbers, number, whole_number
-from dermis.human.hair.groom import groomed
-from dermis.human.hair.look import HairLook, drawn_hair, shaved_shows, usual_hair, usual_recession
-from dermis.human.model import Layout, control_mm, human_head, template
-from dermis.human.published import OLD, YOUNG, human_targets
-from dermis.human.skin.look import Origin, SkinLook, drawn_eyes, drawn_look, usual_eyes, usual_look
+from dermis.base.errors import format_value, refuse
+from dermis.base.quantities import check_fields, checked_integer, checked_number
+from dermis.human.hair.groom import add_hair
+from dermis.human.hair.look import HairLook, sample_hair, sample_recession, stubble_visibility, typical_hair
+from dermis.human.makehuman import OLD, YOUNG, human_targets
+from dermis.human.model import Layout, build_head, control_points_mm, template
+from dermis.human.skin.look import (
+    Demographics,
+    SkinLook,
+    sample_eyes,
+    sample_skin,
+    typical_eyes,
+    typical_skin,
+)
 from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import levels_of
 
-_MOST_SEED = 2**32 - 1
-_BEARDED = 0.6  # shadow of shaved hair below a beard
-_ALIKE = 0.35  # of the Dirichlet distribution of ancestries: most people have mostly one
-_BETWEEN = 0.08  # standard deviation of the sex from its ends
-_WAYS = (("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"), ("concave", "convex"))
+_MAX_SEED = 2**32 - 1
+_MIN_BEARD_SHADOW = 0.6  # shadow of shaved hair below a beard
+_ANCESTRY_CONCENTRATION = 0.35  # of the Dirichlet distribution of ancestries: most people have mostly one
+_SEX_DEVIATION = 0.08  # standard deviation of the sex from its ends
+_OPPOSITE_SUFFIXES = (
+    ("decr", "incr"),
+    ("down", "up"),
+    ("in", "out"),
+    ("backward", "forward"),
+    ("concave", "convex"),
+)
 """Ends of the names of two targets that are each other's opposite."""
-_SPREAD = {  # standard deviation of the weights of a folder's targets
+_FOLDER_DEVIATIONS = {  # standard deviation of the weights of a folder's targets
     "head": 0.1,
     "forehead": 0.25,
     "eyebrows": 0.25,
@@ -42,13 +55,13 @@ _SPREAD = {  # standard deviation of the weights of a folder's targets
     "ears": 0.25,
     "neck": 0.12,
 }
-_LEFT_OUT = ("trans", "age", "fat", "measure", "push")  # what macro weights say, and what moves a whole part
-_SIDES = 0.2  # of the spread, by which left and right differ
-_ASYMMETRY = 0.1
+_EXCLUDED = ("trans", "age", "fat", "measure", "push")  # what macro weights say, and what moves a whole part
+_SIDE_DEVIATION = 0.2  # of the spread, by which left and right differ
+_ASYMMETRY_DEVIATION = 0.1
 _SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
-_MOST_SHAPE = 0.3
+_MAX_SHAPE_WEIGHT = 0.3
 _ANCESTRY = "african", "asian", "caucasian"
-_LOOKS = "targets", "skin", "eyes", "hair"
+_LOOK_FIELDS = "targets", "skin", "eyes", "hair"
 _RANGES = {
     "african": (0.0, 1.0),
     "asian": (0.0, 1.0),
@@ -60,18 +73,18 @@ _RANGES = {
     "hair_eumelanin": (0.0, 10.0),
     "hair_pheomelanin": (0.0, 10.0),
 }
-_LEAST_HAIRS = 0.05
-_MOST_WEIGHT = 2.0  # of a published target
-_NONE: Mapping[str, float] = MappingProxyType({})
+_MIN_HAIR_FRACTION = 0.05
+_MAX_TARGET_WEIGHT = 2.0  # of a published target
+_NO_TARGETS: Mapping[str, float] = MappingProxyType({})
 Levels = int | Callable[[Head], int]
 
 
-def drawn(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
+def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of `Human`, see `Human.drawn`."""
-    macro = {name: float(value) for name, value in given.items() if name not in _LOOKS}
-    rng = np.random.default_rng(whole_number("seed", seed, 0, _MOST_SEED))
-    shares = _ancestry(macro, rng.dirichlet((_ALIKE,) * 3))
-    sex = min(abs(rng.normal(0.0, _BETWEEN)), 0.3)
+    macro = {name: float(value) for name, value in given.items() if name not in _LOOK_FIELDS}
+    rng = np.random.default_rng(checked_integer("seed", seed, 0, _MAX_SEED))
+    shares = _ancestry(macro, rng.dirichlet((_ANCESTRY_CONCENTRATION,) * 3))
+    sex = min(abs(rng.normal(0.0, _SEX_DEVIATION)), 0.3)
     sex = macro.get("sex", 1.0 - sex if rng.random() < 0.5 else sex)
     share = rng.beta(1.2, 2.2)
     share = (macro["age"] - YOUNG) / (OLD - YOUNG) if "age" in macro else share
@@ -82,17 +95,19 @@ def drawn(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
         "age": float(YOUNG + (OLD - YOUNG) * share),
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
-        "targets": {**dict(_details(rng)), **given.get("targets", {})},
+        "targets": {**dict(_sample_targets(rng)), **given.get("targets", {})},
     }
     found |= dict(zip(_ANCESTRY, map(float, shares), strict=True)) | macro
     african, asian, caucasian = shares
-    origin = Origin(african, asian, caucasian, found["sex"], found["age"])
-    skin, eyes = drawn_look(rng, origin), drawn_eyes(rng, origin)
-    brown, red = _hair(np.random.default_rng((int(seed), 1)), shares)
+    demographics = Demographics(african, asian, caucasian, found["sex"], found["age"])
+    skin, eyes = sample_skin(rng, demographics), sample_eyes(rng, demographics)
+    brown, red = _sample_hair_pigments(np.random.default_rng((int(seed), 1)), shares)
     colour = {"hair_eumelanin": brown, "hair_pheomelanin": red} | macro
     found |= colour | {"eyes": replace(eyes, **given.get("eyes", {}))}
-    usual = usual_hair(origin, colour["hair_eumelanin"], colour["hair_pheomelanin"])
-    return found | _hairdo(np.random.default_rng((int(seed), 2)), origin, usual, skin, given)
+    usual = typical_hair(demographics, colour["hair_eumelanin"], colour["hair_pheomelanin"])
+    return found | _sample_hair_and_skin(
+        np.random.default_rng((int(seed), 2)), demographics, usual, skin, given
+    )
 
 
 def _ancestry(given: Mapping[str, float], own: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -105,19 +120,23 @@ def _ancestry(given: Mapping[str, float], own: NDArray[np.float64]) -> NDArray[n
     return np.asarray(shares / shares.sum())
 
 
-def _hairdo(
-    rng: np.random.Generator, origin: Origin, usual: HairLook, skin: SkinLook, given: Mapping[str, Any]
+def _sample_hair_and_skin(
+    rng: np.random.Generator,
+    demographics: Demographics,
+    usual: HairLook,
+    skin: SkinLook,
+    given: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Hair, and the skin with what shows of it there."""
-    hair, recession = drawn_hair(rng, origin, usual), usual_recession(rng, origin)
+    hair, recession = sample_hair(rng, demographics, usual), sample_recession(rng, demographics)
     hair = replace(hair, **given.get("hair", {}))
-    shown = shaved_shows(hair)
-    beard = shown * max(skin.beard, _BEARDED if hair.beard_mm else 0.0)
+    shown = stubble_visibility(hair)
+    beard = shown * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
     seen = replace(skin, stubble=shown * skin.stubble, beard=beard, recession=recession)
     return {"hair": hair, "skin": replace(seen, **given.get("skin", {}))}
 
 
-def _hair(rng: np.random.Generator, shares: NDArray[np.float64]) -> tuple[float, float]:
+def _sample_hair_pigments(rng: np.random.Generator, shares: NDArray[np.float64]) -> tuple[float, float]:
     """Eumelanin and pheomelanin of the hair: near to black but for people of mostly European descent.
 
     shares : (3,) of the ancestries
@@ -128,21 +147,21 @@ def _hair(rng: np.random.Generator, shares: NDArray[np.float64]) -> tuple[float,
     return min(brown, 10.0), min(red, 4.0)
 
 
-def _details(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
+def _sample_targets(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
     """Weights of targets, always drawn in the same order."""
     common: dict[str, float] = {}
-    chance = iter(rng.standard_normal(sum(1 + bool(one.shared) for one in _differences())).tolist())
-    for one in _differences():
+    chance = iter(rng.standard_normal(sum(1 + bool(one.mirrored) for one in _opposite_targets())).tolist())
+    for one in _opposite_targets():
         value = one.spread * next(chance)
-        if one.limited:
+        if one.truncated:
             value = min(max(value, -2 * one.spread), 2 * one.spread)
-        if one.shared:  # left and right are nearly alike
-            value = common.setdefault(one.shared, value) + _SIDES * one.spread * next(chance)
+        if one.mirrored:  # left and right are nearly alike
+            value = common.setdefault(one.mirrored, value) + _SIDE_DEVIATION * one.spread * next(chance)
         yield (one.more if value > 0 else one.less), abs(value)
-    yield f"head/head-{rng.choice(_SHAPES)}", float(rng.uniform(0.0, _MOST_SHAPE))
+    yield f"head/head-{rng.choice(_SHAPES)}", float(rng.uniform(0.0, _MAX_SHAPE_WEIGHT))
 
 
-class _Difference(NamedTuple):
+class _OppositeTargets(NamedTuple):
     """What people differ by: two targets that are each other's opposite.
 
     less, more : their names
@@ -154,26 +173,28 @@ class _Difference(NamedTuple):
     less: str
     more: str
     spread: float
-    limited: bool
-    shared: str
+    truncated: bool
+    mirrored: str
 
 
 @cache
-def _differences() -> tuple[_Difference, ...]:
+def _opposite_targets() -> tuple[_OppositeTargets, ...]:
     """All that details are drawn for, in their order."""
-    known, found = human_targets(), list[_Difference]()
+    known, found = human_targets(), list[_OppositeTargets]()
     for name in known:
         folder, rest = name.split("/")
         if folder == "asym" and name.endswith("-l"):
-            found.append(_Difference(f"{name[:-1]}r", name, _ASYMMETRY, False, ""))
-        if folder not in _SPREAD or any(word in rest for word in _LEFT_OUT):
+            found.append(_OppositeTargets(f"{name[:-1]}r", name, _ASYMMETRY_DEVIATION, False, ""))
+        if folder not in _FOLDER_DEVIATIONS or any(word in rest for word in _EXCLUDED):
             continue
         sided = rest[:2] in ("l-", "r-")
-        for low, high in _WAYS:
+        for low, high in _OPPOSITE_SUFFIXES:
             stem = name.removesuffix(low)
             if stem != name and f"{stem}{high}" in known:
-                shared = f"{folder}/{rest[2:].removesuffix(low)}" if sided else ""
-                found.append(_Difference(name, f"{stem}{high}", _SPREAD[folder], True, shared))
+                mirrored = f"{folder}/{rest[2:].removesuffix(low)}" if sided else ""
+                found.append(
+                    _OppositeTargets(name, f"{stem}{high}", _FOLDER_DEVIATIONS[folder], True, mirrored)
+                )
     return tuple(found)
 
 
@@ -202,25 +223,31 @@ class Human:
     muscle: float = 0.0
     hair_eumelanin: float = 4.0
     hair_pheomelanin: float = 0.3
-    targets: Mapping[str, float] = field(default_factory=lambda: _NONE)
+    targets: Mapping[str, float] = field(default_factory=lambda: _NO_TARGETS)
     skin: SkinLook | None = None
     eyes: EyeLook | None = None
     hair: HairLook | None = None
 
     def __post_init__(self) -> None:
-        check_numbers(self, _RANGES)
+        check_fields(self, _RANGES)
         if not self.african + self.asian + self.caucasian > 0:
             refuse("ancestry", "a share of african, asian or caucasian", "all are 0", "Raise one")
         if not isinstance(self.targets, Mapping):
-            expected, came = "weights of targets by name", f"{shown_value(self.targets)} came"
-            refuse("targets", expected, came, 'Write targets={"nose/nose-hump-incr": 0.5}')
+            expected, actual = "weights of targets by name", f"got {format_value(self.targets)}"
+            refuse("targets", expected, actual, 'Write targets={"nose/nose-hump-incr": 0.5}')
         for name, weight in self.targets.items():
             if not isinstance(name, str):
-                refuse("targets", "names", f"{shown_value(name)} came", "See human_targets()")
-            number(f"target {name!r}", weight, -_MOST_WEIGHT, _MOST_WEIGHT, "what lies beyond is no face")
+                refuse("targets", "names", f"got {format_value(name)}", "See human_targets()")
+            checked_number(
+                f"target {name!r}",
+                weight,
+                -_MAX_TARGET_WEIGHT,
+                _MAX_TARGET_WEIGHT,
+                "what lies beyond is no face",
+            )
         for name, kind in (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook)):
             if not isinstance(look := getattr(self, name), kind | None):
-                refuse(name, f"a {kind.__name__}", f"{shown_value(look)} came", "Make one, or leave it out")
+                refuse(name, f"a {kind.__name__}", f"got {format_value(look)}", "Make one, or leave it out")
 
     @classmethod
     def drawn(cls, seed: int, **given: Any) -> Human:
@@ -233,8 +260,8 @@ class Human:
         Raises DermisError for other seeds and for values out of range.
         """
         for name in given.keys() & _RANGES.keys():
-            number(name, given[name], *_RANGES[name])
-        return cls(**drawn(seed, given))
+            checked_number(name, given[name], *_RANGES[name])
+        return cls(**sample_fields(seed, given))
 
     def head(
         self, maps: Maps | None = None, layout: Layout = "own", subdivide: Levels = 1, hairs: float = 1.0
@@ -249,14 +276,14 @@ class Human:
         Raises DermisError for targets that nobody knows, and for other shares.
         """
         if layout not in get_args(Layout):
-            came = f"{shown_value(layout)} came"
-            refuse("layout", f"one of {', '.join(get_args(Layout))}", came, "Choose one")
-        number("hairs", hairs, _LEAST_HAIRS, 1.0)
+            actual = f"got {format_value(layout)}"
+            refuse("layout", f"one of {', '.join(get_args(Layout))}", actual, "Choose one")
+        checked_number("hairs", hairs, _MIN_HAIR_FRACTION, 1.0)
         painted = maps or PaintedMaps(look=self.look)
-        plain = human_head(self.weights(), painted, layout, self.iris)
-        shared = template(layout, levels_of(plain, subdivide))
-        head = shared.shaped(plain)
-        return groomed(head, plain, shared.rooting, self.hairdo, self.look.recession, hairs)
+        plain = build_head(self.weights(), painted, layout, self.iris)
+        shared_template = template(layout, levels_of(plain, subdivide))
+        head = shared_template.refine_head(plain)
+        return add_hair(head, plain, shared_template.rooting, self.hairdo, self.look.recession, hairs)
 
     def on(self, head: Head) -> Head:
         """The head of another person with this one's skin and eyes.
@@ -276,26 +303,26 @@ class Human:
         """The person's skin: its own, or what usually goes with such a person."""
         if self.skin is not None:
             return self.skin
-        usual, shown = usual_look(self._origin), shaved_shows(self.hairdo)
+        usual, shown = typical_skin(self._demographics), stubble_visibility(self.hairdo)
         return replace(usual, stubble=shown * usual.stubble, beard=shown * usual.beard)
 
     @property
     def iris(self) -> EyeLook:
         """The person's eyes: its own, or what usually goes with such a person."""
-        return usual_eyes(self._origin) if self.eyes is None else self.eyes
+        return typical_eyes(self._demographics) if self.eyes is None else self.eyes
 
     @property
     def hairdo(self) -> HairLook:
         """The person's hair: its own, or what usually goes with such a person."""
         if self.hair is not None:
             return self.hair
-        return usual_hair(self._origin, self.hair_eumelanin, self.hair_pheomelanin)
+        return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)
 
     @property
-    def _origin(self) -> Origin:
+    def _demographics(self) -> Demographics:
         total = self.african + self.asian + self.caucasian
         shares = self.african / total, self.asian / total, self.caucasian / total
-        return Origin(*shares, self.sex, self.age)
+        return Demographics(*shares, self.sex, self.age)
 
     @property
     def positions_mm(self) -> NDArray[np.float32]:
@@ -306,14 +333,14 @@ class Human:
 
         Raises DermisError for targets that nobody knows.
         """
-        return control_mm(self.weights())
+        return control_points_mm(self.weights())
 
     def weights(self) -> dict[str, float]:
         """Weights of published targets by name, those of 0 left out."""
         found = {**self._ancestry(), **self._build()}
         for name, weight in self.targets.items():
             if not isinstance(name, str):
-                refuse("targets", "names", f"{shown_value(name)} came", "See human_targets()")
+                refuse("targets", "names", f"got {format_value(name)}", "See human_targets()")
             found[name] = found.get(name, 0.0) + weight
         return {name: weight for name, weight in found.items() if weight}
 
@@ -322,21 +349,21 @@ class Human:
         return {
             f"macrodetails/{people}-{kind}": getattr(self, people) / total * share
             for people in ("african", "asian", "caucasian")
-            for kind, share in self._kinds().items()
+            for kind, share in self._adult_fractions().items()
         }
 
     def _build(self) -> dict[str, float]:
         """Of weight and muscle; the average of both needs no target."""
         found = {}
-        for kind, share in self._kinds().items():
-            for muscle, much in _steps(self.muscle).items():
-                for weight, more in _steps(self.weight).items():
+        for kind, share in self._adult_fractions().items():
+            for muscle, much in _blend_steps(self.muscle).items():
+                for weight, more in _blend_steps(self.weight).items():
                     if (muscle, weight) != ("average", "average"):
                         name = f"macrodetails/universal-{kind}-{muscle}muscle-{weight}weight"
                         found[name] = share * much * more
         return found
 
-    def _kinds(self) -> dict[str, float]:
+    def _adult_fractions(self) -> dict[str, float]:
         """Shares of the four published kinds of adults."""
         old = (self.age - YOUNG) / (OLD - YOUNG)
         return {
@@ -346,6 +373,6 @@ class Human:
         }
 
 
-def _steps(value: float) -> dict[str, float]:
+def _blend_steps(value: float) -> dict[str, float]:
     """Shares of the least, the average and the most, for a value from -1 to 1."""
     return {"min": max(-value, 0.0), "average": 1.0 - abs(value), "max": max(value, 0.0)}

@@ -12,72 +12,72 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.build import SMALLEST, build_atlas
-from dermis.base.atomic_write import replacing
-from dermis.base.errors import DermisError, about, refuse, shown_value
+from dermis.base.atomic_write import atomic_file
+from dermis.base.errors import DermisError, error_context, format_value, refuse
 from dermis.base.reading import parse_json, read_text
 from dermis.formats.gltf.write import encode_head
 from dermis.human.hair.look import HairLook
+from dermis.human.makehuman import check_targets
 from dermis.human.person import Human
-from dermis.human.published import check_targets
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
-_STRETCH = 1024
+_STRETCH_ATLAS_SIDE = 1024
 """Side of the atlas that tells how long texels are, which changes little from one to the next."""
 
 
-def numbers_of(person: Human) -> dict[str, Any]:
+def person_numbers(person: Human) -> dict[str, Any]:
     """All that a person is made from, by name; skin, eyes and hair too that only usually go with it."""
     found = {one.name: getattr(person, one.name) for one in fields(person)}
     found |= {"targets": dict(person.targets), "skin": asdict(person.look)}
     return found | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
 
 
-def write_numbers(path: Path, person: Human) -> int:
+def write_person_json(path: Path, person: Human) -> int:
     """Write a person as JSON, whole or not at all; its length [byte]."""
-    data = (json.dumps({"person": numbers_of(person)}, indent=2, default=float) + "\n").encode()
-    with replacing(path) as trial:
-        trial.write_bytes(data)
+    data = (json.dumps({"person": person_numbers(person)}, indent=2, default=float) + "\n").encode()
+    with atomic_file(path) as temporary:
+        temporary.write_bytes(data)
     return len(data)
 
 
 def read_person(path: Path) -> Human:
-    """The person of a file as `write_numbers` makes it; what it leaves out is as usual.
+    """The person of a file as `write_person_json` makes it; what it leaves out is as usual.
 
     Raises DermisError for files that are none, and for numbers that cannot be.
     """
     expected = 'JSON with the numbers of a person under "person"'
-    told = parse_json(read_text(path, expected), path, expected)
-    person = told.get("person") if isinstance(told, dict) else None
+    document = parse_json(read_text(path, expected), path, expected)
+    person = document.get("person") if isinstance(document, dict) else None
     if not isinstance(person, dict):
         refuse(path, expected, "there is none", "Write one with dermis head -o person.json")
     parts: tuple[tuple[str, Any], ...] = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
-    made = {name: _made(path, kind, person[name]) for name, kind in parts if person.get(name) is not None}
-    human = _made(path, Human, person | made)
-    with about(path):
+    made = {name: _build(path, kind, person[name]) for name, kind in parts if person.get(name) is not None}
+    human = _build(path, Human, person | made)
+    with error_context(path):
         check_targets(human.targets)
     return human
 
 
-def _made(path: Path, kind: type[T], numbers: Any) -> T:
+def _build(path: Path, kind: type[T], numbers: Any) -> T:
     """A dataclass of plain numbers."""
     known = [one.name for one in fields(kind)]
     if not isinstance(numbers, Mapping):
-        came = f"{shown_value(numbers)} came"
-        refuse(path, f"numbers of {', '.join(known)}", came, "Correct it there")
+        actual = f"got {format_value(numbers)}"
+        refuse(path, f"numbers of {', '.join(known)}", actual, "Correct it there")
     for name in numbers:
         if name not in known:
-            refuse(path, f"names of {', '.join(known)}", f"{shown_value(name)} came", "Correct it there")
+            refuse(path, f"names of {', '.join(known)}", f"got {format_value(name)}", "Correct it there")
     try:
         return kind(**numbers)
     except DermisError as fault:
         raise DermisError(f"{path}: {fault}") from None
 
 
-def write_person(
+def write_person_glb(
     path: Path,
     person: Human,
     head: Head,
@@ -92,12 +92,12 @@ def write_person(
     weights : of expressions with which the file rests
     eyes : what its eyes look like; of one colour where None
     """
-    notes = {"person": numbers_of(person)}
+    notes = {"person": person_numbers(person)}
     data = encode_head(
         head, roughness=roughness, weights=weights, slopes=relief_slopes(head), notes=notes, eyes=eyes
     )
-    with replacing(path) as trial:
-        trial.write_bytes(data)
+    with atomic_file(path) as temporary:
+        temporary.write_bytes(data)
     return len(data)
 
 
@@ -113,7 +113,7 @@ def relief_slopes(head: Head) -> NDArray[np.float32] | None:
     if side != height.shape[1] or side < SMALLEST:
         return None
     down, right = np.gradient(height)
-    coarse = max(SMALLEST, min(side, _STRETCH))
+    coarse = max(SMALLEST, min(side, _STRETCH_ATLAS_SIDE))
     stretch = build_atlas(head.mesh, coarse).stretch.astype(np.float32)
     if side > coarse:
         places = np.arange(side) * coarse // side

@@ -12,14 +12,14 @@ from pydantic import Field, model_validator
 
 from dermis.base.errors import refuse
 from dermis.mesh.head import Head
-from dermis.scene.field_errors import Because
+from dermis.scene.field_errors import BoundsReason
+from dermis.scene.frozen_model import Direction, FrozenModel, Vector
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
-from dermis.scene.plain import Direction, Plain, Vector
 
 _DISTANCE_MM = 1100.0  # a portrait lens' distance: closer makes noses large
 
 
-_Fraction = Annotated[float, Field(ge=-10, le=10), Because("lenses do not shift farther")]
+_Fraction = Annotated[float, Field(ge=-10, le=10), BoundsReason("lenses do not shift farther")]
 
 
 class Window(NamedTuple):
@@ -32,10 +32,10 @@ class Window(NamedTuple):
     shift: tuple[float, float]
 
 
-class Camera(Plain):
+class Camera(FrozenModel):
     """Where the picture is taken from."""
 
-    meant: ClassVar[Mapping[str, str]] = {
+    synonyms: ClassVar[Mapping[str, str]] = {
         "eye": "position",
         "location": "position",
         "look_at": "target",
@@ -49,15 +49,19 @@ class Camera(Plain):
     """The point on the optical axis that is looked at: as a rule the middle of the picture [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
     """The direction that is upwards in the picture."""
-    frame_mm: Annotated[float, Field(ge=0.01, le=1e5), Because("mm: from a pore's wall to a crowd")] = 340.0
+    frame_mm: Annotated[float, Field(ge=0.01, le=1e5), BoundsReason("mm: from a pore's wall to a crowd")] = (
+        340.0
+    )
     """Height of what the picture shows at the target's distance [mm]."""
     principal_point: tuple[_Fraction, _Fraction] = (0.5, 0.5)
     """Where the optical axis meets the picture, from its upper left corner, in widths and heights of it."""
-    pixel_aspect: Annotated[float, Field(ge=0.1, le=10), Because("sensors' pixels are nearly square")] = 1.0
+    pixel_aspect: Annotated[
+        float, Field(ge=0.1, le=10), BoundsReason("sensors' pixels are nearly square")
+    ] = 1.0
     """Width of a pixel over its height."""
 
     @model_validator(mode="after")
-    def _looks_somewhere(self) -> Camera:
+    def _check_view(self) -> Camera:
         view = np.subtract(self.target, self.position)
         if np.linalg.norm(np.cross(view, self.up)) < 1e-6 * np.linalg.norm(self.up):
             raise ValueError("a position away from the target, and not along up from it")
@@ -81,8 +85,8 @@ class Camera(Plain):
         X and t are in mm, X from the head's centre, as all places of a scene. The middles of pixels have
         whole coordinates: the upper left one is at (0, 0), the corner of the picture at (-0.5, -0.5).
         """
-        seen = self.half_tangent, self.principal_point, self.pixel_aspect
-        return OpenCvCamera(intrinsics(seen, size), *extrinsics(self.position, self.target, self.up))
+        lens = self.half_tangent, self.principal_point, self.pixel_aspect
+        return OpenCvCamera(intrinsics(lens, size), *extrinsics(self.position, self.target, self.up))
 
     @property
     def half_tangent(self) -> float:
@@ -91,40 +95,42 @@ class Camera(Plain):
 
     def window(self, aspect: float) -> Window:
         """What a picture of this width over height shows."""
-        across, down = self.principal_point
+        u, v = self.principal_point
         half = self.half_tangent
-        return Window((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * across, 2.0 * down - 1.0))
+        return Window((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * u, 2.0 * v - 1.0))
 
 
 def portrait(head: Head) -> Camera:
     """Head and shoulders from the front."""
-    return _around(head, 0.0)
+    return _camera_at_azimuth(head, 0.0)
 
 
 def three_quarter(head: Head) -> Camera:
     """From the head's left front."""
-    return _around(head, 40.0)
+    return _camera_at_azimuth(head, 40.0)
 
 
 def side(head: Head) -> Camera:
     """From the head's left side."""
-    return _around(head, 90.0)
+    return _camera_at_azimuth(head, 90.0)
 
 
 def cheek(head: Head) -> Camera:
     """Close to the left cheek, which the studio's key light rakes: pores show."""
-    spot = head.frontmost(40.0, -35.0)
-    away = _turned(58.0)
-    return Camera(position=_add(spot, away, 300.0), target=spot, frame_mm=48.0)
+    focus = head.frontmost(40.0, -35.0)
+    view_direction = _azimuth_direction(58.0)
+    return Camera(position=_offset_point(focus, view_direction, 300.0), target=focus, frame_mm=48.0)
 
 
 def ear(head: Head) -> Camera:
     """Close to the left ear."""
     p = head.mesh.positions - np.array(head.centre_mm, dtype=np.float32)
-    beside = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
-    x, y, z = (beside if len(beside) else p)[np.argmax((beside if len(beside) else p)[:, 0])]
-    spot = float(x), float(y), float(z)
-    return Camera(position=_add(spot, _turned(75.0), 600.0), target=spot, frame_mm=120.0)
+    near_ear = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
+    x, y, z = (near_ear if len(near_ear) else p)[np.argmax((near_ear if len(near_ear) else p)[:, 0])]
+    focus = float(x), float(y), float(z)
+    return Camera(
+        position=_offset_point(focus, _azimuth_direction(75.0), 600.0), target=focus, frame_mm=120.0
+    )
 
 
 PRESETS = {
@@ -148,15 +154,15 @@ def preset(name: str, head: Head) -> Camera:
     return PRESETS[name](head)
 
 
-def _around(head: Head, degrees: float) -> Camera:
+def _camera_at_azimuth(head: Head, degrees: float) -> Camera:
     middle = (0.0, -25.0, 0.0)
-    return Camera(position=_add(middle, _turned(degrees), _DISTANCE_MM), target=middle)
+    return Camera(position=_offset_point(middle, _azimuth_direction(degrees), _DISTANCE_MM), target=middle)
 
 
-def _turned(degrees: float) -> Vector:
+def _azimuth_direction(degrees: float) -> Vector:
     return (math.sin(math.radians(degrees)), 0.0, math.cos(math.radians(degrees)))
 
 
-def _add(point: Vector, direction: Vector, length: float) -> Vector:
+def _offset_point(point: Vector, direction: Vector, length: float) -> Vector:
     x, y, z = (p + length * d for p, d in zip(point, direction, strict=True))
     return (x, y, z)

@@ -9,29 +9,31 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import Field
 
-from dermis.base.errors import about, refuse
-from dermis.base.reading import is_file, named_path, read_toml
+from dermis.base.errors import error_context, refuse
+from dermis.base.reading import checked_path, is_file, read_toml
 from dermis.human.regions.apply import with_regions
-from dermis.human.regions.zones import load_table
+from dermis.human.regions.region_table import load_region_table
 from dermis.mesh.head import Head
 from dermis.mesh.pose import MOST_WEIGHT, Pose
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
-from dermis.scene.field_errors import Because, ImpossibleError
-from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable, names_regions
+from dermis.scene.field_errors import BoundsReason, InvalidFieldsError
+from dermis.scene.frozen_model import FrozenModel
+from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable, has_region_table
 from dermis.scene.heads import load_head
 from dermis.scene.lights import LIGHTS, NO_LIGHTS, Light, light_presets, preset_lights
 from dermis.scene.model import Scene
-from dermis.scene.plain import Plain
 from dermis.scene.settings import Settings
 from dermis.scene.skin import PRESETS as SKINS
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn
 
-P = TypeVar("P", bound=Plain)
-_PARTS = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
-_MAPS = ("colour", "normal", "height", "specular", "roughness")
-_Weight = Annotated[float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT), Because("faces come apart long before")]
+P = TypeVar("P", bound=FrozenModel)
+_TABLES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
+_MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
+_Weight = Annotated[
+    float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT), BoundsReason("faces come apart long before")
+]
 
 
 def load_lights(name: str | Path) -> tuple[Light, ...]:
@@ -47,7 +49,7 @@ def load_camera(name: str | Path, head: Head) -> Camera:
     if str(name) in PRESETS:
         return preset(str(name), head)
     table = _read(name, f"a preset ({', '.join(PRESETS)}) or a TOML file").get("camera")
-    return _made(Camera, name, "camera", table)
+    return _build(Camera, name, "camera", table)
 
 
 def load_scene(
@@ -67,19 +69,19 @@ def load_scene(
     known : the head of the file's [head], when the caller has it already
     camera, size : of the picture that the head is subdivided for, in place of the file's own
     """
-    path = named_path(path, "a scene in TOML")
+    path = checked_path(path, "a scene in TOML")
     table = _read(path, "a scene in TOML")
-    for part in table.keys() - _PARTS:
-        refuse(path, f"only the parts {', '.join(sorted(_PARTS))}", f"{part!r} came", "Correct its name")
+    for part in table.keys() - _TABLES:
+        refuse(path, f"only the parts {', '.join(sorted(_TABLES))}", f"got {part!r}", "Correct its name")
     skin = _skin(path, table.get("skin", {}))
-    settings = _made(Settings, path, "render", table.get("render", {}))
-    described = _made(HeadTable, path, "head", table.get("head"))
-    _check_said_once(path, described, skin)
-    told = table.get("camera", "portrait")
-    seen = partial(_camera, path, told) if camera is None else partial(load_camera, camera)
-    picture = SmoothIn(seen, size or settings.size)
-    with about(path):
-        head, skin = (known, skin) if known else head_and_skin(described, skin, path.parent, picture)
+    settings = _build(Settings, path, "render", table.get("render", {}))
+    head_entry = _build(HeadTable, path, "head", table.get("head"))
+    _check_single_strength(path, head_entry, skin)
+    entry = table.get("camera", "portrait")
+    resolve_camera = partial(_camera, path, entry) if camera is None else partial(load_camera, camera)
+    picture = SmoothIn(resolve_camera, size or settings.size)
+    with error_context(path):
+        head, skin = (known, skin) if known else head_and_skin(head_entry, skin, path.parent, picture)
     environment = _environment(path, table["environment"]) if "environment" in table else None
     pose = _pose(path, table["pose"], head) if "pose" in table else None
     lights = table.get("lights")
@@ -87,24 +89,24 @@ def load_scene(
         lights = "studio" if environment is None else NO_LIGHTS
     return Scene(
         head,
-        lights=load_lights(_beside(path.parent, lights))
+        lights=load_lights(_resolve(path.parent, lights))
         if isinstance(lights, str)
         else _lights(path, lights),
         environment=environment,
-        camera=_camera(path, told, head),
-        skin=_found(path.parent, skin),
+        camera=_camera(path, entry, head),
+        skin=_resolve_skin_files(path.parent, skin),
         pose=pose,
     ), settings
 
 
 def head_table(path: Path) -> dict[str, Any]:
     """The [head] of a scene's file with names that hold from any folder."""
-    return with_whole_names(_read(path, "a scene in TOML").get("head", {}), path.parent)
+    return with_absolute_paths(_read(path, "a scene in TOML").get("head", {}), path.parent)
 
 
-def with_whole_names(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def with_absolute_paths(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """A [head] whose files, in a folder, have names that hold from any other."""
-    named = {role: folder / table[role] for role in ("name", "regions", *_MAPS) if role in table}
+    named = {role: folder / table[role] for role in ("name", "regions", *_MAP_ROLES) if role in table}
     return {**table} | {role: str(file.resolve()) for role, file in named.items() if is_file(file)}
 
 
@@ -118,65 +120,65 @@ def head_and_skin(
 
     Raises DermisError for files that cannot be used.
     """
-    regions = load_table(_beside(folder, table.regions)) if names_regions(vars(table)) else None
+    regions = load_region_table(_resolve(folder, table.regions)) if has_region_table(vars(table)) else None
     options = table.model_dump(exclude={"name"}, exclude_none=True)
     if regions is not None:
         options["regions"] = NO_REGIONS
-    options |= {role: folder / options[role] for role in _MAPS if role in options}
+    options |= {role: folder / options[role] for role in _MAP_ROLES if role in options}
     if picture is not None and table.subdivide == AUTO:
         options["subdivide"] = picture
-    head = load_head(_beside(folder, table.name), **options)
+    head = load_head(_resolve(folder, table.name), **options)
     if regions is None:
         return head, skin
     head, rho_s = with_regions(head, regions)
     return head, skin.model_copy(update={"rho_s": rho_s})
 
 
-def _skin(path: Path, told: Any) -> Skin:
+def _skin(path: Path, entry: Any) -> Skin:
     """The [skin] table's skin, or the one of a preset's name."""
-    if not isinstance(told, str):
-        return _made(Skin, path, "skin", told)
-    if told not in SKINS:
-        refuse(f"{path}: skin", f"a table or one of {', '.join(SKINS)}", f"{told!r} came", "Correct it")
-    return Skin.preset(told)
+    if not isinstance(entry, str):
+        return _build(Skin, path, "skin", entry)
+    if entry not in SKINS:
+        refuse(f"{path}: skin", f"a table or one of {', '.join(SKINS)}", f"got {entry!r}", "Correct it")
+    return Skin.preset(entry)
 
 
-def _found(folder: Path, skin: Skin) -> Skin:
+def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
     """The skin with names of files that hold from anywhere."""
-    others = tuple(_beside(folder, name) for name in skin.other_profiles)
-    shares = skin.profile_map and _beside(folder, skin.profile_map)
-    names = {"profile": _beside(folder, skin.profile), "other_profiles": others, "profile_map": shares}
+    others = tuple(_resolve(folder, name) for name in skin.other_profiles)
+    mixture_map = skin.profile_map and _resolve(folder, skin.profile_map)
+    names = {"profile": _resolve(folder, skin.profile), "other_profiles": others, "profile_map": mixture_map}
     return skin.model_copy(update={name: one for name, one in names.items() if one != getattr(skin, name)})
 
 
-def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:
-    if names_regions(vars(table)) and "rho_s" in skin.model_fields_set:
-        came = "it came beside the head's regions, which say it for each region"
-        refuse(f"{path}: skin: rho_s", "one or the other", came, "Leave one out, or use oiliness")
+def _check_single_strength(path: Path, table: HeadTable, skin: Skin) -> None:
+    if has_region_table(vars(table)) and "rho_s" in skin.model_fields_set:
+        actual = "it is given beside the head's regions, which set it for each region"
+        refuse(f"{path}: skin: rho_s", "one or the other", actual, "Leave one out, or use oiliness")
 
 
-def _camera(path: Path, told: Any, head: Head) -> Camera:
-    if isinstance(told, str):
-        return load_camera(_beside(path.parent, told), head)
-    return _made(Camera, path, "camera", told)
+def _camera(path: Path, entry: Any, head: Head) -> Camera:
+    if isinstance(entry, str):
+        return load_camera(_resolve(path.parent, entry), head)
+    return _build(Camera, path, "camera", entry)
 
 
 def _pose(path: Path, table: Any, head: Head) -> Pose:
-    told = _made(PoseTable, path, "pose", table)
-    pose = Pose(told.weights, told.bones)
+    entry = _build(PoseTable, path, "pose", table)
+    pose = Pose(entry.weights, entry.bones)
     pose.motion(head.control, f"{path}: pose")  # so that an error names the file
     return pose
 
 
 def _environment(path: Path, table: Any) -> Environment:
     if isinstance(table, dict) and "visible" in table:
-        remedy = 'Write background = "environment" into [render]'
-        refuse(f"{path}: environment: visible", "what is behind the head elsewhere", "it came", remedy)
-    environment = _made(Environment, path, "environment", table)
-    return environment.model_copy(update={"name": _beside(path.parent, environment.name)})
+        advice = 'Write background = "environment" into [render]'
+        refuse(f"{path}: environment: visible", "what is behind the head elsewhere", "it is given", advice)
+    environment = _build(Environment, path, "environment", table)
+    return environment.model_copy(update={"name": _resolve(path.parent, environment.name)})
 
 
-def _beside(folder: Path, name: str) -> str:
+def _resolve(folder: Path, name: str) -> str:
     """The file of that name in a scene's folder if there is one, else the name, of a preset mostly."""
     file = folder / name
     return str(file) if is_file(file) else name
@@ -184,34 +186,34 @@ def _beside(folder: Path, name: str) -> str:
 
 def _lights(culprit: object, tables: Any) -> tuple[Light, ...]:
     if not isinstance(tables, list) or not tables:
-        came = "none came" if not tables else f"{tables!r} came"
-        refuse(culprit, "at least one [[lights]] table", came, "Add one with kind, position and irradiance")
+        actual = "got none" if not tables else f"got {tables!r}"
+        refuse(culprit, "at least one [[lights]] table", actual, "Add one with kind, position and irradiance")
     return tuple(_light(culprit, f"light {k}", table) for k, table in enumerate(tables, start=1))
 
 
-def _light(culprit: object, which: str, table: Any) -> Light:
+def _light(culprit: object, label: str, table: Any) -> Light:
     kind = table.get("kind", "point") if isinstance(table, dict) else "point"
     if not isinstance(kind, str) or kind not in LIGHTS:
-        refuse(f"{culprit}: {which}", f"a kind of {', '.join(LIGHTS)}", f"{kind!r} came", "Correct it")
-    return _made(LIGHTS[kind], culprit, which, table)
+        refuse(f"{culprit}: {label}", f"a kind of {', '.join(LIGHTS)}", f"got {kind!r}", "Correct it")
+    return _build(LIGHTS[kind], culprit, label, table)
 
 
-def _made(kind: type[P], culprit: object, part: str, table: Any) -> P:
+def _build(kind: type[P], culprit: object, part: str, table: Any) -> P:
     """`kind` from a table of a file; the file and the part are named when it cannot be."""
     if not isinstance(table, dict):
-        came = "there is none" if table is None else f"{table!r} came"
-        refuse(f"{culprit}: {part}", f"a table with {', '.join(kind.model_fields)}", came, "Add one")
+        actual = "there is none" if table is None else f"got {table!r}"
+        refuse(f"{culprit}: {part}", f"a table with {', '.join(kind.model_fields)}", actual, "Add one")
     try:
         return kind(**table)
-    except ImpossibleError as error:
-        raise ImpossibleError(f"{culprit}: {part}", error.findings) from None
+    except InvalidFieldsError as error:
+        raise InvalidFieldsError(f"{culprit}: {part}", error.messages) from None
 
 
 def _read(name: str | Path, expected: str) -> dict[str, Any]:
-    return read_toml(named_path(name, expected), expected)
+    return read_toml(checked_path(name, expected), expected)
 
 
-class PoseTable(Plain):
+class PoseTable(FrozenModel):
     """The [pose] of a scene: what `Pose` takes, without places of points, for which a text is too long."""
 
     weights: dict[str, _Weight] = Field(default_factory=dict)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.base.errors import refuse
-from dermis.base.quantities import numbers
-from dermis.formats.motion.captures import matched
-from dermis.human.movement import gaze
+from dermis.base.quantities import checked_array
+from dermis.formats.motion.captures import match_targets
+from dermis.human.movement import gaze_turns
 from dermis.mesh.head import Head
 from dermis.mesh.pose import FARTHEST_MM, Pose
 from dermis.mesh.rig import Rig, Turn
@@ -20,15 +20,15 @@ from dermis.mesh.rotations import angles_matrix
 
 Doubles = NDArray[np.float64]
 
-MOST_GAZE = 1.3
+MAX_GAZE_WEIGHT = 1.3
 """Weight of a target of gaze that no eye turns beyond."""
-_MOST_DEGREES = 36.0
-_STEPS = 6
+_MAX_BONE_DEGREES = 36.0
+_ITERATIONS = 6
 _SIDES = "Left", "Right"
-_NAME_THEM = "Take the parametric human, or name the groups of the file's eyeballs with --eye-groups"
+_EYES_ADVICE = "Take the parametric human, or name the groups of the file's eyeballs with --eye-groups"
 
 
-def looking_at(head: Head, place_mm: ArrayLike, pose: Pose | Mapping[str, float] | None = None) -> Pose:
+def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float] | None = None) -> Pose:
     """The pose with the eyes turned to a place, by the targets that turn them, or else by their bones.
 
     place_mm : (3,) from the head's centre, as cameras are placed [mm]
@@ -38,63 +38,71 @@ def looking_at(head: Head, place_mm: ArrayLike, pose: Pose | Mapping[str, float]
     """
     base, rig, eyes = Pose.of(pose) or Pose(), head.control, head.eyes
     if eyes is None or rig.skeleton is None:
-        remedy = f"{head.note}. {_NAME_THEM}" if head.note else _NAME_THEM
-        refuse(head.name, "a head with eyes that turn", "it has none", remedy)
-    place = numbers("look at", place_mm, (3,), -FARTHEST_MM, FARTHEST_MM, "mm from the head's centre")
-    own = [rig.skeleton.names[bone] for bone in rig.skeleton.bone[eyes.apex, 0]]
-    weights = {name: value for name, value in base.weights.items() if name not in _names(rig.turns, own)}
-    bones = {name: value for name, value in base.bones.items() if name not in own}
+        advice = f"{head.note}. {_EYES_ADVICE}" if head.note else _EYES_ADVICE
+        refuse(head.name, "a head with eyes that turn", "it has none", advice)
+    goal_mm = checked_array(
+        "look at", target_mm, (3,), -FARTHEST_MM, FARTHEST_MM, "mm from the head's centre"
+    )
+    eye_bones = [rig.skeleton.names[bone] for bone in rig.skeleton.bone[eyes.apex, 0]]
+    weights = {
+        name: value for name, value in base.weights.items() if name not in _target_names(rig.turns, eye_bones)
+    }
+    bones = {name: value for name, value in base.bones.items() if name not in eye_bones}
     frames = eyes.frames(rig, Pose(weights, bones, base.positions_mm).motion(rig))
     resting = eyes.frames(rig, rig.rest)
-    for k, (frame, rest, bone) in enumerate(zip(frames, resting, own, strict=True)):
-        seen = (frame @ np.append(place + np.array(head.centre_mm), 1.0))[:3] - [0.0, 0.0, eyes.middle_mm[k]]
-        angles = _turning(_unit(rest[:3, :3].T @ seen), _unit(rest[:3, :3].T @ eyes.sight[k]))
+    for k, (frame, rest, bone) in enumerate(zip(frames, resting, eye_bones, strict=True)):
+        to_target = (frame @ np.append(goal_mm + np.array(head.centre_mm), 1.0))[:3] - [
+            0.0,
+            0.0,
+            eyes.middle_mm[k],
+        ]
+        angles = _rotation_angles(_unit(rest[:3, :3].T @ to_target), _unit(rest[:3, :3].T @ eyes.sight[k]))
         turns = [turn for turn in rig.turns if turn.bone == bone]
         if not turns:
-            bones[bone] = [*np.clip(np.degrees(angles), -_MOST_DEGREES, _MOST_DEGREES).tolist(), 0.0]
-            turns = _of_lids(rig, _SIDES[k])
+            bones[bone] = [*np.clip(np.degrees(angles), -_MAX_BONE_DEGREES, _MAX_BONE_DEGREES).tolist(), 0.0]
+            turns = _eyelid_turns(rig, _SIDES[k])
         weights |= _weights(turns, angles)
     return Pose(weights, bones, base.positions_mm)
 
 
-def _of_lids(rig: Rig, side: str) -> list[Turn]:
+def _eyelid_turns(rig: Rig, side: str) -> list[Turn]:
     """What ARKit's targets of gaze, which move a file's lids alone, stand for."""
-    usual = [turn for turn in gaze() if turn.target.endswith(side)]
-    known = matched([turn.target for turn in usual], rig.targets.names)
-    return [turn._replace(target=known[turn.target]) for turn in usual if turn.target in known]
+    arkit_turns = [turn for turn in gaze_turns() if turn.target.endswith(side)]
+    known = match_targets([turn.target for turn in arkit_turns], rig.targets.names)
+    return [turn._replace(target=known[turn.target]) for turn in arkit_turns if turn.target in known]
 
 
-def _turning(wanted: Doubles, axis: Doubles) -> tuple[float, float]:
+def _rotation_angles(goal: Doubles, axis: Doubles) -> tuple[float, float]:
     """Angles about x and y [rad] by which an axis comes to lie along another, unit vectors (3,)."""
     x, y = 0.0, 0.0
-    for _ in range(_STEPS):
-        now = np.array(angles_matrix((math.degrees(x), math.degrees(y), 0.0))) @ axis
-        x += _pitch(wanted) - _pitch(now)
-        y += math.remainder(_yaw(wanted) - _yaw(now), math.tau)
+    for _ in range(_ITERATIONS):
+        current = np.array(angles_matrix((math.degrees(x), math.degrees(y), 0.0))) @ axis
+        x += _pitch(goal) - _pitch(current)
+        y += math.remainder(_yaw(goal) - _yaw(current), math.tau)
     return x, y
 
 
-def _pitch(way: Doubles) -> float:
-    return -math.atan2(way[1], math.hypot(way[0], way[2]))
+def _pitch(direction: Doubles) -> float:
+    return -math.atan2(direction[1], math.hypot(direction[0], direction[2]))
 
 
-def _yaw(way: Doubles) -> float:
-    return math.atan2(way[0], way[2])
+def _yaw(direction: Doubles) -> float:
+    return math.atan2(direction[0], direction[2])
 
 
 def _unit(vector: Doubles) -> Doubles:
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
 
 
-def _names(turns: tuple[Turn, ...], bones: list[str]) -> set[str]:
+def _target_names(turns: tuple[Turn, ...], bones: list[str]) -> set[str]:
     return {turn.target for turn in turns if turn.bone in bones}
 
 
-def _weights(turns: list[Turn], wanted: tuple[float, float]) -> dict[str, Any]:
+def _weights(turns: list[Turn], goal: tuple[float, float]) -> dict[str, Any]:
     """Weights of targets for angles about x and y [rad]."""
-    found = {}
+    target_weights = {}
     for turn in turns:
-        for angle, most in zip(np.degrees(wanted), turn.degrees[:2], strict=True):
+        for angle, most in zip(np.degrees(goal), turn.degrees[:2], strict=True):
             if most and angle / most > 0:
-                found[turn.target] = float(min(angle / most, MOST_GAZE))
-    return found
+                target_weights[turn.target] = float(min(angle / most, MAX_GAZE_WEIGHT))
+    return target_weights

@@ -20,11 +20,11 @@ def head_pose(scene: Scene) -> Doubles:
     goes with the bone of that name; one without it stays, and R and t are the camera's own.
     """
     rotation, shift = _camera(scene)
-    turned, moved = _rigid(scene)
-    return np.column_stack([rotation @ turned, rotation @ moved + shift])
+    head_rotation, head_shift = _rigid_motion(scene)
+    return np.column_stack([rotation @ head_rotation, rotation @ head_shift + shift])
 
 
-def gaze(scene: Scene) -> Doubles | None:
+def gaze_directions(scene: Scene) -> Doubles | None:
     """(2, 3) unit vectors along which the left and the right eye look, in the camera's axes.
 
     None for heads without eyes of true shape.
@@ -32,8 +32,8 @@ def gaze(scene: Scene) -> Doubles | None:
     head, motion = scene.head, _motion(scene)
     if head.eyes is None:
         return None
-    ways = np.einsum("kij,ki->kj", head.eyes.frames(head.control, motion)[:, :3, :3], head.eyes.sight)
-    seen = ways / np.linalg.norm(ways, axis=1, keepdims=True) @ _camera(scene)[0].T
+    directions = np.einsum("kij,ki->kj", head.eyes.frames(head.control, motion)[:, :3, :3], head.eyes.sight)
+    seen = directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera(scene)[0].T
     return np.asarray(seen)
 
 
@@ -46,12 +46,12 @@ def _motion(scene: Scene) -> Motion:
     return scene.head.control.rest if scene.motion is None else scene.motion
 
 
-def _rigid(scene: Scene) -> tuple[Doubles, Doubles]:
+def _rigid_motion(scene: Scene) -> tuple[Doubles, Doubles]:
     """Rotation and shift [mm] of places from the head's centre, from where it rests."""
     names = [name.replace(":", " ").split()[-1:] for name in scene.head.bones]
     bone = next((k for k, name in enumerate(names) if [part.lower() for part in name] == [_BONE]), None)
     if bone is None:
         return np.eye(3), np.zeros(3)
     matrix, centre = _motion(scene).matrices[bone].astype(np.float64), np.array(scene.head.centre_mm)
-    turned = matrix[:, :3] / np.cbrt(np.linalg.det(matrix[:, :3]))
-    return turned, matrix[:, :3] @ centre + matrix[:, 3] - centre
+    head_rotation = matrix[:, :3] / np.cbrt(np.linalg.det(matrix[:, :3]))
+    return head_rotation, matrix[:, :3] @ centre + matrix[:, 3] - centre

@@ -8,54 +8,56 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from dermis.base.errors import refuse, shown_value
-from dermis.formats.size_limits import MOST_RELIEF_MM
+from dermis.base.errors import format_value, refuse
+from dermis.formats.size_limits import MAX_RELIEF_MM
 from dermis.mesh.eye_look import LIMITS
-from dermis.scene.field_errors import Because, ImpossibleError, Words
-from dermis.scene.plain import Plain
+from dermis.scene.field_errors import BoundsReason, InvalidFieldsError, Keywords
+from dermis.scene.frozen_model import FrozenModel
 
 _Relief = Annotated[
     float | None,
-    Field(ge=1e-6, le=MOST_RELIEF_MM),
-    Because("mm: 255 levels from a quarter of a micrometre to a nose and more"),
+    Field(ge=1e-6, le=MAX_RELIEF_MM),
+    BoundsReason("mm: 255 levels from a quarter of a micrometre to a nose and more"),
 ]
 _Unit = Annotated[
-    float | None, Field(ge=1e-3, le=1e6), Because("mm: files count in micrometres to kilometres")
+    float | None, Field(ge=1e-3, le=1e6), BoundsReason("mm: files count in micrometres to kilometres")
 ]
 VOrigin = Literal["auto", "top", "bottom"]
-Up = Literal["y", "z"]
+UpAxis = Literal["y", "z"]
 NormalY = Literal["up", "down"]
 AUTO: Final = "auto"
 NO_REGIONS = "none"
-Eyes = Literal["fitted", "plain"]
+EyeMode = Literal["fitted", "plain"]
 if TYPE_CHECKING:
-    _Levels = int | Literal["auto"]
+    _SubdivisionLevels = int | Literal["auto"]
 else:
-    _Levels = Annotated[int, Field(ge=0, le=3), Because("each has four times the triangles"), Words(AUTO)]
-_UNITS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4, "in": 25.4, "ft": 304.8}
+    _SubdivisionLevels = Annotated[
+        int, Field(ge=0, le=3), BoundsReason("each has four times the triangles"), Keywords(AUTO)
+    ]
+_UNIT_LENGTHS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4, "in": 25.4, "ft": 304.8}
 
 
-def _within(name: str) -> Any:
+def _eye_limits(name: str) -> Any:
     low, high = LIMITS[name]
     return Field(ge=low, le=high)
 
 
-class EyeTable(Plain):
+class EyeTable(FrozenModel):
     """What replaces the look of a head's eyes; None leaves their own."""
 
-    eumelanin: Annotated[float | None, _within("eumelanin")] = None
+    eumelanin: Annotated[float | None, _eye_limits("eumelanin")] = None
     """Of the iris, from none, which leaves it blue, to the darkest brown."""
-    pupil_mm: Annotated[float | None, _within("pupil_mm"), Because("mm: pupils in glare and in the dark")] = (
-        None
-    )
+    pupil_mm: Annotated[
+        float | None, _eye_limits("pupil_mm"), BoundsReason("mm: pupils in glare and in the dark")
+    ] = None
     """Radius of the pupil [mm]."""
-    redness: Annotated[float | None, _within("redness")] = None
+    redness: Annotated[float | None, _eye_limits("redness")] = None
     """Of the white of the eye."""
-    seed: Annotated[int | None, _within("seed"), Because("32 bits")] = None
+    seed: Annotated[int | None, _eye_limits("seed"), BoundsReason("32 bits")] = None
     """Which fibres and vessels."""
 
 
-class HeadTable(Plain):
+class HeadTable(FrozenModel):
     """The [head] of a scene: what `load_head` takes, and a table of regions of the face."""
 
     name: str
@@ -76,7 +78,7 @@ class HeadTable(Plain):
     """Length of the file's unit [mm]; 1000 for glTF and 1 for others when left out."""
     v_origin: VOrigin = "auto"
     """Which row of the maps v = 0 is; "auto" keeps to the format's rule."""
-    up: Up = "y"
+    up: UpAxis = "y"
     """The file's upward axis."""
     normal_y: NormalY = "up"
     """Way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)."""
@@ -84,13 +86,13 @@ class HeadTable(Plain):
     """Groups of the file to draw as plain surfaces, which light does not enter, such as teeth or clothes.
     Needed where no group has skin in its name, as all are skin then; where one has, all others are opaque
     already. Two balls whose groups are called eyes become the package's eyes without it."""
-    eyes: Eyes = "fitted"
+    eyes: EyeMode = "fitted"
     """Eyeballs of a file (groups called eyes, Eye_L, cornea ...): replaced by the package's, or plain."""
     eye_groups: tuple[str, ...] = ()
     """Groups of the file that hold eyeballs, whatever they are called, be it with all of the head."""
     eye: EyeTable | None = None
     """What the eyes look like, where it is not as usual."""
-    subdivide: _Levels = AUTO
+    subdivide: _SubdivisionLevels = AUTO
     """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop; "auto" for as many as
     the outline needs to look smooth in a picture of this size from this camera."""
     regions: str = AUTO
@@ -99,47 +101,47 @@ class HeadTable(Plain):
     artist's), and a TOML file is one of your own, which then say rho_s too."""
 
 
-def names_regions(table: Mapping[str, Any]) -> bool:
+def has_region_table(table: Mapping[str, Any]) -> bool:
     """Whether a [head] names a table of regions, which says roughness and strength."""
     return table.get("regions", AUTO) not in (AUTO, NO_REGIONS)
 
 
-def named(head: object) -> str:
+def head_name(head: object) -> str:
     """The name of what is to be loaded."""
     if not isinstance(head, str | os.PathLike):
-        came = "None came" if head is None else f"a {type(head).__name__} came"
-        remedy = "Use a head as it is; write human.head() for that of a Human"
-        refuse("load_head", "the name of a head or a file", came, remedy)
+        actual = "got None" if head is None else f"got a {type(head).__name__}"
+        advice = "Use a head as it is; write human.head() for that of a Human"
+        refuse("load_head", "the name of a head or a file", actual, advice)
     return str(head)
 
 
-def check_given(files: Mapping[str, object], **lengths: object) -> None:
+def check_files_and_lengths(files: Mapping[str, object], **lengths: object) -> None:
     """Refuse words for lengths [mm], and pictures that are no files."""
     for name, value in lengths.items():
         if isinstance(value, str):
-            known = value in _UNITS_MM
-            remedy = f"Write {name}={_UNITS_MM[value]:g}" if known else "Write 10 for cm, 1000 for m"
-            refuse(name, "a length in mm, as a number", f"{value!r} came", remedy)
+            known = value in _UNIT_LENGTHS_MM
+            advice = f"Write {name}={_UNIT_LENGTHS_MM[value]:g}" if known else "Write 10 for cm, 1000 for m"
+            refuse(name, "a length in mm, as a number", f"got {value!r}", advice)
     for role, file in files.items():
         if file is not None and not isinstance(file, str | os.PathLike):
-            remedy = f"Write dataclasses.replace(head, maps=replace(head.maps, {role}=...)) for one in memory"
-            refuse(role, "the name of a picture file", f"a {type(file).__name__} came", remedy)
+            advice = f"Write dataclasses.replace(head, maps=replace(head.maps, {role}=...)) for one in memory"
+            refuse(role, "the name of a picture file", f"got a {type(file).__name__}", advice)
 
 
 def check_options(**options: Any) -> None:
     """Refuse values that no [head] can have; words where several may stand come as tuples."""
     regions = options.get("regions", AUTO)
     if regions not in (AUTO, NO_REGIONS):
-        remedy = "Use with_regions for a table"
-        refuse("regions", f"{AUTO} or {NO_REGIONS}", f"{shown_value(regions)} came", remedy)
+        advice = "Use with_regions for a table"
+        refuse("regions", f"{AUTO} or {NO_REGIONS}", f"got {format_value(regions)}", advice)
     try:
         HeadTable(name="", **options)
-    except ImpossibleError as error:
-        raise ImpossibleError("load_head", error.findings) from None
+    except InvalidFieldsError as error:
+        raise InvalidFieldsError("load_head", error.messages) from None
 
 
 def check_relief(height_mm: float | None, height: object, culprit: str = "height_mm") -> None:
     """Refuse a length without the heights that it is for."""
     if height_mm is not None and height is None:
-        came = f"{height_mm} came without a height map"
-        refuse(culprit, "a height map with it", came, "Give the map too, or leave height_mm out")
+        actual = f"got {height_mm} without a height map"
+        refuse(culprit, "a height map with it", actual, "Give the map too, or leave height_mm out")

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.quantities import whole_number
+from dermis.base.quantities import checked_integer
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight
 
-_MOST_LIGHTS = 10_000
+_MAX_LIGHTS = 10_000
 
 
 def light_stage(count: int) -> list[DirectionalLight]:
@@ -19,14 +19,16 @@ def light_stage(count: int) -> list[DirectionalLight]:
 
     Raises DermisError for less than one and for more than ten thousand. Source: [Debevec2000].
     """
-    count = whole_number("light stage", count, 1, _MOST_LIGHTS, "lights")
+    count = checked_integer("light stage", count, 1, _MAX_LIGHTS, "lights")
     y = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
-    turn, radius = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count), np.sqrt(1.0 - y**2)
-    places = np.stack([radius * np.sin(turn), y, radius * np.cos(turn)], axis=-1)
-    return [DirectionalLight(direction=tuple(-place), irradiance=(1.0, 1.0, 1.0)) for place in places]
+    azimuth, radius = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count), np.sqrt(1.0 - y**2)
+    light_directions = np.stack([radius * np.sin(azimuth), y, radius * np.cos(azimuth)], axis=-1)
+    return [
+        DirectionalLight(direction=tuple(-place), irradiance=(1.0, 1.0, 1.0)) for place in light_directions
+    ]
 
 
-def stage_weights(lights: Sequence[DirectionalLight], around: Environment) -> NDArray[np.float64]:
+def light_stage_weights(lights: Sequence[DirectionalLight], around: Environment) -> NDArray[np.float64]:
     """(n, 3) irradiance that arrives from the directions nearest to each light, linear Rec. 709.
 
     Pictures of a head under each light, times these and added up, are the head in those surroundings.
@@ -37,11 +39,15 @@ def stage_weights(lights: Sequence[DirectionalLight], around: Environment) -> ND
 
     radiance = load_panorama(around.name)
     size = radiance.shape[0], radiance.shape[1]
-    arriving = around.exposure * radiance * solid_angles(*size)[..., None]
-    turn = np.radians(around.rotation_degrees)
+    texel_irradiance = around.exposure * radiance * solid_angles(*size)[..., None]
+    azimuth = np.radians(around.rotation_degrees)
     x, y, z = np.moveaxis(directions(*size).reshape(-1, 3), -1, 0)
-    towards = np.stack([np.cos(turn) * x + np.sin(turn) * z, y, np.cos(turn) * z - np.sin(turn) * x], axis=-1)
-    places = -np.array([light.direction for light in lights], dtype=np.float64)
-    nearest = (towards @ (places / np.linalg.norm(places, axis=1, keepdims=True)).T).argmax(axis=1)
-    sums = [np.bincount(nearest, arriving[..., c].ravel(), len(lights)) for c in range(3)]
+    rotated = np.stack(
+        [np.cos(azimuth) * x + np.sin(azimuth) * z, y, np.cos(azimuth) * z - np.sin(azimuth) * x], axis=-1
+    )
+    light_directions = -np.array([light.direction for light in lights], dtype=np.float64)
+    nearest = (
+        rotated @ (light_directions / np.linalg.norm(light_directions, axis=1, keepdims=True)).T
+    ).argmax(axis=1)
+    sums = [np.bincount(nearest, texel_irradiance[..., c].ravel(), len(lights)) for c in range(3)]
     return np.stack(sums, axis=-1)

@@ -11,8 +11,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.base.registry import Registry
-from dermis.scene.field_errors import Because
-from dermis.scene.plain import Colour, Direction, Plain, Vector, slider
+from dermis.scene.field_errors import BoundsReason
+from dermis.scene.frozen_model import Colour, Direction, FrozenModel, Vector, slider
 
 __all__ = [
     "LIGHTS",
@@ -25,39 +25,39 @@ __all__ = [
     "StripeLight",
     "light_presets",
     "preset_lights",
-    "preset_text",
+    "preset_toml",
     "studio",
 ]
 
 _Degrees = Annotated[
     float,
     Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, log=True)),
-    Because("degrees of half a cone before the lamp"),
+    BoundsReason("degrees of half a cone before the lamp"),
 ]
-_LAMPS = Because("mm: lamps are neither thinner than paper nor larger than a square")
-_Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True)), _LAMPS]
+_LAMP_REASON = BoundsReason("mm: lamps are neither thinner than paper nor larger than a square")
+_Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True)), _LAMP_REASON]
 
-_BRIGHTNESS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
+_BRIGHTNESS_SYNONYMS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
 
 
-def _grey(value: Any) -> Any:
+def _equal_channels(value: Any) -> Any:
     """A number as that of all three channels."""
     return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
-class _Source(Plain):
+class _LightBase(FrozenModel):
     """What every light has."""
 
-    meant: ClassVar[Mapping[str, str]] = dict.fromkeys(_BRIGHTNESS, "irradiance")
+    synonyms: ClassVar[Mapping[str, str]] = dict.fromkeys(_BRIGHTNESS_SYNONYMS, "irradiance")
 
-    irradiance: Annotated[Colour, BeforeValidator(_grey)] = (3.14, 3.14, 3.14)
+    irradiance: Annotated[Colour, BeforeValidator(_equal_channels)] = (3.14, 3.14, 3.14)
     """Irradiance of a surface at the target that faces the light, linear Rec. 709; pi makes white skin 1."""
     shadows: bool = True
     """Whether it casts shadows."""
     softness_mm: Annotated[
         float,
         Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, log=True)),
-        Because("mm: finer than light's own waves no edge is"),
+        BoundsReason("mm: finer than light's own waves no edge is"),
     ] = 1.5
     """Width over which a shadow's edge fades, at most 12 texels of the shadow map; for lights of some size it
     is the least width [mm]."""
@@ -68,7 +68,7 @@ class _Source(Plain):
         return ()
 
 
-class PointLight(_Source):
+class PointLight(_LightBase):
     """Light from a point in all directions; falls off with the square of the distance."""
 
     kind: Literal["point"] = "point"
@@ -79,7 +79,7 @@ class PointLight(_Source):
     """Where it is directed, and where its irradiance is given [mm]."""
 
     @model_validator(mode="after")
-    def _apart(self) -> PointLight:
+    def _check_distance(self) -> PointLight:
         if np.linalg.norm(np.subtract(self.target, self.position)) < 1e-3:
             raise ValueError("a position away from the target")
         return self
@@ -96,7 +96,7 @@ class SpotLight(PointLight):
     """Half angle at which the cone ends."""
 
     @model_validator(mode="after")
-    def _fades(self) -> SpotLight:
+    def _check_cone(self) -> SpotLight:
         if self.inner_degrees >= self.outer_degrees:
             raise ValueError("inner_degrees less than outer_degrees")
         return self
@@ -122,9 +122,9 @@ class SphereLight(PointLight):
 
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
-    radius_mm: Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True)), _LAMPS] = (
-        100.0
-    )
+    radius_mm: Annotated[
+        float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True)), _LAMP_REASON
+    ] = 100.0
     """Radius of the sphere [mm]."""
 
     @property
@@ -132,20 +132,20 @@ class SphereLight(PointLight):
         return "ShirleyChiu1997", "Roberts2018"
 
     @model_validator(mode="after")
-    def _outside(self) -> SphereLight:
+    def _check_target_outside(self) -> SphereLight:
         if np.linalg.norm(np.subtract(self.target, self.position)) <= self.radius_mm:
             raise ValueError("a target outside the sphere")
         return self
 
 
-class DirectionalLight(_Source):
+class DirectionalLight(_LightBase):
     """Parallel light, as from the sun."""
 
     kind: Literal["directional"] = "directional"
     """Word for this kind of light in scene files."""
     direction: Direction = Field(kw_only=False)
     """The way in which the light travels."""
-    angle_degrees: Annotated[float, Field(ge=0, le=20), Because("degrees; wider light is no beam")] = 0.0
+    angle_degrees: Annotated[float, Field(ge=0, le=20), BoundsReason("degrees; wider light is no beam")] = 0.0
     """Angle that its source spans, 0.53 for the sun: shadows harden towards what casts them."""
 
     @property
@@ -168,7 +168,7 @@ class StripeLight(DirectionalLight):
     """Length of the stripe [mm]."""
 
     @model_validator(mode="after")
-    def _across(self) -> StripeLight:
+    def _check_sheet(self) -> StripeLight:
         if self.angle_degrees > 0:
             raise ValueError("no angle_degrees, for a sheet of light is parallel")
         if np.linalg.norm(np.cross(self.direction, self.up)) < 1e-6 * np.linalg.norm(self.up):
@@ -208,10 +208,10 @@ def preset_lights(name: str) -> tuple[Light, ...]:
     """The lights of a rig of the package, by its name."""
     if name == NO_LIGHTS:
         return ()
-    return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_text(name))["lights"])
+    return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(name))["lights"])
 
 
-def preset_text(name: str) -> str:
+def preset_toml(name: str) -> str:
     """The file of a rig of the package."""
     return (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 

@@ -12,8 +12,8 @@ from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.mesh.rig import Motion
 from dermis.scene.camera import Camera, portrait
+from dermis.scene.conversions import as_camera, as_environment, as_head, as_lights, as_model
 from dermis.scene.environment import Environment
-from dermis.scene.given import given_camera, given_environment, given_head, given_lights, given_plain
 from dermis.scene.lights import Light, studio
 from dermis.scene.skin import Skin
 
@@ -54,14 +54,14 @@ class Scene:
         environment: Environment | str | os.PathLike[str] | None = None,
         pose: Pose | Mapping[str, float] | None = None,
     ) -> None:
-        self._set("head", given_head(head))
-        self._set("environment", given_environment(environment))
-        self._set("skin", Skin() if skin is None else given_plain(Skin, skin, "skin", 'profile="medium"'))
+        self._set("head", as_head(head))
+        self._set("environment", as_environment(environment))
+        self._set("skin", Skin() if skin is None else as_model(Skin, skin, "skin", 'profile="medium"'))
         if lights is None:
             self._set("lights", () if self.environment else studio())
         else:
-            self._set("lights", given_lights(lights))
-        self._set("camera", portrait(self.head) if camera is None else given_camera(camera, self.head))
+            self._set("lights", as_lights(lights))
+        self._set("camera", portrait(self.head) if camera is None else as_camera(camera, self.head))
         self._set("pose", Pose.of(pose))
         if self.pose is not None:
             self.motion  # noqa: B018 checks the pose

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from dermis.base.errors import refuse
-from dermis.base.reading import is_file, named_path
+from dermis.base.reading import checked_path, is_file
 from dermis.formats.motion.gltf_clip import load_gltf_clip
 from dermis.formats.motion.live_link import load_live_link
 from dermis.formats.motion.mediapipe import load_mediapipe
@@ -14,9 +14,9 @@ from dermis.formats.motion.sequence import is_sequence, load_sequence
 from dermis.formats.parts import is_gltf
 from dermis.mesh.clip import Clip, check_rate
 from dermis.mesh.head import Head
-from dermis.scene.head_table import Up, check_options
+from dermis.scene.head_table import UpAxis, check_options
 
-_LINES = (".jsonl", ".ndjson", ".json")
+_JSON_LINES = (".jsonl", ".ndjson", ".json")
 _KINDS = "a glTF clip (.glb .gltf), Live Link Face (.csv), MediaPipe (.jsonl) or a sequence of .obj or .ply"
 
 
@@ -27,7 +27,7 @@ def load_motion(
     clip: str | None = None,
     fps: float | None = None,
     unit_mm: float | None = None,
-    up: Up = "y",
+    up: UpAxis = "y",
 ) -> Clip:
     """The motion that a file holds, for a head: `Clip.pose_at` gives its pose at any time.
 
@@ -42,25 +42,25 @@ def load_motion(
     Raises DermisError for files that cannot be read, which it names with their lines, and for motion of
     which the head has no name; what it has only in part, `Clip.note` tells.
     """
-    named = named_path(path, _KINDS)
+    clip_path = checked_path(path, _KINDS)
     check_options(unit_mm=unit_mm, up=up)
     fps = None if fps is None else check_rate("fps", fps)
-    source, inside = _parted(named, clip)
+    source, clip_name = _split_clip_name(clip_path, clip)
     if is_gltf(source):
-        return load_gltf_clip(source, head, inside)
-    if inside is not None:
-        refuse(source, "a clip's name with a glTF file alone", f"{inside!r} came", "Leave it out")
+        return load_gltf_clip(source, head, clip_name)
+    if clip_name is not None:
+        refuse(source, "a clip's name with a glTF file alone", f"got {clip_name!r}", "Leave it out")
     if is_sequence(source):
         return load_sequence(source, head, fps, unit_mm, up)
     if not is_file(source):
         refuse(source, _KINDS, "there is no such file", "Check the name")
-    if source.suffix.lower() not in (".csv", *_LINES):
+    if source.suffix.lower() not in (".csv", *_JSON_LINES):
         refuse(source, _KINDS, f"the suffix is {source.suffix!r}", "Convert it to one of these")
     load = load_live_link if source.suffix.lower() == ".csv" else load_mediapipe
     return load(source, head, fps)
 
 
-def _parted(path: Path, clip: str | None) -> tuple[Path, str | None]:
+def _split_clip_name(path: Path, clip: str | None) -> tuple[Path, str | None]:
     """A file, and the name of a clip that was written after it."""
     file, sign, name = str(path).rpartition("#")
     if sign and not is_file(path) and is_gltf(file):

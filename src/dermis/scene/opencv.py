@@ -7,15 +7,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.base.errors import refuse, shown_value
-from dermis.base.quantities import numbers
+from dermis.base.errors import format_value, refuse
+from dermis.base.quantities import checked_array
 
 Doubles = NDArray[np.float64]
-_CORNER = 0.5  # from the middle of the first pixel, which is OpenCV's origin, to the picture's corner [pixel]
-_ROUNDING = 1e-4  # of rotations and skews as they are written in files
-_LEAST_MM = 1.0
-_LARGEST = 1e9
-_MOST_PIXELS = 1e6  # along a side
+_PIXEL_CENTRE = (
+    0.5  # from the middle of the first pixel, which is OpenCV's origin, to the picture's corner [pixel]
+)
+_TOLERANCE = 1e-4  # of rotations and skews as they are written in files
+_MIN_DISTANCE_MM = 1.0
+_MAX_VALUE = 1e9
+_MAX_PIXELS = 1e6  # along a side
 
 
 class OpenCvCamera(NamedTuple):
@@ -35,73 +37,77 @@ def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int])
 
     Raises DermisError for matrices that are none of a pinhole camera.
     """
-    k, rotation, moved = _array("K", K, (3, 3)), _array("R", R, (3, 3)), _array("t", t, (3,))
+    k, rotation, translation = _matrix("K", K, (3, 3)), _matrix("R", R, (3, 3)), _matrix("t", t, (3,))
     _check_intrinsics(k)
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > _ROUNDING or np.linalg.det(rotation) < 0:
-        came = f"R R^T is not 1, or its determinant is {np.linalg.det(rotation):.3g}"
-        refuse("R", "a rotation matrix", came, "Make one of a vector with cv2.Rodrigues")
-    width, height = _sides(size)
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > _TOLERANCE or np.linalg.det(rotation) < 0:
+        actual = f"R R^T is not 1, or its determinant is {np.linalg.det(rotation):.3g}"
+        refuse("R", "a rotation matrix", actual, "Make one of a vector with cv2.Rodrigues")
+    width, height = _size(size)
     fx, fy, cx, cy = k[0, 0], k[1, 1], k[0, 2], k[1, 2]
-    position = -rotation.T @ moved
-    before = moved[2] if moved[2] > _LEAST_MM else max(float(np.linalg.norm(moved)), _LEAST_MM)
+    position = -rotation.T @ translation
+    distance = (
+        translation[2]
+        if translation[2] > _MIN_DISTANCE_MM
+        else max(float(np.linalg.norm(translation)), _MIN_DISTANCE_MM)
+    )
     return {
         "position": position,
-        "target": position + before * rotation[2],
+        "target": position + distance * rotation[2],
         "up": -rotation[1],
-        "frame_mm": height / fy * before,
-        "principal_point": ((cx + _CORNER) / width, (cy + _CORNER) / height),
+        "frame_mm": height / fy * distance,
+        "principal_point": ((cx + _PIXEL_CENTRE) / width, (cy + _PIXEL_CENTRE) / height),
         "pixel_aspect": fy / fx,
     }
 
 
-def intrinsics(seen: tuple[float, tuple[float, float], float], size: tuple[int, int]) -> Doubles:
+def intrinsics(lens: tuple[float, tuple[float, float], float], size: tuple[int, int]) -> Doubles:
     """(3, 3) K [pixel].
 
     seen : tangent of half the vertical angle, principal point from the upper left corner in widths and
         heights, width of a pixel over its height
     """
-    half_tangent, principal_point, pixel_aspect = seen
-    size = _sides(size)
+    half_tangent, principal_point, pixel_aspect = lens
+    size = _size(size)
     fy = 0.5 * size[1] / half_tangent
-    cx, cy = np.multiply(principal_point, size) - _CORNER
+    cx, cy = np.multiply(principal_point, size) - _PIXEL_CENTRE
     return np.array([[fy / pixel_aspect, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
 
 def extrinsics(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[Doubles, Doubles]:
     """(3, 3) R and (3,) t [mm] of a camera at a position that looks at a target."""
-    forward = _unit(np.subtract(target, position))
-    right = _unit(np.cross(forward, np.asarray(up, np.float64)))
+    forward = _normalise(np.subtract(target, position))
+    right = _normalise(np.cross(forward, np.asarray(up, np.float64)))
     rotation = np.array([right, np.cross(forward, right), forward])
     return rotation, -rotation @ np.asarray(position, np.float64)
 
 
 def _check_intrinsics(k: Doubles) -> None:
-    if k[0, 0] <= 0 or k[1, 1] <= 0 or np.abs(k[2] - (0, 0, 1)).max() > _ROUNDING:
-        came = f"its diagonal is {np.diag(k).tolist()} and its last row {k[2].tolist()}"
-        remedy = "Pass [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"
-        refuse("K", "fx, fy above 0 and a last row of 0, 0, 1", came, remedy)
-    if abs(k[0, 1]) > _ROUNDING * k[0, 0] or abs(k[1, 0]) > _ROUNDING * k[0, 0]:
-        came, remedy = f"its skew is {k[0, 1]:.4g} pixels", "Resample the picture to upright pixels"
-        refuse("K", "pixels with right angles", came, remedy)
+    if k[0, 0] <= 0 or k[1, 1] <= 0 or np.abs(k[2] - (0, 0, 1)).max() > _TOLERANCE:
+        actual = f"its diagonal is {np.diag(k).tolist()} and its last row {k[2].tolist()}"
+        advice = "Pass [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"
+        refuse("K", "fx, fy above 0 and a last row of 0, 0, 1", actual, advice)
+    if abs(k[0, 1]) > _TOLERANCE * k[0, 0] or abs(k[1, 0]) > _TOLERANCE * k[0, 0]:
+        actual, advice = f"its skew is {k[0, 1]:.4g} pixels", "Resample the picture to upright pixels"
+        refuse("K", "pixels with right angles", actual, advice)
 
 
-def _array(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Doubles:
+def _matrix(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Doubles:
     try:
         found = np.asarray(values, np.float64)
     except (TypeError, ValueError, OverflowError):
-        refuse(name, f"numbers of shape {shape}", f"{shown_value(values, 40)} came", "Correct it")
+        refuse(name, f"numbers of shape {shape}", f"got {format_value(values, 40)}", "Correct it")
     if shape == (3,) and found.shape in ((3, 1), (1, 3)):  # as OpenCV returns them
         found = found.reshape(3)
-    if found.shape != shape or not (np.abs(found) <= _LARGEST).all():
-        came = f"shape {found.shape} came" if found.shape != shape else "others came"
-        refuse(name, f"numbers of shape {shape} up to {_LARGEST:g}", came, "Correct it")
+    if found.shape != shape or not (np.abs(found) <= _MAX_VALUE).all():
+        actual = f"got shape {found.shape}" if found.shape != shape else "got others"
+        refuse(name, f"numbers of shape {shape} up to {_MAX_VALUE:g}", actual, "Correct it")
     return found
 
 
-def _sides(size: tuple[int, int]) -> tuple[int, int]:
-    width, height = numbers("size", size, (2,), 1, _MOST_PIXELS, "pixels").tolist()
+def _size(size: tuple[int, int]) -> tuple[int, int]:
+    width, height = checked_array("size", size, (2,), 1, _MAX_PIXELS, "pixels").tolist()
     return int(width), int(height)
 
 
-def _unit(vector: NDArray[Any]) -> Doubles:
+def _normalise(vector: NDArray[Any]) -> Doubles:
     return np.asarray(vector / np.linalg.norm(vector), np.float64)

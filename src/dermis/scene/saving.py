@@ -8,19 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file
 from dermis.mesh.pose import Pose
-from dermis.scene.head_table import names_regions
+from dermis.scene.frozen_model import FrozenModel
+from dermis.scene.head_table import has_region_table
 from dermis.scene.model import Scene
-from dermis.scene.plain import Plain
 from dermis.scene.settings import Settings
 from dermis.scene.toml_text import table_text
 
 _HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
-_SAID_BY_REGIONS = {"rho_s"}
-_FILES = {"profile", "profile_map", "other_profiles", "name"}  # of skins and environments, unless presets
+_SET_BY_REGIONS = {"rho_s"}
+_PATH_FIELDS = {
+    "profile",
+    "profile_map",
+    "other_profiles",
+    "name",
+}  # of skins and environments, unless presets
 
 
 def save_scene(path: Path, scene: Scene, settings: Settings, head: Mapping[str, Any]) -> None:
@@ -30,27 +35,27 @@ def save_scene(path: Path, scene: Scene, settings: Settings, head: Mapping[str, 
 
     Raises DermisError when that is not possible.
     """
-    with replacing(path) as trial:
-        trial.write_text(scene_toml(scene, settings, head), encoding="utf-8")
+    with atomic_file(path) as temporary:
+        temporary.write_text(scene_text(scene, settings, head), encoding="utf-8")
 
 
-def scene_toml(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str:
+def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str:
     """The text of a scene's file.
 
     Raises DermisError for a pose by places of points.
     """
-    said = _SAID_BY_REGIONS if names_regions(head) else set()
+    excluded = _SET_BY_REGIONS if has_region_table(head) else set()
     parts = [] if scene.lights else ['lights = "none"\n']
     parts += [table_text("[head]", head), *_pose(scene.pose)]
-    parts.append(_plain("[skin]", scene.skin, said | {"pigments", "layers"}))
+    parts.append(_model_table("[skin]", scene.skin, excluded | {"pigments", "layers"}))
     if scene.skin.pigments:
-        parts.append(_plain("[skin.pigments]", scene.skin.pigments))
+        parts.append(_model_table("[skin.pigments]", scene.skin.pigments))
     layers = [layer.model_dump(exclude_none=True) for layer in scene.skin.layers]
     parts += [table_text("[[skin.layers]]", layer) for layer in layers]
-    parts += [_plain("[[lights]]", light) for light in scene.lights]
+    parts += [_model_table("[[lights]]", light) for light in scene.lights]
     if scene.environment:
-        parts.append(_plain("[environment]", scene.environment))
-    parts += [_plain("[camera]", scene.camera), _plain("[render]", settings)]
+        parts.append(_model_table("[environment]", scene.environment))
+    parts += [_model_table("[camera]", scene.camera), _model_table("[render]", settings)]
     return "\n".join([_HEADER, *parts])
 
 
@@ -59,23 +64,23 @@ def _pose(pose: Pose | None) -> list[str]:
     if pose is None:
         return []
     if pose.positions_mm is not None:
-        remedy = "Keep those in a file of their own, such as .npy"
-        refuse("pose", "weights and bones, which a scene's file can hold", "it has positions_mm", remedy)
+        advice = "Keep those in a file of their own, such as .npy"
+        refuse("pose", "weights and bones, which a scene's file can hold", "it has positions_mm", advice)
     weights = {name: float(weight) for name, weight in pose.weights.items()}
     bones = {name: np.asarray(given, np.float64).tolist() for name, given in pose.bones.items()}
     tables = {"[pose.weights]": weights, "[pose.bones]": bones}
     return [table_text(title, values) for title, values in tables.items() if values] or ["[pose]\n"]
 
 
-def _plain(title: str, values: Plain, left_out: set[str] | None = None) -> str:
+def _model_table(title: str, values: FrozenModel, left_out: set[str] | None = None) -> str:
     table = values.model_dump(exclude=left_out, exclude_none=True)
-    for key in _FILES & table.keys():
-        table[key] = _whole(table[key])
+    for key in _PATH_FIELDS & table.keys():
+        table[key] = _absolute(table[key])
     return table_text(title, table)
 
 
-def _whole(name: Any) -> Any:
+def _absolute(name: Any) -> Any:
     """A file's name that holds from anywhere, or several; presets as they are."""
     if isinstance(name, tuple):
-        return tuple(map(_whole, name))
+        return tuple(map(_absolute, name))
     return str(Path(name).resolve()) if is_file(name) else name

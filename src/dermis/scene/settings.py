@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from dermis.base.registry import Named
-from dermis.scene.field_errors import Because, Words
-from dermis.scene.plain import Colour, Plain, slider
+from dermis.base.registry import RegisteredName
+from dermis.scene.field_errors import BoundsReason, Keywords
+from dermis.scene.frozen_model import Colour, FrozenModel, slider
 from dermis.scene.talk import Gamma, SeamColour, Seams, Stretch
 from dermis.scene.techniques import TECHNIQUES
 
-_Side = Annotated[int, Field(ge=1, le=16384), Because("pixels: what the largest GPUs hold")]
-_MOST_SAMPLES = 64
-MOST_WORK = 2**27
+_Side = Annotated[int, Field(ge=1, le=16384), BoundsReason("pixels: what the largest GPUs hold")]
+_MAX_SAMPLES = 64
+MAX_SAMPLE_COUNT = 2**27
 _HEX = re.compile(r"#[0-9a-fA-F]{6}")
 
 
-def _decoded(value: Any) -> Any:
+def _parse_colour(value: Any) -> Any:
     """#rrggbb and "red,green,blue" as linear Rec. 709."""
     if not isinstance(value, str):
         return value
@@ -46,36 +46,38 @@ else:
     Exposure = Annotated[
         float,
         Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, log=True)),
-        Because("20 stops either way"),
-        Words("auto"),
+        BoundsReason("20 stops either way"),
+        Keywords("auto"),
     ]
-    Background = Annotated[Colour, BeforeValidator(_decoded), Words("none", "gradient", "environment")]
+    Background = Annotated[
+        Colour, BeforeValidator(_parse_colour), Keywords("none", "gradient", "environment")
+    ]
 
 
-def _square(value: Any) -> Any:
+def _both_sides(value: Any) -> Any:
     """A number as both sides."""
     return (value, value) if isinstance(value, int) else value
 
 
-class Settings(Plain):
+class Settings(FrozenModel):
     """Sizes, quality, and what leaves linear light."""
 
-    meant: ClassVar[Mapping[str, str]] = {"resolution": "size", "spp": "samples"}
+    synonyms: ClassVar[Mapping[str, str]] = {"resolution": "size", "spp": "samples"}
 
-    size: Annotated[tuple[_Side, _Side], BeforeValidator(_square)] = (1024, 1024)
+    size: Annotated[tuple[_Side, _Side], BeforeValidator(_both_sides)] = (1024, 1024)
     """Width and height of the picture [pixel]."""
-    atlas: Annotated[int, Field(ge=64, le=16384), Because("texels: what the largest GPUs hold")] = 2048
+    atlas: Annotated[int, Field(ge=64, le=16384), BoundsReason("texels: what the largest GPUs hold")] = 2048
     """Side of the atlas, the map in which light scatters [texel]."""
-    samples: Annotated[int, Field(ge=1, le=_MOST_SAMPLES), Because("more show no difference")] = 4
+    samples: Annotated[int, Field(ge=1, le=_MAX_SAMPLES), BoundsReason("more show no difference")] = 4
     """Samples of each pixel, for smooth edges."""
-    technique: Annotated[str, Named(TECHNIQUES)] = "texture-space"
+    technique: Annotated[str, RegisteredName(TECHNIQUES)] = "texture-space"
     """How light scatters below the surface."""
     stretch: Stretch = "full"
     seams: Seams = "stitch"
     seam_colour: SeamColour = (0.5, 0.35, 0.3)
     transmission: Literal["thin", "none"] = "thin"
     """Light through the head: "thin" for thin parts such as ears and nostrils, "none" for no part."""
-    shadow_size: Annotated[int, Field(ge=64, le=8192), Because("texels: finer than skin's pores")] = 2048
+    shadow_size: Annotated[int, Field(ge=64, le=8192), BoundsReason("texels: finer than skin's pores")] = 2048
     """Side of each shadow map [texel]."""
     occlusion: Literal["baked", "rest", "none"] = "baked"
     """Ambient occlusion, which dims the environment's light where the head is in its way: "baked" follows a
@@ -102,10 +104,12 @@ class Settings(Plain):
 
     @model_validator(mode="after")
     def _fits_in_memory(self) -> Settings:
-        if self.size[0] * self.size[1] * self.samples > MOST_WORK:
-            raise ValueError(f"width times height times samples of at most {MOST_WORK // 10**6} million")
+        if self.size[0] * self.size[1] * self.samples > MAX_SAMPLE_COUNT:
+            raise ValueError(
+                f"width times height times samples of at most {MAX_SAMPLE_COUNT // 10**6} million"
+            )
         return self
 
 
-PHOTOGRAPHED: Mapping[str, Any] = MappingProxyType({"exposure": "auto", "background": "gradient"})
+PHOTOGRAPHIC_SETTINGS: Mapping[str, Any] = MappingProxyType({"exposure": "auto", "background": "gradient"})
 """Settings that `dermis render`, `animate` and `view` choose where nothing is said."""

@@ -13,15 +13,15 @@ from dermis.scene.techniques import TECHNIQUES
 _FRAME = ("dEonLuebke2007", "Burns2013")
 _FRESNEL = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
 _HALF_SPACE = ("Chandrasekhar1960", "Jensen2001")
-_FORWARD = ("HenyeyGreenstein1941", "Wiscombe1977")
+_ANISOTROPY = ("HenyeyGreenstein1941", "Wiscombe1977")
 _TONES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
 _SHADOWS = ("Williams1978", "Reeves1987", "Hanika2021")
 _RELIEF = ("Mikkelsen2010", "OlanoBaker2010")
-_AROUND = ("RamamoorthiHanrahan2001", "KautzMcCool2000", "Karis2013", "Debevec2005")
+_ENVIRONMENT = ("RamamoorthiHanrahan2001", "KautzMcCool2000", "Karis2013", "Debevec2005")
 _OCCLUSION = ("Keinert2015", "Jimenez2016", "LagardeRousiers2014")
 
 
-def sources_of(
+def picture_sources(
     skin: Skin,
     settings: Settings,
     lights: Sequence[Light] = (),
@@ -38,11 +38,11 @@ def sources_of(
     keys = [*_FRAME, *scattering_sources(settings), *_surface(skin)]
     keys += profile_sources(skin)
     if skin.direction == "half-space":
-        keys += _HALF_SPACE + _FORWARD * (skin.anisotropy > 0)
+        keys += _HALF_SPACE + _ANISOTROPY * (skin.anisotropy > 0)
     keys += _RELIEF * relief
     keys += _light(lights)
     if environment is not None:
-        keys += _AROUND + _OCCLUSION * (settings.occlusion != "none")
+        keys += _ENVIRONMENT + _OCCLUSION * (settings.occlusion != "none")
     keys += _TONES[settings.tone]
     keys += ("BurtAdelson1983",) * (settings.bloom > 0)
     return tuple(dict.fromkeys(keys))
@@ -51,21 +51,21 @@ def sources_of(
 def scattering_sources(settings: Settings) -> tuple[str, ...]:
     """Of the technique, of what it does at the seams, and of light through thin parts."""
     technique = TECHNIQUES[settings.technique]
-    remedied = settings.seams != "stitch" or not technique.stitches
-    keys: tuple[str, ...] = technique.sources + ("Dudash2007",) * (remedied and technique.on_atlas)
-    if settings.transmission == "thin" and technique.transmits:
+    substituted = settings.seams != "stitch" or not technique.stitches_seams
+    keys: tuple[str, ...] = technique.sources + ("Dudash2007",) * (substituted and technique.uses_atlas)
+    if settings.transmission == "thin" and technique.supports_translucency:
         keys += ("JensenBuhler2002",)
     return keys
 
 
 def profile_sources(skin: Skin) -> tuple[str, ...]:
     """Of a diffusion profile; a table's numbers are its own, but for the published ones."""
-    from dermis.optics.profiles import find_table
-    from dermis.scene.tissue import tissue_of
+    from dermis.optics.profiles import find_gaussians
+    from dermis.scene.tissue import skin_tissue
 
-    if find_table(skin.profile) is not None:
+    if find_gaussians(skin.profile) is not None:
         return ("dEonLuebke2007", "DonnerJensen2005") if skin.profile == "gpu-gems-3" else ()
-    return tissue_of(skin).profile().sources
+    return skin_tissue(skin).profile().sources
 
 
 def _surface(skin: Skin) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dermis.scene.plain import Colour, Heading
+from dermis.scene.frozen_model import Colour, Heading
 from dermis.specular.models import EnergyName
 
 COMPARISONS = Heading("Comparisons of the 2007 talk")

@@ -11,29 +11,29 @@ from dermis.optics.tissue import Tissue, load_tissue
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 
 
-def tissue_of(skin: Skin) -> Tissue:
+def skin_tissue(skin: Skin) -> Tissue:
     """The profile's tissue, with the skin's own pigments or layers in it.
 
     Raises DermisError for a profile that is no tissue, and for one that has no such pigments or layers.
     """
     if skin.layers:
-        return load_tissue(skin.profile).with_layers(_optical(skin.layers))
+        return load_tissue(skin.profile).with_layers(_to_media_layers(skin.layers))
     pigments = skin.pigments or Pigments()
-    return load_tissue(skin.profile, pigments.structure, pigments.given())
+    return load_tissue(skin.profile, pigments.structure, pigments.overrides())
 
 
-def layers_of(skin: Skin) -> tuple[TissueLayer, ...]:
+def tissue_layers(skin: Skin) -> tuple[TissueLayer, ...]:
     """The layers of a skin that is a medium in red, green and blue; none of any other.
 
     Raises DermisError for a profile that is no tissue.
     """
     if skin.layers:
         return skin.layers
-    tissue = tissue_of(skin)
-    return () if tissue.rgb is not None else tuple(map(_plain, tissue.medium.layers))
+    tissue = skin_tissue(skin)
+    return () if tissue.rgb is not None else tuple(map(_to_scene_layer, tissue.medium.layers))
 
 
-def _plain(layer: Layer) -> TissueLayer:
+def _to_scene_layer(layer: Layer) -> TissueLayer:
     return TissueLayer(
         name=layer.name,
         thickness_mm=float(layer.thickness_mm) if np.isfinite(layer.thickness_mm) else None,
@@ -42,7 +42,7 @@ def _plain(layer: Layer) -> TissueLayer:
     )
 
 
-def _optical(layers: Iterable[TissueLayer]) -> tuple[Layer, ...]:
+def _to_media_layers(layers: Iterable[TissueLayer]) -> tuple[Layer, ...]:
     return tuple(
         Layer(
             np.array(layer.absorption_per_mm),

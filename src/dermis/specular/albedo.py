@@ -13,13 +13,13 @@ from dermis.specular.kelemen import kelemen
 from dermis.specular.models import MODELS, Lobe
 
 Floats = NDArray[np.float64]
-ROOT_OF_FIRST_ROW = 0.2
+MIN_ROUGHNESS_ROOT = 0.2
 TABLE_COSINES: Floats = np.linspace(0.0, 1.0, 64) ** 2
-TABLE_ROUGHNESSES: Floats = np.linspace(ROOT_OF_FIRST_ROW, 1.0, 32) ** 2
+TABLE_ROUGHNESSES: Floats = np.linspace(MIN_ROUGHNESS_ROOT, 1.0, 32) ** 2
 """Columns and rows of the shader's table: evenly spaced roots, for albedos bend at grazing angles."""
 
 _TABLE_NODES = (24, 12)
-_LEAST_COSINE = 1e-3
+_MIN_COSINE = 1e-3
 
 
 def directional_albedo(
@@ -42,13 +42,13 @@ def directional_albedo(
 
     Source: [dEonLuebke2007] section 14.3 for the quantity.
     """
-    cosine, rough = np.broadcast_arrays(np.asarray(cos_theta, float), np.asarray(m, float))
-    c, m = np.clip(cosine[..., None, None], _LEAST_COSINE, 1.0), rough[..., None, None]
+    cosine, roughness = np.broadcast_arrays(np.asarray(cos_theta, float), np.asarray(m, float))
+    c, m = np.clip(cosine[..., None, None], _MIN_COSINE, 1.0), roughness[..., None, None]
     tangent = np.sqrt(1.0 - c**2) / c
-    y, dy = _slopes(np.zeros_like(c), 1.0 / c, m, nodes[1])
-    reach = np.sqrt(np.maximum(c**-2 - y**2, 0.0))
-    y, dy, reach = (np.swapaxes(a, -1, -2) for a in (y, dy, reach))
-    x, dx = _slopes(tangent - reach, tangent + reach, m, nodes[0])
+    y, dy = _slope_quadrature(np.zeros_like(c), 1.0 / c, m, nodes[1])
+    half_width = np.sqrt(np.maximum(c**-2 - y**2, 0.0))
+    y, dy, half_width = (np.swapaxes(a, -1, -2) for a in (y, dy, half_width))
+    x, dx = _slope_quadrature(tangent - half_width, tangent + half_width, m, nodes[0])
     n_h = 1.0 / np.sqrt(1.0 + x**2 + y**2)
     v_h = c * (1.0 + tangent * x) * n_h
     n_l = np.maximum(2.0 * v_h * n_h - c, 0.0)
@@ -58,11 +58,11 @@ def directional_albedo(
     return albedo
 
 
-def _slopes(low: Floats, high: Floats, m: Floats, nodes: int) -> tuple[Floats, Floats]:
+def _slope_quadrature(low: Floats, high: Floats, m: Floats, nodes: int) -> tuple[Floats, Floats]:
     """Places and weights between two slopes, dense within m of 0; along the last axis."""
-    at, weight = np.polynomial.legendre.leggauss(nodes)
+    nodes_unit, weight = np.polynomial.legendre.leggauss(nodes)
     first, last = np.arctan(low / m), np.arctan(high / m)
-    t = np.tan(0.5 * (first + last) + 0.5 * (last - first) * at)
+    t = np.tan(0.5 * (first + last) + 0.5 * (last - first) * nodes_unit)
     return m * t, m * (1.0 + t**2) * 0.5 * (last - first) * weight
 
 

@@ -18,7 +18,7 @@ _PAIRS = 4000
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-def peak(model: str, m: float) -> float:
+def normal_incidence_peak(model: str, m: float) -> float:
     """BRDF towards the light that stands over the surface, for rho_s = 1 [1/sr]."""
     return float(MODELS[model].lobe(cosines(_UP, _UP, _UP), m))
 

@@ -52,7 +52,7 @@ def hemispherical_reflectance(fresnel: Fresnel = dielectric, nodes: int = 64) ->
 
 
 @dataclass(frozen=True)
-class Energy:
+class EnergyModel:
     """What enters and leaves the skin, with c = 1 unless `returned` divides by the mean of what leaves.
 
     f = (1 - loss rho_s rho_dt(n.l)) (1 - loss rho_s rho_dt(n.v)) / (pi c)
@@ -64,29 +64,31 @@ class Energy:
     loss: float
     returned: bool
 
-    def enters(self, albedo: ArrayLike, rho_s: float) -> Floats:
+    def entering_fraction(self, albedo: ArrayLike, rho_s: float) -> Floats:
         """Share of light from a direction that enters, by the surface's albedo there [-]."""
         return np.maximum(0.0, 1.0 - self.loss * rho_s * np.asarray(albedo, float))
 
-    def leaves(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
+    def exitance_factor(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
         """What leaves in a direction, of light that would leave evenly [-].
 
         albedo : of the surface there
         mean : albedo over all directions, weighed by their cosine
         """
         lost = self.loss * rho_s * np.asarray(mean, float) if self.returned else 0.0
-        return np.asarray(self.enters(albedo, rho_s) / np.maximum(1.0 - lost, 0.5))
+        return np.asarray(self.entering_fraction(albedo, rho_s) / np.maximum(1.0 - lost, 0.5))
 
-    def furnace(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
+    def furnace_radiance(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
         """Outgoing over incoming radiance of white skin under the same light from everywhere [-]."""
         inside = 1.0 - self.loss * rho_s * np.asarray(mean, float)
-        return np.asarray(rho_s * np.asarray(albedo, float) + inside * self.leaves(albedo, mean, rho_s))
+        return np.asarray(
+            rho_s * np.asarray(albedo, float) + inside * self.exitance_factor(albedo, mean, rho_s)
+        )
 
 
-ENERGY: dict[str, Energy] = {
-    "none": Energy(0.0, returned=False),
-    "published": Energy(np.pi, returned=False),
-    "full": Energy(1.0, returned=True),
+ENERGY: dict[str, EnergyModel] = {
+    "none": EnergyModel(0.0, returned=False),
+    "published": EnergyModel(np.pi, returned=False),
+    "full": EnergyModel(1.0, returned=True),
 }
 """By the names that scenes use.
 

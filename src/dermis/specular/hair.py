@@ -13,16 +13,16 @@ ETA = 1.55
 """Index of refraction of keratin [Marschner2003]."""
 TILT = np.radians(2.0)
 """Angle by which scales of the cuticle rise from the fibre towards its tip."""
-ROUGH_ALONG, ROUGH_AROUND = 0.22, 0.5
+LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS = 0.22, 0.5
 """Roughness along and around the fibre, 0 to 1, as artists are given it [Chiang2016]."""
-PLACES = 16
+FIBRE_SAMPLES = 16
 """Places across the fibre that light is followed through, as in hair.wgsl."""
-_LEAST = 1e-5
+_MIN_COS_SQUARED = 1e-5
 _EUMELANIN, _PHEOMELANIN = np.array([0.419, 0.697, 1.37]), np.array([0.187, 0.4, 1.05])
-_USUAL_RADIUS_MM = 0.04  # of the hairs whose absorption over a radius these are
+_REFERENCE_RADIUS_MM = 0.04  # of the hairs whose absorption over a radius these are
 
 
-class Fibre(NamedTuple):
+class FibreParameters(NamedTuple):
     """Numbers that a fibre scatters by.
 
     variance : along it, of light that is reflected, goes through, is reflected inside, and the rest
@@ -33,23 +33,23 @@ class Fibre(NamedTuple):
     width: float
 
 
-def fibre(along: float = ROUGH_ALONG, around: float = ROUGH_AROUND) -> Fibre:
+def fibre(along: float = LONGITUDINAL_ROUGHNESS, around: float = AZIMUTHAL_ROUGHNESS) -> FibreParameters:
     """A fibre's numbers by its roughness. Source: [Chiang2016] equations 7 and 8."""
     v = (0.726 * along + 0.812 * along**2 + 3.7 * along**20) ** 2
     width = np.sqrt(np.pi / 8) * (0.265 * around + 1.194 * around**2 + 5.372 * around**22)
-    return Fibre((v, 0.25 * v, 4.0 * v, 4.0 * v), float(width))
+    return FibreParameters((v, 0.25 * v, 4.0 * v, 4.0 * v), float(width))
 
 
-def hair_numbers() -> dict[str, float]:
+def hair_constants() -> dict[str, float]:
     """Numbers that hair.wgsl fills in."""
     usual = fibre()
     return {
         "hair_eta": ETA,
         "hair_width": usual.width,
-        "hair_cut": float(1.0 / np.tanh(np.pi / (2 * usual.width))),
+        "hair_logistic_norm": float(1.0 / np.tanh(np.pi / (2 * usual.width))),
         "hair_variance": usual.variance[0],
         "hair_tilt": float(TILT),
-        "hair_places": PLACES,
+        "hair_samples": FIBRE_SAMPLES,
     }
 
 
@@ -59,7 +59,7 @@ def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
     0.3 eumelanin is blond, 1.3 brown, 8 black; 2 pheomelanin without it red. Source: [dEon2011] section 6.1.
     """
     brown, red = (np.asarray(c, float)[..., None] for c in (eumelanin, pheomelanin))
-    return np.asarray((brown * _EUMELANIN + red * _PHEOMELANIN) / _USUAL_RADIUS_MM)
+    return np.asarray((brown * _EUMELANIN + red * _PHEOMELANIN) / _REFERENCE_RADIUS_MM)
 
 
 def longitudinal(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
@@ -75,8 +75,8 @@ def longitudinal(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
 
 def logistic(x: ArrayLike, width: float) -> Floats:
     """Logistic distribution over angles, cut at half a turn [1/rad]. Source: [Chiang2016]."""
-    turned = np.abs(np.mod(np.asarray(x, float) + np.pi, 2 * np.pi) - np.pi)
-    e = np.exp(-turned / width)
+    wrapped = np.abs(np.mod(np.asarray(x, float) + np.pi, 2 * np.pi) - np.pi)
+    e = np.exp(-wrapped / width)
     return np.asarray(e / (width * (1 + e) ** 2) / np.tanh(np.pi / (2 * width)))
 
 
@@ -98,17 +98,24 @@ def attenuations(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Float
     Without absorption they add up to 1. Source: [Chiang2016] section 4.
     """
     o, h = np.asarray(sin_o, float), np.asarray(h, float)
-    cos_o = np.sqrt(np.maximum(1 - o * o, _LEAST))
-    within = h * cos_o / np.sqrt(ETA**2 - o * o)
-    way = 2 * np.sqrt(1 - within**2) / np.sqrt(1 - (o / ETA) ** 2)
-    through = np.exp(-np.asarray(depth, float) * way[..., None])
+    cos_o = np.sqrt(np.maximum(1 - o * o, _MIN_COS_SQUARED))
+    sin_inner = h * cos_o / np.sqrt(ETA**2 - o * o)
+    path_length = 2 * np.sqrt(1 - sin_inner**2) / np.sqrt(1 - (o / ETA) ** 2)
+    attenuation = np.exp(-np.asarray(depth, float) * path_length[..., None])
     f = fresnel(cos_o * np.sqrt(1 - h * h))[..., None]
-    passed = (1 - f) ** 2 * through
-    inside = passed * through * f
-    return [np.broadcast_to(f, through.shape), passed, inside, inside * f * through / (1 - f * through)]
+    transmitted = (1 - f) ** 2 * attenuation
+    internal = transmitted * attenuation * f
+    return [
+        np.broadcast_to(f, attenuation.shape),
+        transmitted,
+        internal,
+        internal * f * attenuation / (1 - f * attenuation),
+    ]
 
 
-def scattered(sin_i: ArrayLike, sin_o: ArrayLike, phi: ArrayLike, depth: ArrayLike, of: Fibre) -> Floats:
+def scattering(
+    sin_i: ArrayLike, sin_o: ArrayLike, phi: ArrayLike, depth: ArrayLike, parameters: FibreParameters
+) -> Floats:
     """(..., 3) radiance over the irradiance of a plane that faces the light, mean over the width [1/sr].
 
     sin_i, sin_o : sines of light and view along the fibre, towards its tip
@@ -119,20 +126,20 @@ def scattered(sin_i: ArrayLike, sin_o: ArrayLike, phi: ArrayLike, depth: ArrayLi
     absorption. Source: [Marschner2003], with the terms of [dEon2011, Chiang2016].
     """
     i, o, phi = np.broadcast_arrays(*(np.asarray(x, float) for x in (sin_i, sin_o, phi)))
-    cos_o = np.sqrt(np.maximum(1 - o * o, _LEAST))
+    cos_o = np.sqrt(np.maximum(1 - o * o, _MIN_COS_SQUARED))
     total = np.zeros((*o.shape, 3))
-    for h in (np.arange(PLACES) + 0.5) * 2 / PLACES - 1:
+    for h in (np.arange(FIBRE_SAMPLES) + 0.5) * 2 / FIBRE_SAMPLES - 1:
         entry, inner = np.arcsin(h), np.arcsin(h * cos_o / np.sqrt(ETA**2 - o * o))
-        shares = attenuations(o, depth, np.full(o.shape, h))
-        for p, share in enumerate(shares):
+        attenuation_terms = attenuations(o, depth, np.full(o.shape, h))
+        for p, term in enumerate(attenuation_terms):
             turn = 2 * p * inner - 2 * entry + p * np.pi
-            around = logistic(phi - turn, of.width) if p < 3 else np.full(o.shape, 0.5 / np.pi)
-            along = longitudinal(i, tilted(o, p), of.variance[p])
-            total += share * (along * around / PLACES)[..., None]
+            around = logistic(phi - turn, parameters.width) if p < 3 else np.full(o.shape, 0.5 / np.pi)
+            along = longitudinal(i, tilted_sine(o, p), parameters.variance[p])
+            total += term * (along * around / FIBRE_SAMPLES)[..., None]
     return total
 
 
-def tilted(sin_o: ArrayLike, p: int) -> Floats:
+def tilted_sine(sin_o: ArrayLike, p: int) -> Floats:
     """Sine of the view as the scales of the cuticle turn it for light reflected p times less one inside."""
     angle = np.arcsin(np.clip(np.asarray(sin_o, float), -1, 1))
     return np.asarray(np.sin(angle + (-2.0, 1.0, 4.0, 0.0)[p] * TILT))

@@ -2,19 +2,19 @@
 
 //#fill const HAIR_ETA: f32 = {hair_eta};
 //#fill const HAIR_WIDTH: f32 = {hair_width}; // of the distribution around the fibre [rad]
-//#fill const HAIR_CUT: f32 = {hair_cut}; // its factor, as it ends at half a turn
+//#fill const HAIR_LOGISTIC_NORM: f32 = {hair_logistic_norm}; // its factor, as it ends at half a turn
 //#fill const HAIR_VARIANCE: f32 = {hair_variance}; // along it, of reflected light
 //#fill const HAIR_TILT: f32 = {hair_tilt}; // of the cuticle's scales [rad]
-//#fill const HAIR_PLACES: u32 = {hair_places}; // across the fibre that light is followed through
+//#fill const HAIR_SAMPLES: u32 = {hair_samples}; // across the fibre that light is followed through
 
 const HAIR_PI: f32 = 3.14159265358979;
 
-// Shares of light over the fibre's width: reflected, let through, reflected inside, and the rest.
-struct Shares {
+// Shares of light over the fibre's width: reflected, let through, reflected internal, and the residual.
+struct FibreTerms {
     reflected: f32,
-    passed: vec3f,
-    inside: vec3f,
-    rest: vec3f,
+    transmitted: vec3f,
+    internal: vec3f,
+    residual: vec3f,
 }
 
 // exp(-a) I0(a), by Abramowitz' and Stegun's polynomials.
@@ -30,15 +30,15 @@ fn scaled_bessel(a: f32) -> f32 {
 }
 
 // Share by the sines of light and view along the fibre.
-fn hair_along(sin_i: f32, sin_o: f32, v: f32) -> f32 {
+fn hair_longitudinal(sin_i: f32, sin_o: f32, v: f32) -> f32 {
     let a = sqrt(max(1.0 - sin_i * sin_i, 0.0) * max(1.0 - sin_o * sin_o, 0.0)) / v;
     return scaled_bessel(a) * exp(a - sin_i * sin_o / v - 1.0 / v) / (v * (1.0 - exp(-2.0 / v)));
 }
 
-fn hair_around(x: f32) -> f32 {
+fn hair_azimuthal(x: f32) -> f32 {
     let turned = abs(x - 2.0 * HAIR_PI * round(x / (2.0 * HAIR_PI)));
     let e = exp(-turned / HAIR_WIDTH);
-    return e / (HAIR_WIDTH * (1.0 + e) * (1.0 + e)) * HAIR_CUT;
+    return e / (HAIR_WIDTH * (1.0 + e) * (1.0 + e)) * HAIR_LOGISTIC_NORM;
 }
 
 fn hair_fresnel(c: f32) -> f32 {
@@ -49,30 +49,30 @@ fn hair_fresnel(c: f32) -> f32 {
 }
 
 // depth: absorption over a radius
-fn hair_shares(sin_o: f32, depth: vec3f, h: f32) -> Shares {
+fn hair_fibre_terms(sin_o: f32, depth: vec3f, h: f32) -> FibreTerms {
     let cos_o = sqrt(max(1.0 - sin_o * sin_o, 1e-5));
     let inner = h * cos_o / sqrt(HAIR_ETA * HAIR_ETA - sin_o * sin_o);
-    let way = 2.0 * sqrt(1.0 - inner * inner) / sqrt(1.0 - sin_o * sin_o / (HAIR_ETA * HAIR_ETA));
-    let through = exp(-depth * way);
+    let path_length = 2.0 * sqrt(1.0 - inner * inner) / sqrt(1.0 - sin_o * sin_o / (HAIR_ETA * HAIR_ETA));
+    let through = exp(-depth * path_length);
     let f = hair_fresnel(cos_o * sqrt(1.0 - h * h));
-    let passed = (1.0 - f) * (1.0 - f) * through;
-    let inside = passed * through * f;
-    return Shares(f, passed, inside, inside * f * through / (1.0 - f * through));
+    let transmitted = (1.0 - f) * (1.0 - f) * through;
+    let internal = transmitted * through * f;
+    return FibreTerms(f, transmitted, internal, internal * f * through / (1.0 - f * through));
 }
 
-fn hair_place(k: u32) -> f32 {
-    return (2.0 * f32(k) + 1.0) / f32(HAIR_PLACES) - 1.0;
+fn hair_offset(k: u32) -> f32 {
+    return (2.0 * f32(k) + 1.0) / f32(HAIR_SAMPLES) - 1.0;
 }
 
 // Means of the shares: what light from all around each lobe gives.
-fn hair_albedo(sin_o: f32, depth: vec3f) -> Shares {
-    var mean = Shares(0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0));
-    for (var k = 0u; k < HAIR_PLACES; k += 1u) {
-        let one = hair_shares(sin_o, depth, hair_place(k));
-        mean.reflected += one.reflected / f32(HAIR_PLACES);
-        mean.passed += one.passed / f32(HAIR_PLACES);
-        mean.inside += one.inside / f32(HAIR_PLACES);
-        mean.rest += one.rest / f32(HAIR_PLACES);
+fn hair_albedo(sin_o: f32, depth: vec3f) -> FibreTerms {
+    var mean = FibreTerms(0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0));
+    for (var k = 0u; k < HAIR_SAMPLES; k += 1u) {
+        let one = hair_fibre_terms(sin_o, depth, hair_offset(k));
+        mean.reflected += one.reflected / f32(HAIR_SAMPLES);
+        mean.transmitted += one.transmitted / f32(HAIR_SAMPLES);
+        mean.internal += one.internal / f32(HAIR_SAMPLES);
+        mean.residual += one.residual / f32(HAIR_SAMPLES);
     }
     return mean;
 }
@@ -92,21 +92,21 @@ fn hair_asin(sine: f32) -> f32 {
 fn hair_scattered(sin_i: f32, sin_o: f32, phi: f32, depth: vec3f) -> vec3f {
     let cos_o = sqrt(max(1.0 - sin_o * sin_o, 1e-5));
     let along = vec4f(
-        hair_along(sin_i, hair_tilted(sin_o, -2.0), HAIR_VARIANCE),
-        hair_along(sin_i, hair_tilted(sin_o, 1.0), 0.25 * HAIR_VARIANCE),
-        hair_along(sin_i, hair_tilted(sin_o, 4.0), 4.0 * HAIR_VARIANCE),
-        hair_along(sin_i, sin_o, 4.0 * HAIR_VARIANCE),
+        hair_longitudinal(sin_i, hair_tilted(sin_o, -2.0), HAIR_VARIANCE),
+        hair_longitudinal(sin_i, hair_tilted(sin_o, 1.0), 0.25 * HAIR_VARIANCE),
+        hair_longitudinal(sin_i, hair_tilted(sin_o, 4.0), 4.0 * HAIR_VARIANCE),
+        hair_longitudinal(sin_i, sin_o, 4.0 * HAIR_VARIANCE),
     );
     var total = vec3f(0.0);
-    for (var k = 0u; k < HAIR_PLACES; k += 1u) {
-        let h = hair_place(k);
-        let one = hair_shares(sin_o, depth, h);
+    for (var k = 0u; k < HAIR_SAMPLES; k += 1u) {
+        let h = hair_offset(k);
+        let one = hair_fibre_terms(sin_o, depth, h);
         let entry = hair_asin(h);
         let inner = hair_asin(h * cos_o / sqrt(HAIR_ETA * HAIR_ETA - sin_o * sin_o));
-        total += vec3f(one.reflected * along.x * hair_around(phi + 2.0 * entry));
-        total += one.passed * (along.y * hair_around(phi - (2.0 * inner - 2.0 * entry + HAIR_PI)));
-        total += one.inside * (along.z * hair_around(phi - (4.0 * inner - 2.0 * entry + 2.0 * HAIR_PI)));
-        total += one.rest * (along.w * 0.5 / HAIR_PI);
+        total += vec3f(one.reflected * along.x * hair_azimuthal(phi + 2.0 * entry));
+        total += one.transmitted * (along.y * hair_azimuthal(phi - (2.0 * inner - 2.0 * entry + HAIR_PI)));
+        total += one.internal * (along.z * hair_azimuthal(phi - (4.0 * inner - 2.0 * entry + 2.0 * HAIR_PI)));
+        total += one.residual * (along.w * 0.5 / HAIR_PI);
     }
-    return total / f32(HAIR_PLACES);
+    return total / f32(HAIR_SAMPLES);
 }

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
-from dermis.base.registry import Named, Registry
+from dermis.base.registry import RegisteredName, Registry
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -65,6 +65,6 @@ MODELS: Registry[Model] = Registry(
 )
 """By the names that scenes use, the default first; imported when needed: a command's help is quick."""
 
-SpecularName = Annotated[str, Named(MODELS, "none")]
+SpecularName = Annotated[str, RegisteredName(MODELS, "none")]
 FresnelName = Literal["schlick", "exact"]
 EnergyName = Literal["none", "published", "full"]

@@ -13,13 +13,13 @@ from dermis.specular.fresnel import Fresnel, schlick
 from dermis.specular.models import Model
 from dermis.specular.torrance_sparrow import masked_lobe, smith_masking
 
-NARROW, WIDE = 0.75**2, 1.3**2
+NARROW_FACTOR, WIDE_FACTOR = 0.75**2, 1.3**2
 """Factors of m: an engine's 0.75 and 1.3 belong to its roughness, whose square is m [EpicGames2025]."""
 
-SHARE_OF_NARROW = 0.85
+NARROW_WEIGHT = 0.85
 """Weight of the narrow lobe, the rest is the wide one's [-] [EpicGames2025]."""
 
-LEAST_M, MOST_M = 0.05, 1.0
+MIN_ROUGHNESS, MAX_ROUGHNESS = 0.05, 1.0
 
 
 def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
@@ -43,8 +43,11 @@ def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
 
 def _mean(quantity: Callable[[Floats], Floats], m: ArrayLike) -> Floats:
     """Of both kinds of slopes, by their weights."""
-    narrow, wide = (np.clip(factor * np.asarray(m), LEAST_M, MOST_M) for factor in (NARROW, WIDE))
-    return np.asarray(SHARE_OF_NARROW * quantity(narrow) + (1.0 - SHARE_OF_NARROW) * quantity(wide))
+    narrow, wide = (
+        np.clip(factor * np.asarray(m), MIN_ROUGHNESS, MAX_ROUGHNESS)
+        for factor in (NARROW_FACTOR, WIDE_FACTOR)
+    )
+    return np.asarray(NARROW_WEIGHT * quantity(narrow) + (1.0 - NARROW_WEIGHT) * quantity(wide))
 
 
 TWO_LOBE = Model(
@@ -52,5 +55,5 @@ TWO_LOBE = Model(
     "a narrow and a wide kind of slopes, masked after Smith",
     reciprocal=True,
     sources=("EpicGames2025", "Smith1967", "Walter2007", "Beckmann1963"),
-    numbers={"narrow": NARROW, "wide": WIDE, "share_of_narrow": SHARE_OF_NARROW},
+    numbers={"narrow": NARROW_FACTOR, "wide": WIDE_FACTOR, "narrow_weight": NARROW_WEIGHT},
 )

@@ -2,16 +2,16 @@
 //#include "torrance_sparrow.wgsl"
 
 // factors of the roughness
-//#fill const NARROW: f32 = {narrow};
-//#fill const WIDE: f32 = {wide};
-//#fill const SHARE_OF_NARROW: f32 = {share_of_narrow};
+//#fill const NARROW_FACTOR: f32 = {narrow};
+//#fill const WIDE_FACTOR: f32 = {wide};
+//#fill const NARROW_WEIGHT: f32 = {narrow_weight};
 
 fn two_lobe(a: Angles, m: f32) -> f32 {
-    let narrow = clamp(NARROW * m, 0.05, 1.0);
-    let wide = clamp(WIDE * m, 0.05, 1.0);
-    let slopes = mix(beckmann(a, wide), beckmann(a, narrow), SHARE_OF_NARROW);
+    let narrow = clamp(NARROW_FACTOR * m, 0.05, 1.0);
+    let wide = clamp(WIDE_FACTOR * m, 0.05, 1.0);
+    let slopes = mix(beckmann(a, wide), beckmann(a, narrow), NARROW_WEIGHT);
     // Masking integrates over slopes: areas mix as they do.
-    let to_light = mix(smith_area(a.n_l, wide), smith_area(a.n_l, narrow), SHARE_OF_NARROW);
-    let to_eye = mix(smith_area(a.n_v, wide), smith_area(a.n_v, narrow), SHARE_OF_NARROW);
+    let to_light = mix(smith_area(a.n_l, wide), smith_area(a.n_l, narrow), NARROW_WEIGHT);
+    let to_eye = mix(smith_area(a.n_v, wide), smith_area(a.n_v, narrow), NARROW_WEIGHT);
     return slopes * fresnel(a.v_h) / (4.0 * PI * to_light * to_eye);
 }

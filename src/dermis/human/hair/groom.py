@@ -1,4 +1,4 @@
-"""Hair, beard, brows and lashes of a person, rooted in the same places of everyone's skin."""
+"""Hair, beard, brows and lashes of a person; the roots are the same for all people."""
 
 from __future__ import annotations
 
@@ -9,150 +9,153 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.human.hair import brows, lashes
-from dermis.human.hair.brows import BrowSkin
-from dermis.human.hair.grown import Ground, Grown, Rooted, Skin
-from dermis.human.hair.hairy_skin import skin_beside
+from dermis.human.hair.brows import BrowSurface
+from dermis.human.hair.density import skin_vertices_near_hair
 from dermis.human.hair.head_hair import beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.rooting import SIDES, Rooting, eye_middles
+from dermis.human.hair.root_finder import SIDES, RootFinder, eye_centres
+from dermis.human.hair.skin_surface import GrowthSurface, HairGroup, RootFrames, SkinSurface
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, Strands, seen_in
 from dermis.specular.hair import absorption_per_mm
 
-_LASHES_DARKER = 1.6
-_ALIKE = 5  # hairs of head and beard whose mean one that is drawn has the colour of
-_LEAST_EUMELANIN = 0.07  # white hair is not quite white
+_LASH_PIGMENT_FACTOR = 1.6
+_HAIRS_PER_COLOUR = 5  # hairs of head and beard whose colours are averaged in one strand
+_MIN_EUMELANIN = 0.07  # white hair is not quite white
 
 
-def groomed(
+def add_hair(
     head: Head,
-    plain: Head,
-    rooting: Rooting,
+    control_head: Head,
+    root_finder: RootFinder,
     look: HairLook,
     recession: float = 0.0,
     hairs: float = 1.0,
 ) -> Head:
-    """The head with hair, beard, brows and lashes.
+    """Return the head with hair, beard, brows and lashes.
 
-    plain : the head before it was subdivided
-    rooting : on the person whose brows are where the artist has them
+    control_head : the head before subdivision
+    root_finder : of the template person, on whom brows and lashes are defined
     recession : see `SkinLook`
-    hairs : share of those of head and beard that grows, each as much wider
+    hairs : fraction of the hairs of head and beard that grow, each wider by the inverse
     """
-    skin = Skin(head.mesh, skin_beside(rooting, look.beard_mm > 0.0))
-    ground = Ground(head, plain.mesh, skin, hairs)
+    skin = SkinSurface(head.mesh, skin_vertices_near_hair(root_finder, look.beard_mm > 0.0))
+    surface = GrowthSurface(head, control_head.mesh, skin, hairs)
     rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDES]
-    left, right = _brows(ground, rooting, look, rngs)
-    rows = list(_lashes(ground, rooting, eye_middles(plain.mesh), rngs))
-    parts = [left, *rows[:2], right, *rows[2:]]
-    head = replace(head, strands=_joined(parts, _absorption(parts, look)))
-    hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
+    left, right = _brows(surface, root_finder, look, rngs)
+    rows = list(_lashes(surface, root_finder, eye_centres(control_head.mesh), rngs))
+    groups = [left, *rows[:2], right, *rows[2:]]
+    head = replace(head, strands=_join(groups, _absorption(groups, look)))
+    hair = [*scalp_hair(surface, look, recession), *beard_hair(surface, look)]
     if not hair:
         return head
-    joined = _joined(hair, _mixed_absorption(hair, look))
-    return replace(head, hair=_shuffled(joined, look.seed))
+    joined = _join(hair, _mixed_absorption(hair, look))
+    return replace(head, hair=_shuffle(joined, look.seed))
 
 
-def _shuffled(strands: Strands, seed: int) -> Strands:
-    """The same hairs in no order, so that the first few are like all."""
+def _shuffle(strands: Strands, seed: int) -> Strands:
+    """Return the strands in random order, so that the first few represent all."""
     order = np.random.default_rng((seed, 5)).permutation(len(strands))
     roots = Roots(strands.roots.quad.take(order), strands.roots.place.take(order, axis=0))
     names = "knots_mm", "radius_mm", "absorption", "cover"
-    parts = {name: getattr(strands, name).take(order, axis=0) for name in names}
-    return replace(strands, roots=roots, **parts)
+    arrays = {name: getattr(strands, name).take(order, axis=0) for name in names}
+    return replace(strands, roots=roots, **arrays)
 
 
 def _brows(
-    ground: Ground, rooting: Rooting, look: HairLook, rngs: list[np.random.Generator]
-) -> Iterator[Grown]:
-    """The left and the right brow, grown at once: for so few hairs each step costs what it costs for one."""
-    roots, told = [], []
+    surface: GrowthSurface, root_finder: RootFinder, look: HairLook, rngs: list[np.random.Generator]
+) -> Iterator[HairGroup]:
+    """Yield the left and the right brow, which are computed together as each array operation has a fixed cost."""
+    roots, parameters = [], []
     for side, rng in zip(SIDES, rngs, strict=True):
-        u, v, x, y = brows.places(rng)
-        found, there = rooting.in_front(side * x, y)
-        kept = np.flatnonzero(there)[: brows.count(look)]
-        roots.append(Roots(found.quad[kept], found.place[kept]))
-        shape = brows.shapes(u[kept], v[kept], rng, look)
-        told.append(np.vstack([np.full(len(kept), side), x[kept], y[kept], shape]))
-    where, hair = ground.rooted(_roots(roots)), np.concatenate(told, axis=1)
-    skin = BrowSkin(*ground.skin.foot(ground.rooted(rooting.around_brows).places))
-    both = _grown(where, *brows.grown(skin, where.places, hair[0], hair[1:3], hair[3:]), 1.0)
-    yield from _parted(both, [len(part.quad) for part in roots])
+        u, v, x, y = brows.sample_positions(rng)
+        found, hit = root_finder.front_roots(side * x, y)
+        index = np.flatnonzero(hit)[: brows.hair_count(look)]
+        roots.append(Roots(found.quad[index], found.place[index]))
+        shape = brows.sample_shapes(u[index], v[index], rng, look)
+        parameters.append(np.vstack([np.full(len(index), side), x[index], y[index], shape]))
+    frames, hair = surface.root_frames(_concatenate(roots)), np.concatenate(parameters, axis=1)
+    grid_mm = surface.root_frames(root_finder.brow_grid_roots).positions_mm
+    brow_surface = BrowSurface(*surface.skin.project(grid_mm))
+    knots, radius = brows.grow(brow_surface, frames.positions_mm, hair[0], hair[1:3], hair[3:])
+    yield from _split(_hair_group(frames, knots, radius, 1.0), [len(part.quad) for part in roots])
 
 
 def _lashes(
-    ground: Ground, rooting: Rooting, eyes: Doubles, rngs: list[np.random.Generator]
-) -> Iterator[Grown]:
-    """The upper and the lower lashes of the left eye, then those of the right one, grown at once too.
+    surface: GrowthSurface, root_finder: RootFinder, eyes: Doubles, rngs: list[np.random.Generator]
+) -> Iterator[HairGroup]:
+    """Yield the upper and the lower lashes of the left eye, then those of the right eye, computed together.
 
-    eyes : (2, 3) middles
+    eyes : (2, 3) centres of the eyes [mm]
     """
-    roots, told, before = [], [], 0
+    roots, parameters, clumps = [], [], 0
     for side, eye, rng in zip(SIDES, eyes, rngs, strict=True):
-        for lid in (lashes.UPPER, lashes.LOWER):
-            u, across = lashes.places(lid, rng)
-            roots.append(rooting.beside_lid(lid, side, u, across))
-            shape = lashes.shapes(lid, u, rng, before)
-            told.append(np.vstack([np.full((len(u), 4), [side, *eye]).T, shape]))
-            before += len(u) + 1
-    where, hair = ground.rooted(_roots(roots)), np.concatenate(told, axis=1)
-    grown = lashes.grown(where.places, hair[1:4].T, hair[0], hair[4:])
-    yield from _parted(_grown(where, *grown, _LASHES_DARKER), [len(part.quad) for part in roots])
+        for row in (lashes.UPPER_LASHES, lashes.LOWER_LASHES):
+            u, across = lashes.sample_positions(row, rng)
+            roots.append(root_finder.lid_edge_roots(row, side, u, across))
+            shape = lashes.sample_shapes(row, u, rng, clumps)
+            parameters.append(np.vstack([np.full((len(u), 4), [side, *eye]).T, shape]))
+            clumps += len(u) + 1
+    frames, hair = surface.root_frames(_concatenate(roots)), np.concatenate(parameters, axis=1)
+    knots, radius = lashes.grow(frames.positions_mm, hair[1:4].T, hair[0], hair[4:])
+    group = _hair_group(frames, knots, radius, _LASH_PIGMENT_FACTOR)
+    yield from _split(group, [len(part.quad) for part in roots])
 
 
-def _parted(hair: Grown, counts: list[int]) -> Iterator[Grown]:
-    """So many of some hairs after the other."""
+def _split(group: HairGroup, counts: list[int]) -> Iterator[HairGroup]:
+    """Yield consecutive parts of a group with these numbers of hairs."""
     for end, count in zip(np.cumsum(counts).tolist(), counts, strict=True):
         part = slice(end - count, end)
-        roots = Roots(hair.roots.quad[part], hair.roots.place[part])
-        yield hair._replace(roots=roots, knots=hair.knots[part], radius=hair.radius[part])
+        roots = Roots(group.roots.quad[part], group.roots.place[part])
+        yield group._replace(roots=roots, knots=group.knots[part], radius=group.radius[part])
 
 
-def _grown(where: Rooted, knots_mm: Doubles, radius_mm: Doubles, darker: float) -> Grown:
-    """Hairs whose knots (n, k, 3) are told in the space of the person."""
-    ways = seen_in(where.frame, knots_mm - where.places[:, None])
-    return Grown(where.roots, ways, radius_mm.astype(np.float32), darker)
+def _hair_group(
+    frames: RootFrames, knots_mm: Doubles, radius_mm: Doubles, pigment_factor: float
+) -> HairGroup:
+    """Return hairs from knots (n, k, 3) in the coordinates of the head [mm]."""
+    offsets = seen_in(frames.frame, knots_mm - frames.positions_mm[:, None])
+    return HairGroup(frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)
 
 
-def _joined(parts: list[Grown], absorption: Doubles) -> Strands:
-    """All hairs of some kinds.
+def _join(groups: list[HairGroup], absorption: Doubles) -> Strands:
+    """Return the strands of all groups.
 
     absorption : (n, 3) of single hairs [1/mm]
     """
-    roots = _roots(part.roots for part in parts)
-    ways, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
-    bundle, cover = (_each(parts, name) for name in ("bundle", "cover"))
-    return Strands(
-        roots, ways, radius, (absorption / bundle[:, None]).astype(np.float32), cover.astype(np.float32)
-    )
+    roots = _concatenate(group.roots for group in groups)
+    knots, radius = (np.concatenate([group[k] for group in groups]) for k in (1, 2))
+    hairs_per_strand, cover = (_per_hair(groups, name) for name in ("hairs_per_strand", "cover"))
+    strand_absorption = (absorption / hairs_per_strand[:, None]).astype(np.float32)
+    return Strands(roots, knots, radius, strand_absorption, cover.astype(np.float32))
 
 
-def _roots(parts: Iterable[Roots]) -> Roots:
+def _concatenate(parts: Iterable[Roots]) -> Roots:
     quads, places = zip(*parts, strict=True)
     return Roots(np.concatenate(quads), np.concatenate(places))
 
 
-def _each(parts: list[Grown], name: str) -> Doubles:
-    """(n,) a number of the kinds, for each of their hairs."""
-    return np.concatenate([np.full(len(part.radius), getattr(part, name)) for part in parts])
+def _per_hair(groups: list[HairGroup], name: str) -> Doubles:
+    """Return a scalar field of the groups, repeated for each of their hairs (n,)."""
+    return np.concatenate([np.full(len(group.radius), getattr(group, name)) for group in groups])
 
 
-def _absorption(parts: list[Grown], look: HairLook) -> Doubles:
-    """(n, 3) of brows and lashes, of which some have no pigment [1/mm]."""
-    rng, darker = np.random.default_rng((look.seed, 2)), _each(parts, "darker")
-    n = len(darker)
-    much = darker * rng.lognormal(0.0, 0.15, n) * (rng.random(n) >= look.grey)
-    return absorption_per_mm(much * look.eumelanin, much * look.pheomelanin)
+def _absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
+    """Return the absorption (n, 3) of brows and lashes, some of which are white [1/mm]."""
+    rng, pigment_factor = np.random.default_rng((look.seed, 2)), _per_hair(groups, "pigment_factor")
+    n = len(pigment_factor)
+    amount = pigment_factor * rng.lognormal(0.0, 0.15, n) * (rng.random(n) >= look.grey)
+    return absorption_per_mm(amount * look.eumelanin, amount * look.pheomelanin)
 
 
-def _mixed_absorption(parts: list[Grown], look: HairLook) -> Doubles:
-    """(n, 3) of hairs that stand for some, of which some have no pigment [1/mm].
+def _mixed_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
+    """Return the absorption (n, 3) of strands that represent several hairs, some of them white [1/mm].
 
-    The mean of white and of brown hairs is grey, where brown hair with less pigment would be blond.
+    The mean of white and brown hairs is grey; brown hair with less pigment would be blond.
     """
-    rng, n = np.random.default_rng((look.seed, 6)), sum(len(part.radius) for part in parts)
-    white = rng.binomial(_ALIKE, look.grey, n)[:, None] / _ALIKE
-    much = rng.lognormal(0.0, 0.12, n)
-    dark = absorption_per_mm(much * look.eumelanin, much * look.pheomelanin)
+    rng, n = np.random.default_rng((look.seed, 6)), sum(len(group.radius) for group in groups)
+    white = rng.binomial(_HAIRS_PER_COLOUR, look.grey, n)[:, None] / _HAIRS_PER_COLOUR
+    amount = rng.lognormal(0.0, 0.12, n)
+    dark = absorption_per_mm(amount * look.eumelanin, amount * look.pheomelanin)
     mixed = (1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True)
-    return np.asarray(np.maximum((1.0 - white) ** 2 * mixed, absorption_per_mm(_LEAST_EUMELANIN, 0.0)))
+    return np.asarray(np.maximum((1.0 - white) ** 2 * mixed, absorption_per_mm(_MIN_EUMELANIN, 0.0)))

@@ -10,37 +10,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats
-from dermis.human.hair import hairy_skin
-from dermis.human.hair.grown import Ground, Grown, Rooted, Skin, flattened
-from dermis.human.hair.hairy_skin import HEAD_AXIS_Z, above_hairline, smoothstep, told
+from dermis.human.hair import density
+from dermis.human.hair.density import HEAD_AXIS_Z, average_points, height_above_hairline, smoothstep
 from dermis.human.hair.look import HairLook
+from dermis.human.hair.skin_surface import (
+    GrowthSurface,
+    HairGroup,
+    RootFrames,
+    SkinSurface,
+    tangent_component,
+)
 from dermis.mesh.geometry import compacted, crosses, dots
 from dermis.mesh.strands import Roots, corners, weights
 
 # Artist's values on the average person [mm].
-_WHORL = np.array([9.0, 86.0, -131.0])
+_WHORL_CENTRE = np.array([9.0, 86.0, -131.0])
 _WHORL_MM = 24.0  # around it hair turns in a spiral
-_PART_X = 31.0  # of the line from which short hair is swept to the other side
-_PART_MM = 9.0
-_TILT = 0.15  # of the levels of length, higher in front
+_PARTING_X = 31.0  # of the line from which short hair is swept to the other side
+_PARTING_WIDTH_MM = 9.0
+_LEVEL_TILT = 0.15  # of the levels of length, higher in front
 _CROPPED_RISE, _BEARD_RISE = (0.95, 0.75), (0.85, 0.35)  # of root and tip [rad]
 _SHORT_RISE, _TOP_RISE = (0.5, -0.05), (0.55, -0.35)  # at the sides, and by how much more on top
 _TUFT_MM = 2.2  # between tufts
-_LEAST_OVER_MM = 0.35  # the skin
-_HEAD_MM = 85.0  # radius
-_LEAST = np.float32(1e-9)
-MOST_PER_CM2 = 200.0
+_MIN_HEIGHT_MM = 0.35  # the skin
+_HEAD_RADIUS_MM = 85.0  # radius
+_EPSILON = np.float32(1e-9)
+MAX_PER_CM2 = 200.0
 """Hairs of the densest heads."""
 BEARD_PER_CM2 = 60.0
 """Hairs of beards."""
-_HAIR_MM, _BEARD_MM = 0.034, 0.048  # radius of a hair
-_TIP = 0.6  # of that, at the tip
-_STRAIGHT_KNOTS, _BENT_KNOTS, _COILED_KNOTS = 5, 7, 9
-_TIGHT = 0.5  # curl from which on there are coils
+_HAIR_RADIUS_MM, _BEARD_RADIUS_MM = 0.034, 0.048  # radius of a hair
+_TIP_RADIUS_FACTOR = 0.6  # of that, at the tip
+_STRAIGHT_KNOTS, _CURVED_KNOTS, _COILED_KNOTS = 5, 7, 9
+_COIL_CURL = 0.5  # curl from which on there are coils
 _LONG_BEARD_MM = 8.0
 
 
-class Combed(NamedTuple):
+class GuideShape(NamedTuple):
     """How hairs lie.
 
     way : (n, 3) unit directions along the skin
@@ -48,80 +54,80 @@ class Combed(NamedTuple):
     rise, last_rise : (n,) angles over the skin of root and tip [rad]
     """
 
-    way: Doubles
+    directions: Doubles
     length_mm: Doubles
     rise: Doubles
     last_rise: Doubles
 
 
-def combed(places: Doubles, normals: Doubles, look: HairLook, recession: float) -> Combed:
+def comb_scalp(places: Doubles, normals: Doubles, look: HairLook, recession: float) -> GuideShape:
     """The hair of the head.
 
     places : (n, 3) on the average person [mm]
     normals : (n, 3) of the person's skin
     recession : see `SkinLook`
     """
-    grown, top, n = _grown(places, normals), _top(places), len(places)
-    edge = above_hairline(places, recession)
+    growth, top, n = _growth_directions(places, normals), _top_weight(places), len(places)
+    edge = height_above_hairline(places, recession)
     if look.style == "cropped":
         length = look.length_mm * (0.55 + 0.45 * smoothstep(-2.0, 22.0, edge)) * (0.85 + 0.15 * top)
-        return Combed(grown, length, *(np.full(n, rise) for rise in _CROPPED_RISE))
-    high = places[:, 1] + _TILT * (places[:, 2] - HEAD_AXIS_Z)
+        return GuideShape(growth, length, *(np.full(n, rise) for rise in _CROPPED_RISE))
+    high = places[:, 1] + _LEVEL_TILT * (places[:, 2] - HEAD_AXIS_Z)
     sides = 1.0 - look.fade * (1.0 - smoothstep(-45.0, 62.0, high))
     near = 0.3 + 0.7 * np.maximum(smoothstep(0.0, 35.0, edge), top)
     length = look.length_mm * np.minimum(sides, near)
     rise = (side + more * top for side, more in zip(_SHORT_RISE, _TOP_RISE, strict=True))
-    return Combed(_swept(places, normals, grown), length, *rise)
+    return GuideShape(_combed_directions(places, normals, growth), length, *rise)
 
 
-def combed_beard(places: Doubles, normals: Doubles, look: HairLook) -> Combed:
-    """The beard, down and a little to the sides; see `combed`."""
+def comb_beard(places: Doubles, normals: Doubles, look: HairLook) -> GuideShape:
+    """The beard, down and a little to the sides; see `comb_scalp`."""
     n = len(places)
     aside = 0.4 * np.clip(places[:, 0] / 25.0, -1.0, 1.0)
-    way = along_skin(np.stack([aside, np.full(n, -1.0), np.zeros(n)], axis=1), normals)
-    return Combed(way, np.full(n, look.beard_mm), *(np.full(n, rise) for rise in _BEARD_RISE))
+    directions = tangent_directions(np.stack([aside, np.full(n, -1.0), np.zeros(n)], axis=1), normals)
+    return GuideShape(directions, np.full(n, look.beard_mm), *(np.full(n, rise) for rise in _BEARD_RISE))
 
 
-def along_skin(ways: Doubles, normals: Doubles) -> Doubles:
+def tangent_directions(offsets: Doubles, normals: Doubles) -> Doubles:
     """Unit vectors: what of ways (n, 3) lies along the skin."""
-    flat = flattened(ways, normals)
+    flat = tangent_component(offsets, normals)
     return np.asarray(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9))
 
 
-def turned(ways: Doubles, normals: Doubles, angle: Doubles) -> Doubles:
+def rotate_about_normals(offsets: Doubles, normals: Doubles, angle: Doubles) -> Doubles:
     """Ways along the skin turned about its normals by angles (n,) [rad]."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    return np.asarray(c * ways + s * np.cross(normals, ways))
+    return np.asarray(c * offsets + s * np.cross(normals, offsets))
 
 
-def _grown(places: Doubles, normals: Doubles) -> Doubles:
+def _growth_directions(places: Doubles, normals: Doubles) -> Doubles:
     """As hair grows: away from the whorl, and down at sides and nape."""
-    away = places - _WHORL
+    away = places - _WHORL_CENTRE
     spiral = 1.1 * np.exp(-(away**2).sum(axis=1) / _WHORL_MM**2)
-    ways = turned(along_skin(away, normals), normals, spiral)
+    offsets = rotate_about_normals(tangent_directions(away, normals), normals, spiral)
     low = 1.2 * smoothstep(40.0, -30.0, places[:, 1])
     back = 0.35 * smoothstep(-120.0, -60.0, places[:, 2])
     down = np.stack([np.zeros(len(places)), -low, -low * back], axis=1)
-    return along_skin(ways + down, normals)
+    return tangent_directions(offsets + down, normals)
 
 
-def _top(places: Doubles) -> Doubles:
+def _top_weight(places: Doubles) -> Doubles:
     """1 on top of the head, 0 at its sides and behind."""
-    return smoothstep(48.0, 86.0, places[:, 1] + _TILT * (places[:, 2] - HEAD_AXIS_Z))
+    return smoothstep(48.0, 86.0, places[:, 1] + _LEVEL_TILT * (places[:, 2] - HEAD_AXIS_Z))
 
 
-def _swept(places: Doubles, normals: Doubles, grown: Doubles) -> Doubles:
+def _combed_directions(places: Doubles, normals: Doubles, growth: Doubles) -> Doubles:
     """As hair is combed: on top from the parting to the other side, at the sides down and back."""
     one = np.ones(len(places))
-    top = 2.2 * _top(places) * smoothstep(-135.0, -95.0, places[:, 2])
-    away = np.tanh((places[:, 0] - _PART_X) / _PART_MM)
+    top = 2.2 * _top_weight(places) * smoothstep(-135.0, -95.0, places[:, 2])
+    away = np.tanh((places[:, 0] - _PARTING_X) / _PARTING_WIDTH_MM)
     across = np.stack([away, 0.25 * one, 0.55 * one], axis=1)
-    side = 1.2 * (1.0 - _top(places)) * smoothstep(-120.0, -80.0, places[:, 2])
+    side = 1.2 * (1.0 - _top_weight(places)) * smoothstep(-120.0, -80.0, places[:, 2])
     down = np.stack([0.0 * one, -one, -0.55 * one], axis=1)
-    return along_skin(grown + top[:, None] * across + side[:, None] * down, normals)
+    return tangent_directions(growth + top[:, None] * across + side[:, None] * down, normals)
 
 
-class Roughness(NamedTuple):
+class HairVariation(NamedTuple):
     """By how much hairs differ from their guides.
 
     astray : angle to the side [rad]
@@ -132,22 +138,22 @@ class Roughness(NamedTuple):
     coils : how many turns
     """
 
-    astray: float
-    uneven: float
-    tufts: float
+    angle_deviation: float
+    length_deviation: float
+    tuft_strength: float
     frizz: float
     coil_mm: float = 0.0
     coils: float = 0.0
 
 
-def grown(
-    ground: Ground,
+def grow_hair(
+    surface: GrowthSurface,
     roots: Roots,
-    comb: Callable[[Doubles, Doubles], Combed],
+    comb: Callable[[Doubles, Doubles], GuideShape],
     knots: int,
-    rough: Roughness,
+    variation: HairVariation,
     rng: np.random.Generator,
-) -> tuple[Rooted, Floats]:
+) -> tuple[RootFrames, Floats]:
     """Hairs on the head, and (k, 3, n) ways from their roots to their knots [mm].
 
     roots : on quads of the plain mesh, at whose corners the guides of their hairs grow
@@ -156,43 +162,45 @@ def grown(
     Hairs come last in all arrays here, so that what is done to one is done to all at once. What must be the
     same on all machines is so: sines are taken of doubles, and floats are only added and multiplied.
     """
-    hair, around = ground.rooted(roots), corners(ground.plain, roots.quad)
+    hair, around = surface.root_frames(roots), corners(surface.control_mesh, roots.quad)
     point, near = compacted(around)
-    root_mm = ground.points_mm[point]
-    foot, normals = ground.skin.foot(root_mm)
-    ways = _guides(ground.skin, root_mm, foot, normals, comb(told()[point, :3], normals), knots)
-    t, normal = np.linspace(0.0, 1.0, knots)[:, None], hair.along[2]
-    found = _astray(_between(weights(roots.place), near, ways), normal, rough, rng)
-    _draw_together(found, hair.places, t, rough.tufts, rng)
+    root_mm = surface.points_mm[point]
+    project, normals = surface.skin.project(root_mm)
+    offsets = _trace_guides(
+        surface.skin, root_mm, project, normals, comb(average_points()[point, :3], normals), knots
+    )
+    t, normal = np.linspace(0.0, 1.0, knots)[:, None], hair.frame_vectors[2]
+    found = _vary_directions(_interpolate_guides(weights(roots.place), near, offsets), normal, variation, rng)
+    _form_tufts(found, hair.positions_mm, t, variation.tuft_strength, rng)
     tips = found[-1]
-    size = np.asarray(rough.frizz * np.sqrt(dots(tips, tips)), np.float32)
+    size = np.asarray(variation.frizz * np.sqrt(dots(tips, tips)), np.float32)
     for fade, part in _waves(size, t, rng):
         found += fade[..., None].astype(np.float32) * part
-    if rough.coil_mm:
-        found += _coils(found[-1], t, rough, rng)
-    return hair, _over_skin(found, normal, t.astype(np.float32))
+    if variation.coil_mm:
+        found += _coils(found[-1], t, variation, rng)
+    return hair, _lift_above_skin(found, normal, t.astype(np.float32))
 
 
-def _guides(
-    skin: Skin, root_mm: Doubles, foot: Doubles, normal: Doubles, combed: Combed, knots: int
+def _trace_guides(
+    skin: SkinSurface, root_mm: Doubles, project: Doubles, normal: Doubles, guide: GuideShape, knots: int
 ) -> Doubles:
     """(g, k, 3) ways from roots to knots, over the skin [mm].
 
-    root_mm, foot, normal : (g, 3) with what `Skin.foot` says of them
+    root_mm, foot, normal : (g, 3) with what `SkinSurface.project` says of them
     """
-    off = root_mm - foot  # as far as the skin of few vertices is from the surface
-    way, height, step = combed.way, np.zeros(len(root_mm)), combed.length_mm / (knots - 1)
+    off = root_mm - project  # as far as the skin of few vertices is from the surface
+    directions, height, step = guide.directions, np.zeros(len(root_mm)), guide.length_mm / (knots - 1)
     found = [np.zeros_like(root_mm)]
     for k in range(1, knots):
-        rise = combed.rise + (combed.last_rise - combed.rise) * (k - 0.5) / (knots - 1)
-        height = np.maximum(height + step * np.sin(rise), _LEAST_OVER_MM)
-        way = along_skin(way, normal)
-        foot, normal = skin.foot(foot + (step * np.cos(rise))[:, None] * way)
-        found.append(foot + off + height[:, None] * normal - root_mm)
+        rise = guide.rise + (guide.last_rise - guide.rise) * (k - 0.5) / (knots - 1)
+        height = np.maximum(height + step * np.sin(rise), _MIN_HEIGHT_MM)
+        directions = tangent_directions(directions, normal)
+        project, normal = skin.project(project + (step * np.cos(rise))[:, None] * directions)
+        found.append(project + off + height[:, None] * normal - root_mm)
     return np.stack(found, axis=1)
 
 
-def _between(share: Doubles, near: NDArray[np.int64], ways: Doubles) -> Floats:
+def _interpolate_guides(share: Doubles, near: NDArray[np.int64], offsets: Doubles) -> Floats:
     """(k, 3, n) means of guides' ways.
 
     share, near : (n, 4) of which guides
@@ -200,25 +208,32 @@ def _between(share: Doubles, near: NDArray[np.int64], ways: Doubles) -> Floats:
     from scipy.sparse import csr_array
 
     first = np.arange(0, share.size + 1, share.shape[1])
-    shares = csr_array((share.ravel().astype(np.float32), near.ravel(), first), (len(share), len(ways)))
-    found = shares @ ways.reshape(len(ways), -1).astype(np.float32)
-    return np.ascontiguousarray(found.T).reshape(*ways.shape[1:], len(share))
+    shares = csr_array((share.ravel().astype(np.float32), near.ravel(), first), (len(share), len(offsets)))
+    found = shares @ offsets.reshape(len(offsets), -1).astype(np.float32)
+    return np.ascontiguousarray(found.T).reshape(*offsets.shape[1:], len(share))
 
 
-def _astray(ways: Floats, normal: Floats, rough: Roughness, rng: np.random.Generator) -> Floats:
+def _vary_directions(
+    offsets: Floats, normal: Floats, variation: HairVariation, rng: np.random.Generator
+) -> Floats:
     """Turned about the skin's normal, each as a whole, leaning more or less, and longer or shorter."""
-    n = ways.shape[-1]
-    angle, lean = rough.astray * rng.standard_t(4, size=n), 1.0 + rough.astray * rng.normal(size=n)
-    length = np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)
+    n = offsets.shape[-1]
+    angle, lean = (
+        variation.angle_deviation * rng.standard_t(4, size=n),
+        1.0 + variation.angle_deviation * rng.normal(size=n),
+    )
+    length = np.clip(1.0 + variation.length_deviation * rng.normal(size=n), 0.35, 1.2)
     stay, turn = length * np.cos(angle), length * np.sin(angle)
     stay, turn, rise = (one.astype(np.float32) for one in (stay, turn, length * lean - stay))
-    found: Floats = turn * crosses(normal, ways)
-    found += (rise * dots(ways, normal))[:, None] * normal
-    found += stay * ways
+    found: Floats = turn * crosses(normal, offsets)
+    found += (rise * dots(offsets, normal))[:, None] * normal
+    found += stay * offsets
     return found
 
 
-def _draw_together(ways: Floats, root_mm: Doubles, t: Doubles, much: float, rng: np.random.Generator) -> None:
+def _form_tufts(
+    offsets: Floats, root_mm: Doubles, t: Doubles, strength: float, rng: np.random.Generator
+) -> None:
     """Draw tips to those of a few, in tufts."""
     places = np.ascontiguousarray(root_mm.T)
     cell = np.zeros(len(root_mm), np.int64)
@@ -229,12 +244,12 @@ def _draw_together(ways: Floats, root_mm: Doubles, t: Doubles, much: float, rng:
     hair = np.empty(cell.max() + 1, np.int64)
     hair[cell] = np.arange(len(cell))  # one of those in each
     which = hair[cell]
-    drawn = (much * rng.uniform(0.3, 1.0, len(root_mm)) * t**1.3).astype(np.float32)
-    apart = ways.take(which, axis=-1)
-    apart -= ways
+    drawn = (strength * rng.uniform(0.3, 1.0, len(root_mm)) * t**1.3).astype(np.float32)
+    apart = offsets.take(which, axis=-1)
+    apart -= offsets
     apart += (places.take(which, axis=-1) - places).astype(np.float32)
     apart *= drawn[:, None]
-    ways += apart
+    offsets += apart
 
 
 def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple[Doubles, Floats]]:
@@ -242,25 +257,25 @@ def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple
     fade = np.minimum(2 * t, 1.0)
     for waves in (0.5, 1.1):
         for shape in (np.sin(2 * np.pi * waves * t), np.cos(2 * np.pi * waves * t) - 1.0):
-            much = rng.random((3, len(size)), np.float32) - np.float32(0.5)
-            yield np.sqrt(2.0) / waves * fade * shape, much * size
+            strength = rng.random((3, len(size)), np.float32) - np.float32(0.5)
+            yield np.sqrt(2.0) / waves * fade * shape, strength * size
 
 
-def _coils(tips: Floats, t: Doubles, rough: Roughness, rng: np.random.Generator) -> Floats:
+def _coils(tips: Floats, t: Doubles, variation: HairVariation, rng: np.random.Generator) -> Floats:
     """(k, 3, n) turns around the ways to tips (3, n), from the root on."""
     n = tips.shape[-1]
-    along = np.asarray(tips / np.maximum(np.sqrt(dots(tips, tips)), _LEAST), np.float32)
+    along = np.asarray(tips / np.maximum(np.sqrt(dots(tips, tips)), _EPSILON), np.float32)
     side: Floats = rng.normal(size=tips.shape).astype(np.float32)
     side -= dots(side, along) * along
-    side /= np.maximum(np.sqrt(dots(side, side)), _LEAST)
-    step = 2 * np.pi * t[1] * rough.coils * rng.uniform(0.8, 1.2, n)
+    side /= np.maximum(np.sqrt(dots(side, side)), _EPSILON)
+    step = 2 * np.pi * t[1] * variation.coils * rng.uniform(0.8, 1.2, n)
     turn = np.asarray(2 * np.pi * rng.random(n))
-    radius = rough.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
-    x, y = ((radius * one)[:, None].astype(np.float32) for one in _turned(turn, step, len(t)))
+    radius = variation.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
+    x, y = ((radius * one)[:, None].astype(np.float32) for one in _rotating_sines(turn, step, len(t)))
     return np.asarray(x * side + y * crosses(along, side))
 
 
-def _turned(turn: Doubles, step: Doubles, knots: int) -> tuple[Doubles, Doubles]:
+def _rotating_sines(turn: Doubles, step: Doubles, knots: int) -> tuple[Doubles, Doubles]:
     """Cosines and sines (k, n) of angles (n,) that grow by equal steps, of which only the first are taken."""
     x, y = np.empty((knots, len(turn))), np.empty((knots, len(turn)))
     x[0], y[0], more, across = np.cos(turn), np.sin(turn), np.cos(step), np.sin(step)
@@ -270,72 +285,74 @@ def _turned(turn: Doubles, step: Doubles, knots: int) -> tuple[Doubles, Doubles]
     return x, y
 
 
-def _over_skin(ways: Floats, normal: Floats, t: Floats) -> Floats:
+def _lift_above_skin(offsets: Floats, normal: Floats, t: Floats) -> Floats:
     """Lifted where a knot would be in the skin, taken as round as a head."""
-    height = dots(ways, normal)
-    flat2 = dots(ways, ways) - height**2
-    least = _LEAST_OVER_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_MM)
-    ways += np.maximum(least - height, 0.0)[:, None] * normal
-    return ways
+    height = dots(offsets, normal)
+    flat2 = dots(offsets, offsets) - height**2
+    least = _MIN_HEIGHT_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_RADIUS_MM)
+    offsets += np.maximum(least - height, 0.0)[:, None] * normal
+    return offsets
 
 
-def knots_of(look: HairLook) -> int:
+def knot_count(look: HairLook) -> int:
     """Of each hair: few for what is hardly bent."""
-    if look.curl > _TIGHT:
+    if look.curl > _COIL_CURL:
         return _COILED_KNOTS
-    return _BENT_KNOTS if look.style == "short" or look.beard_mm > _LONG_BEARD_MM else _STRAIGHT_KNOTS
+    return _CURVED_KNOTS if look.style == "short" or look.beard_mm > _LONG_BEARD_MM else _STRAIGHT_KNOTS
 
 
-def scalp_hair(ground: Ground, look: HairLook, recession: float) -> list[Grown]:
+def scalp_hair(surface: GrowthSurface, look: HairLook, recession: float) -> list[HairGroup]:
     """The hair of the head; none for a bald one."""
     if look.style == "none" or look.density == 0.0:
         return []
-    rng, drawn = np.random.default_rng((look.seed, 3)), ground.share * (22.0 + 53.0 * look.density)
-    roots = hairy_skin.rooted(ground.plain, hairy_skin.scalp(recession), drawn, rng)
-    comb = partial(combed, look=look, recession=recession)
-    hair, ways = grown(ground, roots, comb, knots_of(look), _roughness(look), rng)
-    return [_stranded(hair, ways, drawn, MOST_PER_CM2 * look.density, _HAIR_MM, rng)]
+    rng, drawn = np.random.default_rng((look.seed, 3)), surface.hair_fraction * (22.0 + 53.0 * look.density)
+    roots = density.sample_roots(surface.control_mesh, density.scalp_density(recession), drawn, rng)
+    comb = partial(comb_scalp, look=look, recession=recession)
+    hair, offsets = grow_hair(surface, roots, comb, knot_count(look), _scalp_variation(look), rng)
+    return [_hair_group(hair, offsets, drawn, MAX_PER_CM2 * look.density, _HAIR_RADIUS_MM, rng)]
 
 
-def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
+def beard_hair(surface: GrowthSurface, look: HairLook) -> list[HairGroup]:
     """The beard; none for a shaved one."""
     if look.beard_mm == 0.0:
         return []
-    rng, drawn = np.random.default_rng((look.seed, 4)), ground.share * BEARD_PER_CM2
-    roots = hairy_skin.rooted(ground.plain, hairy_skin.beard(), drawn, rng)
-    tight = max(look.curl - _TIGHT, 0.0) * 2
-    rough = Roughness(0.3, 0.22, 0.2, 0.05 + 0.1 * look.curl, 0.5 * tight, 1.5)
-    hair, ways = grown(ground, roots, partial(combed_beard, look=look), knots_of(look), rough, rng)
-    return [_stranded(hair, ways, drawn, BEARD_PER_CM2, _BEARD_MM, rng)]
+    rng, drawn = np.random.default_rng((look.seed, 4)), surface.hair_fraction * BEARD_PER_CM2
+    roots = density.sample_roots(surface.control_mesh, density.beard_density(), drawn, rng)
+    tight = max(look.curl - _COIL_CURL, 0.0) * 2
+    variation = HairVariation(0.3, 0.22, 0.2, 0.05 + 0.1 * look.curl, 0.5 * tight, 1.5)
+    hair, offsets = grow_hair(
+        surface, roots, partial(comb_beard, look=look), knot_count(look), variation, rng
+    )
+    return [_hair_group(hair, offsets, drawn, BEARD_PER_CM2, _BEARD_RADIUS_MM, rng)]
 
 
-def _stranded(
-    hair: Rooted,
-    ways: Floats,
+def _hair_group(
+    hair: RootFrames,
+    offsets: Floats,
     drawn: float,
     true: float,
     radius_mm: float,
     rng: np.random.Generator,
-) -> Grown:
+) -> HairGroup:
     """Hairs with their width; fewer than there are, and wider.
 
-    ways : (k, 3, n) from `grown`
+    ways : (k, 3, n) from `grow_hair`
     drawn, true : how many are made and how many there are on a square centimetre
     """
-    bundle, (knots, _, n) = true / drawn, ways.shape
-    radius = np.tile((bundle * radius_mm * rng.uniform(0.8, 1.2, (n, 1))).astype(np.float32), knots)
-    radius[:, -1] *= np.float32(_TIP)
-    steps = np.diff(ways, axis=0)
+    hairs_per_strand, (knots, _, n) = true / drawn, offsets.shape
+    radius = np.tile((hairs_per_strand * radius_mm * rng.uniform(0.8, 1.2, (n, 1))).astype(np.float32), knots)
+    radius[:, -1] *= np.float32(_TIP_RADIUS_FACTOR)
+    steps = np.diff(offsets, axis=0)
     length = np.sqrt(dots(steps, steps)).sum(axis=0, dtype=np.float64)
     area = float(np.mean(2.0 * radius.mean(axis=1) * length))  # seen from the side; halved as hair leans
     seen = np.empty((n, knots, 3), np.float32)
     for c in range(3):
-        seen[..., c] = dots(ways, hair.along[c]).T
-    return Grown(hair.roots, seen, radius, 1.0, bundle, 0.5 * area * drawn / 100.0)
+        seen[..., c] = dots(offsets, hair.frame_vectors[c]).T
+    return HairGroup(hair.roots, seen, radius, 1.0, hairs_per_strand, 0.5 * area * drawn / 100.0)
 
 
-def _roughness(look: HairLook) -> Roughness:
-    tight = max(look.curl - _TIGHT, 0.0) * 2
+def _scalp_variation(look: HairLook) -> HairVariation:
+    tight = max(look.curl - _COIL_CURL, 0.0) * 2
     if look.style == "cropped":
-        return Roughness(0.25, 0.12, 0.1 + 0.2 * tight, 0.04 + 0.06 * look.curl, 0.9 * tight, 2.0)
-    return Roughness(0.14, 0.14, 0.5, 0.025 + 0.04 * look.curl, 1.6 * tight, 2.0)
+        return HairVariation(0.25, 0.12, 0.1 + 0.2 * tight, 0.04 + 0.06 * look.curl, 0.9 * tight, 2.0)
+    return HairVariation(0.14, 0.14, 0.5, 0.025 + 0.04 * look.curl, 1.6 * tight, 2.0)

@@ -13,7 +13,7 @@ from dermis.human.hair.brows import KNOTS
 _ALONG = np.array([0.0, 0.15, 0.35, 0.55, 0.75, 0.9, 1.0])
 
 
-class Lid(NamedTuple):
+class LashRow(NamedTuple):
     """The lashes of one lid.
 
     loop : control points of the left lid's edge, from the nose outwards
@@ -25,7 +25,7 @@ class Lid(NamedTuple):
     radius : of the roots [mm]
     """
 
-    loop: tuple[int, ...]
+    edge_points: tuple[int, ...]
     hairs: int
     first: float
     last: float
@@ -35,8 +35,8 @@ class Lid(NamedTuple):
     radius: float
 
 
-UPPER = Lid(
-    loop=(2625, 2664, 2622, 2619, 2616, 2563, 2562, 2568, 2571, 2574, 2577, 2580),
+UPPER_LASHES = LashRow(
+    edge_points=(2625, 2664, 2622, 2619, 2616, 2563, 2562, 2568, 2571, 2574, 2577, 2580),
     hairs=165,
     first=0.14,
     last=0.96,
@@ -45,8 +45,8 @@ UPPER = Lid(
     splay=(-0.35, 0.55),
     radius=0.041,
 )
-LOWER = Lid(
-    loop=(2634, 2615, 4280, 2612, 2609, 2606, 2603, 2598, 2595, 2592, 4278),
+LOWER_LASHES = LashRow(
+    edge_points=(2634, 2615, 4280, 2612, 2609, 2606, 2603, 2598, 2595, 2592, 4278),
     hairs=84,
     first=0.2,
     last=0.95,
@@ -57,18 +57,18 @@ LOWER = Lid(
 )
 
 
-def places(lid: Lid, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
+def sample_positions(lid: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
     """Along the lid's edge, evenly but for chance, and from the edge onto the skin, each (n,)."""
     u = (np.arange(lid.hairs) + rng.uniform(-0.3, 1.3, lid.hairs)) / lid.hairs
     across = 0.04 + 0.12 * rng.integers(0, 3, lid.hairs)
     return lid.first + (lid.last - lid.first) * np.clip(u, 0, 1), np.asarray(across, np.float64)
 
 
-def shapes(lid: Lid, u: Doubles, rng: np.random.Generator, before: int) -> Doubles:
+def sample_shapes(lid: LashRow, u: Doubles, rng: np.random.Generator, before: int) -> Doubles:
     """(7, n) how far lashes splay, the angles of their first and last piece [rad], their length, the radius
     of their roots [mm], the number of their clump and how much of the way to its middle their tips are drawn.
 
-    u : (n,) along the lid's edge, from `places`
+    u : (n,) along the lid's edge, from `sample_positions`
     before : how many clumps other lids may have
     """
     n, share = len(u), (u - lid.first) / (lid.last - lid.first)
@@ -78,19 +78,19 @@ def shapes(lid: Lid, u: Doubles, rng: np.random.Generator, before: int) -> Doubl
     length = np.interp(share, _ALONG, lid.length) * rng.uniform(0.7, 1.08, n)
     clump = np.empty(n)  # of neighbours, as wet lashes stick to each other
     clump[np.argsort(u)] = before + np.cumsum(rng.random(n) < 0.4)
-    drawn = rng.uniform(0.2, 0.7, n)
+    pull = rng.uniform(0.2, 0.7, n)
     radius = lid.radius * rng.uniform(0.8, 1.15, n)
-    return np.stack([splay, first, last, length, radius, clump, drawn])
+    return np.stack([splay, first, last, length, radius, clump, pull])
 
 
-def grown(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
+def grow(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
     """Knots (n, k, 3) and radii (n, k) of lashes [mm].
 
     root_mm, eye_mm : (n, 3) on the lids, and middles of their eyes
     side : (n,) 1 for the left one
-    shape : (7, n) from `shapes`; no clump has lashes of two lids
+    shape : (7, n) from `sample_shapes`; no clump has lashes of two lids
     """
-    splay, first, last, length, radius, clump, drawn = shape
+    splay, first, last, length, radius, clump, pull = shape
     ahead = root_mm - eye_mm
     ahead = ahead * [0.55, 0.0, 1.0]  # lashes fan out less than the eye is round
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
@@ -98,18 +98,18 @@ def grown(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> t
     out = np.cross(up, ahead) * side[:, None]
     t = np.linspace(0.0, 1.0, KNOTS)
     angle = first + (last - first) * ((t[1:] - 0.5 / (KNOTS - 1)) ** 0.8)[:, None]
-    ways = np.cos(angle)[..., None] * ahead + np.sin(angle)[..., None] * up
-    ways += (splay * (0.4 + 0.6 * t[1:, None]))[..., None] * out
-    ways /= np.sqrt((ways**2).sum(axis=-1, keepdims=True))
-    steps = (length / (KNOTS - 1))[:, None] * ways
+    directions = np.cos(angle)[..., None] * ahead + np.sin(angle)[..., None] * up
+    directions += (splay * (0.4 + 0.6 * t[1:, None]))[..., None] * out
+    directions /= np.sqrt((directions**2).sum(axis=-1, keepdims=True))
+    steps = (length / (KNOTS - 1))[:, None] * directions
     knots = np.cumsum(np.concatenate([[root_mm - 0.25 * ahead], steps]), axis=0).swapaxes(0, 1)
-    made = _clumped(knots, clump.astype(np.int64), drawn, t)
-    return made, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.55 * np.minimum(1.0, 0.8 + t)
+    clumped = _clump_tips(knots, clump.astype(np.int64), pull, t)
+    return clumped, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.55 * np.minimum(1.0, 0.8 + t)
 
 
-def _clumped(knots: Doubles, clump: NDArray[np.int64], much: Doubles, t: Doubles) -> Doubles:
+def _clump_tips(knots: Doubles, clump: NDArray[np.int64], strength: Doubles, t: Doubles) -> Doubles:
     """Tips drawn together in clumps."""
     count = np.maximum(np.bincount(clump), 1)
     mean = np.stack([np.bincount(clump, knots[:, -1, c]) / count for c in range(3)], axis=-1)
-    drawn = (mean[clump] - knots[:, -1]) * much[:, None]
-    return np.asarray(knots + (t**1.6)[None, :, None] * drawn[:, None])
+    pull = (mean[clump] - knots[:, -1]) * strength[:, None]
+    return np.asarray(knots + (t**1.6)[None, :, None] * pull[:, None])

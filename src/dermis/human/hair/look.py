@@ -7,10 +7,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from dermis.base.errors import refuse, shown_value
-from dermis.base.quantities import check_numbers
-from dermis.human.published import OLD, YOUNG
-from dermis.human.skin.look import Origin
+from dermis.base.errors import format_value, refuse
+from dermis.base.quantities import check_fields
+from dermis.human.makehuman import OLD, YOUNG
+from dermis.human.skin.look import Demographics
 
 Style = Literal["none", "cropped", "short"]
 STYLES: tuple[Style, ...] = get_args(Style)
@@ -24,10 +24,10 @@ RANGES = {
 """Least and greatest values of fields that do not go from 0 to 1."""
 # Artist's values.
 _CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
-_TIGHT = 0.6  # curl from which on hair is cropped
-_CROPPED_MM, _SHORT_MM, _SHORT_MAN_MM = 6.0, 32.0, 27.0
-_LONGEST_BEARD_MM = 14.0
-_DARK = 3.0  # eumelanin from which on shaved hair shows as much as it can
+_CROPPED_CURL = 0.6  # curl from which on hair is cropped
+_CROPPED_LENGTH_MM, _SHORT_LENGTH_MM, _SHORT_MALE_LENGTH_MM = 6.0, 32.0, 27.0
+_MAX_BEARD_MM = 14.0
+_DARK_EUMELANIN = 3.0  # eumelanin from which on shaved hair shows as much as it can
 
 
 @dataclass(frozen=True)
@@ -61,65 +61,77 @@ class HairLook:
 
     def __post_init__(self) -> None:
         if self.style not in STYLES:
-            refuse("style", f"one of {', '.join(STYLES)}", f"{shown_value(self.style)} came", "Choose one")
-        check_numbers(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)[1:]})
+            refuse("style", f"one of {', '.join(STYLES)}", f"got {format_value(self.style)}", "Choose one")
+        check_fields(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)[1:]})
 
 
-def usual_hair(origin: Origin, eumelanin: float, pheomelanin: float) -> HairLook:
+def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: float) -> HairLook:
     """The hair that goes with a person: by ancestry, age and sex.
 
     eumelanin, pheomelanin : see `HairLook`
     """
-    old = (origin.age - YOUNG) / (OLD - YOUNG)
-    curl = origin.mean(_CURL)
-    tight = curl > _TIGHT
+    old = (demographics.age - YOUNG) / (OLD - YOUNG)
+    curl = demographics.weighted_mean(_CURL)
+    tight = curl > _CROPPED_CURL
     return HairLook(
         style="cropped" if tight else "short",
-        length_mm=_CROPPED_MM if tight else _SHORT_MM + (_SHORT_MAN_MM - _SHORT_MM) * origin.sex,
+        length_mm=_CROPPED_LENGTH_MM
+        if tight
+        else _SHORT_LENGTH_MM + (_SHORT_MALE_LENGTH_MM - _SHORT_LENGTH_MM) * demographics.sex,
         density=0.9 - 0.25 * old,
         curl=curl,
-        fade=0.55 + 0.3 * origin.sex,
-        bushy=min(1.0, 0.25 + 0.5 * origin.sex + 0.25 * old * origin.sex),
+        fade=0.55 + 0.3 * demographics.sex,
+        bushy=min(1.0, 0.25 + 0.5 * demographics.sex + 0.25 * old * demographics.sex),
         grey=max(0.0, 0.9 * old - 0.25),
         eumelanin=eumelanin,
         pheomelanin=pheomelanin,
     )
 
 
-def drawn_hair(rng: np.random.Generator, origin: Origin, usual: HairLook) -> HairLook:
+def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: HairLook) -> HairLook:
     """Hair at random around the usual one, by numbers that are always drawn in the same order.
 
     Men crop and shave theirs more often than women, and only they have beards.
     """
-    n, share, bearded = rng.normal(size=4), rng.random(), rng.random()
-    man = origin.sex > 0.5
+    n, style_chance, beard_chance = rng.normal(size=4), rng.random(), rng.random()
+    man = demographics.sex > 0.5
     bare, cropped = (0.12, 0.5) if man else (0.03, 0.25)
-    curl = float(np.clip(usual.curl + 0.12 * n[0], 0.0, 1.0))
+    curl = float(np.clip(typical.curl + 0.12 * n[0], 0.0, 1.0))
     style: Style = (
-        "none" if share < bare else "cropped" if share < cropped or usual.curl > _TIGHT else "short"
+        "none"
+        if style_chance < bare
+        else "cropped"
+        if style_chance < cropped or typical.curl > _CROPPED_CURL
+        else "short"
     )
-    usual_mm = _CROPPED_MM if style == "cropped" else usual.length_mm if usual.style == "short" else _SHORT_MM
-    length = usual_mm * float(np.exp((0.3 if style == "cropped" else 0.15) * n[1]))
-    beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_LONGEST_BEARD_MM))))
+    typical_mm = (
+        _CROPPED_LENGTH_MM
+        if style == "cropped"
+        else typical.length_mm
+        if typical.style == "short"
+        else _SHORT_LENGTH_MM
+    )
+    length = typical_mm * float(np.exp((0.3 if style == "cropped" else 0.15) * n[1]))
+    beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_MAX_BEARD_MM))))
     return replace(
-        usual,
+        typical,
         style=style,
         length_mm=float(np.clip(length, 2.0, 45.0)),
-        density=float(np.clip(usual.density + 0.08 * n[2], 0.3, 1.0)),
+        density=float(np.clip(typical.density + 0.08 * n[2], 0.3, 1.0)),
         curl=curl,
-        fade=float(np.clip(usual.fade + 0.12 * n[3], 0.0, 1.0)),
-        beard_mm=beard if man and bearded < 0.5 else 0.0,
+        fade=float(np.clip(typical.fade + 0.12 * n[3], 0.0, 1.0)),
+        beard_mm=beard if man and beard_chance < 0.5 else 0.0,
         seed=int(rng.integers(2**31)),
     )
 
 
-def usual_recession(rng: np.random.Generator, origin: Origin) -> float:
+def sample_recession(rng: np.random.Generator, demographics: Demographics) -> float:
     """How far the hair of men has gone back at random, more with age."""
-    old = (origin.age - YOUNG) / (OLD - YOUNG)
-    man = max(2.0 * origin.sex - 1.0, 0.0)
+    old = (demographics.age - YOUNG) / (OLD - YOUNG)
+    man = max(2.0 * demographics.sex - 1.0, 0.0)
     return float(np.clip(man * rng.beta(1.2, 1.8) * (0.15 + 1.1 * old), 0.0, 1.0))
 
 
-def shaved_shows(hair: HairLook) -> float:
+def stubble_visibility(hair: HairLook) -> float:
     """Factor of the shadow of shaved hair by its pigments, 0 to 1."""
-    return min(1.0, 0.15 + (hair.eumelanin + 0.3 * hair.pheomelanin) * (1.0 - hair.grey) / _DARK)
+    return min(1.0, 0.15 + (hair.eumelanin + 0.3 * hair.pheomelanin) * (1.0 - hair.grey) / _DARK_EUMELANIN)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Floats
 from dermis.human.hair import brows
-from dermis.human.hair.hairy_skin import above_hairline
+from dermis.human.hair.density import height_above_hairline
 from dermis.human.labels.classes import class_number
-from dermis.human.regions.average import AVERAGE, average_head, is_human, parts
-from dermis.human.regions.labels import known_landmarks, to_average
-from dermis.human.regions.zones import neck_mm, nose_mm
-from dermis.human.skin.surface import FIELDS, average, lid_rings
+from dermis.human.regions.average import AVERAGE_HUMAN, average_head, is_human, part_quads
+from dermis.human.regions.labels import known_landmarks, warp_to_average
+from dermis.human.regions.region_table import neck_distance_mm, nose_distance_mm
+from dermis.human.skin.surface import BORDER_FIELDS, average_surface, lid_rings
 from dermis.mesh.eyeball import LIMBUS_MM
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material
@@ -42,22 +42,22 @@ HUMAN_FIELDS = (
 """Classes in the order in which they count."""
 SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])
 """Distance from the middle and height where the lips meet."""
-_OUTSIDE = -1.0
-_BROW_AHEAD_MM = -30.0  # of the front, where no brow is
-_HAIR_MM = -8.0  # above the hairline, from where on hair is of the head and no beard
+_OUTSIDE_MM = -1.0
+_MIN_BROW_Z = -30.0  # of the front, where no brow is
+_HAIRLINE_MARGIN_MM = -8.0  # above the hairline, from where on hair is of the head and no beard
 _LEVELS = 2
 SIDES = "right", "left"
-_PARTS = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "neck"}
-_MOST_KEPT = 3
-_ALONE = Lock()
+_PART_CLASSES = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "neck"}
+_CACHE_SIZE = 3
+_LOCK = Lock()
 
 
 @cache
-def human_fields() -> Doubles:
+def label_fields() -> Doubles:
     """(k, p) `HUMAN_FIELDS` at the control points [mm, positive inside]."""
     places = average_head().positions_mm.astype(np.float64)
-    told = np.full((len(FIELDS), len(places)), -_OUTSIDE)
-    told[:, : len(average()[1])] = average()[1].T
+    told = np.full((len(BORDER_FIELDS), len(places)), -_OUTSIDE_MM)
+    told[:, : len(average_surface()[1])] = average_surface()[1].T
     lips, mouth, lids = told
     left = places[:, 0] > 0
     above = places[:, 1] - np.interp(np.abs(places[:, 0]), *SEAM_MM.T)
@@ -65,21 +65,21 @@ def human_fields() -> Doubles:
         "mouth_interior": -mouth,
         "upper_lip": np.minimum(lips, above),
         "lower_lip": np.minimum(lips, -above),
-        "nose": nose_mm(places),
-        "neck": neck_mm(places),
+        "nose": nose_distance_mm(places),
+        "neck": neck_distance_mm(places),
     }
-    for name, values in (("ear", _ears()), ("eye", -lids), ("brow", _brows(places))):
-        found[f"left_{name}"] = np.where(left, values, _OUTSIDE)
-        found[f"right_{name}"] = np.where(left, _OUTSIDE, values)
+    for name, values in (("ear", _ear_field()), ("eye", -lids), ("brow", _brow_field(places))):
+        found[f"left_{name}"] = np.where(left, values, _OUTSIDE_MM)
+        found[f"right_{name}"] = np.where(left, _OUTSIDE_MM, values)
     return np.stack([found[name] for name in HUMAN_FIELDS])
 
 
 def dense_fields() -> tuple[Doubles, Doubles]:
     """(n, 3) places all over the average human's outer skin [mm], and (k, n) the fields there."""
-    head = AVERAGE.head(subdivide=_LEVELS)
+    head = AVERAGE_HUMAN.head(subdivide=_LEVELS)
     assert head.control.stencils is not None
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
-    fields = head.control.stencils.points(human_fields().T.copy())[skin].T
+    fields = head.control.stencils.points(label_fields().T.copy())[skin].T
     outer = fields[HUMAN_FIELDS.index("mouth_interior")] < 0
     return head.mesh.points_mm[skin][outer], fields[:, outer]
 
@@ -90,7 +90,7 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
     quads = [part.roots.quad >> (2 * head.levels) for part in both]
     if not quads:
         return np.zeros(0, np.uint8)
-    fine, coarse = _classes_of_quads()
+    fine, coarse = _quad_hair_classes()
     if max(int(one.max(initial=0)) for one in quads) >= len(fine):
         return np.full(sum(map(len, quads)), class_number("hair"), np.uint8)
     tables = [fine if part is head.strands else coarse for part in both]
@@ -98,7 +98,7 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
 
 
 @cache
-def _classes_of_quads() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """(q,) class of fine and of coarse hairs on each of the human's quads."""
     mesh = average_head().mesh
     around = corners(mesh, np.arange(len(mesh.quads)))
@@ -108,16 +108,16 @@ def _classes_of_quads() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         class_number, ("right_brow", "left_brow", "lashes", "hair", "beard")
     )
     fine = np.where(lids, lashes, np.where(middle[:, 0] > 0, left, right))
-    coarse = np.where(above_hairline(middle) > _HAIR_MM, hair, beard)
+    coarse = np.where(height_above_hairline(middle) > _HAIRLINE_MARGIN_MM, hair, beard)
     return fine.astype(np.uint8), coarse.astype(np.uint8)
 
 
-def _ears() -> Doubles:
+def _ear_field() -> Doubles:
     """(p,) above 0 where most quads around a control point are of the ears."""
     mesh = average_head().mesh
     around = corners(mesh, np.arange(len(mesh.quads)))
     within = np.zeros(len(around))
-    within[parts()["ears"]] = 1.0
+    within[part_quads()["ears"]] = 1.0
     count = len(average_head().positions_mm)
     sums, all_of = (
         np.bincount(around.ravel(), np.repeat(each, 4), count) for each in (within, np.ones(len(around)))
@@ -125,20 +125,20 @@ def _ears() -> Doubles:
     return np.asarray(sums / np.maximum(all_of, 1.0) - 0.5)
 
 
-def _brows(places: Doubles) -> Doubles:
+def _brow_field(places: Doubles) -> Doubles:
     """(p,) how far inside the strip where brows grow, seen from the front [mm]."""
     x, y = np.abs(places[:, 0]), places[:, 1]
-    low, high = (brows.strip(side) for side in (-1.0, 1.0))
+    low, high = (brows.outline(side) for side in (-1.0, 1.0))
     ends = 0.5 * (low + high)
     below, above = (np.interp(x, *side.T) for side in (low, high))
     across = np.minimum(np.minimum(y - below, above - y), np.minimum(x - ends[0, 0], ends[-1, 0] - x))
-    return np.where(places[:, 2] > _BROW_AHEAD_MM, across, _OUTSIDE)
+    return np.where(places[:, 2] > _MIN_BROW_Z, across, _OUTSIDE_MM)
 
 
-_KEPT: dict[bytes, Labelling] = {}
+_CACHE: dict[bytes, MeshLabels] = {}
 
 
-class Labelling(NamedTuple):
+class MeshLabels(NamedTuple):
     """What a mesh shows where.
 
     base : (t,) class of each triangle
@@ -151,41 +151,41 @@ class Labelling(NamedTuple):
     fields: Floats
 
 
-def labelling(head: Head) -> Labelling:
+def mesh_labels(head: Head) -> MeshLabels:
     """The labelling of a head; of parametric humans the same for all of one layout and level."""
     if not is_human(head):
-        return _labelling(head)
+        return _build_labels(head)
     key = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest() + bytes(
         [head.strands is not None]
     )
-    with _ALONE:
-        if key not in _KEPT:
-            while len(_KEPT) >= _MOST_KEPT:
-                _KEPT.pop(next(iter(_KEPT)))
-            _KEPT[key] = _labelling(head)
-        return _KEPT[key]
+    with _LOCK:
+        if key not in _CACHE:
+            while len(_CACHE) >= _CACHE_SIZE:
+                _CACHE.pop(next(iter(_CACHE)))
+            _CACHE[key] = _build_labels(head)
+        return _CACHE[key]
 
 
-def _labelling(head: Head) -> Labelling:
-    of_material = np.array([class_number(_named(one)) for one in head.mesh.materials], np.uint8)
+def _build_labels(head: Head) -> MeshLabels:
+    of_material = np.array([class_number(_material_class(one)) for one in head.mesh.materials], np.uint8)
     for material, side in zip(() if head.eyes is None else head.eyes.material, reversed(SIDES), strict=False):
         of_material[material] = class_number(f"{side}_eye")
-    fields = _irises(head.template or head) | _skin(head)
+    fields = _iris_fields(head.template or head) | _skin_fields(head)
     none = np.zeros((int(head.mesh.point.max()) + 1, 0))
     points = np.stack(list(fields.values()), axis=1) if fields else none
     classes = np.array([class_number(name) for name in fields], np.uint8)
-    return Labelling(
+    return MeshLabels(
         of_material[head.mesh.material], classes, np.ascontiguousarray(points[head.mesh.point], np.float32)
     )
 
 
-def _named(material: Material) -> str:
+def _material_class(material: Material) -> str:
     """Class of what is made of it, were it no eyeball."""
-    known = _PARTS.get(material.part or material.name)
+    known = _PART_CLASSES.get(material.part or material.name)
     return known or ("skin" if material.kind == "skin" else "other")
 
 
-def _irises(head: Head) -> dict[str, Doubles]:
+def _iris_fields(head: Head) -> dict[str, Doubles]:
     """How far inside the limbus points of eyeballs are [mm of a usual eye]."""
     if head.eyes is None:
         return {}
@@ -195,22 +195,22 @@ def _irises(head: Head) -> dict[str, Doubles]:
     for frame, material, side in zip(frames, head.eyes.material, reversed(SIDES), strict=False):
         own = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
         local = places[own] @ frame[:3, :3].T + frame[:3, 3]
-        inside = np.where(local[:, 2] > 0, LIMBUS_MM - np.hypot(local[:, 0], local[:, 1]), _OUTSIDE)
-        found[f"{side}_iris"] = np.full(len(places), _OUTSIDE)
+        inside = np.where(local[:, 2] > 0, LIMBUS_MM - np.hypot(local[:, 0], local[:, 1]), _OUTSIDE_MM)
+        found[f"{side}_iris"] = np.full(len(places), _OUTSIDE_MM)
         found[f"{side}_iris"][own] = inside
     return found
 
 
-def _skin(head: Head) -> dict[str, Doubles]:
+def _skin_fields(head: Head) -> dict[str, Doubles]:
     """How far inside of each part of the face points of the skin are [mm]."""
     mesh = head.mesh
     count = int(mesh.point.max()) + 1
     if is_human(head):
         stencils = head.control.stencils
         refined: Callable[[Doubles], Doubles] = stencils.points if stencils else lambda values: values
-        fields = dict(zip(HUMAN_FIELDS, refined(human_fields().T.copy()).T, strict=True))
+        fields = dict(zip(HUMAN_FIELDS, refined(label_fields().T.copy()).T, strict=True))
     elif (places := known_landmarks(head)) is not None:
-        fields = _warped(head, places)
+        fields = _warped_fields(head, places)
     else:
         return {}
     if head.strands is None:
@@ -218,10 +218,10 @@ def _skin(head: Head) -> dict[str, Doubles]:
     kinds = np.array([material.kind == "skin" for material in mesh.materials])
     off = np.ones(count, bool)
     off[mesh.point[mesh.triangles[kinds[mesh.material]]]] = False
-    return {name: np.where(off, _OUTSIDE, values) for name, values in fields.items()}
+    return {name: np.where(off, _OUTSIDE_MM, values) for name, values in fields.items()}
 
 
-def _warped(head: Head, places: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:
+def _warped_fields(head: Head, places: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:
     """Those of the point of the average human where landmarks take each point."""
     from scipy.spatial import cKDTree
 
@@ -229,5 +229,5 @@ def _warped(head: Head, places: Mapping[str, tuple[float, float, float]]) -> dic
 
     points = head.mesh.points_mm
     average, values = dense_fields()
-    _, near = cKDTree(average).query(to_average(head, places, points))
+    _, near = cKDTree(average).query(warp_to_average(head, places, points))
     return {name: values[k][near] for k, name in enumerate(HUMAN_FIELDS) if not name.endswith("_eye")}

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.errors import refuse, shown_value
-from dermis.base.quantities import whole_number
-from dermis.base.reading import named_path, read_text, understood
+from dermis.base.errors import format_value, refuse
+from dermis.base.quantities import checked_integer
+from dermis.base.reading import checked_path, parsing, read_text
 from dermis.base.tables import Rows, parse_rows, read_rows
 from dermis.human.landmarks.sets import SETS
 from dermis.human.regions.average import average_head, is_human
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, corners, finer_roots, weights
 
-_MOST = 10_000
+_MAX_LANDMARKS = 10_000
 _EXPECTED = "landmarks in CSV: rows of name,vertex"
 
 
@@ -47,12 +47,12 @@ def landmark_points(head: Head, name: str) -> LandmarkPoints:
     Raises DermisError for a set on a head of another topology, and for tables that cannot be read.
     """
     if name not in SETS:
-        return _of_table(head, name)
+        return _table_landmarks(head, name)
     if not is_human(head):
-        came = f"{head.name!r} has a topology of its own"
-        remedy = "Write a table of name,vertex for its mesh, and give the name of that file"
-        refuse(f"landmarks {name}", "a head of the parametric human", came, remedy)
-    return _of_human(head, _rows(name))
+        actual = f"{head.name!r} has a topology of its own"
+        advice = "Write a table of name,vertex for its mesh, and give the name of that file"
+        refuse(f"landmarks {name}", "a head of the parametric human", actual, advice)
+    return _human_landmarks(head, _rows(name))
 
 
 def check_landmarks(name: object) -> str:
@@ -60,23 +60,23 @@ def check_landmarks(name: object) -> str:
 
     Raises DermisError for what is neither.
     """
-    text = str(named_path(name, "a set of landmarks or its table"))
+    text = str(checked_path(name, "a set of landmarks or its table"))
     if text not in SETS and not text.endswith(".csv"):
         expected = f"{', '.join(SETS)} or a CSV table"
-        refuse("landmarks", expected, f"{shown_value(text)} came", "Correct the name")
+        refuse("landmarks", expected, f"got {format_value(text)}", "Correct the name")
     return text
 
 
-def table_points(name: str) -> list[tuple[str, int]]:
+def read_landmark_table(name: str) -> list[tuple[str, int]]:
     """Name and vertex of each landmark in a table's file.
 
     Raises DermisError for tables that cannot be read.
     """
     text = read_text(check_landmarks(name), _EXPECTED)
-    with understood(name, _EXPECTED, KeyError, TypeError, csv.Error):
+    with parsing(name, _EXPECTED, KeyError, TypeError, csv.Error):
         found = [(str(row["name"]), int(row["vertex"])) for row in parse_rows(text)]
-    if not 0 < len(found) <= _MOST:
-        refuse(name, f"1 to {_MOST} landmarks", f"{len(found)} came", "Correct the table")
+    if not 0 < len(found) <= _MAX_LANDMARKS:
+        refuse(name, f"1 to {_MAX_LANDMARKS} landmarks", f"got {len(found)}", "Correct the table")
     return found
 
 
@@ -85,7 +85,7 @@ def _rows(name: str) -> Rows:
     return read_rows(__package__, name)
 
 
-def _of_human(head: Head, rows: Rows) -> LandmarkPoints:
+def _human_landmarks(head: Head, rows: Rows) -> LandmarkPoints:
     quad = np.array([int(row["quad"]) for row in rows], np.int32)
     place = np.array([[float(row["along"]), float(row["across"])] for row in rows], np.float32)
     fine = finer_roots(average_head().mesh, Roots(quad, place), head.levels)
@@ -93,17 +93,17 @@ def _of_human(head: Head, rows: Rows) -> LandmarkPoints:
     material = np.full(len(rows), -1, np.int32)
     for k in np.flatnonzero([float(row["sunk"]) > 0 for row in rows]):
         assert head.eyes is not None
-        of = head.mesh.material[head.mesh.quads[fine.quad[k], 0]]
-        back = head.eyes.back[head.eyes.material == of][0]
+        eye_material = head.mesh.material[head.mesh.quads[fine.quad[k], 0]]
+        back = head.eyes.back[head.eyes.material == eye_material][0]
         sunk, apex = float(rows[k]["sunk"]), corner[k, share[k].argmax()]
-        corner[k], share[k], material[k] = (apex, back, back, back), (1 - sunk, sunk, 0, 0), of
+        corner[k], share[k], material[k] = (apex, back, back, back), (1 - sunk, sunk, 0, 0), eye_material
     return LandmarkPoints(tuple(row["landmark"] for row in rows), corner, share, material)
 
 
-def _of_table(head: Head, name: str) -> LandmarkPoints:
-    found, count = table_points(name), len(head.positions_mm)
+def _table_landmarks(head: Head, name: str) -> LandmarkPoints:
+    found, count = read_landmark_table(name), len(head.positions_mm)
     for landmark, vertex in found:
-        whole_number(f"{Path(name).name}: vertex of {landmark}", vertex, 0, count - 1)
+        checked_integer(f"{Path(name).name}: vertex of {landmark}", vertex, 0, count - 1)
     corner = np.repeat(np.array([[vertex] for _, vertex in found], np.int32), 4, axis=1)
     share = np.tile(np.array([1, 0, 0, 0], np.float32), (len(found), 1))
     return LandmarkPoints(tuple(one for one, _ in found), corner, share, np.full(len(found), -1, np.int32))

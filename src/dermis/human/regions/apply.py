@@ -12,9 +12,9 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.base.disk import Array, Arrays, cached_arrays
 from dermis.base.errors import DermisError
-from dermis.base.progress import preparing
+from dermis.base.progress import logged_step
 from dermis.human.regions.labels import known_landmarks, label_texels
-from dermis.human.regions.zones import DEFAULT, LIMITS, Doubles, RegionTable, load_table
+from dermis.human.regions.region_table import DEFAULT_TABLE, LIMITS, Doubles, RegionTable, load_region_table
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
@@ -25,17 +25,20 @@ SIZE = 1024
 EDGE_MM = 2.5
 """Borders between regions are blurred: standard deviation [mm]."""
 _DETAIL_MM = 6.0  # what is finer stays in the head's own maps; what is coarser comes from the table
-_DARKEST, _BRIGHTEST = 0.4, 3.0  # of the mean and of the surroundings: else specks in black would glare
+_MIN_LOCAL_MEAN, _MAX_DETAIL = (
+    0.4,
+    3.0,
+)  # of the mean and of the surroundings: else specks in black would glare
 _CELL_MM = 2.0
-_MOST_CELLS = 256  # along the longest side
-_REACH = 3  # standard deviations
-_FORM = 2  # increment when `with_regions` gives other maps for the same head
+_MAX_CELLS = 256  # along the longest side
+_TRUNCATE = 3  # standard deviations
+_CACHE_VERSION = 2  # increment when `with_regions` gives other maps for the same head
 
 
-def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT) -> tuple[Head, float]:
+def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) -> tuple[Head, float]:
     """The head with roughness and specular maps by region of the face, and the mean rho_s of its skin [-].
 
-    table : what `load_table` gives or takes
+    table : what `load_region_table` gives or takes
 
     The specular map holds rho_s itself; to scale maps to a mean, take the one returned. Pores and blotches of
     the head's own two maps stay, as a factor of their surroundings.
@@ -43,13 +46,14 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT) -> tuple
     Raises DermisError when the head's regions are not known, and for invalid tables.
     """
     if not isinstance(table, RegionTable):
-        table = load_table(table)
+        table = load_region_table(table)
     atlas = build_atlas(head.mesh, SIZE)
     points = atlas.interpolate(head.mesh, head.mesh.positions)[atlas.coverage]
-    soft = soften(points, table.values[label_texels(head, atlas, table)], EDGE_MM)
-    own = (head.maps.roughness, head.maps.specular)
+    smoothed = gaussian_mean(points, table.values[label_texels(head, atlas, table)], EDGE_MM)
+    own_maps = (head.maps.roughness, head.maps.specular)
     roughness, specular = (
-        np.clip(_map(atlas, points, soft[:, k], own[k]), *limits) for k, limits in enumerate(LIMITS.values())
+        np.clip(_region_map(atlas, points, smoothed[:, k], own_maps[k]), *limits)
+        for k, limits in enumerate(LIMITS.values())
     )
     y, x = np.nonzero(atlas.coverage)
     height, width = specular.shape
@@ -57,17 +61,21 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT) -> tuple
     return replace(head, maps=replace(head.maps, roughness=roughness, specular=specular)), mean
 
 
-def _map(atlas: Atlas, points: NDArray[np.float64], level: NDArray[np.float64], own: Floats | None) -> Floats:
+def _region_map(
+    atlas: Atlas, points: NDArray[np.float64], level: NDArray[np.float64], own_maps: Floats | None
+) -> Floats:
     """(h, w) picture of the levels (n,) of the covered texels, times the fine detail of the own map."""
-    if own is None:
+    if own_maps is None:
         return _picture(atlas, level)
     y, x = np.nonzero(atlas.coverage)
-    height, width = own.shape
-    values = own[y * height // SIZE, x * width // SIZE].astype(np.float64)
-    around = np.maximum(soften(points, values[:, None], _DETAIL_MM)[:, 0], _DARKEST * values.mean())
-    around = np.maximum(around, np.finfo(np.float32).eps)
+    height, width = own_maps.shape
+    values = own_maps[y * height // SIZE, x * width // SIZE].astype(np.float64)
+    local_mean = np.maximum(
+        gaussian_mean(points, values[:, None], _DETAIL_MM)[:, 0], _MIN_LOCAL_MEAN * values.mean()
+    )
+    local_mean = np.maximum(local_mean, np.finfo(np.float32).eps)
     shape = max(height, SIZE), max(width, SIZE)
-    detail = np.minimum(_resized(own, shape) / _resized(_picture(atlas, around), shape), _BRIGHTEST)
+    detail = np.minimum(_resized(own_maps, shape) / _resized(_picture(atlas, local_mean), shape), _MAX_DETAIL)
     return np.asarray(detail * _resized(_picture(atlas, level), shape))
 
 
@@ -90,7 +98,7 @@ def _resized(picture: Floats, shape: tuple[int, int]) -> Floats:
     return np.asarray(zoom(picture, factors, order=1, mode="nearest", grid_mode=True), np.float32)
 
 
-def soften(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
+def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
     """Gaussian mean (n, c) of the values around each place, by distance in space: seams do not show.
 
     points : (n, 3) [mm]
@@ -100,24 +108,24 @@ def soften(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
     from scipy.ndimage import gaussian_filter, map_coordinates
 
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
-    side = max(_CELL_MM, float(extent.max()) / _MOST_CELLS)
+    side = max(_CELL_MM, float(extent.max()) / _MAX_CELLS)
     place = (points - low) / side + 1
     shape = tuple(int(length) + 4 for length in extent / side)
     cell = np.ravel_multi_index(tuple(np.rint(place).astype(int).T), shape)
     count = np.bincount(cell, minlength=int(np.prod(shape)))
 
-    def spread(quantity: Doubles) -> Doubles:
+    def blur(quantity: Doubles) -> Doubles:
         grid = np.divide(quantity, count, out=np.zeros(len(count)), where=count > 0).reshape(shape)
-        smooth = gaussian_filter(grid, sigma_mm / side, mode="constant", truncate=_REACH)
+        smooth = gaussian_filter(grid, sigma_mm / side, mode="constant", truncate=_TRUNCATE)
         return np.asarray(map_coordinates(smooth, place.T, order=1))
 
-    weight = spread(count.astype(np.float64))
+    weight = blur(count.astype(np.float64))
     sums = [np.bincount(cell, column, minlength=len(count)).astype(np.float64) for column in values.T]
-    return np.stack([spread(column) / weight for column in sums], axis=-1)
+    return np.stack([blur(column) / weight for column in sums], axis=-1)
 
 
-@preparing("finding the regions of the face")
-def with_usual_regions(head: Head) -> Head:
+@logged_step("finding the regions of the face")
+def with_default_regions(head: Head) -> Head:
     """The head with the package's table by region, where it knows the regions and no map says the roughness.
 
     Strengths are relative to each other: a skin's rho_s is their mean, as of every map. A map of the head's
@@ -125,7 +133,7 @@ def with_usual_regions(head: Head) -> Head:
     """
     if head.maps.rough or known_landmarks(head) is None:
         return head
-    table = load_table(DEFAULT)
+    table = load_region_table(DEFAULT_TABLE)
     missing = ["roughness"] if head.maps.specular is not None else ["roughness", "specular"]
     sources: list[Array] = [head.mesh.positions, head.mesh.uv, head.mesh.triangles, table.values]
 
@@ -134,7 +142,7 @@ def with_usual_regions(head: Head) -> Head:
         return {name: np.asarray(getattr(maps, name), np.float32) for name in missing}
 
     try:
-        found = cached_arrays(sources, f"regions {_FORM} {SIZE} {head.name}", missing, make)
+        found = cached_arrays(sources, f"regions {_CACHE_VERSION} {SIZE} {head.name}", missing, make)
     except DermisError:  # of a known name, but another head
         return head
     return replace(head, maps=replace(head.maps, **found))

@@ -13,57 +13,57 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.base.errors import refuse
-from dermis.base.quantities import numbers
-from dermis.base.reading import read_text, understood
+from dermis.base.quantities import checked_array
+from dermis.base.reading import parsing, read_text
 from dermis.base.tables import parse_rows
 from dermis.formats.maps import load_labels
 from dermis.human.regions.average import (
     average_head,
+    average_positions,
     average_skin,
+    classify_surface,
     control_quads,
     human_landmarks,
-    human_regions,
     is_human,
-    on_average,
 )
-from dermis.human.regions.zones import REGIONS, Doubles, RegionTable
+from dermis.human.regions.region_table import REGIONS, Doubles, RegionTable
 from dermis.mesh.head import Head
 
-Place = tuple[float, float, float]
-Places = Mapping[str, Place]
+Point = tuple[float, float, float]
+Landmarks = Mapping[str, Point]
 
-_FEWEST = 10
-_FLATTEST_MM = 2.0  # root mean square distance from a plane: the warp needs three dimensions
-_FARTHEST_MM = 15.0  # centres of eyes lie this deep; what is farther belongs to another head
-_FARTHEST_AWAY_MM = 1e6
-_SLACK = 1.0  # for places picked by eye; 0 would carry each landmark exactly onto its twin
+_MIN_LANDMARKS = 10
+_MIN_DEPTH_MM = 2.0  # root mean square distance from a plane: the warp needs three dimensions
+_MAX_SKIN_DISTANCE_MM = 15.0  # centres of eyes lie this deep; what is farther belongs to another head
+_MAX_COORDINATE_MM = 1e6
+_SMOOTHING = 1.0  # for places picked by eye; 0 would carry each landmark exactly onto its twin
 
 
-def load_landmarks(path: Path) -> Places:
+def load_landmarks(path: Path) -> Landmarks:
     """Places [mm from the head's centre] by name, from a CSV with landmark,x,y,z and comments after #."""
-    return _read(read_text(path, "landmarks in CSV"), str(path))
+    return _parse_landmarks(read_text(path, "landmarks in CSV"), str(path))
 
 
-def known_landmarks(head: Head) -> Places | None:
+def known_landmarks(head: Head) -> Landmarks | None:
     """Landmarks that the package has for a head, if any: the human's, or by its name [mm from its centre]."""
     if is_human(head):
-        return _plain(human_landmarks(head), head.centre_mm)
+        return _to_tuples(human_landmarks(head), head.centre_mm)
     file = resources.files(__package__) / "landmarks" / f"{Path(head.name).stem}.csv"
-    return _read(file.read_text("utf-8"), file.name) if file.is_file() else None
+    return _parse_landmarks(file.read_text("utf-8"), file.name) if file.is_file() else None
 
 
 @cache
-def average_landmarks() -> Places:
+def average_landmarks() -> Landmarks:
     """All landmarks that can be given, where they are on the average human [mm]."""
-    return _plain(human_landmarks(average_head()))
+    return _to_tuples(human_landmarks(average_head()))
 
 
-def _plain(places: Mapping[str, Doubles], origin: Place = (0.0, 0.0, 0.0)) -> Places:
+def _to_tuples(places: Mapping[str, Doubles], origin: Point = (0.0, 0.0, 0.0)) -> Landmarks:
     apart = {name: place - np.array(origin) for name, place in places.items()}
     return {name: (float(x), float(y), float(z)) for name, (x, y, z) in apart.items()}
 
 
-def to_average(head: Head, places: Places, points: Doubles) -> Doubles:
+def warp_to_average(head: Head, places: Landmarks, points: Doubles) -> Doubles:
     """Where points (n, 3) on a head [mm] lie on or near the average human (n, 3) [mm].
 
     places : the head's landmarks, some of `average_landmarks` [mm from its centre]
@@ -73,38 +73,40 @@ def to_average(head: Head, places: Places, points: Doubles) -> Doubles:
     from scipy.interpolate import RBFInterpolator
 
     average = average_landmarks()
-    _check(head, places, average)
+    _check_landmarks(head, places, average)
     ours, theirs = np.array(list(places.values())), np.array([average[name] for name in places])
-    warp = RBFInterpolator(ours, theirs, kernel="linear", degree=1, smoothing=_SLACK)
+    warp = RBFInterpolator(ours, theirs, kernel="linear", degree=1, smoothing=_SMOOTHING)
     return np.asarray(warp(points - np.array(head.centre_mm)))
 
 
-def _read(text: str, name: str) -> Places:
+def _parse_landmarks(text: str, name: str) -> Landmarks:
     expected = "rows of landmark,x,y,z"
-    with understood(name, expected, KeyError, TypeError, csv.Error):
+    with parsing(name, expected, KeyError, TypeError, csv.Error):
         found = {row["landmark"]: tuple(float(row[axis]) for axis in "xyz") for row in parse_rows(text)}
     if not found:
         refuse(name, expected, "there are none", "Add them")
     for landmark, place in found.items():
-        numbers(f"{name}: {landmark}", place, (3,), -_FARTHEST_AWAY_MM, _FARTHEST_AWAY_MM, "mm")
+        checked_array(f"{name}: {landmark}", place, (3,), -_MAX_COORDINATE_MM, _MAX_COORDINATE_MM, "mm")
     return {landmark: (x, y, z) for landmark, (x, y, z) in found.items()}
 
 
-def _check(head: Head, places: Places, average: Places) -> None:
+def _check_landmarks(head: Head, places: Landmarks, average: Landmarks) -> None:
     culprit = f"landmarks of {head.name}"
     for name in places.keys() - average.keys():
-        refuse(culprit, f"only {', '.join(average)}", f"{name!r} came", "Correct its name")
-    if len(places) < _FEWEST:
-        refuse(culprit, f"at least {_FEWEST}", f"{len(places)} came", "Add some all around the head")
+        refuse(culprit, f"only {', '.join(average)}", f"got {name!r}", "Correct its name")
+    if len(places) < _MIN_LANDMARKS:
+        refuse(culprit, f"at least {_MIN_LANDMARKS}", f"got {len(places)}", "Add some all around the head")
     skin = head.mesh.positions - np.array(head.centre_mm)
     for name, place in places.items():
         off = float(np.linalg.norm(skin - place, axis=1).min())
-        if not off < _FARTHEST_MM:
-            came = f"{name!r} is {off:.0f} mm off the nearest corner of the mesh"
-            refuse(culprit, "places on the skin, in mm from the head's centre", came, "Correct the place")
-    spots = np.array(list(places.values()))
-    off_plane = np.linalg.svd(spots - spots.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(spots))
-    if off_plane < _FLATTEST_MM:
+        if not off < _MAX_SKIN_DISTANCE_MM:
+            actual = f"{name!r} is {off:.0f} mm off the nearest corner of the mesh"
+            refuse(culprit, "places on the skin, in mm from the head's centre", actual, "Correct the place")
+    points_mm = np.array(list(places.values()))
+    off_plane = np.linalg.svd(points_mm - points_mm.mean(axis=0), compute_uv=False)[-1] / np.sqrt(
+        len(points_mm)
+    )
+    if off_plane < _MIN_DEPTH_MM:
         refuse(culprit, "places all around the head", "they lie in one plane", "Add some beside it")
 
 
@@ -115,37 +117,37 @@ def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uin
     the head: the points of the human, or landmarks. Raises DermisError for a head with none of these.
     """
     if table.labels is not None:
-        return _sampled(load_labels(table.labels), atlas, str(table.labels))
+        return _labels_from_map(load_labels(table.labels), atlas, str(table.labels))
     if table.landmarks is not None:
-        return _warped(head, atlas, load_landmarks(table.landmarks))
+        return _labels_from_landmarks(head, atlas, load_landmarks(table.landmarks))
     if head.maps.region is not None:
-        return _sampled(head.maps.region, atlas, head.name)
+        return _labels_from_map(head.maps.region, atlas, head.name)
     if is_human(head):
-        return _human(head, atlas)
+        return _labels_of_human(head, atlas)
     places = known_landmarks(head)
     if places is None:
-        remedy = "Name a file of its landmarks, or a picture of its labels, in the table"
-        refuse(head.name, "a head whose regions are known", "it has no labels", remedy)
-    return _warped(head, atlas, places)
+        advice = "Name a file of its landmarks, or a picture of its labels, in the table"
+        refuse(head.name, "a head whose regions are known", "it has no labels", advice)
+    return _labels_from_landmarks(head, atlas, places)
 
 
-def _sampled(labels: NDArray[np.uint8], atlas: Atlas, name: str) -> NDArray[np.uint8]:
+def _labels_from_map(labels: NDArray[np.uint8], atlas: Atlas, name: str) -> NDArray[np.uint8]:
     y, x = np.nonzero(atlas.coverage)
     height, width = labels.shape
     chosen = labels[y * height // atlas.size, x * width // atlas.size]
     if chosen.size and chosen.max() >= len(REGIONS):
         expected = f"labels from 0 to {len(REGIONS) - 1} on the skin"
-        refuse(name, expected, f"{chosen.max()} came", "Correct the picture")
+        refuse(name, expected, f"got {chosen.max()}", "Correct the picture")
     return np.asarray(chosen)
 
 
-def _warped(head: Head, atlas: Atlas, places: Places) -> NDArray[np.uint8]:
-    corners = to_average(head, places, head.mesh.positions.astype(np.float64))
+def _labels_from_landmarks(head: Head, atlas: Atlas, places: Landmarks) -> NDArray[np.uint8]:
+    corners = warp_to_average(head, places, head.mesh.positions.astype(np.float64))
     points = atlas.interpolate(head.mesh, corners)[atlas.coverage]
-    return human_regions(points, average_skin().quads(points))
+    return classify_surface(points, average_skin().quads(points))
 
 
-def _human(head: Head, atlas: Atlas) -> NDArray[np.uint8]:
+def _labels_of_human(head: Head, atlas: Atlas) -> NDArray[np.uint8]:
     """Of a head of the parametric human, which all have the same quads."""
-    points = atlas.interpolate(head.mesh, on_average(head))[atlas.coverage]
-    return human_regions(points, control_quads(head, atlas.triangle[atlas.coverage]))
+    points = atlas.interpolate(head.mesh, average_positions(head))[atlas.coverage]
+    return classify_surface(points, control_quads(head, atlas.triangle[atlas.coverage]))

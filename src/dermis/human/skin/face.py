@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.tables import numbers, read_rows
+from dermis.base.tables import float_columns, read_rows
 
 Floats = NDArray[np.float32]
 
@@ -26,33 +26,40 @@ MOVEMENTS = (
     "pressed",
 )
 """Those that deepen folds, see folds.csv, then those that move blood."""
-FOLDING = MOVEMENTS.index("flush")
+FOLD_MOVEMENTS = MOVEMENTS.index("flush")
 """How many deepen folds."""
-AMOUNTS = (
+ZONE_AMOUNTS = (
     "blood", "melanin", "strength", "roughness", "pores", "furrows",
     "sun", "level", "around", "hair", "beard", "veins",
 )  # fmt: skip
 """What zones change, see zones.csv."""
-DEGREES = 2
-"""Angle between the heights of `hairline`."""
-_EDGES = 180 // DEGREES + 1
-_PIECES = 4
-_MOST_KEPT = 32  # tables of receding hair
+HAIRLINE_STEP_DEGREES = 2
+"""Angle between the heights of `hairline_heights`."""
+_HAIRLINE_SAMPLES = 180 // HAIRLINE_STEP_DEGREES + 1
+_SAMPLES_PER_SEGMENT = 4
+_CACHE_SIZE = 32  # tables of receding hair
 _CROWN = "crown"  # zone that thin hair leaves
-_TEMPLES_MM, _FOREHEAD_MM = 22.0, 16.0  # by which hair recedes at most, there and all over the forehead
-_TEMPLES, _TEMPLES_WIDE, _FOREHEAD_WIDE = 33.0, 15.0, 38.0  # where these are and how wide [degrees]
+_TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = (
+    22.0,
+    16.0,
+)  # by which hair recedes at most, there and all over the forehead
+_TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = (
+    33.0,
+    15.0,
+    38.0,
+)  # where these are and how wide [degrees]
 
 
-def movements(names: tuple[str, ...], weights: Floats) -> Floats:
+def movement_weights(names: tuple[str, ...], weights: Floats) -> Floats:
     """(m,) how far each movement is made, 0 to 1.
 
     names, weights : of a rig's targets
     """
-    return np.asarray(np.clip(_shares(names) @ weights, 0.0, 1.0), np.float32)
+    return np.asarray(np.clip(_movement_matrix(names) @ weights, 0.0, 1.0), np.float32)
 
 
 @cache
-def _shares(names: tuple[str, ...]) -> Floats:
+def _movement_matrix(names: tuple[str, ...]) -> Floats:
     """(m, t) of each target in each movement."""
     table = np.zeros((len(MOVEMENTS), len(names)), np.float32)
     for row in read_rows(__package__, "movements"):
@@ -61,8 +68,8 @@ def _shares(names: tuple[str, ...]) -> Floats:
     return table
 
 
-@lru_cache(maxsize=_MOST_KEPT)
-def zones(recession: float = 0.0) -> Floats:
+@lru_cache(maxsize=_CACHE_SIZE)
+def zone_table(recession: float = 0.0) -> Floats:
     """(k, 20) of each zone its centre and 0, one over its radii and 0 [mm], and its amounts.
 
     recession : see `SkinLook`
@@ -71,25 +78,27 @@ def zones(recession: float = 0.0) -> Floats:
     for row in rows:
         if row["zone"] == _CROWN:
             row["hair"] = str(recession * float(row["hair"]))
-    centres, radii, amounts = (numbers(rows, names) for names in ("x y z", "rx ry rz", " ".join(AMOUNTS)))
+    centres, radii, amounts = (
+        float_columns(rows, names) for names in ("x y z", "rx ry rz", " ".join(ZONE_AMOUNTS))
+    )
     none = np.zeros((len(rows), 1))
     return np.hstack([centres, none, 1.0 / radii, none, amounts]).astype(np.float32)
 
 
-@lru_cache(maxsize=_MOST_KEPT)
-def hairline(recession: float = 0.0) -> Floats:
+@lru_cache(maxsize=_CACHE_SIZE)
+def hairline_heights(recession: float = 0.0) -> Floats:
     """(91,) height of the edge of the hair, by the angle from the front [mm].
 
     recession : see `SkinLook`; hair leaves the temples first
     """
     from scipy.interpolate import PchipInterpolator
 
-    angle, height = numbers(read_rows(__package__, "hairline"), "angle height").T
-    edges = DEGREES * np.arange(_EDGES)
-    temples = np.exp(-(((edges - _TEMPLES) / _TEMPLES_WIDE) ** 2))
-    forehead = np.exp(-((edges / _FOREHEAD_WIDE) ** 4))
-    gone = recession * (_TEMPLES_MM * temples + recession * _FOREHEAD_MM * forehead)
-    return np.asarray(PchipInterpolator(angle, height)(edges) + gone, np.float32)
+    angle, height = float_columns(read_rows(__package__, "hairline"), "angle height").T
+    edges = HAIRLINE_STEP_DEGREES * np.arange(_HAIRLINE_SAMPLES)
+    temples = np.exp(-(((edges - _TEMPLE_DEGREES) / _TEMPLE_WIDTH_DEGREES) ** 2))
+    forehead = np.exp(-((edges / _FOREHEAD_WIDTH_DEGREES) ** 4))
+    receded = recession * (_TEMPLE_RECESSION_MM * temples + recession * _FOREHEAD_RECESSION_MM * forehead)
+    return np.asarray(PchipInterpolator(angle, height)(edges) + receded, np.float32)
 
 
 class Folds(NamedTuple):
@@ -107,41 +116,45 @@ class Folds(NamedTuple):
 
 
 @cache
-def folds() -> Folds:
+def fold_curves() -> Folds:
     """The folds of the face."""
     knots, curves = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
     for _, group in groupby(read_rows(__package__, "folds"), key=lambda row: row["fold"]):
         rows = list(group)
-        curve = _spline(numbers(rows, "x y z"))
+        curve = _spline_points(float_columns(rows, "x y z"))
         knots.append(np.column_stack([curve, np.linspace(0.0, 1.0, len(curve))]))
-        sizes = [float(rows[0][name]) for name in ("width", "young", "old")]
+        table_sizes = [float(rows[0][name]) for name in ("width", "young", "old")]
         movement = rows[0]["movement"]
-        curves.append(np.array([*_ball(curve), *sizes, 1 + MOVEMENTS.index(movement) if movement else 0]))
+        curves.append(
+            np.array(
+                [*_bounding_sphere(curve), *table_sizes, 1 + MOVEMENTS.index(movement) if movement else 0]
+            )
+        )
     first = np.cumsum([0, *map(len, knots)]).astype(np.uint32)
     return Folds(np.concatenate(knots).astype(np.float32), np.stack(curves).astype(np.float32), first)
 
 
 @cache
-def sizes() -> dict[str, int]:
+def table_sizes() -> dict[str, int]:
     """How many zones, folds, knots and edges there are; found without the libraries that draw curves."""
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
-    knots = sum(map(_pieces, lengths))
-    return {"zones": len(zones()), "folds": len(lengths), "knots": knots, "edges": _EDGES}
+    knots = sum(map(_sample_count, lengths))
+    return {"zones": len(zone_table()), "folds": len(lengths), "knots": knots, "edges": _HAIRLINE_SAMPLES}
 
 
-def _pieces(knots: int) -> int:
+def _sample_count(knots: int) -> int:
     """Places on a curve through so many knots."""
-    return _PIECES * (knots - 1) + 1
+    return _SAMPLES_PER_SEGMENT * (knots - 1) + 1
 
 
-def _spline(knots: NDArray[np.float64]) -> NDArray[np.float64]:
+def _spline_points(knots: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places on the smooth curve through some, several from each to the next."""
     from scipy.interpolate import CubicSpline
 
     place = np.arange(len(knots))
-    return np.asarray(CubicSpline(place, knots)(np.linspace(0, len(knots) - 1, _pieces(len(knots)))))
+    return np.asarray(CubicSpline(place, knots)(np.linspace(0, len(knots) - 1, _sample_count(len(knots)))))
 
 
-def _ball(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _bounding_sphere(points: NDArray[np.float64]) -> NDArray[np.float64]:
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     return np.append(centre, np.linalg.norm(points - centre, axis=1).max())

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.base.quantities import check_numbers
-from dermis.human.published import OLD, YOUNG
+from dermis.base.quantities import check_fields
+from dermis.human.makehuman import OLD, YOUNG
 from dermis.mesh.eye_look import EyeLook
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
@@ -20,10 +20,10 @@ _MELANIN = {"african": 0.19, "asian": 0.024, "caucasian": 0.010}
 _EUMELANIN = {"african": 0.85, "asian": 0.7, "caucasian": 0.65}
 _FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
 _IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
-_SPREAD = 0.42  # standard deviation of the melanin's logarithm within a people
-_STEP = 0.05  # of eumelanin: people share tables of colours
-_SPOTS_FROM = 45.0
-_MOST_LINED = 1.0  # of `age` at 90
+_MELANIN_LOG_DEVIATION = 0.42  # standard deviation of the melanin's logarithm within a people
+_EUMELANIN_STEP = 0.05  # of eumelanin: people share tables of colours
+_AGE_SPOTS_FROM = 45.0
+_MAX_AGE_FOLDS = 1.0  # of `age` at 90
 
 
 @dataclass(frozen=True)
@@ -68,10 +68,10 @@ class SkinLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_numbers(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)})
+        check_fields(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)})
 
 
-class Origin(NamedTuple):
+class Demographics(NamedTuple):
     """What of a person its skin goes with.
 
     african, asian, caucasian : shares of the ancestries that add up to 1
@@ -85,68 +85,74 @@ class Origin(NamedTuple):
     sex: float
     age: float
 
-    def mean(self, values: dict[str, float]) -> float:
+    def weighted_mean(self, values: dict[str, float]) -> float:
         """Of values by ancestry."""
         african, asian, caucasian = (values[name] for name in ("african", "asian", "caucasian"))
         return self.african * african + self.asian * asian + self.caucasian * caucasian
 
 
-def usual_look(origin: Origin) -> SkinLook:
+def typical_skin(demographics: Demographics) -> SkinLook:
     """The skin that goes with a person: by ancestry, age and sex."""
-    old = (origin.age - YOUNG) / (OLD - YOUNG)
-    lines = max(origin.age - _SPOTS_FROM, 0.0) / (OLD - _SPOTS_FROM)
+    old = (demographics.age - YOUNG) / (OLD - YOUNG)
+    lines = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD - _AGE_SPOTS_FROM)
     return SkinLook(
-        melanin=math.exp(origin.mean({name: math.log(share) for name, share in _MELANIN.items()})),
-        eumelanin=origin.mean(_EUMELANIN),
+        melanin=math.exp(
+            demographics.weighted_mean({name: math.log(share) for name, share in _MELANIN.items()})
+        ),
+        eumelanin=demographics.weighted_mean(_EUMELANIN),
         blood=0.009,
-        freckles=origin.mean(_FRECKLES),
+        freckles=demographics.weighted_mean(_FRECKLES),
         moles=0.3,
-        spots=0.7 * lines * (0.4 + 0.6 * origin.caucasian),
+        spots=0.7 * lines * (0.4 + 0.6 * demographics.caucasian),
         veins=0.2 + 0.5 * old,
-        beard=0.45 * max(2.0 * origin.sex - 1.0, 0.0),
+        beard=0.45 * max(2.0 * demographics.sex - 1.0, 0.0),
         oil=0.45 - 0.25 * old,
-        age=0.04 + (_MOST_LINED - 0.04) * old**1.5,
+        age=0.04 + (_MAX_AGE_FOLDS - 0.04) * old**1.5,
     )
 
 
-def usual_eyes(origin: Origin) -> EyeLook:
+def typical_eyes(demographics: Demographics) -> EyeLook:
     """The eyes that go with a person: brown, lighter the more of the ancestry is European."""
-    return EyeLook(eumelanin=origin.mean(_IRIS), redness=0.15 + 0.2 * (origin.age - YOUNG) / (OLD - YOUNG))
+    return EyeLook(
+        eumelanin=demographics.weighted_mean(_IRIS),
+        redness=0.15 + 0.2 * (demographics.age - YOUNG) / (OLD - YOUNG),
+    )
 
 
-def drawn_eyes(rng: np.random.Generator, origin: Origin) -> EyeLook:
+def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:
     """Eyes at random around the usual ones: among Europeans of all colours."""
-    usual = usual_eyes(origin)
-    spread = 0.08 + 0.28 * origin.caucasian
-    eumelanin = _within(usual.eumelanin + spread * rng.normal(), 0.0, 1.0)
+    typical = typical_eyes(demographics)
+    spread = 0.08 + 0.28 * demographics.caucasian
+    eumelanin = _clamp(typical.eumelanin + spread * rng.normal(), 0.0, 1.0)
     pupil, seed = float(rng.uniform(1.4, 2.6)), int(rng.integers(2**31))
-    return EyeLook(eumelanin, pupil, _within(usual.redness + 0.1 * rng.normal(), 0.0, 1.0), seed)
+    return EyeLook(eumelanin, pupil, _clamp(typical.redness + 0.1 * rng.normal(), 0.0, 1.0), seed)
 
 
-def drawn_look(rng: np.random.Generator, origin: Origin) -> SkinLook:
+def sample_skin(rng: np.random.Generator, demographics: Demographics) -> SkinLook:
     """A skin at random around the usual one, by numbers that are always drawn in the same order."""
-    usual = usual_look(origin)
+    typical = typical_skin(demographics)
     n = rng.normal(size=8)
-    freckled = float(rng.beta(0.4, 3.0)) * (1.0 - min(usual.melanin / 0.1, 1.0))
+    freckled = float(rng.beta(0.4, 3.0)) * (1.0 - min(typical.melanin / 0.1, 1.0))
     seed = int(rng.integers(2**31))
-    male = max(2.0 * origin.sex - 1.0, 0.0)
+    male = max(2.0 * demographics.sex - 1.0, 0.0)
     return SkinLook(
-        melanin=_within(usual.melanin * math.exp(_SPREAD * n[0]), 0.002, 0.45),
-        eumelanin=round(_within(usual.eumelanin + 0.05 * n[1], 0.4, 0.95) / _STEP) * _STEP,
-        blood=_within(usual.blood * math.exp(0.2 * n[2]), 0.004, 0.018),
-        redness=_within(0.5 + 0.15 * n[3], 0.1, 1.0),
-        freckles=_within(0.5 * usual.freckles + 0.9 * freckled, 0.0, 1.0),
-        moles=_within(usual.moles + 0.15 * n[4], 0.0, 1.0),
-        spots=_within(usual.spots * (1.0 + 0.4 * n[5]), 0.0, 1.0),
+        melanin=_clamp(typical.melanin * math.exp(_MELANIN_LOG_DEVIATION * n[0]), 0.002, 0.45),
+        eumelanin=round(_clamp(typical.eumelanin + 0.05 * n[1], 0.4, 0.95) / _EUMELANIN_STEP)
+        * _EUMELANIN_STEP,
+        blood=_clamp(typical.blood * math.exp(0.2 * n[2]), 0.004, 0.018),
+        redness=_clamp(0.5 + 0.15 * n[3], 0.1, 1.0),
+        freckles=_clamp(0.5 * typical.freckles + 0.9 * freckled, 0.0, 1.0),
+        moles=_clamp(typical.moles + 0.15 * n[4], 0.0, 1.0),
+        spots=_clamp(typical.spots * (1.0 + 0.4 * n[5]), 0.0, 1.0),
         tan=float(rng.uniform(0.0, 0.6)),
-        veins=usual.veins,
+        veins=typical.veins,
         stubble=float(rng.uniform(0.2, 0.9)),
         beard=male * float(rng.uniform(0.05, 0.9)),
-        oil=_within(usual.oil + 0.12 * n[6], 0.05, 0.9),
-        age=_within(usual.age * (1.0 + 0.2 * n[7]), 0.0, 1.0),
+        oil=_clamp(typical.oil + 0.12 * n[6], 0.05, 0.9),
+        age=_clamp(typical.age * (1.0 + 0.2 * n[7]), 0.0, 1.0),
         seed=seed,
     )
 
 
-def _within(value: float, low: float, high: float) -> float:
+def _clamp(value: float, low: float, high: float) -> float:
     return float(min(max(value, low), high))

@@ -17,32 +17,32 @@ from dermis.optics.skin_colours import ColourTable, colour_table
 
 LIP_EPIDERMIS_MM = 0.03
 """What stands over the blood of the lips, which shows through more than elsewhere [mm]."""
-_ALONE = Lock()  # the frame and the painting ask for the same table at the same time
-LEAST_SIDE, MOST_SIDE = 256, 4096
+_LOCK = Lock()  # the frame and the painting ask for the same table at the same time
+MIN_SIDE, MAX_SIDE = 256, 4096
 """Sides of painted maps [texels]."""
 
 
-def colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
+def skin_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
     """Colour of skin by its shares of melanin and of blood."""
-    with _ALONE:
-        return _colours(eumelanin, oxygen, epidermis_mm)
+    with _LOCK:
+        return _cached_colour_table(eumelanin, oxygen, epidermis_mm)
 
 
 @lru_cache(maxsize=64)
-def _colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
+def _cached_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
     return colour_table(SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=epidermis_mm))
 
 
 def mean_colour(look: SkinLook) -> NDArray[np.float64]:
     """(3,) colour of the skin of usual places, linear Rec. 709 [-]."""
-    table = colours(look.eumelanin, look.oxygen, DEFAULT_SKIN.epidermis_mm)
+    table = skin_colour_table(look.eumelanin, look.oxygen, DEFAULT_SKIN.epidermis_mm)
     return np.asarray(table.read(np.array([look.melanin]), np.array([look.blood]))[0])
 
 
-def colour_tables(look: SkinLook) -> NDArray[np.float32]:
+def face_and_lip_colours(look: SkinLook) -> NDArray[np.float32]:
     """(2, n, n, 3) colours of the face's skin and of the lips', as `ColourTable` has them."""
     thick = DEFAULT_SKIN.epidermis_mm, LIP_EPIDERMIS_MM
-    both = [colours(look.eumelanin, look.oxygen, mm).colours for mm in thick]
+    both = [skin_colour_table(look.eumelanin, look.oxygen, mm).skin_colour_table for mm in thick]
     return np.stack(both).astype(np.float32)
 
 

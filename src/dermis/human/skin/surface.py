@@ -10,54 +10,54 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.tables import numbers, read_rows
+from dermis.base.tables import float_columns, read_rows
 from dermis.mesh.geometry import triangle_areas, vertex_normals
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Stencils
 
 Floats = NDArray[np.float32]
 
-FIELDS = ("lips", "mouth", "lids")
+BORDER_FIELDS = ("lips", "mouth", "lids")
 """Distances from borders [mm]: of the lips, positive inside; of the mouth, negative inside; of the lids,
 negative where they face the eye."""
 _UNIT_MM = 0.01
-_LIDS_MM = -2.0, -0.6  # of the first columns of lid_rings.csv
-_CREST_MM = 0.15, 0.8  # least and most of the third
+_LID_DISTANCES_MM = -2.0, -0.6  # of the first columns of lid_rings.csv
+_CREST_LIMITS_MM = 0.15, 0.8  # least and most of the third
 
 
 @cache
-def average() -> tuple[Floats, Floats]:
-    """(p, 3) the average person's control points, and (p, 3) the fields there, see `FIELDS` [mm]."""
-    places, fields = _stored("places"), _stored("fields")
+def average_surface() -> tuple[Floats, Floats]:
+    """(p, 3) the average person's control points, and (p, 3) the fields there, see `BORDER_FIELDS` [mm]."""
+    points_mm, fields = _load_array("places"), _load_array("fields")
     rings = lid_rings()
-    fields[rings[..., :2], 2] = _LIDS_MM
-    fields[rings[..., 2], 2] = fields[rings[..., 2], 2].clip(*_CREST_MM)
-    return places, fields
+    fields[rings[..., :2], 2] = _LID_DISTANCES_MM
+    fields[rings[..., 2], 2] = fields[rings[..., 2], 2].clip(*_CREST_LIMITS_MM)
+    return points_mm, fields
 
 
 @cache
 def lid_rings() -> NDArray[np.int64]:
     """(2, r, 4) control points of the left and the right eye's lids, see human/lid_rings.csv."""
-    left = numbers(read_rows("dermis.human", "lid_rings"), "wall edge crest skin").astype(np.int64)
-    places = _stored("places")
-    wanted = places[left.ravel()] * np.array([-1.0, 1.0, 1.0], np.float32)
-    opposite = np.array([np.abs(places - place).sum(axis=1).argmin() for place in wanted])
+    left = float_columns(read_rows("dermis.human", "lid_rings"), "wall edge crest skin").astype(np.int64)
+    points_mm = _load_array("places")
+    mirrored = points_mm[left.ravel()] * np.array([-1.0, 1.0, 1.0], np.float32)
+    opposite = np.array([np.abs(points_mm - place).sum(axis=1).argmin() for place in mirrored])
     return np.stack([left, opposite.reshape(left.shape)])
 
 
-def _stored(name: str) -> Floats:
+def _load_array(name: str) -> Floats:
     file = resources.files("dermis.human").joinpath("data", "average.npz")
-    with resources.as_file(file) as path, np.load(path) as found:
-        return np.asarray(found[name].astype(np.float32) * np.float32(_UNIT_MM))
+    with resources.as_file(file) as path, np.load(path) as vertices_mm:
+        return np.asarray(vertices_mm[name].astype(np.float32) * np.float32(_UNIT_MM))
 
 
-_KEPT: dict[bytes, Painting] = {}
-_MOST_KEPT = 3
-_ALONE = Lock()
+_CACHE: dict[bytes, PaintedSurface] = {}
+_CACHE_SIZE = 3
+_LOCK = Lock()
 
 
 @dataclass(frozen=True, eq=False)
-class Painting:
+class PaintedSurface:
     """A human's triangles of skin, as painted_surface.wgsl reads them.
 
     vertices : (v, 12) uv, place and normal on the average person, fields, and the binary logarithm of the mm
@@ -74,41 +74,43 @@ class Painting:
         return len(self.triangles)
 
 
-def painting(mesh: Mesh, stencils: Stencils | None) -> Painting:
+def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
     """What is painted of a human's mesh; the same for all people with its layout.
 
     stencils : which its points are refined by, if they are
     """
     key = mesh.layout_key
-    with _ALONE:
-        if key not in _KEPT:
-            while len(_KEPT) >= _MOST_KEPT:
-                _KEPT.pop(next(iter(_KEPT)))
-            _KEPT[key] = _painting(mesh, stencils)
-        return _KEPT[key]
+    with _LOCK:
+        if key not in _CACHE:
+            while len(_CACHE) >= _CACHE_SIZE:
+                _CACHE.pop(next(iter(_CACHE)))
+            _CACHE[key] = _build_surface(mesh, stencils)
+        return _CACHE[key]
 
 
-def _painting(mesh: Mesh, stencils: Stencils | None) -> Painting:
-    places, fields = average()
-    both = np.hstack([places, fields]).astype(np.float64)
+def _build_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
+    points_mm, fields = average_surface()
+    both = np.hstack([points_mm, fields]).astype(np.float64)
     others = np.zeros(
         (int(mesh.point.max() if stencils is None else stencils.point.max()) + 1, both.shape[1])
     )
     control = np.concatenate([both, others[len(both) :]])  # of eyeballs, which are not painted
     points = control if stencils is None else stencils.points(control)
-    found = points[mesh.point].astype(np.float32)
+    vertices_mm = points[mesh.point].astype(np.float32)
     kinds = np.array([material.kind == "skin" for material in mesh.materials])
     triangles = mesh.triangles[kinds[mesh.material]]
-    normals = vertex_normals(found[:, :3], mesh.point, mesh.triangles)
-    density = _density(mesh.uv, found[:, :3], triangles)
-    vertices = np.column_stack([mesh.uv, found[:, :3], normals, found[:, 3:], density]).astype(np.float32)
-    flagged = np.column_stack([triangles, _at_border(triangles)]).astype(np.uint32)
-    return Painting(np.ascontiguousarray(vertices), np.ascontiguousarray(flagged))
+    normals = vertex_normals(vertices_mm[:, :3], mesh.point, mesh.triangles)
+    density = _log_mm_per_uv(mesh.uv, vertices_mm[:, :3], triangles)
+    vertices = np.column_stack([mesh.uv, vertices_mm[:, :3], normals, vertices_mm[:, 3:], density]).astype(
+        np.float32
+    )
+    flagged = np.column_stack([triangles, _touches_border(triangles)]).astype(np.uint32)
+    return PaintedSurface(np.ascontiguousarray(vertices), np.ascontiguousarray(flagged))
 
 
-def _density(uv: Floats, places: Floats, triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+def _log_mm_per_uv(uv: Floats, points_mm: Floats, triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     """(v,) binary logarithm of the mm in a unit of uv around each vertex."""
-    areas = triangle_areas(places[triangles].astype(np.float64))
+    areas = triangle_areas(points_mm[triangles].astype(np.float64))
     a, b, c = (uv[triangles[:, k]].astype(np.float64) for k in range(3))
     ab, ac = b - a, c - a
     flat = np.abs(ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]) / 2
@@ -116,7 +118,7 @@ def _density(uv: Floats, places: Floats, triangles: NDArray[np.int32]) -> NDArra
     return np.asarray(0.5 * np.log2(np.maximum(sums[0], 1e-9) / np.maximum(sums[1], 1e-12)))
 
 
-def _at_border(triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _touches_border(triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
     sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1).astype(np.int64)
     key = (sides[..., 0] * (int(triangles.max()) + 1) + sides[..., 1]).ravel()
     _, which, count = np.unique(key, return_inverse=True, return_counts=True)

@@ -27,16 +27,16 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, 
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from dermis.base.errors import refuse, shown_value
-from dermis.base.registry import Named
+from dermis.base.errors import format_value, refuse
+from dermis.base.registry import RegisteredName
 from dermis.scene.field_errors import (
-    Because,
-    ImpossibleError,
-    bounds_of,
-    found_in,
-    number_fields,
-    plain_numbers,
-    words_of,
+    BoundsReason,
+    InvalidFieldsError,
+    field_bounds,
+    field_keywords,
+    messages_by_field,
+    numeric_fields,
+    python_numbers,
 )
 
 if TYPE_CHECKING:
@@ -44,10 +44,10 @@ if TYPE_CHECKING:
 else:
     ModelMetaclass = type(BaseModel)
 
-FARTHEST_MM = 1e6
-_VAST = 1e5  # bounds beyond it only keep numbers finite
-_MEMBERS = FunctionType, classmethod, property
-_WIDTH = 92  # of a line of a docstring
+MAX_COORDINATE_MM = 1e6
+_DISPLAYED_BOUND = 1e5  # bounds beyond it only keep numbers finite
+_MEMBER_TYPES = FunctionType, classmethod, property
+_DOCSTRING_WIDTH = 92  # of a line of a docstring
 
 
 def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -58,14 +58,16 @@ def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
 
 Coordinate = Annotated[
     float,
-    Field(ge=-FARTHEST_MM, le=FARTHEST_MM),
-    Because("mm: beyond a kilometre single precision is too coarse for skin"),
+    Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM),
+    BoundsReason("mm: beyond a kilometre single precision is too coarse for skin"),
 ]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
-_Component = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM), Because("only their ratios count")]
+_Component = Annotated[
+    float, Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM), BoundsReason("only their ratios count")
+]
 Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_direction)]
 Intensity = Annotated[
-    float, Field(ge=0, le=1e6), Because("light is not negative, and the sun on skin is about 3")
+    float, Field(ge=0, le=1e6), BoundsReason("light is not negative, and the sun on skin is about 3")
 ]
 Colour = tuple[Intensity, Intensity, Intensity]
 
@@ -78,7 +80,7 @@ class _Documented(ModelMetaclass):
 
         @property
         def __signature__(self) -> Signature:
-            return signature_of(self)
+            return constructor_signature(self)
 
         @__signature__.setter
         def __signature__(self, signature: Any) -> None:
@@ -86,40 +88,42 @@ class _Documented(ModelMetaclass):
 
         @property
         def __doc__(self) -> str:
-            return documentation_of(self)
+            return model_docstring(self)
 
         def __dir__(self) -> list[str]:
             bases = self.__mro__[: self.__mro__.index(BaseModel)]
             members = {name: thing for base in reversed(bases) for name, thing in vars(base).items()}
-            return [name for name, thing in members.items() if name[0] != "_" and isinstance(thing, _MEMBERS)]
+            return [
+                name for name, thing in members.items() if name[0] != "_" and isinstance(thing, _MEMBER_TYPES)
+            ]
 
 
-class Plain(BaseModel, metaclass=_Documented):
+class FrozenModel(BaseModel, metaclass=_Documented):
     """Immutable settings: unknown names and impossible values are refused.
 
     The docstring under a field is its help, in Python, the command line, the viewer and the documentation.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, defer_build=True)
-    meant: ClassVar[Mapping[str, str]] = {}
+    synonyms: ClassVar[Mapping[str, str]] = {}
     """Fields by the names that other programs have for them."""
 
     def __init__(self, *value: Any, **data: Any) -> None:
         """Values by name; one without a name is that of the one field that has no default."""
         model = type(self)
         if value:
-            data[_only_required(model, value)] = value[0]
-        for name, text in number_fields(model).items():
+            data[_positional_field(model, value)] = value[0]
+        for name, text in numeric_fields(model).items():
             if name in data:
-                data[name] = plain_numbers(data[name], text)
+                data[name] = python_numbers(data[name], text)
         try:
             super().__init__(**data)
         except ValidationError as error:
-            raise ImpossibleError(model.__name__, found_in(error.errors(), model)) from None
+            raise InvalidFieldsError(model.__name__, messages_by_field(error.errors(), model)) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
-        owner, remedy = type(self).__name__, f"Write replace({name}={shown_value(value)}) for a copy with it"
-        refuse(owner, "a value that stays as it is", f"{name} was to be changed", remedy)
+        owner, advice = type(self).__name__, f"Write replace({name}={format_value(value)}) for a copy with it"
+        refuse(owner, "a value that stays as it is", f"{name} was to be changed", advice)
 
     def replace(self, **values: Any) -> Self:
         """The same with other values, checked."""
@@ -130,7 +134,7 @@ class Plain(BaseModel, metaclass=_Documented):
         return type(self) is type(other) and vars(self) == vars(other)
 
 
-class Range(NamedTuple):
+class SliderRange(NamedTuple):
     """Where a number lies as a rule: the ends of its slider."""
 
     low: float
@@ -140,29 +144,29 @@ class Range(NamedTuple):
 
 def slider(low: float, high: float, *, log: bool = False) -> dict[str, Any]:
     """For a field's `json_schema_extra`: a slider's range, where the bounds are wider than what is useful."""
-    return {"slider": Range(low, high, log)}
+    return {"slider": SliderRange(low, high, log)}
 
 
-def help_of(model: type[BaseModel], field: str) -> str:
+def field_help(model: type[BaseModel], field: str) -> str:
     """What a field means, on one line, with what each of the names of a registry stands for."""
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
-    summaries = [one for named in _named(info) for one in named.registry.summaries()]
+    summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]
     return f"{text} {'; '.join(summaries)}." if summaries else text
 
 
-def choices_of(model: type[BaseModel], field: str) -> tuple[str, ...]:
+def field_choices(model: type[BaseModel], field: str) -> tuple[str, ...]:
     """The words that a field may be; none where it is no choice of words."""
     info = model.model_fields[field]
-    for named in _named(info):
+    for named in _registry_names(info):
         return named.names
-    words = [word for one in _kinds(info) if get_origin(one) is Literal for word in get_args(one)]
+    words = [word for one in _union_members(info) if get_origin(one) is Literal for word in get_args(one)]
     return tuple(words)
 
 
-def range_of(model: type[BaseModel], field: str) -> Range | None:
+def field_slider_range(model: type[BaseModel], field: str) -> SliderRange | None:
     """The ends of a number's slider, or of each number in a tuple; None where the model names no two ends."""
-    return _range(model.model_fields[field])
+    return _slider_range(model.model_fields[field])
 
 
 class Heading(str):
@@ -171,17 +175,17 @@ class Heading(str):
     __slots__ = ()
 
 
-def heading_of(model: type[BaseModel], field: str) -> str:
+def field_heading(model: type[BaseModel], field: str) -> str:
     """Return the heading under which a field is listed; an empty text for one of the main fields."""
     return next((one for one in model.model_fields[field].metadata if isinstance(one, Heading)), "")
 
 
 def fields_under(heading: str, model: type[BaseModel]) -> list[str]:
     """Return the fields that are listed under a heading; those without one for an empty text."""
-    return [name for name in model.model_fields if heading_of(model, name) == heading]
+    return [name for name in model.model_fields if field_heading(model, name) == heading]
 
 
-def signature_of(model: type[BaseModel]) -> Signature:
+def constructor_signature(model: type[BaseModel]) -> Signature:
     """Return the parameters of a model's constructor; the one required field may come without its name."""
     alone = _required(model)
     return Signature(sorted(_parameters(model, alone), key=lambda one: one.kind))
@@ -192,7 +196,7 @@ def _parameters(model: type[BaseModel], required: list[str]) -> Iterator[Paramet
         kind = Parameter.POSITIONAL_OR_KEYWORD if required == [name] else Parameter.KEYWORD_ONLY
         default = Parameter.empty if info.is_required() else info.get_default(call_default_factory=True)
         annotation = _without_checks(info.annotation)
-        if words := words_of(model, name):
+        if words := field_keywords(model, name):
             annotation = annotation | Literal[words]
         yield Parameter(name, kind, default=default, annotation=annotation)
 
@@ -208,59 +212,59 @@ def _without_checks(kind: Any) -> Any:
     return reduce(or_, bare) if origin in (Union, UnionType) else origin[bare]
 
 
-def documentation_of(model: type[BaseModel]) -> str:
+def model_docstring(model: type[BaseModel]) -> str:
     """Return a model's own docstring with its fields, those under a heading last, in numpydoc's form."""
     sections: dict[str, list[str]] = {"Parameters": []}
-    for parameter in signature_of(model).parameters.values():
-        lines = sections.setdefault(heading_of(model, parameter.name) or "Parameters", [])
+    for parameter in constructor_signature(model).parameters.values():
+        lines = sections.setdefault(field_heading(model, parameter.name) or "Parameters", [])
         default = "" if parameter.default is Parameter.empty else f", default {parameter.default!r}"
         lines.append(f"{parameter.name} : {formatannotation(parameter.annotation)}{default}")
-        bounds = "" if "Literal" in lines[-1] else values_of(model, parameter.name)
-        text = help_of(model, parameter.name) + (f" [{bounds}]" if bounds else "")
+        bounds = "" if "Literal" in lines[-1] else accepted_values(model, parameter.name)
+        text = field_help(model, parameter.name) + (f" [{bounds}]" if bounds else "")
         lines += textwrap.wrap(
-            text, _WIDTH, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False
+            text, _DOCSTRING_WIDTH, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False
         )
     listed = ["\n".join(["", title, "-" * len(title), *lines]) for title, lines in sections.items() if lines]
     return "\n".join([cleandoc(vars(model)["__doc__"] or ""), *listed])
 
 
-def values_of(model: type[BaseModel], field: str) -> str:
+def accepted_values(model: type[BaseModel], field: str) -> str:
     """The words that a field may be, and the bounds of a number where they say something."""
-    low, high = bounds_of(model.model_fields[field])
-    words = [*words_of(model, field), *choices_of(model, field)]
-    if low is not None and high is not None and high < _VAST:
+    low, high = field_bounds(model.model_fields[field])
+    words = [*field_keywords(model, field), *field_choices(model, field)]
+    if low is not None and high is not None and high < _DISPLAYED_BOUND:
         words.append(f"{low:g} to {high:g}")
     return ", ".join(words)
 
 
-def shown(value: Any) -> str:
+def format_default(value: Any) -> str:
     """A default as it is typed; nothing where a setting is off or left out."""
     if isinstance(value, tuple):
-        return ("x" if all(isinstance(one, int) for one in value) else ",").join(map(shown, value))
+        return ("x" if all(isinstance(one, int) for one in value) else ",").join(map(format_default, value))
     if value is None or isinstance(value, bool) or value is PydanticUndefined:
         return ""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _named(info: FieldInfo) -> list[Named]:
-    return [one for one in info.metadata if isinstance(one, Named)]
+def _registry_names(info: FieldInfo) -> list[RegisteredName]:
+    return [one for one in info.metadata if isinstance(one, RegisteredName)]
 
 
-def _kinds(info: FieldInfo) -> tuple[Any, ...]:
+def _union_members(info: FieldInfo) -> tuple[Any, ...]:
     """The types that a field's value may have."""
     kind = info.annotation
     return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
 
 
-def _range(info: FieldInfo) -> Range | None:
+def _slider_range(info: FieldInfo) -> SliderRange | None:
     extra = info.json_schema_extra
     if isinstance(extra, dict) and "slider" in extra:
-        return Range(*extra["slider"])  # type: ignore[misc]
-    for kind in _kinds(info):
+        return SliderRange(*extra["slider"])  # type: ignore[misc]
+    for kind in _union_members(info):
         if get_origin(kind) is tuple:
-            return _range(FieldInfo.from_annotation(get_args(kind)[0]))
-    low, high = bounds_of(info)
-    return None if low is None or high is None else Range(low, high)
+            return _slider_range(FieldInfo.from_annotation(get_args(kind)[0]))
+    low, high = field_bounds(info)
+    return None if low is None or high is None else SliderRange(low, high)
 
 
 def _required(model: type[BaseModel]) -> list[str]:
@@ -268,13 +272,13 @@ def _required(model: type[BaseModel]) -> list[str]:
     return [name for name, info in model.model_fields.items() if info.is_required()]
 
 
-def _only_required(model: type[BaseModel], value: tuple[Any, ...]) -> str:
+def _positional_field(model: type[BaseModel], value: tuple[Any, ...]) -> str:
     """The field that a value without a name is for."""
     required = _required(model)
     if len(required) != 1 or len(value) != 1:
-        some, came = (
+        some, actual = (
             ", ".join(f"{name}=..." for name in list(model.model_fields)[:3]),
-            f"{shown_value(value[0])} came",
+            f"got {format_value(value[0])}",
         )
-        refuse(model.__name__, f"values by name, such as {some}", f"{came} without one", "Name it")
+        refuse(model.__name__, f"values by name, such as {some}", f"{actual} without one", "Name it")
     return required[0]

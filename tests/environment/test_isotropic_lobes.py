@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.environment.mirror_fits import MIRROR_ROUGHNESSES
-from dermis.environment.mirrors import equivalent_mirrors
+from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES
+from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import directions, solid_angles
-from dermis.environment.prefilter import HEIGHT, ROUGHNESSES, prefilter, round_lobe
+from dermis.environment.prefilter import HEIGHT, ROUGHNESSES, isotropic_lobe, prefilter
 from dermis.images.io import write_exr
 from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 def test_mirrors_seen_along_the_normal_are_the_lobe() -> None:
     """Their sum looks along the normal, and their shares are all of the light."""
-    table = equivalent_mirrors()
+    table = isotropic_lobe_table()
     assert np.allclose(table[..., 3].sum(axis=-1), 1) and table[..., 3].min() >= 0
     assert np.allclose(table[:, -1, :, :2], 0)
 
@@ -27,7 +27,7 @@ def test_mirrors_seen_along_the_normal_are_the_lobe() -> None:
 @pytest.mark.parametrize("model", MODELS)
 def test_mirrors_are_alike_on_both_sides_of_the_plane_of_view(model: str) -> None:
     """Of those that lie beside it there are two each; the rest lie in it."""
-    table = equivalent_mirrors(model)
+    table = isotropic_lobe_table(model)
     assert np.allclose(table[..., :3, 1], 0) and np.allclose(table[..., 3, 1], -table[..., 4, 1], atol=1e-4)
     beside = table[..., 3, 1] > 0
     assert beside.any() and np.allclose(
@@ -36,7 +36,7 @@ def test_mirrors_are_alike_on_both_sides_of_the_plane_of_view(model: str) -> Non
 
 
 def test_mirrors_that_are_looked_up_are_five_at_most_and_three_at_steep_views() -> None:
-    weights = equivalent_mirrors()[..., 3] > 0
+    weights = isotropic_lobe_table()[..., 3] > 0
     assert (weights.sum(axis=-1) == np.array([5] * 10 + [4] * 3 + [3] * 3)).all()
 
 
@@ -44,7 +44,7 @@ def test_mirrors_that_are_looked_up_are_five_at_most_and_three_at_steep_views() 
 def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
     """At a node of the table, by light sampled over the hemisphere; and nearly its width across."""
     light, area = directions(256, 512)[:128], solid_angles(256, 512)[:128]
-    cosine, m = (7 / 15) ** 2, MIRROR_ROUGHNESSES[6]
+    cosine, m = (7 / 15) ** 2, LOBE_TABLE_ROUGHNESSES[6]
     view, up = np.array([-np.sqrt(1 - cosine**2), cosine, 0]), np.array([0.0, 1.0, 0.0])
     weight = MODELS[model].lobe(cosines(up, light, view), m) * light[..., 1] * area
     weight /= weight.sum()
@@ -53,9 +53,9 @@ def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
     made, across = np.zeros(2), 0.0
     along, ahead, aside = np.array([1.0, 0.0, 0.0]), view * [-1, 1, 1], np.array([0.0, 0.0, 1.0])
     away = cosine * along - np.sqrt(1 - cosine**2) * up
-    for x, y, wide, share in equivalent_mirrors(model)[6, 7]:
+    for x, y, wide, share in isotropic_lobe_table(model)[6, 7]:
         to = (2 * (x * away + y * aside) + (1 - x**2 - y**2) * ahead) / (1 + x**2 + y**2)
-        own = round_lobe(np.arccos(light[..., 1]), wide) * area
+        own = isotropic_lobe(np.arccos(light[..., 1]), wide) * area
         own /= own.sum()
         inward, tilt = (own * light[..., 1]).sum(), to @ aside
         made += share * np.array([to @ along, to @ up]) * inward
@@ -68,8 +68,8 @@ def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
 def test_mirrors_of_another_packages_model_are_fitted_when_asked_for() -> None:
     """As those of the table were."""
     with MODELS.including("theirs", MODELS["kelemen"]):
-        made = equivalent_mirrors("theirs")
-    assert np.allclose(made, equivalent_mirrors("kelemen"), atol=2e-3)
+        made = isotropic_lobe_table("theirs")
+    assert np.allclose(made, isotropic_lobe_table("kelemen"), atol=2e-3)
 
 
 @pytest.fixture(scope="module")
@@ -142,9 +142,9 @@ def error_of(lit_room: tuple[str, Floats], pairs: Floats, cosine: float, m: floa
 
 def lobes_between(cosine: float, m: float) -> Floats:
     """(5, 4) round lobes between the nodes of the table."""
-    x, y = np.sqrt(cosine) * 15, np.interp(np.log(m), np.log(MIRROR_ROUGHNESSES), np.arange(12))
+    x, y = np.sqrt(cosine) * 15, np.interp(np.log(m), np.log(LOBE_TABLE_ROUGHNESSES), np.arange(12))
     j, i = int(x), int(y)
-    five = equivalent_mirrors()[i : i + 2, j : j + 2]
+    five = isotropic_lobe_table()[i : i + 2, j : j + 2]
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], five))
 
 

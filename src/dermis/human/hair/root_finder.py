@@ -11,21 +11,24 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles
 from dermis.human.hair import lashes
-from dermis.human.hair.brows import nodes
+from dermis.human.hair.brows import grid_points
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, corners
 
 Index = NDArray[np.int64]
 SIDES = 1.0, -1.0
 """Of x: the left one and the right one."""
-_ENDS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
-_INSIDE = -1e-9  # least share of a corner
+_QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
+_MIN_WEIGHT = -1e-9  # least share of a corner
 _CELL_MM = 2.0  # of the grid that triangles are listed in
-_LOW, _HIGH = np.array([-70.0, -20.0]), np.array([70.0, 50.0])  # of places in front, around the brows [mm]
+_GRID_LOW, _GRID_HIGH = (
+    np.array([-70.0, -20.0]),
+    np.array([70.0, 50.0]),
+)  # of places in front, around the brows [mm]
 _HALVES = np.array([[0, 1, 2], [2, 3, 0]])
 
 
-class _Front(NamedTuple):
+class _FrontTriangles(NamedTuple):
     """Triangles that face the viewer, by cells of a grid over the front plane.
 
     listed : (columns, rows, most) in order, -1 for none
@@ -33,13 +36,13 @@ class _Front(NamedTuple):
     corner : (t, 3, 3) [mm]
     """
 
-    listed: Index
+    triangle_lists: Index
     quad: Index
     half: Index
     corner: Doubles
 
 
-class _Row(NamedTuple):
+class _LidEdge(NamedTuple):
     """Edges in a row, with a quad beside each.
 
     run : (m,) how far along the row each begins and the last ends [mm]
@@ -47,12 +50,12 @@ class _Row(NamedTuple):
     frame : (m - 1, 4, 2) places on these: the edge's ends, and what lies beside each
     """
 
-    run: Doubles
+    lengths_mm: Doubles
     quad: Index
     frame: Doubles
 
 
-class Rooting:
+class RootFinder:
     """Roots on a mesh of quads.
 
     mesh : with control points at points_mm (p, 3)
@@ -60,114 +63,118 @@ class Rooting:
     drawn : the mesh as it is drawn, of the same person
     """
 
-    def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles, drawn: Mesh) -> None:
-        self.mesh, self.points_mm, self.drawn, self._eyes_mm = mesh, points_mm, drawn, eyes_mm
-        self._rows: dict[tuple[tuple[int, ...], float], _Row] = {}
+    def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles, subdivided: Mesh) -> None:
+        self.mesh, self.points_mm, self.subdivided, self._eyes_mm = mesh, points_mm, subdivided, eyes_mm
+        self._lid_edges: dict[tuple[tuple[int, ...], float], _LidEdge] = {}
 
-    def in_front(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
+    def front_roots(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
         """Roots on what faces the viewer at places of the front plane (n,) [mm], and which there are."""
         front = self._front
-        cell = np.floor((np.column_stack([x, y]) - _LOW) / _CELL_MM).astype(np.int64)
-        listed = front.listed[tuple(np.clip(cell, 0, np.array(front.listed.shape[:2]) - 1).T)]
-        asked, column = np.nonzero(listed >= 0)
-        which = listed[asked, column]
+        cell = np.floor((np.column_stack([x, y]) - _GRID_LOW) / _CELL_MM).astype(np.int64)
+        triangle_lists = front.triangle_lists[
+            tuple(np.clip(cell, 0, np.array(front.triangle_lists.shape[:2]) - 1).T)
+        ]
+        query_index, column = np.nonzero(triangle_lists >= 0)
+        which = triangle_lists[query_index, column]
         (ax, ay, az), (bx, by, bz), (cx, cy, cz) = front.corner.take(which, axis=0).transpose(1, 2, 0)
-        px, py = x[asked], y[asked]
+        px, py = x[query_index], y[query_index]
         det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
         v = ((px - ax) * (cy - ay) - (cx - ax) * (py - ay)) / det
         w = ((bx - ax) * (py - ay) - (px - ax) * (by - ay)) / det
         u = 1 - v - w
-        inside = np.flatnonzero((u >= _INSIDE) & (v >= _INSIDE) & (w >= _INSIDE))
+        inside = np.flatnonzero((u >= _MIN_WEIGHT) & (v >= _MIN_WEIGHT) & (w >= _MIN_WEIGHT))
         z = (az + v * (bz - az) + w * (cz - az))[inside]
-        won = np.full(len(x), -1)
+        foremost = np.full(len(x), -1)
         order = inside[np.argsort(z)]
-        won[asked[order]] = order  # the last one stays: the foremost
-        there = won >= 0
-        which, share = which[won], np.stack([u[won], v[won], w[won]], axis=-1)
-        place = np.einsum("nk,nkc->nc", share, _ENDS[_HALVES].take(front.half[which], axis=0))
-        quad = np.where(there, front.quad[which], 0)
-        return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), there
+        foremost[query_index[order]] = order  # the last one stays: the foremost
+        hit = foremost >= 0
+        which, weights = which[foremost], np.stack([u[foremost], v[foremost], w[foremost]], axis=-1)
+        place = np.einsum("nk,nkc->nc", weights, _QUAD_CORNERS[_HALVES].take(front.half[which], axis=0))
+        quad = np.where(hit, front.quad[which], 0)
+        return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), hit
 
     @cached_property
-    def around_brows(self) -> Roots:
+    def brow_grid_roots(self) -> Roots:
         """The grids of `BrowSkin`; what faces the viewer is all around a brow."""
-        x, y = nodes()
-        return self.in_front(np.concatenate([side * x for side in SIDES]), np.tile(y, len(SIDES)))[0]
+        x, y = grid_points()
+        return self.front_roots(np.concatenate([side * x for side in SIDES]), np.tile(y, len(SIDES)))[0]
 
-    def beside_lid(self, lid: lashes.Lid, side: float, u: Doubles, across: Doubles) -> Roots:
+    def lid_edge_roots(self, lid: lashes.LashRow, side: float, u: Doubles, across: Doubles) -> Roots:
         """Roots along a lid's edge, on the quads beside it that are farther from the eye.
 
         side : 1 for the left one
         u : (n,) how far along it, from 0 to 1 by length
         across : (n,) how far from the edge into the quad, 0 to 1
         """
-        key = lid.loop, side
-        if key not in self._rows:
-            self._rows[key] = self._row(np.array(lid.loop), side)
-        run, quad, frame = self._rows[key]
-        at = np.clip(np.searchsorted(run, u * run[-1], "right") - 1, 0, len(quad) - 1)
-        part = (u * run[-1] - run[at]) / (run[at + 1] - run[at])
+        key = lid.edge_points, side
+        if key not in self._lid_edges:
+            self._lid_edges[key] = self._lid_edge(np.array(lid.edge_points), side)
+        lengths_mm, quad, frame = self._lid_edges[key]
+        at = np.clip(np.searchsorted(lengths_mm, u * lengths_mm[-1], "right") - 1, 0, len(quad) - 1)
+        part = (u * lengths_mm[-1] - lengths_mm[at]) / (lengths_mm[at + 1] - lengths_mm[at])
         frame = frame[at]
         low = (1 - part)[:, None] * frame[:, 0] + part[:, None] * frame[:, 1]
         high = (1 - part)[:, None] * frame[:, 2] + part[:, None] * frame[:, 3]
         place = (1 - across)[:, None] * low + across[:, None] * high
         return Roots(quad[at].astype(np.int32), place.astype(np.float32))
 
-    def _row(self, loop: Index, side: float) -> _Row:
-        points, around, away = self.points_mm, self._around, self._eyes_mm[0 if side > 0 else 1]
-        loop = loop if side > 0 else _mirrored(points, loop)
-        off = np.linalg.norm(points[around].mean(axis=1) - away, axis=1)
-        run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points[loop], axis=0), axis=1))])
+    def _lid_edge(self, edge_points: Index, side: float) -> _LidEdge:
+        points, around, away = self.points_mm, self._quad_points, self._eyes_mm[0 if side > 0 else 1]
+        edge_points = edge_points if side > 0 else _mirrored_points(points, edge_points)
+        distances = np.linalg.norm(points[around].mean(axis=1) - away, axis=1)
+        lengths_mm = np.concatenate(
+            [[0], np.cumsum(np.linalg.norm(np.diff(points[edge_points], axis=0), axis=1))]
+        )
         quads, frames = [], []
-        for a, b in pairwise(loop.tolist()):
+        for a, b in pairwise(edge_points.tolist()):
             both = np.flatnonzero((around == a).any(axis=1) & (around == b).any(axis=1))
-            quad = int(both[off[both].argmax()])
+            quad = int(both[distances[both].argmax()])
             i, j = (int(np.flatnonzero(around[quad] == p)[0]) for p in (a, b))
             quads.append(quad)
-            frames.append(_ENDS[[i, j, (2 * i - j) % 4, (2 * j - i) % 4]])  # beside a, beside b
-        return _Row(run, np.array(quads), np.array(frames))
+            frames.append(_QUAD_CORNERS[[i, j, (2 * i - j) % 4, (2 * j - i) % 4]])  # beside a, beside b
+        return _LidEdge(lengths_mm, np.array(quads), np.array(frames))
 
     @cached_property
-    def _around(self) -> NDArray[np.int32]:
+    def _quad_points(self) -> NDArray[np.int32]:
         """(q, 4) points of all quads."""
         return corners(self.mesh, np.arange(len(self.mesh.quads)))
 
     @cached_property
-    def _front(self) -> _Front:
+    def _front(self) -> _FrontTriangles:
         quad = np.repeat(np.arange(len(self.mesh.quads)), 2)
         half = np.tile([0, 1], len(self.mesh.quads))
-        corner = self.points_mm[np.take_along_axis(self._around[quad], _HALVES[half], axis=1)]
-        (ab, ac), low, high = np.diff(corner[..., :2], axis=1).transpose(1, 0, 2), *_box(corner)
+        corner = self.points_mm[np.take_along_axis(self._quad_points[quad], _HALVES[half], axis=1)]
+        (ab, ac), low, high = np.diff(corner[..., :2], axis=1).transpose(1, 0, 2), *_bounding_box(corner)
         ac = ab + ac
         seen = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1] > 1e-9
-        seen &= ((high >= _LOW) & (low <= _HIGH)).all(axis=1)
+        seen &= ((high >= _GRID_LOW) & (low <= _GRID_HIGH)).all(axis=1)
         quad, half, corner = quad[seen], half[seen], corner[seen]
-        shape = np.ceil((_HIGH - _LOW) / _CELL_MM).astype(np.int64)
-        first, last = (np.clip(np.floor((at[seen] - _LOW) / _CELL_MM).astype(np.int64), 0, shape - 1)
+        shape = np.ceil((_GRID_HIGH - _GRID_LOW) / _CELL_MM).astype(np.int64)
+        first, last = (np.clip(np.floor((at[seen] - _GRID_LOW) / _CELL_MM).astype(np.int64), 0, shape - 1)
                        for at in (low, high))  # fmt: skip
         cells: dict[tuple[int, int], list[int]] = {}
         for number, ((x0, y0), (x1, y1)) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
             for x in range(x0, x1 + 1):
                 for y in range(y0, y1 + 1):
                     cells.setdefault((x, y), []).append(number)
-        listed = np.full((*shape, max(map(len, cells.values()))), -1)
+        triangle_lists = np.full((*shape, max(map(len, cells.values()))), -1)
         for (x, y), numbers in cells.items():
-            listed[x, y, : len(numbers)] = numbers
-        return _Front(listed, quad, half, corner)
+            triangle_lists[x, y, : len(numbers)] = numbers
+        return _FrontTriangles(triangle_lists, quad, half, corner)
 
 
-def _box(corner: Doubles) -> tuple[Doubles, Doubles]:
+def _bounding_box(corner: Doubles) -> tuple[Doubles, Doubles]:
     return corner[..., :2].min(axis=1), corner[..., :2].max(axis=1)
 
 
-def _mirrored(points_mm: Doubles, index: Index) -> Index:
+def _mirrored_points(points_mm: Doubles, index: Index) -> Index:
     """Points opposite to some of a symmetric head."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(points_mm).query(points_mm[index] * [-1, 1, 1])[1], np.int64)
 
 
-def eye_middles(mesh: Mesh) -> Doubles:
+def eye_centres(mesh: Mesh) -> Doubles:
     """(2, 3) middles of the left and of the right eye [mm]."""
     names = [one.name for one in mesh.materials]
     found = []

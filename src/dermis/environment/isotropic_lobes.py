@@ -7,34 +7,34 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.progress import preparing
-from dermis.base.tables import numbers, read_rows
-from dermis.environment.mirror_fits import (
-    LOBES,
-    MIRROR_ROUGHNESSES,
-    MIRROR_VIEWS,
-    ROUGH,
-    VIEWS,
-    fitted_mirrors,
+from dermis.base.progress import logged_step
+from dermis.base.tables import float_columns, read_rows
+from dermis.environment.isotropic_fits import (
+    LOBE_COUNT,
+    LOBE_TABLE_COSINES,
+    LOBE_TABLE_ROUGHNESSES,
+    ROUGHNESS_COUNT,
+    VIEW_COUNT,
+    fit_isotropic_lobes,
 )
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
 
 
-def mirror_numbers() -> dict[str, float]:
+def isotropic_lobe_constants() -> dict[str, float]:
     """Numbers that environment.wgsl fills in."""
     return {
-        "mirror_rough": ROUGH,
-        "mirror_views": VIEWS,
-        "mirror_lobes": LOBES,
-        "mirror_smoothest": float(MIRROR_ROUGHNESSES[0]),
-        "mirror_roughest": float(MIRROR_ROUGHNESSES[-1]),
+        "mirror_rough": ROUGHNESS_COUNT,
+        "mirror_views": VIEW_COUNT,
+        "mirror_lobes": LOBE_COUNT,
+        "mirror_smoothest": float(LOBE_TABLE_ROUGHNESSES[0]),
+        "mirror_roughest": float(LOBE_TABLE_ROUGHNESSES[-1]),
     }
 
 
 @cache
-def equivalent_mirrors(model: str = "kelemen") -> Floats:
+def isotropic_lobe_table(model: str = "kelemen") -> Floats:
     """(12, 16, 5, 4) by roughness and view: where round lobes point (x, y), their roughness, weight.
 
     model : name in MODELS
@@ -50,16 +50,20 @@ def equivalent_mirrors(model: str = "kelemen") -> Floats:
     """
     rows = [row for row in read_rows("dermis.environment", "data/mirrors") if row["model"] == model]
     columns = " ".join(
-        f"{name}_{k}" for k in range(LOBES) for name in ("angle", "beside", "roughness", "weight")
+        f"{name}_{k}" for k in range(LOBE_COUNT) for name in ("angle", "beside", "roughness", "weight")
     )
-    fits = numbers(rows, columns).reshape(ROUGH, VIEWS, LOBES, 4) if rows else _fitted(model)
+    fits = (
+        float_columns(rows, columns).reshape(ROUGHNESS_COUNT, VIEW_COUNT, LOBE_COUNT, 4)
+        if rows
+        else _fit_model(model)
+    )
     angle, beside, roughness, weight = np.moveaxis(fits, -1, 0)
     weight = weight / weight.sum(axis=-1, keepdims=True)
-    off = angle - np.arccos(MIRROR_VIEWS)[:, None]
+    off = angle - np.arccos(LOBE_TABLE_COSINES)[:, None]
     farther = 1.0 + np.cos(off) * np.cos(beside)
     return np.stack([np.sin(off) * np.cos(beside) / farther, np.sin(beside) / farther, roughness, weight], -1)
 
 
-@preparing("finding what the surface reflects of the environment")
-def _fitted(model: str) -> Floats:
-    return fitted_mirrors(MODELS[model].lobe)
+@logged_step("finding what the surface reflects of the environment")
+def _fit_model(model: str) -> Floats:
+    return fit_isotropic_lobes(MODELS[model].lobe)

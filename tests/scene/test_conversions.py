@@ -44,15 +44,15 @@ def test_heads_may_be_named(head: Head, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        ({"lights": "windo"}, "lights: expected lights, or one of the presets .*'windo' came"),
-        ({"lights": [None]}, r"lights\[0\]: expected a light, but None came"),
-        ({"lights": [LAMP, dermis.PointLight]}, r"lights\[1\]: .*the class PointLight came"),
-        ({"lights": 3}, "lights: expected a list of lights, but 3 came"),
+        ({"lights": "windo"}, "lights: expected lights, or one of the presets .*got 'windo'"),
+        ({"lights": [None]}, r"lights\[0\]: expected a light, but got None"),
+        ({"lights": [LAMP, dermis.PointLight]}, r"lights\[1\]: .*got the class PointLight"),
+        ({"lights": 3}, "lights: expected a list of lights, but got 3"),
         ({"lights": {"kind": "point"}}, "lights: expected a list of lights"),
         ({"camera": "portait"}, "camera portait: expected one of portrait"),
-        ({"camera": (0, 0, 900)}, r"camera: expected a camera, but \(0, 0, 900\) came"),
-        ({"skin": "dark"}, r"skin: expected a Skin, but 'dark' came\. Write skin=dermis\.Skin\("),
-        ({"environment": 3}, "environment: expected an environment, but 3 came"),
+        ({"camera": (0, 0, 900)}, r"camera: expected a camera, but got \(0, 0, 900\)"),
+        ({"skin": "dark"}, r"skin: expected a Skin, but got 'dark'\. Write skin=dermis\.Skin\("),
+        ({"environment": 3}, "environment: expected an environment, but got 3"),
     ],
 )
 def test_what_is_not_clear_is_refused(head: Head, parts: dict[str, Any], said: str) -> None:

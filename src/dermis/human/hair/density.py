@@ -1,0 +1,188 @@
+"""Where hair grows: how much of it at places of the average person, and roots drawn from that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.arrays import Doubles, Floats
+from dermis.base.tables import read_rows
+from dermis.human.hair.root_finder import Index, RootFinder
+from dermis.human.skin.face import HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, hairline_heights, zone_table
+from dermis.human.skin.surface import BORDER_FIELDS, average_surface
+from dermis.mesh.geometry import crosses, dots
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import Roots, between, corners
+
+HEAD_AXIS_Z = -72.0
+"""Of the axis around which the hairline is told [mm]."""
+_SEQUENCE_STEPS = np.array([0.7548776662, 0.5698402909])  # of places that fill a square evenly
+_SCALP_BOTTOM_Y = -80.0  # of the hair of the head [mm]
+_HAIRLINE_FADE_MM = (-3.0, 11.0)  # beside the hairline, between which hair gets as dense as it is
+_LIP_FADE_MM = (1.5, 4.5)  # beside the lips, between which the beard does
+_BEARD_FADE = (0.25, 0.75)  # amount of the zones between which it does
+_HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # waves of the hairline [rad/mm]
+
+_SCALP_MARGIN_MM = 25.0  # the hairline, to where quads may have a little hair
+_HAIR_MARGIN_MM, _BROW_MARGIN_MM = (
+    25.0,
+    8.0,
+)  # quads with hairs and those around brows, where skin still counts
+_MIN_BEARD = 0.02  # amount of the zones from which on quads may have a beard
+
+
+class HairDensity(NamedTuple):
+    """Where hair grows.
+
+    amount : share of the density (n,) at places (n, 4): on the average person, and how far inside the lips
+        these are [mm]
+    near : (p,) control points of quads on which any may grow
+    """
+
+    amount: Callable[[Doubles], Doubles]
+    near: NDArray[np.bool_]
+
+
+def sample_roots(
+    control_mesh: Mesh, hair_density: HairDensity, per_cm2: float, rng: np.random.Generator
+) -> Roots:
+    """Roots on the skin, evenly but for chance, quad after quad; none on ears, lips and in the mouth.
+
+    plain : the person's mesh of control points
+    per_cm2 : density where the share is 1
+    """
+    quad = _hairy_quads(control_mesh)
+    corner_points = corners(control_mesh, quad)
+    counts = np.floor(per_cm2 * quad_areas_cm2(control_mesh, quad) + rng.random(len(quad))).astype(np.int64)
+    starts, chance = rng.random((len(quad), 2)), rng.random(int(counts.sum()))
+    near = hair_density.near[corner_points].any(axis=1)
+    which = np.repeat(np.flatnonzero(near), counts[near])
+    ends = np.cumsum(counts)[near]
+    number = np.arange(len(which)) + np.repeat(ends - np.cumsum(counts[near]), counts[near])
+    step = number - (np.cumsum(counts) - counts)[which]
+    place = starts.take(which, axis=0) + step[:, None] * _SEQUENCE_STEPS
+    place -= np.floor(place)
+    values = average_points().T.take(corner_points.T.take(which, axis=1), axis=1)
+    kept = np.flatnonzero(chance.take(number) < hair_density.amount(between(place, values).T))
+    return Roots(quad.take(which.take(kept)).astype(np.int32), place.take(kept, axis=0).astype(np.float32))
+
+
+def height_above_hairline(places: Doubles, recession: float = 0.0) -> Doubles:
+    """How far (n,) places (n, 3 or more) are above the edge of the hair, on the average person [mm].
+
+    recession : see `SkinLook`
+    """
+    angle = np.degrees(np.arctan2(np.abs(places[:, 0]), places[:, 2] - HEAD_AXIS_Z))
+    edge = hairline_heights(recession)
+    return np.asarray(places[:, 1] - np.interp(angle, HAIRLINE_STEP_DEGREES * np.arange(len(edge)), edge))
+
+
+def scalp_density(recession: float) -> HairDensity:
+    """Hair of the head."""
+    column = _amount_column("hair")
+    receding = zone_table(recession)[:, column] != zone_table()[:, column]
+
+    def amount(places: Doubles) -> Doubles:
+        above = height_above_hairline(places, recession)
+        soft = np.flatnonzero(
+            (above > _HAIRLINE_FADE_MM[0] - len(_HAIRLINE_WAVES))
+            & (above < _HAIRLINE_FADE_MM[1] + len(_HAIRLINE_WAVES))
+        )
+        above[soft] += sum(np.sin(places[soft, :3] @ wave) for wave in _HAIRLINE_WAVES)
+        fraction = smoothstep(*_HAIRLINE_FADE_MM, above) * (places[:, 1] > _SCALP_BOTTOM_Y)
+        thinned = _sum_zones("hair", zone_table(recession)[receding], places)
+        return np.asarray(fraction * np.clip(1.0 + thinned, 0.0, 1.0))
+
+    return HairDensity(amount, _scalp_candidates())
+
+
+def beard_density() -> HairDensity:
+    """Hair of the beard."""
+    return HairDensity(_beard_amount, _beard_candidates())
+
+
+@cache
+def _scalp_candidates() -> NDArray[np.bool_]:
+    return height_above_hairline(average_points()) > -_SCALP_MARGIN_MM
+
+
+@cache
+def _beard_candidates() -> NDArray[np.bool_]:
+    return _sum_zones("beard", zone_table(), average_points()) > _MIN_BEARD
+
+
+def _beard_amount(places: Doubles) -> Doubles:
+    lip_fade = smoothstep(*_LIP_FADE_MM, -places[:, 3])
+    return np.asarray(smoothstep(*_BEARD_FADE, _sum_zones("beard", zone_table(), places)) * lip_fade)
+
+
+def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
+    """From 0 at `low` to 1 at `high`."""
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
+    """(n,) area of quads [cm2]."""
+    corner_points = control_mesh.points_mm.T.take(corners(control_mesh, quad).T, axis=1)
+    a, b, c, d = corner_points.swapaxes(0, 1)
+    across = crosses(c - a, d - b)
+    return np.asarray(np.sqrt(dots(across, across)) / 200.0)
+
+
+def _sum_zones(name: str, rows: Floats, places: Doubles) -> Doubles:
+    """Sum (n,) of an amount of zones, see zones.csv."""
+    column, found = _amount_column(name), np.zeros(len(places))
+    left = np.abs(places[:, 0]), places[:, 1], places[:, 2]
+    for zone in rows[rows[:, column] != 0.0].astype(np.float64):
+        away = sum(((left[c] - zone[c]) * zone[4 + c]) ** 2 for c in range(3))
+        found += zone[column] * np.exp(-away)
+    return found
+
+
+@cache
+def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
+    """Vertices of the drawn mesh among which are all that hairs of anyone lie beside."""
+    from scipy.spatial import cKDTree
+
+    mesh = root_finder.mesh
+    corner_points = corners(mesh, _hairy_quads(mesh))
+    near = np.zeros(len(root_finder.drawn.positions), bool)
+    hairy = _scalp_candidates() | _beard_candidates() if bearded else _scalp_candidates()
+    places = corner_points[hairy[corner_points].any(axis=1)], corners(mesh, root_finder.brow_grid_roots.quad)
+    for points, reach in zip(places, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
+        tree = cKDTree(root_finder.points_mm[np.unique(points)])
+        near |= tree.query(root_finder.drawn.positions, distance_upper_bound=reach)[0] < reach
+    return np.flatnonzero(near)
+
+
+def _amount_column(name: str) -> int:
+    return 8 + ZONE_AMOUNTS.index(name)
+
+
+@cache
+def average_points() -> Doubles:
+    """(p, 4) of control points their place on the average person, and how far inside the lips [mm]."""
+    places, average_points = average_surface()
+    return np.asfortranarray(
+        np.column_stack([places, average_points[:, BORDER_FIELDS.index("lips")]]), np.float64
+    )
+
+
+@cache
+def _hairless_quads() -> Index:
+    """Quads on which no hair grows: ears, lips, the mouth."""
+    rows = read_rows("dermis.human.regions", "parts")
+    return np.concatenate([np.arange(int(row["first"]), int(row["last"]) + 1) for row in rows])
+
+
+def _hairy_quads(control_mesh: Mesh) -> Index:
+    skin = np.array([one.kind == "skin" for one in control_mesh.materials])[
+        control_mesh.material[control_mesh.quads[:, 0]]
+    ]
+    skin[_hairless_quads()] = False
+    return np.flatnonzero(skin)

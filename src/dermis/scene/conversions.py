@@ -1,0 +1,117 @@
+"""The parts of a scene as callers give them: what is meant clearly is taken, the rest is refused."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from dermis.base.errors import format_value, notify, refuse
+from dermis.mesh.head import Head
+from dermis.scene.camera import Camera, preset
+from dermis.scene.environment import Environment
+from dermis.scene.frozen_model import FrozenModel, Vector
+from dermis.scene.lights import Light, PointLight, light_presets, preset_lights
+
+P = TypeVar("P", bound=FrozenModel)
+_NEAR_CENTRE_MM = 5.0  # from the middle of any head, where nothing but a mistake stands
+
+
+def as_head(head: object) -> Head:
+    """A head, by itself or by what `load_head` takes; a `Human` too.
+
+    Raises DermisError for anything else.
+    """
+    if isinstance(head, Head):
+        return head
+    from dermis.human.person import Human
+    from dermis.scene.heads import load_head
+
+    if isinstance(head, Human):
+        return head.head()
+    if not isinstance(head, str | os.PathLike) or str(head).endswith(".toml"):
+        advice = 'Write dermis.load_head("human"), or dermis.load_scene(FILE), which gives scene and settings'
+        refuse("scene", "a head to show, or a scene", f"got {format_value(head)}", advice)
+    return load_head(head)
+
+
+def as_lights(lights: object) -> Sequence[Light]:
+    """Several lights, one, or a preset's name.
+
+    Raises DermisError for anything else.
+    """
+    advice = "Write lights=[dermis.PointLight(position=(0, 300, 900))], or dermis.load_lights(FILE)"
+    if isinstance(lights, Light):
+        return _check_positions((lights,))
+    if isinstance(lights, str):
+        if lights not in light_presets():
+            expected = f"lights, or one of the presets {', '.join(light_presets())}"
+            refuse("lights", expected, f"got {lights!r}", advice)
+        return preset_lights(lights)
+    if not isinstance(lights, Iterable) or isinstance(lights, Mapping | FrozenModel):
+        refuse("lights", "a list of lights", f"got {format_value(lights)}", advice)
+    light_list = lights if isinstance(lights, list | tuple) else tuple(lights)
+    for number, light in enumerate(light_list):
+        if not isinstance(light, Light):
+            refuse(f"lights[{number}]", "a light", f"got {format_value(light)}", advice)
+    return _check_positions(light_list)
+
+
+def as_camera(camera: object, head: Head) -> Camera:
+    """A camera, a preset's name, or a function such as `portrait`.
+
+    Raises DermisError for anything else.
+    """
+    if isinstance(camera, str):
+        return preset(camera, head)
+    if callable(camera) and not isinstance(camera, type):
+        camera = camera(head)
+    advice = "Write camera=dermis.portrait(head), or dermis.Camera(position=(0, 0, 1100))"
+    if not isinstance(camera, Camera):
+        refuse("camera", "a camera", f"got {format_value(camera)}", advice)
+    _warn_near_centre("camera", camera.position)
+    return camera
+
+
+def as_environment(environment: object) -> Environment | None:
+    """An environment, or its name.
+
+    Raises DermisError for anything else.
+    """
+    if environment is None or isinstance(environment, Environment):
+        return environment
+    if not isinstance(environment, str | os.PathLike):
+        advice = 'Write environment=dermis.Environment("lebombo")'
+        refuse("environment", "an environment", f"got {format_value(environment)}", advice)
+    return Environment(name=str(environment))
+
+
+def as_model(kind: type[P], values: object, part: str, example: str) -> P:
+    """Plain data of a kind, or their values by name.
+
+    Raises DermisError for anything else.
+    """
+    if isinstance(values, kind):
+        return values
+    if not isinstance(values, Mapping):
+        actual, advice = f"got {format_value(values)}", f"Write {part}=dermis.{kind.__name__}({example})"
+        refuse(part, f"a {kind.__name__}", actual, advice)
+    return kind(**values)
+
+
+def _check_positions(lights: Sequence[Light]) -> Sequence[Light]:
+    for light in lights:
+        if isinstance(light, PointLight):
+            _warn_near_centre("light", light.position)
+    return lights
+
+
+def _warn_near_centre(what: str, position: Vector) -> None:
+    distance = float(np.linalg.norm(position))
+    if 0.0 < distance < _NEAR_CENTRE_MM:
+        notify(
+            f"{what}: expected a place around the head in mm, but this one is {distance:g} mm from its middle. "
+            "Write 1100 for 1.1 m."
+        )
