@@ -15,7 +15,7 @@ class Bad(NamedTuple):
 
     words: str
     culprit: str
-    came: str
+    actual: str
 
 
 MESHES = {
@@ -36,11 +36,11 @@ MESHES = {
     "too small": Bad("head.obj --unit-mm 0.1", "head.obj", "it is 24 mm high"),
     "too large": Bad("head.obj --unit-mm 10", "head.obj", "it is 2400 mm high"),
     "metres": Bad("metres.obj", "metres.obj", "it is 0.24 mm high"),
-    "unit of 0": Bad("head.obj --unit-mm 0", "--unit-mm", "0.0 came"),
-    "unit of 0 for a sample": Bad("lee_perry_smith --unit-mm 0", "--unit-mm", "0.0 came"),
-    "unit NaN": Bad("head.obj --unit-mm nan", "--unit-mm", "nan came"),
-    "subdivided too often": Bad("head.obj --subdivide 4", "subdivide", "4 came"),
-    "unknown axis": Bad("head.obj --up x", "--up", "'x' came"),
+    "unit of 0": Bad("head.obj --unit-mm 0", "--unit-mm", "got 0.0"),
+    "unit of 0 for a sample": Bad("lee_perry_smith --unit-mm 0", "--unit-mm", "got 0.0"),
+    "unit NaN": Bad("head.obj --unit-mm nan", "--unit-mm", "got nan"),
+    "subdivided too often": Bad("head.obj --subdivide 4", "subdivide", "got 4"),
+    "unknown axis": Bad("head.obj --up x", "--up", "got 'x'"),
 }
 MAPS = {
     "no such map": Bad("head.obj --colour none.png", "none.png", "No such file"),
@@ -58,43 +58,43 @@ MAPS = {
     "NaN mm": Bad("head.obj --height grey.png --height-mm nan", "--height-mm", "nan"),
 }
 NUMBERS = {
-    "size of nothing": Bad("head.obj --size 0x0", "--size", "0 came"),
-    "size beyond all": Bad("head.obj --size 100000x100000", "--size", "100000 came"),
+    "size of nothing": Bad("head.obj --size 0x0", "--size", "got 0"),
+    "size beyond all": Bad("head.obj --size 100000x100000", "--size", "got 100000"),
     "size of too much memory": Bad("head.obj --size 16384x16384 --samples 64", "--size", "16384"),
-    "size in words": Bad("head.obj --size large", "--size", "'large' came"),
-    "atlas under 64": Bad("head.obj --atlas 63", "--atlas", "63 came"),
-    "atlas beyond all": Bad("head.obj --atlas 1000000", "--atlas", "1000000 came"),
-    "atlas of a half": Bad("head.obj --atlas 64.5", "--atlas", "'64.5' came"),
-    "samples 0": Bad("head.obj --samples 0", "--samples", "0 came"),
-    "samples 65": Bad("head.obj --samples 65", "--samples", "65 came"),
-    "negative roughness": Bad("head.obj --roughness -0.1", "--roughness", "-0.1 came"),
-    "roughness NaN": Bad("head.obj --roughness nan", "--roughness", "nan came"),
-    "negative rho_s": Bad("head.obj --rho-s -1", "--rho-s", "-1.0 came"),
-    "mix below 0": Bad("head.obj --mix -0.01", "--mix", "-0.01 came"),
-    "mix above 1": Bad("head.obj --mix 1.01", "--mix", "1.01 came"),
-    "mix NaN": Bad("head.obj --mix nan", "--mix", "nan came"),
-    "mix in words": Bad("head.obj --mix half", "--mix", "'half' came"),
-    "negative exposure": Bad("head.obj --exposure -1", "--exposure", "-1.0 came"),
-    "exposure NaN": Bad("head.obj --exposure nan", "--exposure", "nan came"),
-    "exposure infinite": Bad("head.obj --exposure inf", "--exposure", "inf came"),
-    "background of two": Bad("head.obj --background 0,0", "--background", "'0,0' came"),
-    "background NaN": Bad("head.obj --background 0,nan,0", "--background", "nan came"),
+    "size in words": Bad("head.obj --size large", "--size", "got 'large'"),
+    "atlas under 64": Bad("head.obj --atlas 63", "--atlas", "got 63"),
+    "atlas beyond all": Bad("head.obj --atlas 1000000", "--atlas", "got 1000000"),
+    "atlas of a half": Bad("head.obj --atlas 64.5", "--atlas", "got '64.5'"),
+    "samples 0": Bad("head.obj --samples 0", "--samples", "got 0"),
+    "samples 65": Bad("head.obj --samples 65", "--samples", "got 65"),
+    "negative roughness": Bad("head.obj --roughness -0.1", "--roughness", "got -0.1"),
+    "roughness NaN": Bad("head.obj --roughness nan", "--roughness", "got nan"),
+    "negative rho_s": Bad("head.obj --rho-s -1", "--rho-s", "got -1.0"),
+    "mix below 0": Bad("head.obj --mix -0.01", "--mix", "got -0.01"),
+    "mix above 1": Bad("head.obj --mix 1.01", "--mix", "got 1.01"),
+    "mix NaN": Bad("head.obj --mix nan", "--mix", "got nan"),
+    "mix in words": Bad("head.obj --mix half", "--mix", "got 'half'"),
+    "negative exposure": Bad("head.obj --exposure -1", "--exposure", "got -1.0"),
+    "exposure NaN": Bad("head.obj --exposure nan", "--exposure", "got nan"),
+    "exposure infinite": Bad("head.obj --exposure inf", "--exposure", "got inf"),
+    "background of two": Bad("head.obj --background 0,0", "--background", "got '0,0'"),
+    "background NaN": Bad("head.obj --background 0,nan,0", "--background", "got nan"),
 }
 NAMES = {
     "unknown option": Bad("head.obj --colors red.png", "--colors", "Did you mean --colour"),
     "option without value": Bad("head.obj --colour", "--colour", "none"),
     "option given twice": Bad("head.obj --mix 0 --mix 1", "--mix", "twice"),
-    "two heads": Bad("head.obj head.obj", "head.obj", "this word came"),
-    "unknown technique": Bad("head.obj --technique wet", "--technique", "'wet' came"),
+    "two heads": Bad("head.obj head.obj", "head.obj", "got this word"),
+    "unknown technique": Bad("head.obj --technique wet", "--technique", "got 'wet'"),
     "unknown profile": Bad("head.obj --profile milk", "profile milk", "no such file"),
     "profile of words": Bad("head.obj --profile words.csv", "profile words.csv", "rows"),
     "profile that decreases": Bad("head.obj --profile falling.csv", "profile falling.csv", "they are"),
-    "profile that is a scene": Bad("head.obj --profile red.toml", "red.toml", "rho_s came"),
+    "profile that is a scene": Bad("head.obj --profile red.toml", "red.toml", "rho_s"),
     "unknown lights": Bad("head.obj --lights disco", "disco", "No such file"),
     "unknown camera": Bad("head.obj --camera selfie", "selfie", "No such file"),
     "camera file without one": Bad("head.obj --camera red.toml", "red.toml: camera", "none"),
     "lights file without any": Bad("head.obj --lights red.toml", "red.toml", "none"),
-    "head option with a scene": Bad("red.toml --unit-mm 5", "--unit-mm", "it came"),
+    "head option with a scene": Bad("red.toml --unit-mm 5", "--unit-mm", "it is given"),
 }
 CASES = {**MESHES, **MAPS, **NUMBERS, **NAMES}
 
@@ -104,7 +104,7 @@ def test_input_is_refused(refused: Run, opened: None, bad: Bad, request: pytest.
     if "lee_perry_smith" in bad.words:
         request.getfixturevalue("sample_folder")
     message = refused(*(word.strip("'") for word in bad.words.split()))
-    assert message["culprit"].endswith(bad.culprit) and bad.came in message[0]
+    assert message["culprit"].endswith(bad.culprit) and bad.actual in message[0]
 
 
 def test_height_names_a_unit_that_would_fit(refused: Run) -> None:

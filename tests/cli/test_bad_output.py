@@ -21,9 +21,9 @@ OUTPUTS = {
 
 @pytest.mark.parametrize("bad", OUTPUTS.values(), ids=OUTPUTS)
 def test_output_is_refused_before_anything_is_loaded(refused: Run, bad: tuple[str, str]) -> None:
-    output, came = bad
+    output, actual = bad
     message = refused("nobody.obj", output=output)
-    assert message["culprit"] == output and came in message[0]
+    assert message["culprit"] == output and actual in message[0]
 
 
 def test_folder_that_may_not_be_written(refused: Run, monkeypatch: pytest.MonkeyPatch) -> None:

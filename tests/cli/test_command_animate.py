@@ -164,22 +164,22 @@ def test_one_of_several_clips(animate: Run) -> None:
 
 
 REFUSED = {
-    "no such clip": ("two.glb --clip wave", "two.glb", "'wave' came"),
+    "no such clip": ("two.glb --clip wave", "two.glb", "got 'wave'"),
     "which clip": ("two.glb", "two.glb", "it has talk, nod"),
     "no motion": ("head.obj", "--motion", "head.obj has no clips"),
     "no such motion": ("face.glb --motion nothing.csv", "nothing.csv", "no such file"),
     "no name in common": ("face.glb --motion other.csv", "other.csv", "it has browDown"),
-    "to before from": ("face.glb --from 2 --to 1", "--to", "1 s came"),
-    "from below 0": ("face.glb --from -1", "--from", "-1.0 came"),
-    "to that is none": ("face.glb --to nan", "--to", "nan came"),
+    "to before from": ("face.glb --from 2 --to 1", "--to", "got 1 s"),
+    "from below 0": ("face.glb --from -1", "--from", "got -1.0"),
+    "to that is none": ("face.glb --to nan", "--to", "got nan"),
     "from after the end": ("face.glb --from 10", "--from", "talk lasts 0.300 s"),
     "between two frames": ("face.glb --fps 10 --from 0.11 --to 0.12", "--to", "there is none"),
-    "rate": ("face.glb --fps fast", "--fps", "'fast' came"),
-    "rate of the motion": ("face.glb --motion-fps 0", "--motion-fps", "0.0 came"),
-    "odd size": ("face.glb --size 31x32", "--size", "31x32 came"),
-    "crf": ("face.glb --crf 99", "--crf", "99 came"),
-    "crf of pictures": ("face.glb -o f/%d.png --crf 9", "--crf", "f/%d.png came"),
-    "anew with a movie": ("face.glb --anew", "--anew", "out.mp4 came"),
+    "rate": ("face.glb --fps fast", "--fps", "got 'fast'"),
+    "rate of the motion": ("face.glb --motion-fps 0", "--motion-fps", "got 0.0"),
+    "odd size": ("face.glb --size 31x32", "--size", "got 31x32"),
+    "crf": ("face.glb --crf 99", "--crf", "got 99"),
+    "crf of pictures": ("face.glb -o f/%d.png --crf 9", "--crf", "f/%d.png"),
+    "anew with a movie": ("face.glb --anew", "--anew", "out.mp4"),
     "one picture": ("face.glb -o a.png", "a.png", "one picture"),
     "another film": ("face.glb -o a.avi", "a.avi", "'.avi'"),
     "no folder": ("face.glb -o nowhere/a.mp4", "nowhere/a.mp4", "no folder"),
@@ -193,7 +193,7 @@ def test_refused_before_anything_is_drawn(
 ) -> None:
     from small_head import obj_text
 
-    words, culprit, came = bad
+    words, culprit, actual = bad
     monkeypatch.setattr("dermis.frame.renderer.Renderer.__init__", lambda *_: pytest.fail("opened"))
     Path("other.csv").write_text("Timecode,BlendShapeCount,browDown\n10:00:00:00,1,0\n", encoding="utf-8")
     Path("head.obj").write_text(obj_text())
@@ -201,7 +201,9 @@ def test_refused_before_anything_is_drawn(
     ended = animate(*words.split(), *(() if "-o" in words else ("-o", "out.mp4")))
     assert (ended.code, ended.stdout) == (2, "")
     assert (
-        ended.stderr.startswith(f"dermis: {culprit}") and came in ended.stderr and "expected" in ended.stderr
+        ended.stderr.startswith(f"dermis: {culprit}")
+        and actual in ended.stderr
+        and "expected" in ended.stderr
     )
     assert sorted(path.name for path in Path().iterdir()) == before
 

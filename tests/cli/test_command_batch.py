@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from small_set import COUNT, SHARD_SIZE, write_spec
 
-from dermis.cli.batch import Lines, Pace
+from dermis.cli.batch import ProgressLog, ImageRate
 
 Run = Callable[..., Any]
 
@@ -93,16 +93,16 @@ def test_what_cannot_be_is_refused(run: Run, spec: Path, words: str, says: str) 
 
 def test_pace_is_that_of_the_last_minute() -> None:
     clock = iter([0.0, *range(10, 200, 10)])
-    pace = Pace(lambda: float(next(clock)))
-    slow = [pace.at(done) for done in range(1, 10)]
-    fast = [pace.at(9 + 10 * done) for done in range(1, 9)]
+    pace = ImageRate(lambda: float(next(clock)))
+    slow = [pace.update(done) for done in range(1, 10)]
+    fast = [pace.update(9 + 10 * done) for done in range(1, 9)]
     assert slow[-1] == pytest.approx(0.1) and fast[-1] == pytest.approx(1.0)
 
 
 def test_logs_get_a_line_now_and_then() -> None:
     now, written = [0.0], list[str]()
-    lines = Lines(written.append, lambda: now[0])
+    lines = ProgressLog(written.append, lambda: now[0])
     for done in range(1, 101):
         now[0] = done * 1.0
-        lines.tell(done, 220)
+        lines.report(done, 220)
     assert len(written) == 3 and written[0] == "30 of 220 images, 1 images/s, 3 min left"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from tolerances import RECIPROCAL
 
-from dermis.cli.compare import _lobes
+from dermis.cli.compare import _lobe_figure
 from dermis.images.io import read_image
 from dermis.specular.models import MODELS
 
@@ -73,13 +73,13 @@ def test_pictures_are_written_into_a_new_folder(compare: Run) -> None:
 
 @pytest.mark.parametrize("m", [0.1, 1.0])
 def test_no_curve_leaves_its_panel(m: float) -> None:
-    for axes in _lobes(m).axes:
+    for axes in _lobe_figure(m).axes:
         assert all(curve.get_ydata().max() <= axes.get_rmax() for curve in axes.lines)
 
 
 def test_lobes_of_other_packages_have_panels_of_their_own() -> None:
     with MODELS.including("other", MODELS["phong"]), MODELS.including("another", MODELS["phong"]):
-        assert [axes.get_title() for axes in _lobes(0.3).axes][-2:] == ["other", "another"]
+        assert [axes.get_title() for axes in _lobe_figure(0.3).axes][-2:] == ["other", "another"]
 
 
 @pytest.mark.parametrize(

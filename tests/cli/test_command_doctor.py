@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from dermis.frame.renderer import Rendered
-from dermis.gpu.adapters import WANTED_FEATURES, Adapter
+from dermis.gpu.adapters import OPTIONAL_FEATURES, Adapter
 
 Run = Callable[..., Any]
 KEYS = {"healthy", "used", "self_test", "problem", "adapters"} | {
@@ -46,7 +46,7 @@ def test_healthy_machine_as_json(run: Run, opened: None, device: Any) -> None:
     assert report["used"]["half_store_rounding"] in ("nearest", "toward zero", "other")
     assert report["self_test"]["passed"] is True
     assert report["self_test"]["centre"] == pytest.approx(1, abs=0.02)
-    assert all(set(adapter["features"]) == set(WANTED_FEATURES) for adapter in report["adapters"])
+    assert all(set(adapter["features"]) == set(OPTIONAL_FEATURES) for adapter in report["adapters"])
     assert {"dermis", "wgpu", "numpy"} <= set(report["libraries"])
     assert "lee_perry_smith" in report["samples"]
 
@@ -89,7 +89,7 @@ def test_frame_that_is_lit_wrongly_is_no_health(
     ("adapters", "problem"),
     [
         ([], "mesa-vulkan-drivers"),
-        ([BROKEN], "Voodoo 3: expected it to open, but its driver says: vkCreateDevice failed"),
+        ([BROKEN], "Voodoo 3: expected it to open, but its driver reports: vkCreateDevice failed"),
     ],
 )
 def test_machine_that_cannot_render(

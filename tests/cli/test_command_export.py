@@ -24,5 +24,5 @@ def test_it_says_in_json_what_was_written_and_how_wrong_it_is(run: Run, tmp_path
 
 def test_unknown_versions_are_refused_with_those_known(run: Run, tmp_path: Path) -> None:
     ended = run("export", "skin1", "--to", "unreal", "--version", "4.27", "-o", tmp_path / "made")
-    assert ended.code == 2 and "5.7, 5.8, but '4.27' came" in ended.stderr
+    assert ended.code == 2 and "5.7, 5.8, but got '4.27'" in ended.stderr
     assert not list(tmp_path.iterdir())

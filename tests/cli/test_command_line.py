@@ -15,7 +15,7 @@ import pytest
 
 from dermis.base.citations import parse_bibtex
 from dermis.cli.options import option_name
-from dermis.scene.plain import fields_under
+from dermis.scene.frozen_model import fields_under
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.talk import COMPARISONS
@@ -159,8 +159,8 @@ def test_cite_names_what_is_in_use(
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("Kelemen2001", "--technique", "none"), "--technique: expected no such option beside keys"),
-        (("--against", "heat", "--seams", "alpha"), "--seams: expected no such option beside --against"),
+        (("Kelemen2001", "--technique", "none"), "--technique: expected no such option with keys"),
+        (("--against", "heat", "--seams", "alpha"), "--seams: expected no such option with --against"),
     ],
 )
 def test_cite_refuses_options_without_effect(run: Run, words: tuple[str, ...], says: str) -> None:

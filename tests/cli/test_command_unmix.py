@@ -59,7 +59,7 @@ def test_help_prints_the_default_skin(run: Run) -> None:
     assert "[default: 0.05, light 0.25, medium 0.25, dark 0.25]" in shown["profile"]
     assert "[default: 0.018, light 0.005, medium 0.15, dark 0.5]" in shown["profile"]
     assert "[default: 0.75]" in shown["profile"] and "[default: dj2006]" in shown["profile"]
-    assert "Thickness of its epidermis [mm]. [default: 0.05]" in shown["unmix"]
+    assert "Thickness of the epidermis [mm]. [default: 0.05]" in shown["unmix"]
     assert "[default: 0.75]" in shown["unmix"] and "[default: 0.7]" in shown["unmix"]
 
 

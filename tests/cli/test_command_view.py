@@ -57,12 +57,12 @@ def test_without_the_extra_it_says_what_to_install(
 
 
 def test_who_exposes_the_page_is_warned(capfd: pytest.CaptureFixture[str]) -> None:
-    from dermis.cli.view import _announce
+    from dermis.cli.view import _print_url
 
-    _announce("http://gpu.example:8765/secret/", True)
+    _print_url("http://gpu.example:8765/secret/", True)
     told = capfd.readouterr()
     assert "/secret/" in told.out and "not encrypted" in told.err and "other machines" in told.err
-    _announce("http://127.0.0.1:8765/", False)
+    _print_url("http://127.0.0.1:8765/", False)
     assert "warning" not in capfd.readouterr().err
 
 

@@ -9,7 +9,7 @@ from eyed_head import EYE_MM, ball, write_head
 
 from dermis.images.io import read_image
 from dermis.scene.files import load_scene
-from dermis.scene.saving import scene_toml
+from dermis.scene.saving import scene_text
 
 SMALL = ("--unit-mm", 1, "--size", "48x48", "--atlas", 128, "--samples", 1)
 
@@ -73,7 +73,7 @@ def test_scene_files_say_what_eyes_look_like(tmp_path: Path) -> None:
     assert scene.head.eyes is not None
     assert (scene.head.eyes.look.eumelanin, scene.head.eyes.look.seed) == (0.25, 7)
     head = {"name": str(tmp_path / "a.gltf"), "unit_mm": 1.0, "eye": {"eumelanin": 0.25, "seed": 7}}
-    (tmp_path / "b.toml").write_text(scene_toml(scene, settings, head))
+    (tmp_path / "b.toml").write_text(scene_text(scene, settings, head))
     again, _ = load_scene(tmp_path / "b.toml")
     assert again.head.eyes is not None and again.head.eyes.look == scene.head.eyes.look
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from dermis.base.command_line import reflowed
+from dermis.base.command_line import reflow
 from dermis.cli import COMMANDS
 
 Run = Callable[..., Any]
@@ -34,7 +34,7 @@ def test_paragraphs_become_lines_and_the_rest_stays() -> None:
     other:
         Third.
     """
-    assert reflowed(text).splitlines() == [
+    assert reflow(text).splitlines() == [
         "Do this.", "", "A long paragraph.", "", "Examples:", "", "    dermis one", "", "    dermis two", "",
         "Parameters", "----------", "name:", "    First and second.", "other:", "    Third.",
     ]  # fmt: skip

@@ -14,16 +14,16 @@ from pydantic import Field
 
 import dermis.cli
 from dermis.base.errors import DermisError
-from dermis.cli.head_options import HEAD
-from dermis.cli.options import check, options_of
-from dermis.cli.scene_options import AROUND
+from dermis.cli.head_options import HEAD_OPTION_NAMES
+from dermis.cli.options import check_fields, model_options
+from dermis.cli.scene_options import ENVIRONMENT_OPTION_NAMES
 from dermis.scene import Camera, Environment, Settings, Skin, files
 from dermis.scene.head_table import EyeTable, HeadTable
-from dermis.scene.plain import Plain, choices_of, help_of, range_of, slider
+from dermis.scene.frozen_model import FrozenModel, field_choices, field_help, field_slider_range, slider
 from dermis.scene.skin import Pigments, TissueLayer
 
 ROOT = Path(__file__).resolve().parents[2]
-_OF_SKIN: tuple[type[Plain], ...] = (Skin, Pigments, TissueLayer)
+_OF_SKIN: tuple[type[FrozenModel], ...] = (Skin, Pigments, TissueLayer)
 MODELS = (*_OF_SKIN, Settings, Environment, HeadTable, EyeTable, Camera)
 
 
@@ -41,7 +41,7 @@ class WaxedSkin(Skin):
     """Colour of the wax."""
 
 
-WaxOptions = options_of(WaxedSkin, without=("mix",), names={"coats": "wax_coats"})
+WaxOptions = model_options(WaxedSkin, without=("mix",), names={"coats": "wax_coats"})
 
 
 def taken(*words: str) -> Any:
@@ -68,21 +68,21 @@ def test_a_new_field_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_impossible_values_name_the_option() -> None:
-    with pytest.raises(DermisError, match=r"--wax-coats: expected a number .* 1, but 0 came\. Correct it\."):
-        check(WaxedSkin, {"coats": 0}, {"coats": "wax_coats"})
+    with pytest.raises(DermisError, match=r"--wax-coats: expected a number .* 1, but got 0\. Correct it\."):
+        check_fields(WaxedSkin, {"coats": 0}, {"coats": "wax_coats"})
 
 
 def test_a_new_field_is_a_key_of_scene_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from small_head import write_head
 
-    from dermis.scene.saving import scene_toml
+    from dermis.scene.saving import scene_text
 
     monkeypatch.setattr(files, "Skin", WaxedSkin)
     head = write_head(tmp_path / "head.obj")
     (tmp_path / "scene.toml").write_text(f'[head]\nname = "{head.name}"\n[skin]\nwax = 0.75\n')
     scene, settings = files.load_scene(tmp_path / "scene.toml")
     assert isinstance(scene.skin, WaxedSkin) and scene.skin.wax == 0.75
-    assert "wax = 0.75" in scene_toml(scene, settings, {"name": str(head)}).splitlines()
+    assert "wax = 0.75" in scene_text(scene, settings, {"name": str(head)}).splitlines()
 
 
 def test_a_new_field_is_a_row_of_the_docs() -> None:
@@ -98,28 +98,34 @@ def test_a_new_field_is_a_row_of_the_docs() -> None:
 
 
 def test_fields_tell_their_help_choices_and_range() -> None:
-    assert help_of(WaxedSkin, "wax") == "Share of the skin that is waxed, seen from above."
-    assert choices_of(WaxedSkin, "polish") == ("cloth", "wheel") and choices_of(WaxedSkin, "wax") == ()
-    assert range_of(WaxedSkin, "wax") == (0, 1, False) and range_of(WaxedSkin, "coats") == (1, 5, True)
-    assert range_of(TissueLayer, "absorption_per_mm") == (1e-4, 50, True)
-    assert range_of(WaxedSkin, "polish") is None is range_of(WaxedSkin, "tint")
+    assert field_help(WaxedSkin, "wax") == "Share of the skin that is waxed, seen from above."
+    assert field_choices(WaxedSkin, "polish") == ("cloth", "wheel") and field_choices(WaxedSkin, "wax") == ()
+    assert field_slider_range(WaxedSkin, "wax") == (0, 1, False) and field_slider_range(
+        WaxedSkin, "coats"
+    ) == (1, 5, True)
+    assert field_slider_range(TissueLayer, "absorption_per_mm") == (1e-4, 50, True)
+    assert field_slider_range(WaxedSkin, "polish") is None is field_slider_range(WaxedSkin, "tint")
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_every_field_is_explained(model: type[Plain]) -> None:
+def test_every_field_is_explained(model: type[FrozenModel]) -> None:
     for field in model.model_fields:
-        text = help_of(model, field)
+        text = field_help(model, field)
         assert text[0].isupper() and text.endswith("."), (field, text)
 
 
 def test_no_two_options_have_one_name() -> None:
-    names = [*Settings.model_fields, *Skin.model_fields, *(HEAD.get(f, f) for f in HeadTable.model_fields)]
-    names += AROUND.values()
+    names = [
+        *Settings.model_fields,
+        *Skin.model_fields,
+        *(HEAD_OPTION_NAMES.get(f, f) for f in HeadTable.model_fields),
+    ]
+    names += ENVIRONMENT_OPTION_NAMES.values()
     assert len(names) == len(set(names))
 
 
 def test_no_command_retypes_the_words_of_a_model() -> None:
-    known = [set(choices_of(model, field)) for model in MODELS for field in model.model_fields]
+    known = [set(field_choices(model, field)) for model in MODELS for field in model.model_fields]
     for path in sorted(Path(dermis.cli.__file__).parent.glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Subscript) and ast.unparse(node.value) == "Literal":

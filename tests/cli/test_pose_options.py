@@ -11,8 +11,8 @@ import pytest
 from moving_head import write_moving_head
 
 import dermis
-from dermis.cli.head_options import parse_turns, parse_weights
-from dermis.cli.scene_options import SceneOptions, assemble
+from dermis.cli.head_options import parse_bone_angles, parse_weights
+from dermis.cli.scene_options import SceneOptions, assemble_scene
 from dermis.images.io import read_image
 from dermis.mesh.pose import Pose
 
@@ -31,7 +31,7 @@ def test_words_become_a_pose() -> None:
         "mouthSmileLeft": 1.0,
         "a=b": -2.0,
     }
-    assert parse_turns(["head=0,25,0", "eye.L=1,2,-3"]) == {"head": [0, 25, 0], "eye.L": [1, 2, -3]}
+    assert parse_bone_angles(["head=0,25,0", "eye.L=1,2,-3"]) == {"head": [0, 25, 0], "eye.L": [1, 2, -3]}
 
 
 def test_pose_and_bone_move_the_picture(render: Run, face: str) -> None:
@@ -53,9 +53,9 @@ def test_pose_and_bone_move_the_picture(render: Run, face: str) -> None:
 def test_options_are_laid_over_a_scenes_pose(face: str) -> None:
     told = "[pose.weights]\njawOpen = 0.25\nmouthSmileLeft = 0.5\n[pose.bones]\nhead = [1, 2, 3]\n"
     Path("s.toml").write_text(f'[head]\nname = "{face}"\n{told}')
-    plain = Pose.of(assemble("s.toml", SceneOptions())[0].pose)
+    plain = Pose.of(assemble_scene("s.toml", SceneOptions())[0].pose)
     assert plain and plain.weights == {"jawOpen": 0.25, "mouthSmileLeft": 0.5}
-    pose = Pose.of(assemble("s.toml", SceneOptions(pose=["jawOpen=1"], camera="profile"))[0].pose)
+    pose = Pose.of(assemble_scene("s.toml", SceneOptions(pose=["jawOpen=1"], camera="profile"))[0].pose)
     assert pose and pose.weights == {"jawOpen": 1.0, "mouthSmileLeft": 0.5}
     assert pose.bones == {"head": [1, 2, 3]}
 
@@ -66,9 +66,9 @@ def test_options_are_laid_over_a_scenes_pose(face: str) -> None:
         ("--pose jawOpne=1", "Nearest: jawOpen. All names: dermis animate face.glb --names."),
         ("--bone hed=1,2,3", "Nearest: head. All names: dermis animate face.glb --names."),
         ("--pose jawOpen", "--pose: expected NAME=WEIGHT"),
-        ("--pose jawOpen=wide", "'jawOpen=wide' came"),
-        ("--pose =1", "'=1' came"),
-        ("--pose jawOpen=nan", "jawOpen=nan' came"),
+        ("--pose jawOpen=wide", "got 'jawOpen=wide'"),
+        ("--pose =1", "got '=1'"),
+        ("--pose jawOpen=nan", "jawOpen=nan'"),
         ("--pose jawOpen=1e9", "from -100 to 100"),
         ("--bone head=1,2", "--bone: expected NAME=X,Y,Z"),
         ("--bone head=1,2,inf", "three angles in degrees"),

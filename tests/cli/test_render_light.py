@@ -97,7 +97,7 @@ def test_bloom_and_tone_reach_the_picture(render: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "culprit", "came"),
+    ("words", "culprit", "actual"),
     [
         ("--env nowhere.hdr", "environment 'nowhere.hdr'", "neither"),
         ("--env lee_perry_smith", "lee_perry_smith", "a head"),
@@ -105,14 +105,14 @@ def test_bloom_and_tone_reach_the_picture(render: Run) -> None:
         ("--env-rotation 30", "--env-rotation", "there is none"),
         ("--background environment", "background environment", "there is none"),
         ("--env uniform --env-rotation nan", "--env-rotation", "nan"),
-        ("--env uniform --env-exposure -1", "--env-exposure", "-1.0 came"),
+        ("--env uniform --env-exposure -1", "--env-exposure", "got -1.0"),
         ("--lights none", "--lights", "'none' has none"),
-        ("--bloom 1.5", "--bloom", "1.5 came"),
-        ("--tone aces", "--tone", "'aces' came"),
-        ("--occlusion some", "--occlusion", "'some' came"),
+        ("--bloom 1.5", "--bloom", "got 1.5"),
+        ("--tone aces", "--tone", "got 'aces'"),
+        ("--occlusion some", "--occlusion", "got 'some'"),
     ],
 )
-def test_bad_light_is_refused(render: Run, words: str, culprit: str, came: str) -> None:
+def test_bad_light_is_refused(render: Run, words: str, culprit: str, actual: str) -> None:
     ended = render("head.obj", *words.split(), "-o", "a.png")
     assert ended.code == 2 and ended.stdout == ""
-    assert ended.stderr.startswith(f"dermis: {culprit}: expected ") and came in ended.stderr
+    assert ended.stderr.startswith(f"dermis: {culprit}: expected ") and actual in ended.stderr

@@ -13,7 +13,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from dermis.frame.output_files import encoded, png_levels
+from dermis.frame.output_files import encode_output, quantise
 from dermis.images.io import read_image
 from dermis.scene.outputs import OUTPUTS
 
@@ -83,22 +83,22 @@ def test_a_single_picture_has_no_motion_and_says_so(render: Run, folder: Path) -
 @pytest.mark.parametrize("kind", ["exr", "png", "npy"])
 def test_files_are_the_same_to_the_byte(kind: Any) -> None:
     values = np.random.default_rng(0).random((9, 7, 3)).astype(np.float32)
-    assert encoded("normal", values, kind) == encoded("normal", values.copy(), kind)
+    assert encode_output("normal", values, kind) == encode_output("normal", values.copy(), kind)
 
 
 def test_numbers_of_any_channels_are_encoded() -> None:
     """A channel for each light, and whole numbers of a byte."""
     many = np.random.default_rng(0).random((5, 4, 2)).astype(np.float32)
-    assert np.array_equal(np.load(io.BytesIO(encoded("uv", many, "npy"))), many)
+    assert np.array_equal(np.load(io.BytesIO(encode_output("uv", many, "npy"))), many)
     levels = np.arange(20, dtype=np.uint8).reshape(4, 5)
-    assert np.array_equal(png_levels("triangle", levels), levels)
-    assert png_levels("depth", np.array([[-1.0, 1e9]], np.float32)).tolist() == [[0, 65535]]
+    assert np.array_equal(quantise("triangle", levels), levels)
+    assert quantise("depth", np.array([[-1.0, 1e9]], np.float32)).tolist() == [[0, 65535]]
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--outputs", "depth,deep"], r"output: expected one of depth, position, .* but 'deep' came"),
+        (["--outputs", "depth,deep"], r"output: expected one of depth, position, .* but got 'deep'"),
         (["--outputs", ""], "output: expected one of depth"),
         (["--outputs", "triangle", "--outputs-format", "png"], "output triangle: expected exr or npy"),
         (["--outputs-format", "png"], "--outputs-format: expected --outputs with it"),

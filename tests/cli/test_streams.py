@@ -14,7 +14,7 @@ import pytest
 pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a shell and a full device")
 
 HELP, CITE = "render --help", "cite"
-FAILS = "dermis: stdout: expected a place to write to, but it fails ({}). Write it elsewhere.\n"
+FAILS = "dermis: stdout: expected writable output, but writing failed ({}). Redirect it.\n"
 SINKS = {
     "full": (">/dev/full", 2, FAILS.format("No space left on device")),
     "closed": (">&-", 2, FAILS.format("Bad file descriptor")),
@@ -83,10 +83,10 @@ def test_a_bar_outlives_its_terminal() -> None:
     master, slave = os.openpty()
     code = """
 import sys
-from dermis.base.console import progress, working_on
-from dermis.cli.process import Streams
-with Streams():
-    with working_on("loading"), progress("drawing") as report:
+from dermis.base.console import progress_bar, spinner
+from dermis.cli.process import StandardStreams
+with StandardStreams():
+    with spinner("loading"), progress_bar("drawing") as report:
         sys.stdin.readline()
         report(1, 2)
 sys.stdout.write("done")
@@ -106,10 +106,10 @@ def test_a_stream_that_is_full_for_a_while_gets_all() -> None:
     os.set_blocking(writing, False)
     code = """
 import sys
-from dermis.cli.process import Streams
-with Streams() as streams:
+from dermis.cli.process import StandardStreams
+with StandardStreams() as streams:
     sys.stdout.write("x" * 300_000)
-    assert streams.fault() is None
+    assert streams.stdout_error() is None
 """
     with subprocess.Popen([sys.executable, "-c", code], stdout=writing) as ran:
         os.close(writing)

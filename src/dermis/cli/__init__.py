@@ -1,4 +1,4 @@
-"""The command `dermis`: one module for each of its commands."""
+"""The command `dermis`, with one module per subcommand."""
 
 from __future__ import annotations
 
@@ -8,56 +8,56 @@ import dermis
 
 COMMANDS = {
     "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
-    "animate": "Draw a head that moves, as a movie or as numbered pictures.",
-    "batch": "Draw a data set of many people, with ground truth, on one machine or many.",
-    "view": "Turn a head, its skin and its light in a window or a web page.",
-    "profile": "Compute how light spreads below a skin, and fit Gaussians to it.",
-    "head": "Make a person of the parametric human and write it as glTF.",
-    "export": "Write a skin or a head for another program, and say how wrong it will be there.",
-    "unmix": "Find the melanin and blood of a picture of skin, and recolour it.",
-    "fit": "Find the light and the skin of a photograph of a head.",
-    "lights": "Print a rig of lights as a file to start from.",
-    "compare": "Compare techniques with the truth, or the models of the surface.",
-    "gallery": "Draw every comparison of the talk, and a page that explains them.",
-    "bench": "Measure how fast frames are on this machine.",
-    "doctor": "Show what this machine can do and render a test frame.",
-    "cite": "Print BibTeX entries of the works behind a picture.",
+    "animate": "Render a moving head as a movie or as numbered images.",
+    "batch": "Render a data set of people with ground truth, on one or many machines.",
+    "view": "Show a head in an interactive window or web page.",
+    "profile": "Compute the diffusion profile of a skin and fit Gaussians to it.",
+    "head": "Create a person of the parametric human and write it as glTF.",
+    "export": "Export a skin or a head to another program and report the error.",
+    "unmix": "Estimate melanin and blood from a skin colour map, and recolour it.",
+    "fit": "Estimate the light and the skin in a photograph of a head.",
+    "lights": "Print a lighting rig as a TOML file to start from.",
+    "compare": "Compare techniques with a reference, or the specular models.",
+    "gallery": "Render the comparisons of the 2007 talk and a page that explains them.",
+    "bench": "Measure the frame times on this machine.",
+    "doctor": "Report what this machine supports and render a test frame.",
+    "cite": "Print the BibTeX entries of the works behind a picture.",
 }
-_INTERRUPTED = 130
+_EXIT_INTERRUPTED = 130
 
 
 def main() -> None:
-    """Run the command line; exit with 2 for faults that the caller can correct.
+    """Run the command line and exit the process.
 
-    130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP; 2 also when stdout could not be written to, but
-    not when its reader left.
+    The exit status is 2 for errors that the caller can correct, including a failed write to stdout, 130 after
+    Ctrl-C, 143 after SIGTERM and 129 after SIGHUP. A closed pipe on stdout is not an error.
     """
     from dermis.cli.process import Interruption, StandardStreams
 
     with StandardStreams() as streams, Interruption() as interruption:
         try:
             code = _run()
-            if (fault := streams.fault()) and not code:
-                from dermis.base.command_line import failed
+            if (error := streams.stdout_error()) and not code:
+                from dermis.base.command_line import print_failure
 
-                came = f"it fails ({fault.strerror})"
-                code = failed(
-                    "dermis", f"stdout: expected a place to write to, but {came}. Write it elsewhere."
+                reason = f"writing failed ({error.strerror})"
+                code = print_failure(
+                    "dermis", f"stdout: expected writable output, but {reason}. Redirect it."
                 )
         except KeyboardInterrupt:
-            code = _INTERRUPTED
-            streams.drop()
-        except Exception:  # some libraries raise their own error for an interruption
+            code = _EXIT_INTERRUPTED
+            streams.discard_stdout()
+        except Exception:  # some libraries raise their own error after an interruption
             if not (code := interruption.code):
                 raise
     sys.exit(interruption.code or code)
 
 
 def _run() -> int:
-    """Return the exit status of the command that was typed."""
+    """Run the subcommand named on the command line and return its exit status."""
     from dermis.base.command_line import add_command, make_app, run_app
 
-    app = make_app("dermis", "Human skin: physically based, in real time, checked against the truth.")
+    app = make_app("dermis", "Physically based rendering of human skin in real time.")
     app.version = lambda: dermis.__version__
     app.version_flags = ("--version",)
     for name, summary in COMMANDS.items():

@@ -1,4 +1,4 @@
-"""`dermis animate`: a movie of a head that moves, and the times of its frames."""
+"""The command `dermis animate`: movies and image sequences of a moving head."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.console import note, print_report, progress, working_on
+from dermis.base.console import note, print_report, progress_bar, spinner
 from dermis.base.errors import refuse
-from dermis.base.quantities import number
-from dermis.cli.options import Adapter, OutputPath, Flag, Json, Options, Integer
+from dermis.base.quantities import checked_number
+from dermis.cli.options import AdapterOption, Flag, Integer, JsonOption, Options, OutputPath
 from dermis.cli.output_options import AnimationOutput
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble_scene, note_subdivision
 
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _AnimatedScene:
-    """Scene moved by a clip, with frame k at k / rate.
+    """Scene animated by a clip, with frame k at time k / rate.
 
+    rate : frame rate [1/s]
     first : number of the first frame
     """
 
@@ -42,7 +43,7 @@ class _AnimatedScene:
     first: int
 
     def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
-        """Yield the scene of each frame; what the clip does not move keeps the scene's own pose."""
+        """Yield the scene of each frame; targets and bones without animation keep the pose of the scene."""
         from dermis.mesh.pose import laid_over
 
         for frame in numbers:
@@ -62,16 +63,16 @@ def animate(
     begin: Annotated[float | None, Parameter(name="--from")] = None,
     end: Annotated[float | None, Parameter(name="--to")] = None,
     crf: Integer = None,
-    anew: Flag = False,
+    overwrite: Annotated[bool, Parameter(name="--anew", negative="", show_default=False)] = False,
     names: Flag = False,
     scene: SceneOptions = DEFAULTS,
-    adapter: Adapter = "auto",
-    as_json: Json = False,
+    adapter: AdapterOption = "auto",
+    as_json: JsonOption = False,
 ) -> int:
-    """Draw a head that moves, as a movie (H.264 in MP4) or as numbered pictures.
+    """Render a moving head as a movie (H.264 in MP4) or as numbered images.
 
-    Numbered pictures that are there already are kept if they are whole and show the same; an interrupted
-    command goes on where it was when it is given again. The other options are those of `dermis render`.
+    Numbered images that already exist are reused if they are complete and belong to the same scene, so an
+    interrupted command can be repeated to continue it. All other options are those of `dermis render`.
 
     Examples:
 
@@ -86,109 +87,109 @@ def animate(
     Parameters
     ----------
     head:
-        A mesh (.glb .gltf .obj .ply), a sample, or a scene (.toml).
+        Mesh (.glb .gltf .obj .ply), sample name or scene (.toml).
     motion:
-        What moves it: a .glb or .gltf with clips, a .csv of Live Link Face, a .jsonl of MediaPipe, or a
-        sequence as face_%05d.obj [the head's own file].
+        File with the motion: .glb or .gltf with clips, .csv of Live Link Face, .jsonl of MediaPipe, or a
+        sequence of meshes such as face_%05d.obj. [default: the file of the head]
     output:
-        Movie (.mp4), or pictures such as frames/%05d.png or .exr, whose folder is made.
+        Movie (.mp4) or numbered images such as frames/%05d.png or .exr; their folder is created if necessary.
     clip:
-        The clip of a glTF file that has several.
+        Name of the clip, for glTF files with several clips.
     fps:
-        Frames a second, as 30, 23.976 or 24000/1001 [the motion's own rate, else 30].
+        Frame rate, such as 30, 23.976 or 24000/1001 [1/s]. [default: rate of the motion, or 30]
     motion_fps:
-        Frames a second of the motion itself, where its file does not tell: of a sequence [--fps, else 30], of
-        a timecode.
+        Frame rate of a motion file without times: a mesh sequence [default: --fps, or 30] or timecodes [1/s].
     begin:
-        Seconds of the motion at which to begin [0].
+        Start time within the motion [s]. [default: 0]
     end:
-        Seconds before which to end [the motion's end].
+        End time within the motion, exclusive [s]. [default: end of the motion]
     crf:
-        Quality of a movie, from 0 (without loss) to 51 [18].
-    anew:
-        Draw numbered pictures again that are there.
+        Quality of the movie as constant rate factor, 0 (lossless) to 51. [default: 18]
+    overwrite:
+        Render existing numbered images again.
     names:
-        List the names of morph targets, bones and clips of the head, and draw nothing.
+        List the morph targets, bones and clips of the head without rendering.
     as_json:
-        Print one JSON object with the number of frames and the time they took.
+        Print one JSON object with the number of frames and the timings.
     """
     if names:
         return _list_names(head, scene, as_json)
     started = time.perf_counter()
-    span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, anew)
+    span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, overwrite)
     target.check(scene.settings.get("size", (2, 2)))
-    moving = motion_file(head, motion)
-    with working_on("loading"):
-        described, settings = assemble_scene(head, scene)
+    motion_path = motion_file(head, motion)
+    with spinner("loading"):
+        animated, settings = assemble_scene(head, scene)
         target.check(settings.size)
-        moved = load_clip(head, described.head, moving, clip, scene.head, span)
-        numbers, rate = span.frames(moved)
-    if moved.note:
-        note(f"note: {moved.note}")
-    note_subdivision(head, scene, described.head)
-    take = _AnimatedScene(described, settings, moved, rate, numbers[0])
-    missing = target.missing(numbers, settings.size, _frame_digest(take, scene, head, moving))
-    began = time.perf_counter()
-    used = _draw(take, missing, target, adapter) if missing else None
+        motion_clip = load_clip(head, animated.head, motion_path, clip, scene.head, span)
+        numbers, rate = span.frames(motion_clip)
+    if motion_clip.note:
+        note(f"note: {motion_clip.note}")
+    note_subdivision(head, scene, animated.head)
+    animation = _AnimatedScene(animated, settings, motion_clip, rate, numbers[0])
+    missing = target.missing(numbers, settings.size, _frame_digest(animation, scene, head, motion_path))
+    draw_started = time.perf_counter()
+    adapter_name = _draw(animation, missing, target, adapter) if missing else None
     now = time.perf_counter()
     report = {
         "file": str(output),
-        "adapter": used,
+        "adapter": adapter_name,
         "size": list(settings.size),
-        "subdivide": described.head.levels,
+        "subdivide": animated.head.levels,
         "fps": float(rate),
         "frames": len(numbers),
         "drawn": len(missing),
         "seconds": round(now - started, 3),
-        "frames_per_s": round(len(missing) / (now - began), 3),
+        "frames_per_s": round(len(missing) / (now - draw_started), 3),
     }
-    print_report(as_json, report, lambda: [_summary_line(report), *filter(None, [described.head.attribution])])
+    print_report(as_json, report, lambda: [_summary_line(report), *filter(None, [animated.head.attribution])])
     return 0
 
 
-def _draw(take: _AnimatedScene, numbers: Sequence[int], target: AnimationOutput, adapter: str) -> str:
-    """Draw and write frames; return the adapter's name."""
+def _draw(animation: _AnimatedScene, numbers: Sequence[int], target: AnimationOutput, adapter: str) -> str:
+    """Render the frames, write them, and return the name of the adapter."""
     from dermis.frame.renderer import Renderer
 
-    renderer, size = Renderer(adapter), take.settings.size
-    options: Options = {**take.settings.model_dump(), "linear": target.linear}
-    options["exposure"] = _exposure(take, renderer)
-    options["alpha"] = target.numbered and take.settings.background == "none"
-    writing, bar = target.writing(size, take.rate), progress("drawing frames")
+    renderer, size = Renderer(adapter), animation.settings.size
+    options: Options = {**animation.settings.model_dump(), "linear": target.linear}
+    options["exposure"] = _exposure(animation, renderer)
+    options["alpha"] = target.numbered and animation.settings.background == "none"
+    writing, bar = target.writing(size, animation.rate), progress_bar("rendering frames")
     with writing as write, bar as report:
-        pictures = renderer.render_many(take.scenes(numbers), **options)
+        pictures = renderer.render_many(animation.scenes(numbers), **options)
         for done, (number, picture) in enumerate(zip(numbers, pictures, strict=True), 1):
             write(number, picture)
             report(done, len(numbers))
     return str(renderer.device.adapter.name)
 
 
-def _exposure(take: _AnimatedScene, renderer: Renderer) -> float:
-    """Return the exposure of all frames: the given one, or that metered at the first frame of the motion."""
-    if take.settings.exposure != "auto":
-        return take.settings.exposure
-    (scene,) = take.scenes([take.first])
-    found = renderer.draw(scene, take.settings, timed=False).exposure
-    note(f"note: --exposure {found:.3g}, metered at the first frame")
-    return found
+def _exposure(animation: _AnimatedScene, renderer: Renderer) -> float:
+    """Return the exposure of all frames: the --exposure value, or the one metered at the first frame."""
+    if animation.settings.exposure != "auto":
+        return animation.settings.exposure
+    (scene,) = animation.scenes([animation.first])
+    exposure = renderer.draw(scene, animation.settings, timed=False).exposure
+    note(f"note: --exposure {exposure:.3g}, metered at the first frame")
+    return exposure
 
 
-def _frame_digest(take: _AnimatedScene, given: SceneOptions, *files: str) -> str:
-    """Return a digest that two frames of one number share if they look the same.
+def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str) -> str:
+    """Return a hash that changes whenever the appearance of the frames may change.
 
-    files : head and motion as they were typed; files count with their size and time
+    files : head and motion as named on the command line; files contribute their size and modification time
     """
-    scene = take.scene
-    named = [*files, scene.head.name, *map(str, given.head.values()), take.clip.name]
-    metered_at = take.first if take.settings.exposure == "auto" else None
-    seen = scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate, metered_at
-    typed = given.head, given.eye, given.pose, given.bone, given.look_at
-    parts = [*map(_file_state, named), *map(repr, typed), repr(seen), str(scene.head.levels)]
+    scene = animation.scene
+    names = [*files, scene.head.name, *map(str, options.head.values()), animation.clip.name]
+    metered_at = animation.first if animation.settings.exposure == "auto" else None
+    scene_values = scene.lights, scene.camera, scene.skin, scene.environment
+    frame_values = *scene_values, animation.settings, animation.rate, metered_at
+    option_values = options.head, options.eye, options.pose, options.bone, options.look_at
+    parts = [*map(_file_state, names), *map(repr, option_values), repr(frame_values), str(scene.head.levels)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 def _file_state(name: str) -> str:
-    """Return a name, with size and time of the file where it is one."""
+    """Return the path, size and modification time of a file; the name itself if no such file exists."""
     path = Path(name.partition("#")[0])
     if not path.exists():
         return name
@@ -198,17 +199,17 @@ def _file_state(name: str) -> str:
 
 def _summary_line(report: Options) -> str:
     count, drawn = report["frames"], report["drawn"]
-    kept = f" ({count - drawn} were there)" if drawn < count else ""
-    place = f" on {report['adapter']}" if report["adapter"] else ""
+    reused = f" ({count - drawn} reused)" if drawn < count else ""
+    device = f" on {report['adapter']}" if report["adapter"] else ""
     frames = f"{count} frame{'s' * (count != 1)}"
-    return f"{report['file']}  {frames}{kept} at {report['fps']:g}/s  {report['seconds']:.1f} s{place}"
+    return f"{report['file']}  {frames}{reused} at {report['fps']:g}/s  {report['seconds']:.1f} s{device}"
 
 
-def _list_names(name: str, given: SceneOptions, as_json: bool) -> int:
-    with working_on("loading"):
-        found = animatable_names(name, assemble_scene(name, given)[0].head)
+def _list_names(name: str, options: SceneOptions, as_json: bool) -> int:
+    with spinner("loading"):
+        names = animatable_names(name, assemble_scene(name, options)[0].head)
     print_report(
-        as_json, found, lambda: (f"{kind}: {', '.join(each) or 'none'}" for kind, each in found.items())
+        as_json, names, lambda: (f"{kind}: {', '.join(each) or 'none'}" for kind, each in names.items())
     )
     return 0
 
@@ -218,10 +219,11 @@ _DEFAULT_RATE = 30.0
 
 @dataclass(frozen=True)
 class TimeSpan:
-    """Times between which frames are drawn, and their rate; None where an option was left out.
+    """Time span and frame rate of an animation; None for each option that was omitted.
 
-    begin, end : seconds of the motion
-    own_rate : of the motion itself, where it does not tell [1/s]
+    begin, end : times within the motion [s]
+    rate : frame rate of the animation [1/s]
+    own_rate : frame rate of motion files without times [1/s]
     """
 
     begin: Fraction | None
@@ -230,83 +232,88 @@ class TimeSpan:
     own_rate: float | None
 
     def frames(self, clip: Clip) -> tuple[range, Fraction]:
-        """Numbers of the frames, of which number k lies at k / rate, and the rate [1/s].
+        """Return the range of frame numbers and the frame rate [1/s]; frame k is at time k / rate.
 
-        Raises DermisError when the motion ends before the frames begin.
+        Raises DermisError if the motion ends before the time span begins.
         """
-        from dermis.images.movie import exact_rate
+        from dermis.images.movie import parse_frame_rate
 
-        rate = self.rate or exact_rate(clip.rate or _DEFAULT_RATE)
+        rate = self.rate or parse_frame_rate(clip.rate or _DEFAULT_RATE)
         first = math.ceil((self.begin or 0) * rate)
         count = clip.frame_count(float(rate))
-        beyond = count if self.end is None else min(count, math.ceil(self.end * rate))
+        stop = count if self.end is None else min(count, math.ceil(self.end * rate))
         if first >= count:
-            came = f"{clip.name} lasts {clip.duration_s:.3f} s"
-            refuse("--from", "a time at which there is motion", came, "Choose an earlier one")
-        if first >= beyond:
-            came = f"at {float(rate):g} frames a second there is none"
-            refuse("--to", "at least one frame before it", came, "Choose a later time")
-        return range(first, beyond), rate
+            actual = f"{clip.name} lasts {clip.duration_s:.3f} s"
+            refuse("--from", "a time before the end of the motion", actual, "Choose an earlier time")
+        if first >= stop:
+            actual = f"there is none at {float(rate):g} frames per second"
+            refuse("--to", "at least one frame before it", actual, "Choose a later time")
+        return range(first, stop), rate
 
 
-def parse_time_span(begin: float | None, end: float | None, fps: str | None, own_rate: float | None) -> TimeSpan:
-    """Return the span that was typed."""
-    from dermis.images.movie import exact_rate
+def parse_time_span(
+    begin: float | None, end: float | None, fps: str | None, own_rate: float | None
+) -> TimeSpan:
+    """Return the time span given by the options --from, --to, --fps and --motion-fps."""
+    from dermis.images.movie import parse_frame_rate
     from dermis.mesh.clip import LONGEST_S, check_rate
 
     for option, seconds in (("--from", begin), ("--to", end)):
         if seconds is not None:
-            number(option, seconds, 0.0, LONGEST_S, "s")
+            checked_number(option, seconds, 0.0, LONGEST_S, "s")
     if end is not None and end <= (begin or 0):
-        refuse("--to", f"a time after --from ({begin or 0:g} s)", f"{end:g} s came", "Correct one of them")
+        refuse("--to", f"a time after --from ({begin or 0:g} s)", f"got {end:g} s", "Correct one of them")
     if own_rate is not None:
         check_rate("--motion-fps", own_rate)
-    # as written: the float nearest to 0.1 lies after frame 3 of 30
-    exact = [None if seconds is None else Fraction(str(seconds)) for seconds in (begin, end)]
-    return TimeSpan(exact[0], exact[1], None if fps is None else exact_rate(fps, "--fps"), own_rate)
+    # exact decimal values: the float nearest to 0.1 is after frame 3 at 30 frames per second
+    start, stop = (None if seconds is None else Fraction(str(seconds)) for seconds in (begin, end))
+    return TimeSpan(start, stop, None if fps is None else parse_frame_rate(fps, "--fps"), own_rate)
 
 
 def motion_file(name: str, motion: str | None) -> str:
-    """Return the motion's file as named, else the head's own file where that can hold clips."""
+    """Return the name of the motion file: the --motion value, or the head's own file if it can hold clips."""
     from dermis.formats.parts import is_gltf
 
     if motion is not None:
         return motion
-    own = str(_table(name).get("name", name))
-    if not is_gltf(own):
-        remedy = "Add --motion with a .glb, .csv or .jsonl, or a sequence of .obj"
-        refuse("--motion", "a file", f"none came, and {own} has no clips of its own", remedy)
-    return own
+    own_file = str(_table(name).get("name", name))
+    if not is_gltf(own_file):
+        advice = "Add --motion with a .glb, .csv or .jsonl file, or a sequence of .obj files"
+        refuse("--motion", "a file", f"it is missing, and {own_file} cannot contain clips", advice)
+    return own_file
 
 
-def load_clip(name: str, head: Head, motion: str, clip: str | None, given: Options, span: TimeSpan) -> Clip:
-    """Return the motion of a file for a head.
+def load_clip(
+    name: str, head: Head, motion: str, clip: str | None, head_options: Options, span: TimeSpan
+) -> Clip:
+    """Load the clip that animates a head from a motion file.
 
-    name : of the head as it was typed
-    given : fields of its [head] that were typed, of which unit_mm and up hold for a sequence too
+    name : head as named on the command line
+    head_options : options of the head; `unit_mm` and `up` also apply to mesh sequences
     """
     from dermis.formats.motion.sequence import is_sequence
     from dermis.scene.motion import load_motion
 
     rate = span.own_rate
-    if rate is None and span.rate and is_sequence(Path(motion)):  # a file for each frame
+    if rate is None and span.rate and is_sequence(Path(motion)):  # one file per frame
         rate = float(span.rate)
-    table = {key: value for key, value in {**_table(name), **given}.items() if key in ("unit_mm", "up")}
-    return load_motion(motion, head, clip=clip, fps=rate, **table)
+    fields = {**_table(name), **head_options}
+    units = {key: fields[key] for key in ("unit_mm", "up") if key in fields}
+    return load_motion(motion, head, clip=clip, fps=rate, **units)
 
 
 def animatable_names(name: str, head: Head) -> dict[str, tuple[str, ...]]:
-    """Return names of the head's morph targets and bones, and of the clips in its file."""
+    """Return the names of the morph targets and bones of the head, and of the clips in its file."""
     from dermis.formats.gltf.animations import clip_names
     from dermis.formats.parts import is_gltf
 
-    own = Path(str(_table(name).get("name", name)))
-    clips = clip_names(own) if is_gltf(own) else ()
+    own_file = Path(str(_table(name).get("name", name)))
+    clips = clip_names(own_file) if is_gltf(own_file) else ()
     return {"targets": head.targets, "bones": head.bones, "clips": clips}
 
 
 def _table(name: str) -> Options:
-    """Return the [head] table of a scene's file; empty for other heads."""
+    """Return the [head] table of a scene file; an empty table for heads that are not scene files."""
     from dermis.scene.files import head_table
 
     return head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else {}

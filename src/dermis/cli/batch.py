@@ -1,4 +1,4 @@
-"""`dermis batch`: a data set of many people, with what is known about each picture."""
+"""The command `dermis batch`: data sets of rendered people with ground truth."""
 
 from __future__ import annotations
 
@@ -11,12 +11,22 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from dermis.base.console import note, print_json, print_lines, print_report, working_on
+from dermis.base.console import note, print_json, print_lines, print_report, spinner
 from dermis.base.errors import refuse
-from dermis.cli.options import Adapter, Flag, Json, Options, Output, Integer, given, parse_size
+from dermis.cli.options import (
+    AdapterOption,
+    Flag,
+    Integer,
+    JsonOption,
+    OptionalOutputPath,
+    Options,
+    drop_none,
+    parse_size,
+    refuse_options,
+)
 
 if TYPE_CHECKING:
-    from dermis.apps.batch.run import WorkerPool, Report
+    from dermis.apps.batch.run import RunReport, WorkerPool
     from dermis.apps.batch.spec import Spec
 
 _MAX_PROCESSES = 1024
@@ -26,13 +36,13 @@ def batch(
     spec: Path | None = None,
     /,
     *,
-    output: Output = None,
+    output: OptionalOutputPath = None,
     count: Integer = None,
     size: str | None = None,
     seed: Integer = None,
     format: Literal["webdataset", "folder"] | None = None,
     shard: str = "0/1",
-    adapter: Adapter = "auto",
+    adapter: AdapterOption = "auto",
     adapters: str | None = None,
     workers: Integer = None,
     workers_per_gpu: Integer = None,
@@ -42,12 +52,12 @@ def batch(
     keep_going: Flag = False,
     dry_run: Flag = False,
     example: Flag = False,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> int:
-    """Draw a data set: people, faces, light and cameras from stated distributions, with ground truth.
+    """Render a data set with ground truth: people, expressions, lights and cameras drawn from distributions.
 
-    An interrupted command goes on where it was when it is given again: shards that are whole are kept. The
-    same spec gives the same bytes on the same kind of adapter, however many workers draw it and wherever.
+    An interrupted command can be repeated to continue it: complete shards are kept. The same spec gives the
+    same bytes on the same kind of adapter, independent of the number and location of the workers.
 
     Examples:
 
@@ -64,140 +74,146 @@ def batch(
     Parameters
     ----------
     spec:
-        What is drawn (.toml), see --example.
+        File with the distributions of the data set (.toml); see --example.
     output:
-        Folder of the data set, made if it is not there; with --dry-run the contact sheet (.png).
+        Folder of the data set, created if necessary; with --dry-run the contact sheet (.png).
     count:
-        Number of images, in place of the spec's.
+        Number of images. [default: from the spec]
     size:
-        Of the images, WIDTHxHEIGHT, in place of the spec's.
+        Width and height of the images, WIDTHxHEIGHT [pixel]. [default: from the spec]
     seed:
-        By which all is drawn, in place of the spec's.
+        Seed of the random numbers. [default: from the spec]
     format:
-        Shards as tar files of WebDataset, or as folders; in place of the spec's.
+        Format of the shards: WebDataset tar files, or folders. [default: from the spec]
     shard:
-        I/N: every N-th shard from the I-th on, counted from 0, for arrays of jobs that share a disk.
+        I/N: render every N-th shard, beginning with shard I (from 0), for job arrays with a shared disk.
     adapters:
-        Numbers of several, such as 0,1, as `dermis doctor` has them [all GPUs of the best kind].
+        Numbers of several adapters, such as 0,1; see `dermis doctor`. [default: all GPUs of the best kind]
     workers:
-        Processes that draw [one for each GPU; on a software adapter one for two cores].
+        Number of worker processes. [default: one per GPU; on a software adapter one per two cores]
     workers_per_gpu:
-        Processes that share a GPU, which Python alone does not fill [1].
+        Number of worker processes that share each GPU; more than one can increase its utilisation. [default:
+        1]
     encoders:
-        Processes of each worker that encode pictures; 0 lets it encode itself [by the number of cores].
+        Number of processes per worker that encode images; 0 encodes in the worker itself. [default: by the
+        number of cores]
     scheduler:
-        Address of dask's scheduler, such as tcp://head:8786: each of its workers draws on a GPU of its own.
+        Address of a dask scheduler, such as tcp://head:8786; each dask worker renders on its own GPU.
     cluster:
-        The file that dask's scheduler wrote (dask scheduler --scheduler-file FILE), for its address.
+        Scheduler file with the address, as written by `dask scheduler --scheduler-file FILE`.
     keep_going:
-        Leave out images that cannot be made, and list them.
+        Skip images that cannot be rendered, and list them.
     dry_run:
-        Print what would be drawn, draw the first 16 images as a contact sheet, and write no data set.
+        Print the parameters of the data set and render its first 16 images as a contact sheet, without
+        writing it.
     example:
-        Print a spec with comments that can be drawn as it is.
+        Print a complete example spec with comments.
     as_json:
-        Print one JSON object: counts, seconds, images/s, shards, what was skipped and what was left out.
+        Print one JSON object with counts, time [s], images per second, and skipped shards and images.
     """
     from dermis.apps.batch.spec import example_toml, load_spec
 
     if example:
         print_lines(example_toml().rstrip("\n"))
         return 0
-    part = _part(shard)
+    part = _parse_part(shard)
     if spec is None:
-        refuse("SPEC", "a file", "none was named", "Print one to start from with --example")
-    changed = given(count=count, size=size and parse_size(size), seed=seed, format=format)
-    with working_on("reading the spec"):
-        read = load_spec(spec, **changed)
+        refuse("SPEC", "a file", "it is missing", "Print an example spec with --example")
+    overrides = drop_none(count=count, size=size and parse_size(size), seed=seed, format=format)
+    with spinner("reading the spec"):
+        loaded_spec = load_spec(spec, **overrides)
     if dry_run:
-        return _dry_run(read, adapter, output or Path("dry-run.png"), as_json)
+        return _dry_run(loaded_spec, adapter, output or Path("dry-run.png"), as_json)
     if output is None:
-        refuse("--output", "the folder of the data set", "none was named", "Name one with -o")
+        refuse("--output", "the folder of the data set", "it is missing", "Name one with -o")
     from dermis.apps.batch.run import run
     from dermis.apps.batch.worker import RunOptions
 
     if scheduler is not None or cluster is not None:
-        elsewhere = given(adapters=adapters, workers=workers, workers_per_gpu=workers_per_gpu)
-        crew, each = _cluster(scheduler, cluster, adapter, elsewhere), _number("--encoders", encoders, 0)
+        local_options = drop_none(adapters=adapters, workers=workers, workers_per_gpu=workers_per_gpu)
+        pool: WorkerPool = _dask_cluster(scheduler, cluster, adapter, local_options)
+        encoder_count = _checked_count("--encoders", encoders, 0)
     else:
-        crew, each = _crew(adapter, adapters, workers, workers_per_gpu, encoders)
-    work = RunOptions(read, output, each or 0, keep_going)
-    with image_progress() as told:
-        report = run(work, crew, part, lambda now: told(now.images, now.to_draw))
-    _tell(report, output, as_json)
+        pool, encoder_count = _local_processes(adapter, adapters, workers, workers_per_gpu, encoders)
+    work = RunOptions(loaded_spec, output, encoder_count or 0, keep_going)
+    with image_progress() as report_progress:
+        report = run(work, pool, part, lambda state: report_progress(state.images, state.total))
+    _print_report(report, output, as_json)
     return 0
 
 
-def _part(text: str) -> tuple[int, int]:
-    """Return I and N of --shard I/N."""
+def _parse_part(text: str) -> tuple[int, int]:
+    """Return the integers I and N of the option --shard I/N."""
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text)
     if not match or int(match[1]) >= int(match[2]):
-        refuse("--shard", "I/N with I from 0 to N - 1, such as 3/16", f"{text!r} came", "Correct it")
+        refuse("--shard", "I/N with I from 0 to N - 1, such as 3/16", f"got {text!r}", "Correct it")
     return int(match[1]), int(match[2])
 
 
-def _number(option: str, value: int | None, least: int) -> int | None:
+def _checked_count(option: str, value: int | None, least: int) -> int | None:
     if value is not None and not least <= value <= _MAX_PROCESSES:
-        refuse(option, f"{least} to {_MAX_PROCESSES}", f"{value} came", "Correct it")
+        refuse(option, f"{least} to {_MAX_PROCESSES}", f"got {value}", "Correct it")
     return value
 
 
-def _crew(
-    adapter: str, adapters: str | None, workers: int | None, per_gpu: int | None, encoders: int | None
+def _local_processes(
+    adapter: str, adapters: str | None, workers: int | None, workers_per_gpu: int | None, encoders: int | None
 ) -> tuple[WorkerPool, int]:
-    """Return the processes of this machine, and how many encoders each has."""
+    """Return the pool of local worker processes and the number of encoders of each."""
     from dermis.apps.batch.worker_pool import ProcessPool, SlotRequest
 
-    if workers is not None and per_gpu is not None:
-        refuse("--workers-per-gpu", "no such option beside --workers", "it came", "Leave one of them out")
+    if workers is not None and workers_per_gpu is not None:
+        refuse("--workers-per-gpu", "no --workers", "both are given", "Remove one of them")
     request = SlotRequest(
         adapter,
-        _numbers(adapter, adapters),
-        _number("--workers", workers, 1),
-        _number("--workers-per-gpu", per_gpu, 1) or 1,
-        _number("--encoders", encoders, 0),
+        _parse_adapter_numbers(adapter, adapters),
+        _checked_count("--workers", workers, 1),
+        _checked_count("--workers-per-gpu", workers_per_gpu, 1) or 1,
+        _checked_count("--encoders", encoders, 0),
     )
-    slots, each = request.slots()
-    return ProcessPool(slots), each
+    slots, encoder_count = request.slots()
+    return ProcessPool(slots), encoder_count
 
 
-def _numbers(adapter: str, adapters: str | None) -> tuple[int, ...]:
+def _parse_adapter_numbers(adapter: str, adapters: str | None) -> tuple[int, ...]:
     if adapters is None:
         return ()
     if adapter != "auto":
-        refuse("--adapters", "no such option beside --adapter", "it came", "Leave one of them out")
+        refuse("--adapters", "no --adapter", "both are given", "Remove one of them")
     if not re.fullmatch(r"\d{1,4}(,\d{1,4})*", adapters):
-        refuse("--adapters", "numbers with commas, such as 0,1", f"{adapters!r} came", "Correct it")
+        refuse("--adapters", "numbers separated by commas, such as 0,1", f"got {adapters!r}", "Correct it")
     return tuple(map(int, adapters.split(",")))
 
 
-def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: Options) -> WorkerPool:
-    from dermis.apps.batch.dask_cluster import Cluster
+def _dask_cluster(address: str | None, file: Path | None, adapter: str, local_options: Options) -> WorkerPool:
+    from dermis.apps.batch.dask_cluster import DaskCluster
 
     if address is not None and file is not None:
-        refuse("--cluster", "no such option beside --scheduler", "it came", "Leave one of them out")
-    for name in elsewhere:
-        option = f"--{name.replace('_', '-')}"
-        refuse(option, "no such option with dask's workers", "it came", "Start as many of them as you want")
-    return Cluster(address, file, adapter)
+        refuse("--cluster", "no --scheduler", "both are given", "Remove one of them")
+    refuse_options(
+        local_options, None, "with a dask cluster", "Remove it and start more dask workers instead"
+    )
+    return DaskCluster(address, file, adapter)
 
 
-def _tell(report: Report, out: Path, as_json: bool) -> None:
+def _print_report(report: RunReport, folder: Path, as_json: bool) -> None:
     rate = report.images / report.seconds if report.images else 0.0
     if as_json:
-        failed = [{"image": one.number, "reason": one.reason} for one in report.failed]
-        values = {"folder": str(out), "images": report.images, "seconds": round(report.seconds, 3)}
+        failed = [{"image": failure.number, "reason": failure.reason} for failure in report.failed]
+        values = {"folder": str(folder), "images": report.images, "seconds": round(report.seconds, 3)}
         values |= {"images_per_s": round(rate, 3), "shards": report.shards, "skipped": report.skipped}
-        print_json({**values, "failed": failed, "whole": report.is_whole})
+        print_json({**values, "failed": failed, "whole": report.is_complete})
         return
-    kept = f" ({report.skipped} were there)" if report.skipped else ""
+    reused = f" ({report.skipped} reused)" if report.skipped else ""
     lines = [
-        f"{out}  {report.images:,} images in {report.shards:,} shards{kept}  {report.seconds:.1f} s"
+        f"{folder}  {report.images:,} images in {report.shards:,} shards{reused}  {report.seconds:.1f} s"
         + (f", {rate:.3g} images/s" if rate else "")
     ]
-    lines += [f"left out: image {one.number}: {one.reason}" for one in report.failed]
-    if not report.is_whole:
-        lines.append("shards of other parts are missing still: index and datasheet come with the last one")
+    lines += [f"skipped: image {failure.number}: {failure.reason}" for failure in report.failed]
+    if not report.is_complete:
+        lines.append(
+            "shards of other parts are missing: index and data sheet are written with the last shard"
+        )
     print_lines(*lines)
 
 
@@ -207,8 +223,8 @@ def _dry_run(spec: Spec, adapter: str, sheet: Path, as_json: bool) -> int:
 
     check_output(sheet)
     if sheet.suffix.lower() != ".png":
-        refuse(sheet, "a name that ends in .png", "it does not", "Name the contact sheet, or leave -o out")
-    with working_on("drawing a contact sheet"):
+        refuse(sheet, "a name that ends in .png", "it does not", "Name the contact sheet, or omit -o")
+    with spinner("rendering a contact sheet"):
         rows, picture = dry_run(spec, adapter)
     write_png(sheet, picture)
     report = {"sheet": str(sheet), "parameters": rows}
@@ -216,21 +232,21 @@ def _dry_run(spec: Spec, adapter: str, sheet: Path, as_json: bool) -> int:
     return 0
 
 
-_LOG_INTERVAL_S = 30.0  # between lines of a log
-_RATE_WINDOW_S = 60.0  # that the rate is taken over
+_LOG_INTERVAL_S = 30.0
+_RATE_WINDOW_S = 60.0  # over which the rate is averaged
 
 
 @contextmanager
 def image_progress() -> Iterator[Callable[[int, int], None]]:
-    """Yield a function that takes how many images are done, of how many."""
+    """Yield a function that reports progress, given the number of finished images and their total number."""
     if not sys.stderr.isatty():
-        yield ProgressLog(note).tell
+        yield ProgressLog(note).report
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
-        TextColumn("drawing images"),
+        TextColumn("rendering images"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[rate]}"),
@@ -238,49 +254,49 @@ def image_progress() -> Iterator[Callable[[int, int], None]]:
     )
     with Progress(*columns, console=Console(stderr=True), speed_estimate_period=_RATE_WINDOW_S) as bar:
         task = bar.add_task("", rate="", total=None)
-        pace = ImageRate()
+        image_rate = ImageRate()
 
-        def tell(done: int, of: int) -> None:
-            bar.update(task, completed=done, total=of, rate=f"{pace.at(done):.3g} images/s")
+        def report(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total, rate=f"{image_rate.update(done):.3g} images/s")
 
-        yield tell
+        yield report
 
 
 class ImageRate:
-    """Images a second over the last minute.
+    """Number of images per second over the last minute.
 
-    clock : seconds
+    clock : function that returns the time [s]
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._seen = deque([(clock(), 0)])
+        self._samples = deque([(clock(), 0)])
 
-    def at(self, done: int) -> float:
-        """The pace with so many images done by now."""
+    def update(self, done: int) -> float:
+        """Return the current rate [1/s], given the number of images finished so far."""
         now = self._clock()
-        self._seen.append((now, done))
-        while len(self._seen) > 2 and now - self._seen[1][0] >= _RATE_WINDOW_S:
-            self._seen.popleft()
-        began, before = self._seen[0]
+        self._samples.append((now, done))
+        while len(self._samples) > 2 and now - self._samples[1][0] >= _RATE_WINDOW_S:
+            self._samples.popleft()
+        began, before = self._samples[0]
         return (done - before) / (now - began) if now > began else 0.0
 
 
 class ProgressLog:
-    """A line every half minute, for logs.
+    """Progress messages for log files, at most one every 30 seconds.
 
-    write : takes a line
+    write : function that takes the line to log
     """
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         self._write, self._clock = write, clock
-        self._pace, self._last = ImageRate(clock), clock()
+        self._rate, self._last = ImageRate(clock), clock()
 
-    def tell(self, done: int, of: int) -> None:
-        """So many images are done."""
-        pace, now = self._pace.at(done), self._clock()
+    def report(self, done: int, total: int) -> None:
+        """Log the number of finished images, unless the last message is too recent."""
+        rate, now = self._rate.update(done), self._clock()
         if now - self._last < _LOG_INTERVAL_S:
             return
         self._last = now
-        left = f"{(of - done) / pace / 60:.0f} min left" if pace else "no time known"
-        self._write(f"{done:,} of {of:,} images, {pace:.3g} images/s, {left}")
+        remaining = f"{(total - done) / rate / 60:.0f} min left" if rate else "time left unknown"
+        self._write(f"{done:,} of {total:,} images, {rate:.3g} images/s, {remaining}")

@@ -1,13 +1,13 @@
-"""`dermis bench`: how fast the frame is on this machine."""
+"""The command `dermis bench`: frame times on this machine."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
-from dermis.base.console import print_report, progress
+from dermis.base.console import print_report, progress_bar
 from dermis.cli.head_options import HEAD_OPTION_NAMES, FileOptions, check_head
-from dermis.cli.options import NO_OPTIONS, Adapter, Json, Output, refuse_options
+from dermis.cli.options import NO_OPTIONS, AdapterOption, JsonOption, OptionalOutputPath, refuse_options
 
 if TYPE_CHECKING:
     from dermis.apps.validation.benchmarks.run import Benchmark
@@ -18,17 +18,18 @@ def bench(
     preset: Literal["film", "interactive", "cpu"] | None = None,
     head: str = "auto",
     file: FileOptions = NO_OPTIONS,
-    output: Output = None,
-    adapter: Adapter = "auto",
-    as_json: Json = False,
+    output: OptionalOutputPath = None,
+    adapter: AdapterOption = "auto",
+    as_json: JsonOption = False,
 ) -> int:
-    """Measure the frame, stage by stage, at several sizes, beside what the memory's speed would allow.
+    """Measure the time of each stage of a frame, and compare it with the memory bandwidth limit.
 
-    Camera and lights move and everything is computed anew. The passes of 2007 are measured in the same run,
-    in compute and as fragments. A frame that the adapter cannot hold is left out, and told with its reason.
+    Camera and lights move between the frames, and every frame is computed from scratch. The passes of 2007
+    are measured in the same run, as compute and as fragment shaders. Frames that do not fit on the adapter
+    are skipped and listed with the reason.
 
-    A GPU's time of a stage is that of a pass of its own; the time of a whole frame, on the device, is that of
-    frames whose stages share one pass, as they do when nobody asks, and less than the sum of its stages.
+    The GPU time of a stage is measured with each stage in its own pass. The time of a whole frame is measured
+    with the stages sharing one pass, as in normal use, and is therefore less than the sum of its stages.
 
     Examples:
 
@@ -44,40 +45,40 @@ def bench(
     ----------
     preset:
         interactive (around 1920x1080, atlas 2048), film (around 3840x2160, atlas 4096), or cpu (around
-        1024x1024; some minutes on two cores) [by the adapter].
+        1024x1024; takes minutes on two cores). [default: by the adapter]
     head:
-        auto (the scan lee_perry_smith when it is here, else human), or what `dermis render` takes.
+        auto (the scan lee_perry_smith if it has been downloaded, else human), or any HEAD of `dermis render`.
     output:
-        HTML report with plots.
+        HTML report with plots to write.
     """
     from dermis.apps.validation.benchmarks.cases import PRESETS
     from dermis.apps.validation.benchmarks.report import as_json as to_json
     from dermis.apps.validation.benchmarks.report import write_report
     from dermis.apps.validation.benchmarks.run import run
     from dermis.base.atomic_write import check_output
-    from dermis.base.extras import needed
-    from dermis.formats.samples import cached
+    from dermis.base.extras import import_extra
+    from dermis.formats.samples import is_available
     from dermis.gpu.adapters import select_adapters
 
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
-        needed("matplotlib", "the report's plots")
+        import_extra("matplotlib", "the report's plots")
     name = head
     if head == "auto":
         refuse_options(file, HEAD_OPTION_NAMES, "without a file", "Add --head")
-        name = "lee_perry_smith" if cached("lee_perry_smith") else "human"
+        name = "lee_perry_smith" if is_available("lee_perry_smith") else "human"
     check_head(head, file)
-    software = select_adapters(adapter)[0][0].kind == "CPU"
-    cases = PRESETS[preset or ("cpu" if software else "interactive")].cases()
-    with progress("measuring") as tell:
-        made = run(cases, name, adapter, tell, file)
-    print_report(as_json, to_json(made), lambda: _lines(made))
-    if output is not None:  # last: where it cannot be written any more, the figures are not lost
-        write_report(output, made)
+    is_software = select_adapters(adapter)[0][0].kind == "CPU"
+    cases = PRESETS[preset or ("cpu" if is_software else "interactive")].cases()
+    with progress_bar("measuring") as report_progress:
+        benchmark = run(cases, name, adapter, report_progress, file)
+    print_report(as_json, to_json(benchmark), lambda: _report_lines(benchmark))
+    if output is not None:  # last: the figures are printed even if the report cannot be written
+        write_report(output, benchmark)
     return 0
 
 
-def _lines(made: Benchmark) -> list[str]:
+def _report_lines(benchmark: Benchmark) -> list[str]:
     from dermis.apps.validation.benchmarks.report import (
         COLUMNS,
         cells,
@@ -87,13 +88,16 @@ def _lines(made: Benchmark) -> list[str]:
         summary,
     )
 
-    rows, stages = _aligned([COLUMNS, *map(cells, made.rows)]), _aligned(stage_table(made))
-    usual = ["", "the usual frame:", *stages] if stages else []
-    published = ["", text] if (text := published_text(made)) else []
-    return [summary(made), "", *rows, *left_out_lines(made), *usual, *published]
+    rows, stages = (
+        _align_columns([COLUMNS, *map(cells, benchmark.rows)]),
+        _align_columns(stage_table(benchmark)),
+    )
+    usual_lines = ["", "the default frame:", *stages] if stages else []
+    published_lines = ["", text] if (text := published_text(benchmark)) else []
+    return [summary(benchmark), "", *rows, *left_out_lines(benchmark), *usual_lines, *published_lines]
 
 
-def _aligned(table: Sequence[tuple[str, ...]]) -> list[str]:
-    """Lines of a table whose columns end at the same place."""
-    wide = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return ["  ".join(cell.rjust(width) for cell, width in zip(row, wide, strict=True)) for row in table]
+def _align_columns(table: Sequence[tuple[str, ...]]) -> list[str]:
+    """Return the rows of a table as lines with right-aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in table]

@@ -1,4 +1,4 @@
-"""`dermis cite`: the works behind a picture."""
+"""The command `dermis cite`: references of the methods used in a picture."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def cite(
     skin: SkinOptions = NO_OPTIONS,
     against: Literal["surface-integral", "heat", "path-traced", "cycles"] | None = None,
 ) -> int:
-    """Print BibTeX entries: of the given keys, or of the works behind a picture or a comparison.
+    """Print the BibTeX entries of the works behind a picture or comparison, or of the given keys.
 
-    For example:
+    Examples:
 
         dermis cite
 
@@ -42,24 +42,24 @@ def cite(
     Parameters
     ----------
     keys:
-        Author-year keys as they stand in the documentation.
+        Author-year keys as used in the documentation.
     scene:
-        A scene file: what its skin, lights and settings use; without it a picture with all defaults.
+        Scene file whose skin, lights and settings are cited. [default: the default picture]
     against:
-        A truth of compare, instead of a picture: it, the measure of difference and the techniques.
+        Reference solution of `dermis compare`: cite it, the error measures and the techniques.
     """
     from dermis.base.citations import bibtex
 
     options = {**({"scene": scene} if scene else {}), **settings, **skin}
     if keys:
-        refuse_options([*options, *(["against"] if against else [])], None, "beside keys", "Leave one out")
-        wanted: tuple[str, ...] = keys
+        refuse_options([*options, *(["against"] if against else [])], None, "with keys", "Remove one of them")
+        selected: tuple[str, ...] = keys
     elif against:
-        refuse_options(options.keys() - {"technique"}, None, "beside --against", "Leave one out")
-        wanted = _comparison_sources(against, settings.get("technique"))
+        refuse_options(options.keys() - {"technique"}, None, "with --against", "Remove one of them")
+        selected = _comparison_sources(against, settings.get("technique"))
     else:
-        wanted = _picture_sources(scene, settings, skin)
-    print_lines(bibtex(wanted))
+        selected = _picture_sources(scene, settings, skin)
+    print_lines(bibtex(selected))
     return 0
 
 
@@ -73,15 +73,15 @@ def _comparison_sources(against: str, technique: str | None) -> tuple[str, ...]:
 def _picture_sources(file: Path | None, settings: Options, skin: Options) -> tuple[str, ...]:
     from dermis.scene import load_scene
     from dermis.scene.lights import studio
-    from dermis.scene.sources import sources_of
+    from dermis.scene.sources import picture_sources
 
     if file is None:
-        return sources_of(Skin(**skin), Settings(**settings), studio())
-    scene, written = load_scene(file)
+        return picture_sources(Skin(**skin), Settings(**settings), studio())
+    scene, scene_settings = load_scene(file)
     maps = scene.head.maps
-    return sources_of(
+    return picture_sources(
         Skin(**(scene.skin.model_dump() | dict(skin))),
-        Settings(**(written.model_dump() | dict(settings))),
+        Settings(**(scene_settings.model_dump() | dict(settings))),
         scene.lights,
         scene.environment,
         relief=maps.normal is not None or maps.height is not None,

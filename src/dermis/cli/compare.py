@@ -1,4 +1,4 @@
-"""`dermis compare`: techniques against the truth, and the models of the surface against each other."""
+"""The command `dermis compare`: techniques against reference solutions, and specular models side by side."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy as np
 
 from dermis.apps.validation.comparisons.scenes import ModelName
 from dermis.base.arrays import Doubles
-from dermis.base.atomic_write import refuse_output, replacing
-from dermis.base.console import print_report, working_on
+from dermis.base.atomic_write import atomic_file, refuse_output
+from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 from dermis.cli.head_options import ShapeOptions, check_head, note_eyes
 from dermis.cli.options import (
     NO_OPTIONS,
-    Adapter,
-    Json,
-    Options,
-    Output,
+    AdapterOption,
     Integer,
-    check,
-    given,
-    option_name,
+    JsonOption,
+    OptionalOutputPath,
+    Options,
+    check_fields,
+    drop_none,
     model_options,
+    option_name,
 )
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
@@ -52,7 +52,7 @@ else:
 
 
 def compare(
-    what: str,
+    subject: str,
     /,
     *,
     against: str | None = None,
@@ -65,13 +65,14 @@ def compare(
     skin: SkinOptions = NO_OPTIONS,
     shape: ShapeOptions = NO_OPTIONS,
     samples: Integer = None,
-    output: Output = None,
-    adapter: Adapter = "auto",
-    as_json: Json = False,
+    output: OptionalOutputPath = None,
+    adapter: AdapterOption = "auto",
+    as_json: JsonOption = False,
 ) -> int:
-    """Compare techniques of scattering with the truth on a head, or the models of the surface.
+    """Compare scattering techniques with a reference solution, or the specular models with each other.
 
-    Techniques are judged with the profile's own colour, without maps, surface reflection and energy term.
+    Techniques are compared with the colour of the diffusion profile, without maps, surface reflection or
+    energy conservation.
 
     Examples:
 
@@ -89,136 +90,139 @@ def compare(
 
     Parameters
     ----------
-    what:
-        A head (sample, file), or specular: the models of the surface reflection.
+    subject:
+        A head (sample name or file), or the word specular for the models of surface reflection.
     against:
-        surface-integral (the profile summed over the surface: shows the map's error), heat (spread along the
-        surface near the middle of the picture), path-traced (light through the medium; needs Mitsuba) or
-        cycles (Blender's random walk; DERMIS_BLENDER_PYTHON names a Python that has bpy) [surface-integral].
+        Reference solution: surface-integral (profile integrated over the surface; shows the error of the
+        atlas), heat (diffusion along the surface around the centre of the picture), path-traced (light
+        transport in the medium; needs Mitsuba) or cycles (random walk of Blender; DERMIS_BLENDER_PYTHON names
+        a Python interpreter with bpy). [default: surface-integral]
     techniques:
-        Names with commas, as `dermis render --technique` takes them [all].
+        Names of techniques, separated by commas; see `dermis render --technique`. [default: all]
     light:
-        front, back (through the ear) or laser (a stripe over cheek and ear) [front].
+        front, back (through the ear) or laser (a stripe across cheek and ear). [default: front]
     region:
-        portrait, three-quarter, ear, cheek or nose [where the light shows most].
+        portrait, three-quarter, ear, cheek or nose. [default: where the light has the largest effect]
     medium:
-        skin1, skin2 or another medium with a name, index-matched [skin1].
+        skin1, skin2 or another named medium, index-matched. [default: skin1]
     model:
-        The medium's profile, as techniques have it: by tables of photons (counted), by layered diffusion, or
-        by photons one by one (montecarlo) [counted for one semi-infinite layer, else layered].
+        Model of the diffusion profile: counted (tabulated photons), layered (layered diffusion) or montecarlo
+        (photons traced now). [default: counted for one semi-infinite layer, else layered]
     samples:
-        Paths through each pixel, for path-traced and cycles [64].
+        Paths per pixel, for path-traced and cycles. [default: 64]
     output:
-        HTML report; for specular a folder of plots.
+        HTML report to write; for specular the folder of the plots.
     """
-    words = given(against=against, techniques=techniques, light=light, region=region)
-    chosen = words | given(medium=medium, model=model, samples=samples) | sizes | skin | shape
-    _refuse_unused_options(what, chosen)
-    if what == "specular":
-        check(Skin, skin)
-        compare_specular(output, Skin(**skin).roughness, adapter, as_json)
+    named = drop_none(against=against, techniques=techniques, light=light, region=region)
+    options = named | drop_none(medium=medium, model=model, samples=samples) | sizes | skin | shape
+    _refuse_unused_options(subject, options)
+    if subject == "specular":
+        compare_specular(output, check_fields(Skin, skin).roughness, adapter, as_json)
     else:
-        _compare_techniques(what, shape, _comparison_arguments(chosen, sizes) | {"adapter": adapter}, output, as_json)
+        arguments = _comparison_arguments(options, sizes) | {"adapter": adapter}
+        _compare_techniques(subject, shape, arguments, output, as_json)
     return 0
 
 
-def _refuse_unused_options(what: str, chosen: Options) -> None:
-    """Refuse options that would change nothing."""
-    if what == "specular":
-        idle = dict.fromkeys(chosen.keys() - {"roughness"}, "surface models are compared without a head")
+def _refuse_unused_options(subject: str, options: Options) -> None:
+    """Raise DermisError for options that would have no effect on this comparison."""
+    if subject == "specular":
+        unused = dict.fromkeys(options.keys() - {"roughness"}, "specular models are compared without a head")
     else:
-        idle = {"roughness": "techniques are compared without surface reflection"}
-        if chosen.get("against") not in _PATH_TRACERS:
-            idle["samples"] = f"only {' and '.join(_PATH_TRACERS)} trace paths"
-            idle["direction"] = f"only {' and '.join(_PATH_TRACERS)} know directions"
-    for name, why in idle.items():
-        if name in chosen:
-            refuse(option_name(name), "no such option here", f"it came, and {why}", "Leave it out")
+        unused = {"roughness": "techniques are compared without surface reflection"}
+        if options.get("against") not in _PATH_TRACERS:
+            unused["samples"] = f"only {' and '.join(_PATH_TRACERS)} trace paths"
+            unused["direction"] = f"only {' and '.join(_PATH_TRACERS)} depend on directions"
+    for name, reason in unused.items():
+        if name in options:
+            refuse(option_name(name), "no such option here", f"it is given, and {reason}", "Remove it")
 
 
-def _comparison_arguments(chosen: Options, sizes: Options) -> Options:
-    """Return the arguments for `dermis.apps.validation.comparisons.compare`."""
+def _comparison_arguments(options: Options, sizes: Options) -> Options:
+    """Return the keyword arguments of `dermis.apps.validation.comparisons.compare`."""
     from dermis.apps.validation.comparisons.scenes import usual_region
 
-    names = [name.strip() for name in chosen.get("techniques", ",".join(TECHNIQUES)).split(",")]
+    names = [name.strip() for name in options.get("techniques", ",".join(TECHNIQUES)).split(",")]
+    size_settings = {**_SIZES, **sizes}
     for name in names:
-        check(Settings, {**_SIZES, **sizes, "technique": name}, {"technique": "techniques"})
-    light = chosen.get("light", "front")
+        check_fields(Settings, {**size_settings, "technique": name}, {"technique": "techniques"})
+    light = options.get("light", "front")
     return {
-        "against": chosen.get("against", "surface-integral"),
+        "against": options.get("against", "surface-integral"),
         "techniques": names,
         "light": light,
-        "region": chosen.get("region", usual_region(light)),
-        "medium": chosen.get("medium", "skin1"),
-        "direction": chosen.get("direction"),
-        "model": chosen.get("model"),
-        "settings": Settings(**{**_SIZES, **sizes}),
-        "samples": chosen.get("samples", 64),
+        "region": options.get("region", usual_region(light)),
+        "medium": options.get("medium", "skin1"),
+        "direction": options.get("direction"),
+        "model": options.get("model"),
+        "settings": Settings(**size_settings),
+        "samples": options.get("samples", 64),
     }
 
 
 def _compare_techniques(
-    head: str, shape: Options, chosen: Options, output: Path | None, as_json: bool
+    head: str, shape: Options, arguments: Options, output: Path | None, as_json: bool
 ) -> None:
-    """Render a head with each technique, compare it with a truth, print and write the result."""
+    """Compare the techniques with a reference on a head; print the result and write the report."""
     from dermis.apps.validation.comparisons import compare as comparison
     from dermis.apps.validation.comparisons.report import write_report
     from dermis.base.atomic_write import check_output
     from dermis.scene.heads import load_head
 
     check_head(head, shape)
-    comparison.check_choices(*(chosen[option] for option in ("against", "light", "region", "medium")))
+    comparison.check_choices(*(arguments[option] for option in ("against", "light", "region", "medium")))
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
-    with working_on("comparing"):
-        loaded = load_head(head, subdivide=0, **shape)
-        note_eyes(loaded, shape.get("eyes"))
-        made = comparison.compare(loaded, **chosen)
+    with spinner("comparing"):
+        loaded_head = load_head(head, subdivide=0, **shape)
+        note_eyes(loaded_head, shape.get("eyes"))
+        result = comparison.compare(loaded_head, **arguments)
     if output is not None:
-        write_report(output, made)
+        write_report(output, result)
     report = {
-        "title": made.title,
-        "adapter": made.adapter,
-        "truth": {"seconds": made.truth.seconds, "notes": list(made.truth.notes)},
-        "rows": [asdict(row) for row in made.rows],
+        "title": result.title,
+        "adapter": result.adapter,
+        "truth": {"seconds": result.truth.seconds, "notes": list(result.truth.notes)},
+        "rows": [asdict(row) for row in result.rows],
     }
-    print_report(as_json, report, lambda: _lines(made))
+    print_report(as_json, report, lambda: _report_lines(result))
 
 
-def _lines(made: Comparison) -> Sequence[str]:
+def _report_lines(comparison: Comparison) -> Sequence[str]:
     from dermis.apps.validation.comparisons.report import cells
 
+    truth = comparison.truth
     lines = [
-        f"{made.title}; times on {made.adapter}",
-        f"against {made.against}, {made.truth.seconds:.0f} s: {'; '.join(made.truth.notes)}",
+        f"{comparison.title}; times on {comparison.adapter}",
+        f"against {comparison.against}, {truth.seconds:.0f} s: {'; '.join(truth.notes)}",
         "",
         f"{'technique':18}{'relative RMSE':>20}{'FLIP':>8}{'energy ratio':>20}{'ms':>9}",
     ]
-    for row in made.rows:
+    for row in comparison.rows:
         name, error, flip, energy, ms = cells(row)
         lines.append(f"{name:18}{error:>20}{flip:>8}{energy:>20}{ms:>9}")
     return lines
 
 
-_DEGREES = (0, 30, 60, 75, 85)
-_INCIDENT = {15: "#2a62b0", 45: "#2e8b57", 75: "#c0392b"}
-_DUPLICATE_MODEL = "kelemen-direct"  # as kelemen
+_DEGREES = (0, 30, 60, 75, 85)  # angles of the printed albedos
+_INCIDENT = {15: "#2a62b0", 45: "#2e8b57", 75: "#c0392b"}  # angles of incidence [degrees] and plot colours
+_DUPLICATE_MODEL = "kelemen-direct"  # the same lobe as kelemen
 _COLUMNS = 4
-_FARTHEST = 1.8  # root of the intensity over kelemen's peak; on rough skin some models pass it
+_PLOT_RADIUS = 1.8  # least radius of the plots: square root of the intensity over the peak of kelemen
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 def compare_specular(output: Path | None, roughness: float, adapter: str, as_json: bool) -> None:
-    """Print what surface models reflect and cost, and draw their lobes into a folder if there is one."""
+    """Print reflectance and cost of the specular models, and plot their lobes if a folder is given."""
     if output is not None:
         _draw_lobes_and_albedo(output, roughness)
-    with working_on("measuring"):
+    with spinner("measuring"):
         report = _specular_report(adapter)
     print_report(as_json, report, lambda: _specular_lines(report, roughness))
 
 
 def _specular_report(adapter: str) -> Options:
-    """Return all findings as one object for JSON."""
+    """Return the properties of all specular models as one JSON object."""
     from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
     from dermis.gpu.failures import run_on_device
     from dermis.specular.comparison import albedo_rows, reciprocity_error
@@ -243,33 +247,34 @@ def _specular_report(adapter: str) -> Options:
 
 
 def _specular_lines(report: Options, m: float) -> list[str]:
-    from dermis.specular.comparison import peak
+    from dermis.specular.comparison import normal_incidence_peak
 
     cosine = np.cos(np.radians(_DEGREES))
     angles = "".join(f"{f'{angle}°':>8}" for angle in _DEGREES)
     lines = [
-        f"roughness {m:g}, rho_s 1, Schlick's Fresnel; cost of an evaluation on {report['adapter']}",
+        f"roughness {m:g}, rho_s 1, Schlick's Fresnel term; cost per evaluation on {report['adapter']}",
         "",
         f"{'model':24}{'peak':>8}{angles}{'reciprocity':>13}{'cost':>10}{'exact':>10}",
-        f"{'':24}{'1/sr':>8}{'share reflected in all directions':>40}{'error':>13}{'ns':>10}{'ns':>10}",
+        f"{'':24}{'1/sr':>8}{'directional albedo':>40}{'error':>13}{'ns':>10}{'ns':>10}",
     ]
-    for name, found in report["models"].items():
-        rho = "".join(f"{value:8.4f}" for value in directional_albedo(cosine, m, MODELS[name].lobe))
-        costs = "".join(f"{found[key]:10.3g}" for key in ("gpu_ns", "gpu_ns_exact_fresnel"))
-        lines.append(f"{name:24}{peak(name, m):8.4f}{rho}{found['reciprocity_error']:13.0e}{costs}")
-    one_way = [(name, found["note"]) for name, found in report["models"].items() if not found["reciprocal"]]
-    smooth = report["hemispherical_fresnel"]
+    for name, values in report["models"].items():
+        albedos = "".join(f"{value:8.4f}" for value in directional_albedo(cosine, m, MODELS[name].lobe))
+        costs = "".join(f"{values[key]:10.3g}" for key in ("gpu_ns", "gpu_ns_exact_fresnel"))
+        peak, error = normal_incidence_peak(name, m), values["reciprocity_error"]
+        lines.append(f"{name:24}{peak:8.4f}{albedos}{error:13.0e}{costs}")
+    notes = [(name, values["note"]) for name, values in report["models"].items() if not values["reciprocal"]]
+    fresnel = report["hemispherical_fresnel"]
     return [
         *lines,
         "",
-        *(f"{name}: {note}." for name, note in one_way),
-        f"A smooth surface of index 1.4 reflects {smooth['exact']:.1%} of light from everywhere "
-        f"({smooth['schlick']:.1%} by Schlick's curve); the talk says up to 6 %.",
+        *(f"{name}: {note}." for name, note in notes),
+        f"A smooth surface of index 1.4 reflects {fresnel['exact']:.1%} of uniform illumination "
+        f"({fresnel['schlick']:.1%} by Schlick's approximation); the 2007 talk states up to 6 %.",
     ]
 
 
 def _draw_lobes_and_albedo(folder: Path, m: float) -> None:
-    """Write lobes.png and albedo.png of all models into a folder, made when it is not there."""
+    """Write lobes.png and albedo.png with all specular models to a folder, created if necessary."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as fault:
@@ -279,30 +284,27 @@ def _draw_lobes_and_albedo(folder: Path, m: float) -> None:
 
 
 def _distinct_models() -> list[str]:
-    """Return names of the models that have a curve of their own."""
+    """Return the names of the specular models, without those that equal another model."""
     return [name for name in MODELS if name != _DUPLICATE_MODEL]
 
 
 def _lobe_figure(m: float) -> Figure:
-    """Return the intensity under three lights in the plane of incidence: a polar panel for each model."""
-    whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
-    roots = {name: np.sqrt(_intensity(name, m) / whole) for name in _distinct_models()}
-    farthest = max(_FARTHEST, 1.05 * float(np.max(list(roots.values()))))
-    rows = -(-len(roots) // _COLUMNS)
+    """Return a figure with one polar plot per model: intensity in the plane of incidence for three lights."""
+    peak = _intensity("kelemen", m).max(axis=1, keepdims=True)
+    curves_by_model = {name: np.sqrt(_intensity(name, m) / peak) for name in _distinct_models()}
+    radius = max(_PLOT_RADIUS, 1.05 * float(np.max(list(curves_by_model.values()))))
+    rows = -(-len(curves_by_model) // _COLUMNS)
     figure = _figure(3.0 * _COLUMNS, 2.4 * rows)
-    figure.suptitle(f"Intensity over kelemen's peak under the same light, on a root scale; m = {m:g}")
+    figure.suptitle(f"Intensity relative to the peak of kelemen, square root scale; m = {m:g}")
     panels = figure.subplots(rows, _COLUMNS, subplot_kw={"projection": "polar"}).ravel()
-    for axes in panels[len(roots) :]:
+    for axes in panels[len(curves_by_model) :]:
         axes.remove()
-    for axes, (name, curves) in zip(panels, roots.items(), strict=False):
-        for (degrees, ink), curve in zip(_INCIDENT.items(), curves, strict=True):
-            axes.plot(_view_angles(), curve, color=ink, label=f"light from {degrees}°")
-        axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=farthest)
-        axes.set(
-            rticks=np.sqrt([0.25, 1.0, 2.25]),
-            yticklabels=["", "1", ""],
-            xticks=np.radians(range(-90, 91, 30)),
-        )
+    for axes, (name, curves) in zip(panels, curves_by_model.items(), strict=False):
+        for (degrees, colour), curve in zip(_INCIDENT.items(), curves, strict=True):
+            axes.plot(_view_angles(), curve, color=colour, label=f"light from {degrees}°")
+        axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=radius)
+        axes.set(rticks=np.sqrt([0.25, 1.0, 2.25]), yticklabels=["", "1", ""])
+        axes.set(xticks=np.radians(range(-90, 91, 30)))
         axes.tick_params(labelsize=7)
         axes.set_title(name, fontsize=10)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
@@ -310,7 +312,7 @@ def _lobe_figure(m: float) -> Figure:
 
 
 def _intensity(name: str, m: float) -> Doubles:
-    """Return the BRDF times both cosines, (3, n), for each incident angle and view [1/sr]."""
+    """Return the (3, n) BRDF times both cosines by angle of incidence and view angle [1/sr]."""
     angle = _view_angles()
     view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
     rows = []
@@ -326,14 +328,14 @@ def _view_angles() -> Doubles:
 
 
 def _albedo_figure(m: float) -> Figure:
-    """Return the directional albedo by angle, all models in one panel."""
+    """Return a figure of the directional albedo of all models by angle."""
     figure = _figure(7.2, 4.6)
     axes = figure.subplots()
     degrees = np.linspace(0.0, 89.0, 180)
     for name in _distinct_models():
         rho = directional_albedo(np.cos(np.radians(degrees)), m, MODELS[name].lobe)
         axes.plot(degrees, rho, linewidth=1.4, label=name)
-    axes.set(xlabel="angle from the normal [°]", ylabel="share reflected, ρ_s = 1", xlim=(0, 90))
+    axes.set(xlabel="angle from the normal [°]", ylabel="directional albedo, ρ_s = 1", xlim=(0, 90))
     axes.set(yscale="log", title=f"Directional albedo, m = {m:g}")
     axes.grid(which="major", alpha=0.25, linewidth=0.6)
     axes.legend(frameon=False, fontsize=8)
@@ -341,11 +343,11 @@ def _albedo_figure(m: float) -> Figure:
 
 
 def _figure(width: float, height: float) -> Figure:
-    """Return an empty figure of some size [inch]."""
-    make: type[Figure] = needed("matplotlib.figure", "plots").Figure
-    return make(figsize=(width, height), dpi=130, layout="constrained")
+    """Return an empty figure of the given width and height [inch]."""
+    figure_class: type[Figure] = import_extra("matplotlib.figure", "plots").Figure
+    return figure_class(figsize=(width, height), dpi=130, layout="constrained")
 
 
 def _save_figure(figure: Figure, path: Path) -> None:
-    with replacing(path) as trial:
-        figure.savefig(trial)
+    with atomic_file(path) as temporary:
+        figure.savefig(temporary)

@@ -1,4 +1,4 @@
-"""`dermis doctor`: what this machine can do."""
+"""The command `dermis doctor`: diagnosis of this machine."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dermis.base.console import print_report
 from dermis.base.errors import DermisError
-from dermis.cli.options import Adapter, Json, Options
+from dermis.cli.options import AdapterOption, JsonOption, Options
 
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
@@ -16,75 +16,79 @@ if TYPE_CHECKING:
 _LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "OpenEXR", "pillow")
 
 
-def doctor(*, adapter: Adapter = "auto", as_json: Json = False) -> int:
-    """Show the adapters, the one that is used and why, versions and sample data, and render a test frame.
+def doctor(*, adapter: AdapterOption = "auto", as_json: JsonOption = False) -> int:
+    """List adapters, versions and sample data, report which adapter is used and why, and render a test frame.
 
-    Exits with 0 when everything works and with 2 when not.
+    Exits with 0 if everything works and with 2 if not.
 
-    For example:
+    Examples:
 
         dermis doctor
 
         dermis doctor --adapter cpu --json
     """
     report = examine(adapter)
-    print_report(as_json, report, lambda: _lines(report))
+    print_report(as_json, report, lambda: _report_lines(report))
     return 0 if report["healthy"] else 2
 
 
-def examine(wanted: str) -> Options:
-    """Return all findings as one object for JSON."""
+def examine(adapter: str) -> Options:
+    """Return all results of the diagnosis as one JSON object."""
     from dermis.base.private import cache_folder
-    from dermis.formats.samples import SAMPLES, cached
+    from dermis.formats.samples import SAMPLES, is_available
     from dermis.gpu.adapters import OPTIONAL_FEATURES, list_adapters
 
-    found = [
-        {"number": a.number, "name": a.name, "driver": a.driver, "kind": a.kind, "backend": a.backend}
-        | {"features": {feature: feature in a.features for feature in OPTIONAL_FEATURES}}
-        for a in list_adapters()
+    adapters = [
+        {"number": one.number, "name": one.name, "driver": one.driver, "kind": one.kind}
+        | {"backend": one.backend}
+        | {"features": {feature: feature in one.features for feature in OPTIONAL_FEATURES}}
+        for one in list_adapters()
     ]
     return {
-        **_test_adapter(wanted),
-        "adapters": found,
+        **_test_adapter(adapter),
+        "adapters": adapters,
         "python": platform.python_version(),
         "platform": platform.platform(),
         "libraries": {name: _version(name) for name in _LIBRARIES},
         "cache": str(cache_folder()),
-        "samples": {name: cached(name) for name in SAMPLES},
+        "samples": {name: is_available(name) for name in SAMPLES},
     }
 
 
 def _version(name: str) -> str:
-    """Return the version of a package; sources that were never installed have none."""
+    """Return the version of an installed package, or "not installed"."""
     try:
         return version(name)
     except PackageNotFoundError:
         return "not installed"
 
 
-def _test_adapter(wanted: str) -> Options:
-    """Open the adapter and draw a test frame with it."""
+def _test_adapter(adapter: str) -> Options:
+    """Open the adapter, render a test frame and return the results."""
     from dermis.frame.renderer import Renderer
     from dermis.gpu.textures import half_store_rounding
 
     try:
-        renderer = Renderer(wanted)
-        rounding = renderer.kept_open.run(lambda: half_store_rounding(renderer.device))
-        test = _self_test(renderer)
+        renderer = Renderer(adapter)
+        rounding = renderer.reopening_device.run(lambda: half_store_rounding(renderer.device))
+        test = _render_test_frame(renderer)
     except DermisError as error:
         return {"healthy": False, "used": None, "problem": str(error)}
-    used = {
+    adapter_info = {
         "name": renderer.device.adapter.name,
         "backend": renderer.device.adapter.backend,
         "reason": renderer.device.reason,
         "half_store_rounding": rounding,
     }
-    problem = None if test["passed"] else "the test frame is not lit as it should be"
-    return {"healthy": test["passed"], "used": used, "self_test": test, "problem": problem}
+    problem = None if test["passed"] else "the brightness of the test frame is wrong"
+    return {"healthy": test["passed"], "used": adapter_info, "self_test": test, "problem": problem}
 
 
-def _self_test(renderer: Renderer) -> Options:
-    """Draw a white sphere, lit from the camera: its middle must reflect the irradiance, and no pixel more."""
+def _render_test_frame(renderer: Renderer) -> Options:
+    """Render a white sphere lit from the camera and check its brightness.
+
+    The centre must equal the irradiance, and no pixel may be brighter.
+    """
     from dermis.mesh.head import Head
     from dermis.mesh.maps import Maps
     from dermis.mesh.primitives import uv_sphere
@@ -105,21 +109,21 @@ def _self_test(renderer: Renderer) -> Options:
     return {"passed": passed, "centre": centre, "frame_ms": rendered.frame_ms}
 
 
-def _lines(report: Options) -> list[str]:
-    mark = {True: "yes", False: "no"}
+def _report_lines(report: Options) -> list[str]:
     lines = ["adapters:"]
-    for one in report["adapters"]:
-        features = ", ".join(f"{name} {mark[has]}" for name, has in one["features"].items())
-        lines.append(f"  #{one['number']} {one['name']}, {one['backend']} ({one['kind']}): {features}")
+    for adapter in report["adapters"]:
+        features = ", ".join(f"{name} {'yes' if has else 'no'}" for name, has in adapter["features"].items())
+        name = f"{adapter['name']}, {adapter['backend']} ({adapter['kind']})"
+        lines.append(f"  #{adapter['number']} {name}: {features}")
     if used := report["used"]:
         test = report["self_test"]
         lines.append(f"used: {used['name']}, {used['backend']}, because {used['reason']}")
         lines.append(f"half-float stores round: {used['half_store_rounding']}")
         result = "passed" if test["passed"] else "FAILED"
         lines.append(f"test frame: {result} in {test['frame_ms']:.0f} ms, centre {test['centre']:.3f} of 1")
-    libraries = ", ".join(f"{name} {number}" for name, number in report["libraries"].items())
+    libraries = ", ".join(f"{name} {version}" for name, version in report["libraries"].items())
     lines.append(f"python {report['python']} on {report['platform']}; {libraries}")
-    state = {True: "here", False: "not here"}
-    samples = ", ".join(f"{name} {state[here]}" for name, here in report["samples"].items())
+    state = {True: "available", False: "not downloaded"}
+    samples = ", ".join(f"{name} {state[is_cached]}" for name, is_cached in report["samples"].items())
     lines += [f"cache: {report['cache']}", f"samples: {samples}"]
     return [*lines, "healthy" if report["healthy"] else f"NOT healthy: {report['problem']}"]

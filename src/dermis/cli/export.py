@@ -1,4 +1,4 @@
-"""`dermis export`: a skin or a head for another program, with how wrong it will be there."""
+"""The command `dermis export`: files of a skin or head for other programs."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from dermis.apps.export.registry import TARGETS
-from dermis.base.console import print_report, working_on
+from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
 from dermis.cli.head_options import HeadOptions, check_head
-from dermis.cli.options import NO_OPTIONS, Adapter, OutputPath, Flag, Json, given
+from dermis.cli.options import NO_OPTIONS, AdapterOption, Flag, JsonOption, OutputPath, drop_none
 
 if TYPE_CHECKING:
     TargetName = str
@@ -22,7 +22,7 @@ Model = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
 
 
 def export(
-    what: str,
+    subject: str,
     /,
     *,
     to: TargetName,
@@ -35,14 +35,14 @@ def export(
     library: Path | None = None,
     map_side: int = 2048,
     head: HeadOptions = NO_OPTIONS,
-    adapter: Adapter = "auto",
+    adapter: AdapterOption = "auto",
     naive: Flag = False,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> int:
-    """Write a skin or a head for another program, and say how wrong it will be there.
+    """Export a skin or a head to another program, and report the remaining error.
 
-    The true profile is fitted with what the program can show, by the program's own formulas, and the
-    differences are stated: of light within a radius, beside a shadow's edge, and in all.
+    The diffusion profile is fitted with the profile model of the program, and the errors are reported for the
+    light within a radius, for the light beside a shadow edge, and for the total.
 
     Examples:
 
@@ -62,42 +62,42 @@ def export(
 
     Parameters
     ----------
-    what:
-        A skin (skin1, dj3, medium, gpu-gems-3 ..., a .toml or .csv file), or a head: human, human:7, a
-        person's .json, a sample, or a file.
+    subject:
+        A skin (skin1, dj3, medium, gpu-gems-3 ..., a .toml or .csv file) or a head (human, human:SEED, a
+        person (.json), a sample or a mesh file).
     output:
-        File to write, or a folder that is made where the name has no suffix. A table of parameters, meanings
-        and errors is written beside it, as a page and as JSON.
+        File to write, or a folder, created if necessary, if the name has no suffix. A table of the
+        parameters, their meaning and the errors is written beside it as HTML and JSON.
     version:
-        Of the program [the newest that is known].
+        Version of the program. [default: newest supported]
     variant:
-        Of what the program can do, such as a method of scattering [its first].
+        Variant of the export, such as a scattering method of the program. [default: the first]
     diffuse_transmission:
-        The same as --variant diffuse-transmission, which gltf has.
+        Short for --variant diffuse-transmission of the target gltf.
     model:
-        What the true profile is by [montecarlo for one layer without end, layered for others].
+        Model of the true diffusion profile. [default: montecarlo for one semi-infinite layer, else layered]
     profile:
-        Skin of a head [a person's own pigments, or gpu-gems-3].
+        Skin of a head. [default: the pigments of a person, else gpu-gems-3]
     library:
-        For pages: the folder node_modules that npm has installed the library into, which is then put into the
-        page; else it is loaded from a public server.
+        For web pages: npm's node_modules folder with the library to embed. [default: load it from a public
+        server]
     map_side:
-        Of maps that are painted, a power of two from 256 to 4096 [texels].
+        Side of the painted maps, a power of two from 256 to 4096 [texel].
     adapter:
-        Which adapter paints maps: auto, cpu or part of a name.
+        Adapter that paints the maps: auto, cpu or part of a name.
     naive:
-        Also print what one would type without knowing what the numbers mean there.
+        Also print the values that result from copying the numbers without conversion.
     """
     from dermis.apps.export.run import export_skin
 
-    check_head(what, head)
+    check_head(subject, head)
     if diffuse_transmission:
         if variant is not None:
-            came = f"--variant {variant} came with it"
-            refuse("--diffuse-transmission", "no other variant", came, "Leave one of them out")
+            actual = f"it is given with --variant {variant}"
+            refuse("--diffuse-transmission", "no other variant", actual, "Remove one of them")
         variant = "diffuse-transmission"
-    told = given(version=version, variant=variant, model=model, profile=profile, library=library)
-    with working_on(f"exporting {what}"):
-        report = export_skin(what, to, output, side=map_side, adapter=adapter, **told, **head)
+    options = drop_none(version=version, variant=variant, model=model, profile=profile, library=library)
+    with spinner(f"exporting {subject}"):
+        report = export_skin(subject, to, output, side=map_side, adapter=adapter, **options, **head)
     print_report(as_json, report.as_json(), lambda: [*report.lines(naive), "", *map(str, report.files)])
     return 0

@@ -1,12 +1,12 @@
-"""`dermis fit`: from a photograph of a face to its light and skin."""
+"""The command `dermis fit`: light and skin from a photograph of a face."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dermis.base.console import print_json, print_lines, progress
-from dermis.cli.options import Adapter, OutputPath, Json, Options, parse_colour
+from dermis.base.console import print_json, print_lines, progress_bar
+from dermis.cli.options import AdapterOption, JsonOption, Options, OutputPath, parse_colour
 
 if TYPE_CHECKING:
     from dermis.apps.inverse.fitting.result import FitResult
@@ -26,15 +26,15 @@ def fit(
     noise: float = 0.02,
     side: int = 128,
     atlas: int = 256,
-    adapter: Adapter = "auto",
-    as_json: Json = False,
+    adapter: AdapterOption = "auto",
+    as_json: JsonOption = False,
 ) -> int:
-    """Find the light and the skin of a photograph: melanin, blood, roughness, gloss, sky and suns.
+    """Estimate the light and the skin in a photograph: melanin, blood, roughness, gloss, sky and suns.
 
-    The head must be of the right shape, before the camera that took the photograph. Written are scene.toml,
-    which dermis render takes, with its light and person, the table fit.json, and photo, fit and difference
-    as PNG. Eumelanin, oxygen and the thickness of the epidermis are held at the scene's, or else at the
-    default skin's, which dermis profile --help prints.
+    The head must have the shape of the person, and the camera must match the photograph. The command writes
+    scene.toml (for `dermis render`) with its light and person, the table fit.json, and the photograph, the
+    fit and their difference as PNG. Eumelanin, oxygenation and epidermis thickness stay at the values of the
+    scene, or else at the defaults that `dermis profile --help` prints.
 
     Examples:
 
@@ -49,30 +49,31 @@ def fit(
     photo:
         Photograph: PNG, JPEG or TIFF in sRGB, or EXR (linear).
     head:
-        human, human:7, a person's numbers (.json), a sample or a mesh; or a scene (.toml) with head, camera
-        and pose.
+        human, human:SEED, a person (.json), a sample or a mesh file; or a scene (.toml) with head, camera and
+        pose.
     camera:
-        portrait, three-quarter, profile or a TOML file with [camera]; the scene's own when left out.
+        portrait, three-quarter, profile or a TOML file with [camera]. [default: camera of the scene]
     landmarks:
-        Landmarks in the photograph, to find the camera by and the shape of the human: a CSV file of name,x,y
-        in pixels, what dermis render --landmarks writes, or MediaPipe's as JSON.
+        Landmarks in the photograph, from which the camera and the shape of the human are estimated: a CSV
+        file with name,x,y [pixel], the output of `dermis render --landmarks`, or JSON of MediaPipe.
     output:
-        Folder for what is found, which is made.
+        Folder of the results, created if necessary.
     suns:
-        Lights from one direction beside the light from all around: 0, 1 or 2.
+        Number of directional lights in addition to the environment: 0, 1 or 2.
     exposure:
-        Factor from radiance to the photograph; the light's strength is one number with it.
+        Factor from radiance to pixel value; only its product with the intensity of the light can be
+        estimated.
     white:
-        Colour of the light in the photograph as red,green,blue (linear), or specular: find it by what the
-        skin's surface mirrors.
+        Colour of the light as linear red,green,blue; or the word specular to estimate it from specular
+        highlights.
     noise:
-        Standard deviation of a pixel, relative.
+        Relative standard deviation of the pixel values [-].
     side:
-        Pixels along the longer side at which the photograph is fitted.
+        Length of the longer side of the photograph during the fit [pixel].
     atlas:
-        Side of the atlas of the frames [texel].
+        Side of the atlas of the rendered frames [texel].
     adapter:
-        Which adapter computes: auto, cpu or part of a name.
+        Adapter to compute on: auto, cpu or part of a name.
     """
     from dermis.apps.inverse.fitting.fit import fit as fitted
     from dermis.apps.inverse.fitting.result import SUMMARY, save_fit
@@ -80,33 +81,36 @@ def fit(
 
     colour = white if white == "specular" else parse_colour(white, "--white")
     check_folder(output, SUMMARY)
-    how: Options = {"suns": suns, "exposure": exposure, "white": colour, "noise": noise}
-    how |= {"side": side, "atlas": atlas}
-    with progress("fitting") as told:
-        found = fitted(photo, head, camera=camera, landmarks=landmarks, adapter=adapter, told=told, **how)
-    _report(found, save_fit(output, found), as_json)
+    options: Options = {"suns": suns, "exposure": exposure, "white": colour, "noise": noise}
+    options |= {"side": side, "atlas": atlas}
+    with progress_bar("fitting") as report_progress:
+        result = fitted(
+            photo, head, camera=camera, landmarks=landmarks, adapter=adapter, told=report_progress, **options
+        )
+    _report(result, save_fit(output, result), as_json)
     return 0
 
 
-def _report(found: FitResult, written: list[Path], as_json: bool) -> None:
-    told = found.summary() | {"files": [str(one) for one in written]}
+def _report(result: FitResult, written: list[Path], as_json: bool) -> None:
+    summary = result.summary() | {"files": [str(path) for path in written]}
     if as_json:
-        print_json(told)
+        print_json(summary)
         return
-    lines = [f"{told['pixels']} pixels of skin, {told['frames']} frames ({told['seconds']:.1f} s)"]
-    for name, one in told["skin"].items():
-        lines.append(f"  {name:10} {one['value']:8.4f}  known to {100 * one['relative_sd']:.0f} %")
-    for k, sun in enumerate(told["suns"], start=1):
-        way, off = ", ".join(f"{x:.2f}" for x in sun["towards"]), max(sun["sd_degrees"])
+    lines = [f"{summary['pixels']} pixels of skin, {summary['frames']} frames ({summary['seconds']:.1f} s)"]
+    for name, value in summary["skin"].items():
+        lines.append(f"  {name:10} {value['value']:8.4f}  ± {100 * value['relative_sd']:.0f} %")
+    for k, sun in enumerate(summary["suns"], start=1):
+        direction, sd_degrees = ", ".join(f"{x:.2f}" for x in sun["towards"]), max(sun["sd_degrees"])
         lines.append(
-            f"  sun {k}      towards {way} (known to {off:.1f} degrees), irradiance {sun['irradiance']:.3g}"
+            f"  sun {k}      towards {direction} (± {sd_degrees:.1f} degrees), "
+            f"irradiance {sun['irradiance']:.3g}"
         )
-    lines.append(f"  around     mean radiance {told['around']['mean_radiance']:.3g}")
-    lines.append(f"  light      {', '.join(f'{x:.3f}' for x in told['white'])}")
-    lines.append(f"  photograph and fit differ by {100 * told['residual']:.1f} % (median)")
-    for name in told["not_determined"]:
-        lines.append(f"  not determined: {name}, which a belief or a limit says")
-    for one in told["not_told_apart"]:
-        lines.append(f"  not told apart: {' and '.join(one['pair'])} (correlation {one['correlation']:.2f})")
-    lines += [f"  believed: {one}" for one in told["priors"]]
-    print_lines(*lines, *(f"  {one}" for one in written))
+    lines.append(f"  sky        mean radiance {summary['around']['mean_radiance']:.3g}")
+    lines.append(f"  white      {', '.join(f'{x:.3f}' for x in summary['white'])}")
+    lines.append(f"  median difference of photograph and fit {100 * summary['residual']:.1f} %")
+    for name in summary["not_determined"]:
+        lines.append(f"  not determined by the photograph: {name} (from a prior or a limit)")
+    for row in summary["not_told_apart"]:
+        lines.append(f"  not separable: {' and '.join(row['pair'])} (correlation {row['correlation']:.2f})")
+    lines += [f"  prior: {prior}" for prior in summary["priors"]]
+    print_lines(*lines, *(f"  {path}" for path in written))

@@ -1,4 +1,4 @@
-"""`dermis gallery`: every comparison of the talk as a picture, and all of them as one page."""
+"""The command `dermis gallery`: the comparisons of the 2007 talk as pictures on one page."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.console import note, print_report, progress
-from dermis.cli.options import Adapter, OutputPath, Json, Integer
+from dermis.base.console import note, print_report, progress_bar
+from dermis.cli.options import AdapterOption, Integer, JsonOption, OutputPath
 
 if TYPE_CHECKING:
     from dermis.apps.gallery.script import Picture
@@ -22,12 +22,12 @@ def gallery(
     head: str | None = None,
     size: Integer = None,
     output: OutputPath = Path("gallery"),
-    adapter: Adapter = "auto",
-    as_json: Json = False,
+    adapter: AdapterOption = "auto",
+    as_json: JsonOption = False,
 ) -> int:
-    """Draw the comparisons of the talk, and a page that explains them.
+    """Render the comparisons of the 2007 talk and a page that explains them.
 
-    Writes the pictures, and index.html, which holds them all and works without a network.
+    Writes the pictures and index.html, which contains all of them and works offline.
 
     Examples:
 
@@ -40,13 +40,13 @@ def gallery(
     Parameters
     ----------
     only:
-        Some of the pictures, by number or a part of their names.
+        Pictures to render, by number or part of the name. [default: all]
     head:
-        The head to show: a sample or a file [the scan where its files are at hand, else human].
+        Head in the pictures: a sample or a file. [default: the scan lee_perry_smith if available, else human]
     size:
-        Side of a panel in pixels, 32 to 2048 [448].
+        Side of a panel, 32 to 2048 [pixel]. [default: 448]
     output:
-        Folder for pictures and page; made if it is not there.
+        Folder of the pictures and the page, created if necessary.
     """
     from dermis.apps.gallery.page import write_page
     from dermis.apps.gallery.script import draw_pictures, find_scripts, write_panels
@@ -56,7 +56,7 @@ def gallery(
 
     side = _SIZE if size is None else size
     if not 32 <= side <= 2048:
-        refuse("--size", "32 to 2048 pixels", f"{side} came", "Correct it")
+        refuse("--size", "32 to 2048 pixels", f"got {side}", "Correct it")
     scripts, studio = find_scripts(only or ()), Studio(head, side, adapter)
     try:
         output.mkdir(parents=True, exist_ok=True)
@@ -64,22 +64,23 @@ def gallery(
         refuse_output(output, fault)
     studio.head()
     pictures = []
-    with progress("drawing pictures") as report:
+    with progress_bar("rendering pictures") as report_progress:
         for picture in draw_pictures(scripts, studio):
             write_panels(output, picture)
             pictures.append(picture)
-            report(len(pictures), len(scripts))
+            report_progress(len(pictures), len(scripts))
             if picture.fault:
                 note(f"dermis: {picture.script.name}: {picture.fault}")
     page = output / "index.html"
     write_page(page, pictures, studio.name, studio.renderer.device.adapter.name)
-    number = f"{len(pictures)} picture{'s' * (len(pictures) != 1)}"
-    said = f"{page}  {number}  {sum(one.seconds for one in pictures):.0f} s"
-    print_report(as_json, {"page": str(page), "pictures": list(map(_row, pictures))}, lambda: [said])
+    count = f"{len(pictures)} picture{'s' * (len(pictures) != 1)}"
+    summary = f"{page}  {count}  {sum(picture.seconds for picture in pictures):.0f} s"
+    report = {"page": str(page), "pictures": list(map(_picture_row, pictures))}
+    print_report(as_json, report, lambda: [summary])
     return 2 if any(picture.fault for picture in pictures) else 0
 
 
-def _row(picture: Picture) -> dict[str, object]:
+def _picture_row(picture: Picture) -> dict[str, object]:
     return {
         "name": picture.script.name,
         "deck": list(picture.script.deck),

@@ -1,4 +1,4 @@
-"""`dermis head`: a person of the parametric human, as a file that other programs open."""
+"""The command `dermis head`: people of the parametric human as files for other programs."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 from cyclopts import Parameter
 
-from dermis.base.console import print_report, working_on
+from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
 from dermis.cli.head_options import parse_weights
-from dermis.cli.options import Adapter, OutputPath, Flag, Json, Options, Integer, given
+from dermis.cli.options import AdapterOption, Flag, Integer, JsonOption, Options, OutputPath, drop_none
 
 if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dermis.mesh.eyeball import EyePictures
     from dermis.mesh.head import Head
 
-L = TypeVar("L", "SkinLook", "EyeLook", "HairLook")
+Look = TypeVar("Look", "SkinLook", "EyeLook", "HairLook")
 TARGET, EXPRESSION = "--target", "--expression"
 _Values = Parameter(negative="", metavar="NAME=VALUE,...", show_default=False)
 _Pairs = Parameter(negative="", metavar="NAME=WEIGHT,...", show_default=False)
@@ -50,14 +50,14 @@ def head(
     size: int = 1024,
     layout: Literal["own", "hm08"] = "own",
     subdivide: Integer = None,
-    adapter: Adapter = "auto",
+    adapter: AdapterOption = "auto",
     list_targets: Flag = False,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> int:
-    """Make a person of the parametric human and write it as glTF.
+    """Create a person of the parametric human and write it as glTF.
 
-    Other programs find a mesh in metres with materials and maps, 52 morph targets by ARKit's names and a
-    skeleton of neck, head, jaw and eyes; this package reads the same person back.
+    The file has a mesh in metres, materials and maps, 52 morph targets with the names of ARKit, and a
+    skeleton of neck, head, jaw and eyes. Other programs and dermis itself can read it.
 
     Examples:
 
@@ -78,138 +78,139 @@ def head(
     Parameters
     ----------
     output:
-        File to write: .glb, or .json for the person's numbers alone, which dermis render takes.
+        File to write: .glb, or .json with only the parameters of the person, for `dermis render`.
     seed:
-        A person at random, the same for the same number [a person between all].
+        Seed of a random person; the options below override its values. [default: the average person]
     african:
-        Share of this ancestry, 0 to 1; only the ratios of the three count [1/3, or the seed's, as all below].
+        Proportion of this ancestry, 0 to 1; the three are normalised to a sum of 1. [default: 1/3]
     asian:
-        Share of this ancestry.
+        Proportion of this ancestry, 0 to 1. [default: 1/3]
     caucasian:
-        Share of this ancestry.
+        Proportion of this ancestry, 0 to 1. [default: 1/3]
     sex:
-        From 0, female, to 1, male [0].
+        0 (female) to 1 (male). [default: 0]
     age:
-        25 to 90 years [30].
+        Age, 25 to 90 [years]. [default: 30]
     weight:
-        From -1, least, to 1, most [0].
+        Body weight, -1 (lowest) to 1 (highest). [default: 0]
     muscle:
-        From -1, least, to 1, most [0].
+        Muscle mass, -1 (lowest) to 1 (highest). [default: 0]
     target:
-        Weights of published targets, as nose/nose-hump-incr=0.5; may be given again.
+        Weights of MakeHuman shape targets, such as nose/nose-hump-incr=0.5; repeatable.
     expression:
-        Weights with which morph targets of the file rest, as jawOpen=0.2; may be given again.
+        Weights of morph targets in the rest pose of the file, such as jawOpen=0.2; repeatable.
     skin:
-        Pigments and texture: melanin, eumelanin, blood, oxygen, redness, freckles, moles, spots, tan, veins,
-        stubble, recession, beard, oil and age, all from 0 to 1, and seed; as melanin=0.1,freckles=0.4 [what
-        goes with the person].
+        Pigments and texture, such as melanin=0.1,freckles=0.4: melanin, eumelanin, blood, oxygen, redness,
+        freckles, moles, spots, tan, veins, stubble, recession, beard, oil and age from 0 to 1, and seed.
+        [default: from the person]
     eye:
-        eumelanin, 0 (blue) to 1 (dark brown), pupil_mm, redness, seed; as eumelanin=0.2 [what goes with it].
+        Eye appearance, such as eumelanin=0.2: eumelanin from 0 (blue) to 1 (dark brown), pupil_mm, redness,
+        seed. [default: from the person]
     hair:
-        style (none, cropped or short), length_mm, density, curl, fade, beard_mm, bushy, grey, eumelanin,
-        pheomelanin and seed; as style=cropped,length_mm=5 [what goes with the person]. In .glb hairs are
-        thin tubes, which this package does not read back.
+        Hair, such as style=cropped,length_mm=5: style (none, cropped or short), length_mm, density, curl,
+        fade, beard_mm, bushy, grey, eumelanin, pheomelanin and seed [default: from the person]. In .glb files
+        hairs are thin tubes, which dermis ignores when it reads the file.
     colour:
-        Picture of the skin's colour, sRGB [the head's own, as the next two].
+        Colour map of the skin, sRGB. [default: painted]
     normal:
-        Normal map, green up.
+        Normal map, green up. [default: painted]
     roughness:
-        Grey picture of the roughness.
+        Grey roughness map. [default: painted]
     size:
-        Side of the maps that are painted, a power of two from 256 to 4096 [texels].
+        Side of the painted maps, a power of two from 256 to 4096 [texel].
     layout:
-        own has most room for the face; hm08 is MakeHuman's, which its skins fit.
+        uv layout: own (most texels for the face) or hm08 (of MakeHuman, for its skin textures).
     subdivide:
-        Levels of subdivision, 0 to 3; each takes four times the room [1].
+        Levels of subdivision, 0 to 3; each makes the file four times larger. [default: 1]
     adapter:
-        Which adapter paints: auto, cpu or part of a name.
+        Adapter that paints the maps: auto, cpu or part of a name.
     list_targets:
-        Print the names of the published targets, and write nothing.
+        Print the names of the MakeHuman shape targets and exit.
     """
     from dermis.base.atomic_write import check_output
     from dermis.frame.features.surface.painting.painted_head import painted_head
     from dermis.gpu.failures import run_on_device
-    from dermis.human.person_file import numbers_of, write_numbers
-    from dermis.human.published import human_targets
+    from dermis.human.makehuman import human_targets
+    from dermis.human.person_file import person_numbers, write_person_json
 
     if list_targets:
         print_report(as_json, list(human_targets()), human_targets)
         return 0
     started = time.perf_counter()
-    check_output(output, (".glb", ".json"), "Choose .glb for a head, .json for the numbers of a person")
-    ancestry = given(african=african, asian=asian, caucasian=caucasian)
-    numbers = ancestry | given(sex=sex, age=age, weight=weight, muscle=muscle)
-    resting = parse_weights(expression or [], EXPRESSION)
+    check_output(output, (".glb", ".json"), "Choose .glb for a head, .json for the parameters of a person")
+    ancestry = drop_none(african=african, asian=asian, caucasian=caucasian)
+    numbers = ancestry | drop_none(sex=sex, age=age, weight=weight, muscle=muscle)
+    rest_weights = parse_weights(expression or [], EXPRESSION)
     person = _person(seed, numbers, parse_weights(target or [], TARGET))
-    own = _look(person.look, skin, "--skin"), _look(person.iris, eye, "--eye")
-    person = replace(person, skin=own[0], eyes=own[1], hair=_hair(person.hairdo, hair))
-    report: Options = {"head": str(output), "person": numbers_of(person)}
+    person = replace(
+        person,
+        skin=_with_values(person.look, skin, "--skin"),
+        eyes=_with_values(person.iris, eye, "--eye"),
+        hair=_with_hair_values(person.hairdo, hair),
+    )
+    report: Options = {"head": str(output), "person": person_numbers(person)}
     if output.suffix.lower() == ".json":
-        report |= {"bytes": write_numbers(output, person)}
+        report |= {"bytes": write_person_json(output, person)}
         print_report(as_json, report, lambda: [f"{output}  {report['bytes']} bytes"])
         return 0
-    with working_on("making the head"):
-        made = person.head(layout=layout, **given(subdivide=subdivide))
-        made = _with_maps(made, given(colour=colour, normal=normal, roughness=roughness))
-        made, eyes = run_on_device(adapter, lambda device: painted_head(device, made, size))
-        length = _write(output, person, made, resting, eyes)
-    seconds, triangles = round(time.perf_counter() - started, 3), len(made.mesh.triangles)
-    report |= {
-        "vertices": len(made.mesh.positions),
-        "triangles": triangles,
-        "bytes": length,
-        "seconds": seconds,
-    }
-    said = f"{output}  {triangles:,} triangles  {length / 1e6:.1f} MB  {seconds:.1f} s"
-    print_report(as_json, report, lambda: [said, *filter(None, [made.attribution])])
+    with spinner("creating the head"):
+        person_head = person.head(layout=layout, **drop_none(subdivide=subdivide))
+        person_head = _with_maps(person_head, drop_none(colour=colour, normal=normal, roughness=roughness))
+        person_head, eyes = run_on_device(adapter, lambda device: painted_head(device, person_head, size))
+        byte_count = _write(output, person, person_head, rest_weights, eyes)
+    seconds, mesh = round(time.perf_counter() - started, 3), person_head.mesh
+    report |= {"vertices": len(mesh.positions), "triangles": len(mesh.triangles)}
+    report |= {"bytes": byte_count, "seconds": seconds}
+    summary = f"{output}  {len(mesh.triangles):,} triangles  {byte_count / 1e6:.1f} MB  {seconds:.1f} s"
+    print_report(as_json, report, lambda: [summary, *filter(None, [person_head.attribution])])
     return 0
 
 
 def _person(seed: int | None, numbers: Options, targets: dict[str, float]) -> Human:
-    """The drawn or the usual person, with what was given in place of its own."""
+    """Return the random or average person with the given parameters and shape targets."""
     from dermis.human.person import Human
 
     base = Human() if seed is None else Human.drawn(seed)
     return replace(base, **numbers, targets={**base.targets, **targets})
 
 
-def _look(usual: L, words: list[str] | None, option: str) -> L:
-    """A look with some of its numbers replaced."""
-    chosen = parse_weights(words or [], option)
-    known = [one.name for one in fields(usual)]
-    for name in chosen:
-        if name not in known:
-            refuse(option, f"names of {', '.join(known)}", f"{name!r} came", "Correct it")
-    numbers: Options = dict(chosen)
-    if (seed := chosen.get("seed")) is not None and seed.is_integer():
+def _with_values(look: Look, option_values: list[str] | None, option: str) -> Look:
+    """Return a copy of a skin, eye or hair appearance with the values given by an option."""
+    values = parse_weights(option_values or [], option)
+    field_names = [field.name for field in fields(look)]
+    for name in values:
+        if name not in field_names:
+            refuse(option, f"a name of {', '.join(field_names)}", f"got {name!r}", "Correct it")
+    numbers: Options = dict(values)
+    if (seed := values.get("seed")) is not None and seed.is_integer():
         numbers["seed"] = int(seed)
-    return replace(usual, **numbers)
+    return replace(look, **numbers)
 
 
-def _hair(usual: HairLook, words: list[str] | None) -> HairLook:
-    """Hair with some of it replaced; its style is a word."""
-    pairs = [pair for pair in ",".join(words or []).split(",") if pair]
+def _with_hair_values(look: HairLook, option_values: list[str] | None) -> HairLook:
+    """Return a copy of the hair with the values given by --hair; its style is a word."""
+    pairs = [pair for pair in ",".join(option_values or []).split(",") if pair]
     styles = [pair.removeprefix("style=") for pair in pairs if pair.startswith("style=")]
     numbers = [pair for pair in pairs if not pair.startswith("style=")]
     style: Options = {"style": styles[-1]} if styles else {}
-    return replace(_look(usual, numbers, "--hair"), **style)
+    return replace(_with_values(look, numbers, "--hair"), **style)
 
 
-def _with_maps(made: Head, files: Options) -> Head:
-    """The head with maps of files in place of its own; a normal map takes the place of its relief."""
+def _with_maps(head: Head, files: Options) -> Head:
+    """Return a copy of the head with maps from files; a normal map also replaces the height map."""
     from dermis.formats.maps import load_maps
 
     loaded = load_maps(**files)
-    chosen = {role: getattr(loaded, role) for role in files} | ({"height": None} if "normal" in files else {})
-    return replace(made, maps=replace(made.maps, **chosen))
+    maps = {role: getattr(loaded, role) for role in files} | ({"height": None} if "normal" in files else {})
+    return replace(head, maps=replace(head.maps, **maps))
 
 
 def _write(
-    output: Path, person: Human, made: Head, expression: dict[str, float], eyes: EyePictures | None
+    output: Path, person: Human, head: Head, expression: dict[str, float], eyes: EyePictures | None
 ) -> int:
-    from dermis.human.person_file import write_person
+    from dermis.human.person_file import write_person_glb
     from dermis.mesh.pose import Pose
     from dermis.scene.skin import Skin
 
-    Pose(expression).motion(made.control, EXPRESSION)  # names and weights that can be
-    return write_person(output, person, made, roughness=Skin().roughness, weights=expression, eyes=eyes)
+    Pose(expression).motion(head.control, EXPRESSION)  # raises for unknown names and invalid weights
+    return write_person_glb(output, person, head, roughness=Skin().roughness, weights=expression, eyes=eyes)

@@ -1,4 +1,4 @@
-"""Options of a head: how its file is read, how its eyes look, and how it is posed."""
+"""Options of a head: file format, eye appearance and pose."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from cyclopts import Parameter
 
 from dermis.base.console import note
 from dermis.base.errors import DermisError, refuse
-from dermis.cli.options import Options, check, model_options
+from dermis.cli.options import Options, check_fields, model_options
 from dermis.mesh.eye_look import LIMITS
 from dermis.scene.head_table import HeadTable
 
 HEAD_OPTION_NAMES = {"specular": "specular_map", "roughness": "roughness_map"}
-"""Options by field of a [head], where their name differs."""
+"""Option names by field of the [head] table, where they differ from the name of the field."""
 _SHAPE = "unit_mm", "v_origin", "up", "opaque", "eyes", "eye_groups"
 _MAPS = "colour", "normal", "normal_y", "height", "height_mm", "specular", "roughness"
 
@@ -33,36 +33,40 @@ else:
 
 
 def check_head(name: str, options: Options) -> None:
-    """Refuse impossible options of a head."""
-    check(HeadTable, {"name": name, **options}, HEAD_OPTION_NAMES)
+    """Validate the options of a head.
+
+    Raises DermisError that names the option.
+    """
+    check_fields(HeadTable, {"name": name, **options}, HEAD_OPTION_NAMES)
 
 
 EYE = "--eye"
-_LEAST, _MOST = LIMITS["pupil_mm"]
+_MIN_PUPIL_MM, _MAX_PUPIL_MM = LIMITS["pupil_mm"]
 EyeOptions = Annotated[
     list[str] | None,
     Parameter(
         name=EYE,
         negative="",
         metavar="NAME=NUMBER,...",
-        help="What the eyes look like, as eumelanin=0.1,pupil_mm=2.5: eumelanin of the iris, 0 (blue) to 1; "
-        f"pupil_mm, its radius, {_LEAST:g} to {_MOST:g}; redness of the white, 0 to 1; seed.",
+        help="Eye appearance, such as eumelanin=0.1,pupil_mm=2.5: eumelanin of the iris, 0 (blue) to 1 (dark "
+        f"brown); pupil_mm, radius of the pupil, {_MIN_PUPIL_MM:g} to {_MAX_PUPIL_MM:g} [mm]; redness of the "
+        "sclera, 0 to 1; seed.",
     ),
 ]
 
 
-def note_eyes(head: Head, wanted: str | None) -> None:
-    """Print a line on stderr if eyes of a file stay plain although names or options request fitted ones.
+def note_eyes(head: Head, requested: str | None) -> None:
+    """Print a note on stderr if the eyeballs of a file could not be replaced by those of the package.
 
-    wanted : what was typed for --eyes
+    requested : value of the option --eyes
     """
     if head.note:
         note(f"note: {head.note}")
-    elif wanted == "fitted" and head.eyes is None:
-        note("note: eyes: none found by name; --eye-groups names the groups that hold eyeballs")
+    elif requested == "fitted" and head.eyes is None:
+        note("note: eyes: no group has a name of an eye; name the groups with --eye-groups")
 
 
-_FARTHEST = 1e10
+_LARGEST_NUMBER = 1e10
 POSE, BONE, LOOK_AT = "--pose", "--bone", "--look-at"
 Weights = Annotated[
     list[str] | None,
@@ -70,8 +74,8 @@ Weights = Annotated[
         name=POSE,
         negative="",
         metavar="NAME=WEIGHT,...",
-        help="Weights of morph targets, as jawOpen=0.6,mouthSmileLeft=1, beside those of a scene's [pose]. "
-        "dermis animate HEAD --names lists them.",
+        help="Weights of morph targets, such as jawOpen=0.6,mouthSmileLeft=1, in addition to the [pose] of a "
+        "scene; `dermis animate HEAD --names` lists the names; repeatable.",
     ),
 ]
 LookAtOption = Annotated[
@@ -79,8 +83,7 @@ LookAtOption = Annotated[
     Parameter(
         name=LOOK_AT,
         metavar="X,Y,Z",
-        help="Where the eyes look, the human's or those fitted to a file: a place in mm from the head's "
-        "centre, or camera.",
+        help="Point that the eyes look at, relative to the centre of the head [mm], or the word camera.",
     ),
 ]
 BoneAngleOptions = Annotated[
@@ -89,46 +92,48 @@ BoneAngleOptions = Annotated[
         name=BONE,
         negative="",
         metavar="NAME=X,Y,Z",
-        help="A bone turned by degrees about the head's x (nod), y (turn) and z (tilt), as head=0,25,0; once "
-        "for each bone.",
+        help="Rotation of a bone about the head's x (nod), y (turn) and z (tilt) axes, such as head=0,25,0 "
+        "[degrees]; repeatable.",
     ),
 ]
 
 
 def parse_weights(words: Sequence[str], option: str = POSE) -> dict[str, float]:
-    """Return weights by name of "jawOpen=0.6,mouthSmileLeft=1"."""
-    expected = "NAME=WEIGHT with commas between, such as jawOpen=0.6,mouthSmileLeft=1"
+    """Return a dictionary of weights by name, parsed from texts such as "jawOpen=0.6,mouthSmileLeft=1"."""
+    expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1"
     parts = (part for text in words for part in text.split(","))
-    return {name: weight for name, (weight,) in _pairs(parts, 1, option, expected)}
+    return {name: weight for name, (weight,) in _parse_pairs(parts, 1, option, expected)}
 
 
 def parse_bone_angles(words: Sequence[str]) -> dict[str, list[float]]:
-    """Return angles [degrees] by name of the bone of "head=0,25,0"."""
-    return dict(_pairs(words, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"))
+    """Return a dictionary of the three angles [degrees] by bone, parsed from texts such as "head=0,25,0"."""
+    return dict(_parse_pairs(words, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"))
 
 
-def _pairs(words: Iterable[str], count: int, option: str, expected: str) -> Iterator[tuple[str, list[float]]]:
-    """Yield name and numbers of each "NAME=NUMBER,..."."""
+def _parse_pairs(
+    words: Iterable[str], count: int, option: str, expected: str
+) -> Iterator[tuple[str, list[float]]]:
+    """Yield the name and the numbers of each text "NAME=NUMBER,..."."""
     for word in words:
         name, _, text = word.rpartition("=")
-        numbers = _numbers(text)
+        numbers = _parse_numbers(text)
         if not name.strip() or numbers is None or len(numbers) != count:
-            refuse(option, expected, f"{word!r} came", "Correct it")
+            refuse(option, expected, f"got {word!r}", "Correct it")
         yield name.strip(), numbers
 
 
 def pose_from_options(
-    weights: Mapping[str, float], turns: Mapping[str, Sequence[float]], head: Head, name: str
+    weights: Mapping[str, float], bone_angles: Mapping[str, Sequence[float]], head: Head, name: str
 ) -> Pose:
-    """Return the pose that was typed.
+    """Return the pose with the weights and bone angles from the command line.
 
-    name : of the head as it was typed, for messages
+    name : head as named on the command line, for messages
 
-    Raises DermisError for names that the head lacks, and says where all are listed.
+    Raises DermisError for names that do not exist in the head, with the command that lists all names.
     """
     from dermis.mesh.pose import Pose
 
-    parts = {POSE: Pose(weights), BONE: Pose(bones=turns)}
+    parts = {POSE: Pose(weights), BONE: Pose(bones=bone_angles)}
     for option, part in parts.items():
         try:
             part.motion(head.control, option)
@@ -136,23 +141,24 @@ def pose_from_options(
             if not (head.targets or head.bones):
                 raise
             raise DermisError(f"{fault} All names: dermis animate {name} --names.") from None
-    return Pose(weights, turns)
+    return Pose(weights, bone_angles)
 
 
-def pose_with_gaze(words: str, scene: Scene) -> Pose:
-    """Return the scene's pose with eyes that look at the place that was typed."""
+def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
+    """Return the pose of the scene with the eyes turned to a point or to the camera."""
     from dermis.scene.gaze import looking_at
 
-    place = scene.camera.position if words == "camera" else _numbers(words)
-    if place is None or len(place) != 3:
-        refuse(LOOK_AT, "camera, or X,Y,Z in mm from the head's centre", f"{words!r} came", "Correct it")
-    return looking_at(scene.head, place, scene.pose)
+    point = scene.camera.position if option_value == "camera" else _parse_numbers(option_value)
+    if point is None or len(point) != 3:
+        expected = "camera, or X,Y,Z in mm from the head's centre"
+        refuse(LOOK_AT, expected, f"got {option_value!r}", "Correct it")
+    return looking_at(scene.head, point, scene.pose)
 
 
-def _numbers(text: str) -> list[float] | None:
-    """Return the numbers between commas; None where one is not a number, or too large."""
+def _parse_numbers(text: str) -> list[float] | None:
+    """Return the comma-separated numbers of a text; None if one is invalid or too large."""
     try:
-        found = [float(part) for part in text.split(",")]
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
         return None
-    return found if all(abs(one) <= _FARTHEST for one in found) else None
+    return numbers if all(abs(number) <= _LARGEST_NUMBER for number in numbers) else None

@@ -1,13 +1,13 @@
-"""`dermis lights`: the rigs of the package as files to start from."""
+"""The command `dermis lights`: the lighting rigs of the package as TOML."""
 
 from __future__ import annotations
 
 from dermis.base.console import print_json, print_lines
-from dermis.cli.options import Json
+from dermis.cli.options import JsonOption
 
 
-def lights(name: str = "", /, *, as_json: Json = False) -> int:
-    """Print a rig of lights as TOML, to change and pass to --lights; without a name, list the rigs.
+def lights(name: str = "", /, *, as_json: JsonOption = False) -> int:
+    """Print a lighting rig as TOML, to edit and pass to --lights; without a name, list all rigs.
 
     Examples:
 
@@ -20,28 +20,29 @@ def lights(name: str = "", /, *, as_json: Json = False) -> int:
     Parameters
     ----------
     name:
-        studio, window, top, rim, rembrandt, laser or another that the list has.
+        studio, window, top, rim, rembrandt, laser or another rig of the list.
     as_json:
-        Print one JSON object instead: under "lights" those of the rig, or under "rigs" what each is.
+        Print one JSON object: the lights of the rig under "lights", or the summaries of all rigs under
+        "rigs".
     """
     from dermis.base.errors import refuse
-    from dermis.scene.lights import NO_LIGHTS, light_presets, preset_lights, preset_text
+    from dermis.scene.lights import NO_LIGHTS, light_presets, preset_lights, preset_toml
 
-    rigs = {one: _summary(preset_text(one)) for one in light_presets() if one != NO_LIGHTS}
+    rigs = {rig: _summary(preset_toml(rig)) for rig in light_presets() if rig != NO_LIGHTS}
     if name and name not in rigs:
-        refuse(name, f"a rig ({', '.join(rigs)})", "it is none of these", "Run dermis lights for the list")
+        refuse(name, f"a rig ({', '.join(rigs)})", "it is none of these", "List them with dermis lights")
     if as_json:
-        made = [light.model_dump() for light in preset_lights(name)] if name else None
-        print_json({"rigs": rigs} if made is None else {"rig": name, "lights": made})
+        preset = [light.model_dump() for light in preset_lights(name)] if name else None
+        print_json({"rigs": rigs} if preset is None else {"rig": name, "lights": preset})
     elif name:
-        print_lines(preset_text(name).rstrip())
+        print_lines(preset_toml(name).rstrip())
     else:
         width = max(map(len, rigs))
-        print_lines(*(f"{one:<{width}}  {summary}" for one, summary in rigs.items()))
+        print_lines(*(f"{rig:<{width}}  {summary}" for rig, summary in rigs.items()))
     return 0
 
 
 def _summary(text: str) -> str:
-    """The first sentence of a file's comment."""
+    """Return the first sentence of the comment at the top of a TOML file."""
     comment = " ".join(line.lstrip("# ") for line in text.split("\n\n")[0].splitlines())
     return comment.split(". ")[0].rstrip(".") + "."

@@ -1,4 +1,4 @@
-"""Options made of the scene's own models, options that commands share, and words as values."""
+"""Options generated from pydantic models, options shared by commands, and parsers of option values."""
 
 from __future__ import annotations
 
@@ -7,29 +7,31 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, TypeVar, get_args
 
 from cyclopts import CoercionError, Group, Parameter, Token
 
 from dermis.base.errors import DermisError, refuse
-from dermis.base.quantities import number
+from dermis.base.quantities import checked_number
 
 if TYPE_CHECKING:
-    from dermis.scene.plain import Plain
+    from dermis.scene.frozen_model import FrozenModel
+
+M = TypeVar("M", bound="FrozenModel")
 
 
 def _to_int(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
 
 
-def _to_choice(model: type[Plain], field: str, kind: object, tokens: Sequence[Token]) -> str:
-    """Return a word that the field takes; choices may have been registered after the command was imported."""
-    from dermis.scene.plain import choices_of
+def _to_choice(model: type[FrozenModel], field: str, kind: object, tokens: Sequence[Token]) -> str:
+    """Return the chosen word, checked when the command runs because plug-ins can register further choices."""
+    from dermis.scene.frozen_model import field_choices
 
-    if (word := tokens[0].value) in (choices := choices_of(model, field)):
+    if (word := tokens[0].value) in (choices := field_choices(model, field)):
         return word
-    wanted: Any = Literal[choices]
-    raise CoercionError(token=tokens[0], target_type=wanted)
+    expected_type: Any = Literal[choices]
+    raise CoercionError(token=tokens[0], target_type=expected_type)
 
 
 def _to_int_or_word(words: Collection[str], _: type, tokens: Sequence[Token]) -> int | str:
@@ -44,87 +46,88 @@ def _to_colour(_: type, tokens: Sequence[Token]) -> tuple[float, float, float]:
     return parse_colour(tokens[0].value, str(tokens[0].keyword))
 
 
-Json = Annotated[
+JsonOption = Annotated[
     bool, Parameter(name="--json", negative="", show_default=False, help="Print one JSON object.")
 ]
-Adapter = Annotated[
+AdapterOption = Annotated[
     str,
     Parameter(
-        help="auto (the best), cpu (software), a part of an adapter's name, or its number as #1 (see doctor)."
+        help="Graphics adapter: auto (the best), cpu (software), part of a name, or a number such as #1 "
+        "(see `dermis doctor`)."
     ),
 ]
 _OUTPUT_NAMES = Parameter(name=("--output", "-o"))
-Output = Annotated[Path | None, _OUTPUT_NAMES]
+OptionalOutputPath = Annotated[Path | None, _OUTPUT_NAMES]
 OutputPath = Annotated[Path, _OUTPUT_NAMES]
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 _LENGTH_RANGE_MM = 1e-6, 1e4
 Options = dict[str, Any]
-"""Fields of a model by name, as they were typed."""
+"""Values of options by the name of the model field."""
 NO_OPTIONS: Options = {}
-"""Options of a model when none is given."""
-# cyclopts itself would round 64.5.
+"""Default of a parameter of type `Options`."""
 Integer = Annotated[int | None, Parameter(converter=_to_int)]
+"""Integer option; unlike cyclopts' own conversion it refuses 64.5 instead of rounding it."""
 
 
 def model_options(
-    model: type[Plain],
+    model: type[FrozenModel],
     *,
     only: Collection[str] = (),
     without: Collection[str] = (),
     names: Mapping[str, str] | None = None,
     defaults: Mapping[str, object] | None = None,
 ) -> Any:
-    """Return the type of a command's parameter that takes a dictionary of the fields that were given.
+    """Return a parameter type for cyclopts with one option per model field; its value is a dictionary.
 
-    Each field is an option, with the model's own type, choices, bounds and help, except fields that are
-    models themselves.
+    Type, choices, bounds and help of each option are those of the field. Fields that hold other models have
+    no option. The dictionary contains only the options that were given.
 
-    only, without : fields that are options (all by default), and fields that are not
-    names : options by field, where their name differs
-    defaults : what the help shows in place of the model's own
+    only, without : names of the fields to include (all by default) and to exclude
+    names : option names by field, where they differ from the name of the field
+    defaults : default values to show in the help instead of those of the model
     """
-    from dermis.scene.plain import heading_of
+    from dermis.scene.frozen_model import field_heading
 
     options: dict[str, object] = {}
     for field in only or model.model_fields:
-        kind, how = _option_type(model, field)
+        kind, keywords = _option_type(model, field)
         if kind is not None and field not in without:
-            name, text = option_name(field, names), _option_help(model, field, defaults or {})
-            if heading := heading_of(model, field):
-                how = how | {"group": Group(heading, sort_key=1)}  # after cyclopts' own groups
-            options[field] = Annotated[kind, Parameter(name=name, help=text, **how)]
-    made: Any = TypedDict  # mypy wants its names spelled out
-    return Annotated[made(model.__name__, options, total=False), Parameter(name="*")]
+            name, help_text = option_name(field, names), _option_help(model, field, defaults or {})
+            if heading := field_heading(model, field):
+                keywords = keywords | {"group": Group(heading, sort_key=1)}  # after cyclopts' own groups
+            options[field] = Annotated[kind, Parameter(name=name, help=help_text, **keywords)]
+    typed_dict: Any = TypedDict  # mypy requires literal names
+    return Annotated[typed_dict(model.__name__, options, total=False), Parameter(name="*")]
 
 
-def given(**options: object) -> Options:
-    """Return the options that are not None."""
+def drop_none(**options: object) -> Options:
+    """Return a dictionary of the keyword arguments without those that are None."""
     return {name: value for name, value in options.items() if value is not None}
 
 
 def option_name(field: str, names: Mapping[str, str] | None = None) -> str:
-    """Return the option of a field: --rho-s for rho_s."""
+    """Return the option name of a field, such as --rho-s for rho_s."""
     return "--" + (names or {}).get(field, field).replace("_", "-")
 
 
-def is_option(model: type[Plain], field: str) -> bool:
+def is_option(model: type[FrozenModel], field: str) -> bool:
     """Return whether a field can be an option: it holds words or numbers, not other models."""
     return _option_type(model, field)[0] is not None
 
 
-def _option_type(model: type[Plain], field: str) -> tuple[Any, Options]:
-    """Return the type of a field's option, None for no option, and keywords of its `Parameter`."""
-    from dermis.scene.field_errors import words_of
-    from dermis.scene.plain import choices_of
+def _option_type(model: type[FrozenModel], field: str) -> tuple[Any, Options]:
+    """Return the type of a field's option, None if it cannot be one, and arguments of its `Parameter`."""
+    from dermis.scene.field_errors import field_keywords
+    from dermis.scene.frozen_model import field_choices
 
-    if choices := choices_of(model, field):
+    if choices := field_choices(model, field):
         return Literal[choices] | str, {"converter": partial(_to_choice, model, field), "metavar": "CHOICE"}
-    if words := words_of(model, field):
+    if words := field_keywords(model, field):
         number = model.model_fields[field].annotation in (float, int)
-        shown = {"metavar": "|".join((*words, "NUMBER" if number else "COLOUR")), "show_choices": False}
+        display = {"metavar": "|".join((*words, "NUMBER" if number else "COLOUR")), "show_choices": False}
         if model.model_fields[field].annotation is int:
-            return int | Literal[words], shown | {"converter": partial(_to_int_or_word, words)}
-        return (float | Literal[words] if number else str), shown
+            return int | Literal[words], display | {"converter": partial(_to_int_or_word, words)}
+        return (float | Literal[words] if number else str), display
     kind = model.model_fields[field].annotation
     kind = next((one for one in get_args(kind) if get_args(kind)[-1] is NoneType), kind)
     parts = tuple(get_args(part)[0] if get_args(part) else part for part in get_args(kind))
@@ -143,63 +146,64 @@ def _option_type(model: type[Plain], field: str) -> tuple[Any, Options]:
     return (kind, {}) if kind in (bool, float, str) else known.get(parts or kind, (None, {}))
 
 
-def _option_help(model: type[Plain], field: str, defaults: Mapping[str, object]) -> str:
-    """Return a field's help with its bounds, unless they are trivial, and its default."""
-    from dermis.scene.field_errors import words_of
-    from dermis.scene.plain import choices_of, help_of, shown, values_of
+def _option_help(model: type[FrozenModel], field: str, defaults: Mapping[str, object]) -> str:
+    """Return the help text of a field's option, with its bounds and its default."""
+    from dermis.scene.field_errors import field_keywords
+    from dermis.scene.frozen_model import accepted_values, field_choices, field_help, format_default
 
-    text = help_of(model, field)
-    worded = choices_of(model, field) or words_of(model, field)  # which cyclopts adds itself
-    if (values := values_of(model, field)) and not worded:
+    text = field_help(model, field)
+    has_choices = field_choices(model, field) or field_keywords(model, field)  # added by cyclopts
+    if (values := accepted_values(model, field)) and not has_choices:
         text += f" [range: {values}]"
-    default = shown(defaults.get(field, model.model_fields[field].get_default()))
+    default = format_default(defaults.get(field, model.model_fields[field].get_default()))
     return f"{text} [default: {default}]" if default else text
 
 
-def check(model: type[Plain], values: Mapping[str, object], names: Mapping[str, str] | None = None) -> None:
-    """Refuse impossible values of a model's fields, under the names of their options.
+def check_fields(model: type[M], values: Mapping[str, object], names: Mapping[str, str] | None = None) -> M:
+    """Return the model with the given field values; errors name the option instead of the field.
 
-    values : by field
-    names : options by field, where their name differs
+    values : field values by name
+    names : option names by field, where they differ from the name of the field
+
+    Raises DermisError for invalid values.
     """
-    from dermis.scene.field_errors import ImpossibleError
+    from dermis.scene.field_errors import InvalidFieldsError
 
     try:
-        model(**values)
-    except ImpossibleError as error:
-        place, finding = next(iter(error.findings.items()))
-        field = place.partition(".")[0] or next(name for name in model.model_fields if name in values)
+        return model(**values)
+    except InvalidFieldsError as error:
+        path, finding = next(iter(error.messages.items()))
+        field = path.partition(".")[0] or next(name for name in model.model_fields if name in values)
         raise DermisError(f"{option_name(field, names)}: {finding}. Correct it.") from None
 
 
-def refuse_options(fields: Iterable[str], names: Mapping[str, str] | None, place: str, remedy: str) -> None:
-    """Refuse options that would have no effect."""
+def refuse_options(fields: Iterable[str], names: Mapping[str, str] | None, context: str, advice: str) -> None:
+    """Raise DermisError if any of the given options would have no effect."""
     for field in fields:
-        refuse(option_name(field, names), f"no such option {place}", "it came", remedy)
+        refuse(option_name(field, names), f"no such option {context}", "it is given", advice)
 
 
 def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
-    """Return width and height [pixel] of "1024x1024"."""
+    """Return width and height [pixel] of a text such as "1024x1024"."""
     match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
     if not match:
-        came, remedy = f"{text!r} came", "Write two whole numbers with an x"
-        refuse(option, "WIDTHxHEIGHT, such as 1024x1024", came, remedy)
+        refuse(option, "WIDTHxHEIGHT, such as 1024x1024", f"got {text!r}", "Write two integers with an x")
     return int(match[1]), int(match[2])
 
 
 def parse_colour(text: str, option: str) -> tuple[float, float, float]:
-    """Return linear Rec. 709 of "red,green,blue"."""
+    """Return the linear Rec. 709 colour of a text "red,green,blue"."""
     try:
         red, green, blue = (float(part) for part in text.split(","))
     except ValueError:
-        refuse(option, "red,green,blue, such as 0,0,0", f"{text!r} came", "Write three numbers")
+        refuse(option, "red,green,blue, such as 0,0,0", f"got {text!r}", "Write three numbers")
     return red, green, blue
 
 
 def parse_lengths(option: str, text: str) -> tuple[float, ...]:
-    """Return lengths [mm] of "0.5,1,2"."""
+    """Return the lengths [mm] of a text such as "0.5,1,2"."""
     try:
         lengths = tuple(float(part) for part in text.split(","))
     except ValueError:
-        refuse(option, "lengths in mm, such as 0.5,1,2", f"{text!r} came", "Write numbers with commas")
-    return tuple(number(option, length, *_LENGTH_RANGE_MM, "mm") for length in lengths)
+        refuse(option, "lengths in mm, such as 0.5,1,2", f"got {text!r}", "Write numbers with commas")
+    return tuple(checked_number(option, length, *_LENGTH_RANGE_MM, "mm") for length in lengths)

@@ -1,4 +1,4 @@
-"""Files that `dermis render` and `animate` write: outputs and landmarks beside an image, and movies."""
+"""Output files of `dermis render` and `animate`: outputs, landmarks, movies and numbered images."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 from cyclopts import Parameter
 
-from dermis.base.atomic_write import check_output, replacing
+from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.console import note
 from dermis.base.errors import refuse
 from dermis.human.landmarks.sets import SETS
-from dermis.scene.outputs import OUTPUTS, checked_outputs
+from dermis.scene.outputs import OUTPUTS, check_outputs
 
 if TYPE_CHECKING:
     from dermis.base.arrays import Bytes, Floats
@@ -29,59 +29,62 @@ if TYPE_CHECKING:
     from dermis.scene.settings import Settings
 
 _OUTPUTS_HELP = (
-    "What else is known of each pixel, with commas between: "
-    f"{', '.join(OUTPUTS)}. Written beside the image, as face.depth.exr beside face.png, or into it as the "
-    "parts of one .exr."
+    "Additional outputs per pixel, separated by commas: "
+    f"{', '.join(OUTPUTS)}. They are written beside the image, such as face.depth.exr beside face.png, or as "
+    "parts of the same .exr file."
 )
-_FORMAT_HELP = "Of the files beside the image: exr (the default), png (16 bit, in steps) or npy."
+_FORMAT_HELP = "Format of the outputs beside the image: exr, png (16 bit, quantised) or npy. [default: exr]"
 Outputs = Annotated[str | None, Parameter(name="--outputs", help=_OUTPUTS_HELP, metavar="NAME,...")]
 Format = Annotated[Literal["exr", "png", "npy"] | None, Parameter(name="--outputs-format", help=_FORMAT_HELP)]
 
 
 class FrameOutputs:
-    """Outputs that were requested on the command line.
+    """Outputs requested with --outputs, and the files that they are written to.
 
     Raises DermisError for unknown names and for files that cannot be written.
     """
 
-    def __init__(self, typed: str | None, kind: Literal["exr", "png", "npy"] | None, image: Path) -> None:
-        if kind and typed is None:
-            refuse("--outputs-format", "--outputs with it", "there is none", "Name what is to be written")
+    def __init__(
+        self, typed: str | None, file_format: Literal["exr", "png", "npy"] | None, image: Path
+    ) -> None:
+        if file_format and typed is None:
+            refuse("--outputs-format", "the option --outputs", "it is missing", "Add --outputs NAME,...")
         self.image = image
-        self.names = checked_outputs(_names(typed)) if typed is not None else ()
-        self.together = image.suffix.lower() == ".exr" and kind in (None, "exr")
+        self.names = check_outputs(_names(typed)) if typed is not None else ()
+        self.together = image.suffix.lower() == ".exr" and file_format in (None, "exr")
         if not self.names:
             self.paths: dict[str, Path] = {}
             return
-        from dermis.frame.output_files import beside, check_formats
+        from dermis.frame.output_files import check_formats, output_path
 
-        check_formats(self.names, kind or "exr")
+        check_formats(self.names, file_format or "exr")
         self.paths = {
-            name: image if self.together else beside(image, name, kind or "exr") for name in self.names
+            name: image if self.together else output_path(image, name, file_format or "exr")
+            for name in self.names
         }
         for path in self.paths.values():
             check_output(path, (path.suffix,))
         if "motion" in self.names:
-            note("note: motion is 0 in a single picture; Renderer.observe counts it from one to the next")
+            note("note: motion is 0 in a single picture; Renderer.observe measures it between pictures")
 
     def write(self, picture: Floats | None, values: Mapping[str, PlaneArray]) -> None:
         """Write the outputs.
 
-        picture : linear, where they are parts of its file
-        values : by name
+        picture : linear image, for outputs that are parts of the same EXR file
+        values : output arrays by name
         """
-        from dermis.frame.output_files import write_output, write_together
+        from dermis.frame.output_files import write_multipart, write_output
 
         if self.together:
             assert picture is not None
-            write_together(self.image, picture, values)
+            write_multipart(self.image, picture, values)
             return
         for name, path in self.paths.items():
             write_output(path, name, values[name])
 
     @property
     def report(self) -> dict[str, str]:
-        """Paths of the files by name of the output."""
+        """Return the paths of the written files by name of the output."""
         return {name: str(path) for name, path in self.paths.items()}
 
 
@@ -90,14 +93,14 @@ def _names(typed: str) -> list[str]:
 
 
 _LANDMARKS_HELP = (
-    "Landmarks to write beside the image, as face.landmarks.json, with camera, head pose and gaze: "
-    f"{', '.join(SETS)}, or a .csv of name,vertex; several with commas between."
+    "Landmark sets to write beside the image, such as face.landmarks.json, with camera, head pose and gaze: "
+    f"{', '.join(SETS)}, or a .csv file of name,vertex; separated by commas."
 )
 Landmarks = Annotated[str | None, Parameter(name="--landmarks", help=_LANDMARKS_HELP, metavar="SET,...")]
 
 
 class FrameLandmarks:
-    """Landmarks that were requested on the command line.
+    """Landmark sets requested with --landmarks, and the file that they are written to.
 
     Raises DermisError for unknown sets and for a file that cannot be written.
     """
@@ -112,7 +115,7 @@ class FrameLandmarks:
             check_output(self.path, (self.path.suffix,))
 
     def check(self, head: Head) -> None:
-        """Raises DermisError for a head that has no landmarks of these names."""
+        """Raise DermisError if the head does not have the requested landmarks."""
         if self.names:
             from dermis.human.landmarks.points import landmark_points
 
@@ -120,43 +123,49 @@ class FrameLandmarks:
                 landmark_points(head, name)
 
     def write(self, renderer: Renderer, scene: Scene, settings: Settings) -> None:
-        """Write the landmarks, if any were requested."""
+        """Write the requested landmarks of the scene to the JSON file."""
         if not self.names:
             return
-        seen = next(renderer.observe([scene], settings, landmarks=self.names))
-        text = json.dumps(_observation_json(seen), indent=1) + "\n"
-        with replacing(self.path) as part:
-            part.write_text(text, "utf-8")
+        observation = next(renderer.observe([scene], settings, landmarks=self.names))
+        text = json.dumps(_observation_json(observation), indent=1) + "\n"
+        with atomic_file(self.path) as temporary:
+            temporary.write_text(text, "utf-8")
 
 
-def _observation_json(seen: Observation) -> dict[str, object]:
-    camera = seen.camera
+def _observation_json(observation: Observation) -> dict[str, object]:
+    camera = observation.camera
     return {
         "camera": {"K": camera.K.tolist(), "R": camera.R.tolist(), "t_mm": camera.t.tolist()},
-        "head_pose": seen.head_pose.tolist(),
-        "gaze": None if seen.gaze is None else seen.gaze.tolist(),
-        "landmarks": {name: _landmark_rows(one) for name, one in seen.landmarks.items()},
+        "head_pose": observation.head_pose.tolist(),
+        "gaze": None if observation.gaze is None else observation.gaze.tolist(),
+        "landmarks": {name: _landmark_rows(landmarks) for name, landmarks in observation.landmarks.items()},
     }
 
 
-def _landmark_rows(one: ProjectedLandmarks) -> list[dict[str, object]]:
-    each = zip(one.names, one.pixels.tolist(), one.positions_mm.tolist(), one.visible.tolist(), strict=True)
+def _landmark_rows(landmarks: ProjectedLandmarks) -> list[dict[str, object]]:
+    rows = zip(
+        landmarks.names,
+        landmarks.pixels.tolist(),
+        landmarks.positions_mm.tolist(),
+        landmarks.visible.tolist(),
+        strict=True,
+    )
     return [
-        {"name": name, "pixel": pixel, "position_mm": place, "visible": visible}
-        for name, pixel, place, visible in each
+        {"name": name, "pixel": pixel, "position_mm": position, "visible": visible}
+        for name, pixel, position, visible in rows
     ]
 
 
-Write = Callable[[int, "PlaneArray"], None]
-"""Takes the number of a frame and its picture."""
+WriteFrame = Callable[[int, "PlaneArray"], None]
+"""Function that writes a frame, given its number and its image."""
 
 
 @dataclass(frozen=True)
 class AnimationOutput:
-    """Output of a moving head, as it was typed.
+    """Output of `dermis animate`: a movie or numbered images.
 
-    crf : quality of a movie; None for the usual one
-    anew : whether to draw numbered pictures again that exist
+    crf : constant rate factor of the movie; None for the default
+    overwrite : whether existing numbered images are rendered again
     """
 
     path: Path
@@ -165,44 +174,47 @@ class AnimationOutput:
 
     @property
     def numbered(self) -> bool:
-        """Whether the output is numbered pictures."""
+        """Return whether the output is a sequence of numbered images."""
         return "%" in self.path.name
 
     @property
     def linear(self) -> bool:
-        """Whether the pictures are linear floats."""
+        """Return whether the images are stored as linear floats."""
         return self.path.suffix.lower() == ".exr"
 
     def check(self, size: tuple[int, int]) -> None:
-        """Refuse what cannot be written, before anything is drawn."""
-        from dermis.images.movie import DEFAULT_CRF, SUFFIX, check_movie
+        """Raise DermisError if the output cannot be written, before anything is rendered."""
+        from dermis.images.movie import DEFAULT_CRF, MOVIE_SUFFIX, check_movie
         from dermis.images.writer import FrameFiles
 
         if self.numbered:
             if self.crf is not None:
-                refuse("--crf", f"a movie ({SUFFIX}) with it", f"{self.path} came", "Leave it out")
+                refuse("--crf", f"a movie ({MOVIE_SUFFIX}) as output", f"got {self.path}", "Leave it out")
             FrameFiles(self.path).prepare()
             return
         if self.anew:
-            refuse("--anew", "numbered pictures with it", f"{self.path} came", "Leave it out")
+            refuse("--anew", "numbered pictures with it", f"got {self.path}", "Leave it out")
         if self.path.suffix.lower() in (".png", ".exr"):
             numbered = self.path.with_name(f"%05d{self.path.suffix}")
             refuse(self.path, "a movie or numbered pictures", "it is one picture", f"Name it {numbered}")
         check_movie(self.path, size, DEFAULT_CRF if self.crf is None else self.crf)
 
-    def missing(self, numbers: range, size: tuple[int, int], made_of: str) -> Sequence[int]:
-        """Return the numbers of the frames to be drawn."""
+    def missing(self, numbers: range, size: tuple[int, int], digest: str) -> Sequence[int]:
+        """Return the numbers of the frames that must be rendered.
+
+        digest : hash of everything that determines the frames
+        """
         from dermis.images.writer import FrameFiles
 
         if not self.numbered:
             return numbers
         files = FrameFiles(self.path)
-        files.claim(made_of, anew=self.anew)
+        files.claim(digest, anew=self.anew)
         return files.missing(numbers, size)
 
     @contextmanager
-    def writing(self, size: tuple[int, int], rate: Fraction) -> Iterator[Write]:
-        """Yield a function that writes frames while others are drawn; at the end all are written."""
+    def writing(self, size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
+        """Yield a function that writes a frame in the background; all are written when the block ends."""
         from dermis.images.movie import DEFAULT_CRF, MovieWriter
         from dermis.images.writer import FrameFiles, ImageWriter
 

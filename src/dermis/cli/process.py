@@ -1,7 +1,7 @@
 """Standard streams and signals of the process that runs a command.
 
-Writing to stdout or stderr never fails where it is used: the fault is reported once, at the end. Ctrl-C and
-signals that ask the process to end raise an exception, so that no file is left half-written.
+A failed write to stdout or stderr does not raise an exception; it is reported once when the command ends.
+Ctrl-C and signals that ask the process to end raise KeyboardInterrupt, so that no file is left half-written.
 """
 
 from __future__ import annotations
@@ -25,20 +25,21 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], Any] | int | signal.Handlers | None
 
-_OPEN_MODES = (os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)  # of what takes the place of a closed stdin, stdout, stderr
+_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # of the null device, for closed stdin, stdout, stderr
 
 
 class StandardStreams:
-    """Guards stdout and stderr, where they are the process's own, inside a `with` block.
+    """Context manager that replaces stdout and stderr by streams whose writes never fail.
 
-    A closed stream is treated as one that cannot be written to. Its number is occupied, as the next file that
-    is opened would get it otherwise, and libraries would print into that file.
+    A closed stream is treated as one that cannot be written to. Its file descriptor is reserved, because the
+    next opened file would get it otherwise and libraries would print into that file.
     """
 
     def __enter__(self) -> Self:
-        for number, use in enumerate(_OPEN_MODES):
-            _reserve_descriptor(number, use)
-        self._usual = sys.stdout, sys.stderr
+        """Replace the standard streams."""
+        for number, mode in enumerate(_OPEN_MODES):
+            _reserve_descriptor(number, mode)
+        self._original = sys.stdout, sys.stderr
         self._raw: list[_GuardedStream] = []
         if sys.stdout is sys.__stdout__:
             sys.stdout = self._guarded(sys.stdout, 1)
@@ -49,39 +50,40 @@ class StandardStreams:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for stream, usual in zip((sys.stdout, sys.stderr), self._usual, strict=True):
-            if stream is not usual:
+        """Flush the replacements and restore the original streams."""
+        for stream, original in zip((sys.stdout, sys.stderr), self._original, strict=True):
+            if stream is not original:
                 stream.flush()
-        sys.stdout, sys.stderr = self._usual
+        sys.stdout, sys.stderr = self._original
 
-    def fault(self) -> OSError | None:
-        """Return why output on stdout was lost; a reader that closes the pipe is no fault."""
+    def stdout_error(self) -> OSError | None:
+        """Return the error by which output to stdout was lost, or None; a closed pipe is not an error."""
         sys.stdout.flush()
         faults = [raw.fault for raw in self._raw if raw.number == 1]
-        return next((one for one in faults if not isinstance(one, BrokenPipeError)), None)
+        return next((fault for fault in faults if not isinstance(fault, BrokenPipeError)), None)
 
-    def drop(self) -> None:
-        """Discard the rest of stdout: its reader may block, and the command was interrupted."""
+    def discard_stdout(self) -> None:
+        """Discard the remaining output to stdout after an interruption, because its reader may be blocked."""
         for raw in self._raw:
             if raw.number == 1:
                 raw.fault = raw.fault or BrokenPipeError()
 
-    def _guarded(self, usual: TextIO | None, number: int) -> TextIO:
-        inner: Any = usual.buffer if usual else io.FileIO(number, "w", closefd=False)
+    def _guarded(self, original: TextIO | None, number: int) -> TextIO:
+        inner: Any = original.buffer if original else io.FileIO(number, "w", closefd=False)
         raw = _GuardedStream(getattr(inner, "raw", inner), number)
         self._raw.append(raw)
         return io.TextIOWrapper(
             io.BufferedWriter(raw),
-            encoding=usual.encoding if usual else "utf-8",
-            errors="backslashreplace",  # of what the encoding lacks, and of names that are no text
+            encoding=original.encoding if original else "utf-8",
+            errors="backslashreplace",  # for characters outside the encoding, and undecodable file names
             line_buffering=number == 2 or raw.isatty(),
         )
 
 
 class _GuardedStream(io.RawIOBase):
-    """Writes to a stream until that fails, and drops the rest.
+    """Raw stream that discards all output after the first failed write.
 
-    fault : the first failure
+    fault : the first error, None before
     """
 
     def __init__(self, inner: io.RawIOBase, number: int) -> None:
@@ -89,18 +91,18 @@ class _GuardedStream(io.RawIOBase):
         self.fault: OSError | None = None
 
     def write(self, data: ReadableBuffer, /) -> int:
-        """Write as many bytes as possible at once; return their number."""
+        """Write as many bytes as possible and return their number."""
         while self.fault is None:
             try:
                 if (written := self._inner.write(data)) is not None:
                     return written
-                select.select([], [self.number], [])  # it does not block, and is full
+                select.select([], [self.number], [])  # wait: the stream is non-blocking and full
             except OSError as fault:
                 self.fault = fault
         return memoryview(data).nbytes
 
     def writable(self) -> bool:
-        """Return True: faults are reported at the end only."""
+        """Return True, also after a failed write."""
         return True
 
     def fileno(self) -> int:
@@ -112,77 +114,79 @@ class _GuardedStream(io.RawIOBase):
         return self._inner.isatty()
 
 
-def _reserve_descriptor(number: int, use: int) -> None:
-    """Open the null device under a stream's number if the stream is closed."""
+def _reserve_descriptor(number: int, mode: int) -> None:
+    """Open the null device at the file descriptor of a standard stream if that is closed."""
     try:
         os.fstat(number)
     except OSError:
-        empty = os.open(os.devnull, use)
-        if empty != number:
-            os.dup2(empty, number)
-            os.close(empty)
+        null_device = os.open(os.devnull, mode)
+        if null_device != number:
+            os.dup2(null_device, number)
+            os.close(null_device)
         else:
             os.set_inheritable(number, True)
 
 
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-_SECOND_SIGNAL_S = 0.5  # a second one so late is another; programs in between send the same one twice
+_SECOND_SIGNAL_S = 0.5  # earlier repetitions are ignored: intermediate programs may send a signal twice
 _RETRY_S = 0.02
-_UNSAFE_PACKAGES = {"importlib", "pydantic"}  # modules half imported, and what calls back from Rust
+_UNSAFE_PACKAGES = {"importlib", "pydantic"}  # half-imported modules, and callbacks from Rust
 _DRIVERS = {"wgpu", "glfw"}
-_RETRY, _END = b"\0", b"\xff"  # no signals
-_SIGNAL_EXIT_BASE = 128  # a shell's status of what a signal ended, less the signal's number
+_RETRY, _END = b"\0", b"\xff"  # bytes that are not signal numbers
+_SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal
 
 
 class Interruption:
-    """Raises KeyboardInterrupt once for Ctrl-C, SIGTERM or SIGHUP inside a `with` block.
+    """Context manager that raises KeyboardInterrupt once, after Ctrl-C, SIGTERM or SIGHUP.
 
-    At a second signal the process ends at once, also while the main thread is in a driver or another library.
-    Signals that the caller ignores or handles are left alone.
+    A second signal ends the process immediately, even while the main thread is inside a driver or another
+    library. Signals that the caller ignores or handles keep their handlers.
 
-    code : the exit status that follows; 0 before any signal
+    code : exit status for the received signal; 0 if there was none
     """
 
     def __init__(self) -> None:
         self.code = 0
-        self._is_raised = self._is_late = False
-        self._usual: dict[int, Handler] = {}
-        self._sent = 0  # by ourselves
+        self._is_raised = self._is_postponed = False
+        self._original: dict[int, Handler] = {}
+        self._resent = 0  # signals that this object sent again
 
     def __enter__(self) -> Self:
+        """Install the signal handlers, if called from the main thread."""
         if threading.current_thread() is not threading.main_thread():
             return self
         for number in _SIGNALS:
-            usual = signal.getsignal(number)
-            if usual in (signal.SIG_DFL, signal.default_int_handler):
-                self._usual[number] = usual
+            handler = signal.getsignal(number)
+            if handler in (signal.SIG_DFL, signal.default_int_handler):
+                self._original[number] = handler
                 signal.signal(number, self._handle)
-        self._usual_hook, sys.unraisablehook = sys.unraisablehook, self._on_unraisable
+        self._original_hook, sys.unraisablehook = sys.unraisablehook, self._on_unraisable
         self._reading, self._writing = socket.socketpair()
         self._writing.setblocking(False)
-        self._before = signal.set_wakeup_fd(self._writing.fileno(), warn_on_full_buffer=False)
-        self._watching = threading.Thread(target=self._watch, daemon=True, name="dermis-signals")
-        self._watching.start()
+        self._original_fd = signal.set_wakeup_fd(self._writing.fileno(), warn_on_full_buffer=False)
+        self._thread = threading.Thread(target=self._watch, daemon=True, name="dermis-signals")
+        self._thread.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Restore the signal handlers."""
         if threading.current_thread() is not threading.main_thread():
             return
-        for number, usual in self._usual.items():
-            signal.signal(number, signal.SIG_DFL if self.code else usual)
-        signal.set_wakeup_fd(self._before)
-        sys.unraisablehook = self._usual_hook
+        for number, handler in self._original.items():
+            signal.signal(number, signal.SIG_DFL if self.code else handler)
+        signal.set_wakeup_fd(self._original_fd)
+        sys.unraisablehook = self._original_hook
         self._writing.send(_END)
-        self._watching.join()
+        self._thread.join()
         self._writing.close()
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         self.code = self.code or _SIGNAL_EXIT_BASE + number
         if self._is_raised:
             return
-        if (loop := _running_loop()) is not None:  # from one of its tasks asyncio would print it
+        if (loop := _running_loop()) is not None:  # raised inside a task, asyncio would print it
             self._is_raised = True
             loop.call_soon_threadsafe(_interrupt)
         elif _would_be_swallowed(frame):
@@ -192,39 +196,39 @@ class Interruption:
             _interrupt()
 
     def _raise_later(self) -> None:
-        self._is_raised, self._is_late = False, True
+        self._is_raised, self._is_postponed = False, True
         self._writing.send(_RETRY)
 
-    def _on_unraisable(self, lost: sys.UnraisableHookArgs) -> None:
-        """Handle an exception that Python cannot raise, as in a destructor."""
-        if self.code and issubclass(lost.exc_type, KeyboardInterrupt):
+    def _on_unraisable(self, error: sys.UnraisableHookArgs) -> None:
+        """Raise the interruption again if it occurred where Python cannot raise, as in a destructor."""
+        if self.code and issubclass(error.exc_type, KeyboardInterrupt):
             self._raise_later()
         else:
-            self._usual_hook(lost)
+            self._original_hook(error)
 
     def _watch(self) -> None:
-        """Receive signals, which the main thread does only between two steps of Python."""
-        asked_s = 0.0
+        """Receive signals in a thread, as the main thread handles them only between Python instructions."""
+        first_signal_s = 0.0
         with self._reading:
             while True:
-                if not select.select([self._reading], [], [], _RETRY_S if self._is_late else None)[0]:
-                    self._is_late = False
+                if not select.select([self._reading], [], [], _RETRY_S if self._is_postponed else None)[0]:
+                    self._is_postponed = False
                     self._send_again()
                     continue
-                arrived = self._reading.recv(1)
-                if arrived == _END:
+                received = self._reading.recv(1)
+                if received == _END:
                     return
-                if arrived[0] not in self._usual or signal.getsignal(arrived[0]) != self._handle:
-                    continue  # a server shuts down by its own rules
-                if self._sent:
-                    self._sent -= 1
-                elif not asked_s:
-                    asked_s = time.monotonic()
-                elif time.monotonic() - asked_s > _SECOND_SIGNAL_S:
-                    os._exit(_SIGNAL_EXIT_BASE + arrived[0])
+                if received[0] not in self._original or signal.getsignal(received[0]) != self._handle:
+                    continue  # a server has installed its own handler
+                if self._resent:
+                    self._resent -= 1
+                elif not first_signal_s:
+                    first_signal_s = time.monotonic()
+                elif time.monotonic() - first_signal_s > _SECOND_SIGNAL_S:
+                    os._exit(_SIGNAL_EXIT_BASE + received[0])
 
     def _send_again(self) -> None:
-        self._sent += 1
+        self._resent += 1
         number = self.code - _SIGNAL_EXIT_BASE
         if hasattr(signal, "pthread_kill"):
             signal.pthread_kill(threading.main_thread().ident or 0, number)
@@ -237,7 +241,7 @@ def _interrupt() -> None:
 
 
 def _running_loop() -> AbstractEventLoop | None:
-    """Return the event loop of asyncio in which the main thread runs, if any."""
+    """Return the asyncio event loop that runs in the main thread, or None."""
     if (asyncio := sys.modules.get("asyncio")) is None:
         return None
     try:
@@ -248,7 +252,7 @@ def _running_loop() -> AbstractEventLoop | None:
 
 
 def _would_be_swallowed(frame: FrameType | None) -> bool:
-    """Return whether libraries between the frame and its callers would swallow an exception."""
+    """Return whether a library in the call stack of the frame would swallow an exception."""
     while frame is not None:
         package, name = str(frame.f_globals.get("__name__")).partition(".")[0], frame.f_code.co_name
         if package in _UNSAFE_PACKAGES or (package in _DRIVERS and "callback" in name):

@@ -1,31 +1,43 @@
-"""`dermis profile`: how light spreads below a skin, and the Gaussians that stand for it."""
+"""The command `dermis profile`: diffusion profiles of skin and their Gaussian fits."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
-from cyclopts import Parameter
-
-from dermis.base.console import note, print_json, print_lines, progress
+from dermis.base.console import note, print_json, print_lines, progress_bar
 from dermis.base.errors import refuse
-from dermis.base.quantities import number, whole_number
-from dermis.cli.options import NO_OPTIONS, Json, Options, Output, Integer, option_name, model_options, parse_lengths
+from dermis.base.quantities import checked_integer, checked_number
+from dermis.cli.options import (
+    NO_OPTIONS,
+    Flag,
+    Integer,
+    JsonOption,
+    OptionalOutputPath,
+    Options,
+    drop_none,
+    model_options,
+    option_name,
+    parse_lengths,
+)
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.scene.skin import Pigments
 
-_NAMES = {"structure": "skin"}
+_OPTION_NAMES = {"structure": "skin"}
 
 
-def _defaults() -> dict[str, str]:
-    """Return the default of each pigment: the default skin's, and those of other skins where they differ."""
-    found: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
-    for field in Pigments.model_fields.keys() - found.keys():
-        usual, own = getattr(DEFAULT_SKIN, field), {name: getattr(one, field) for name, one in SKINS.items()}
-        others = [f"{name} {value:g}" for name, value in own.items() if value != usual]
-        found[field] = ", ".join([f"{usual:g}", *others])
-    return found
+def _default_pigments() -> dict[str, str]:
+    """Return the default of each pigment as help text, with the values of named skins that differ from it."""
+    defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
+    for field in Pigments.model_fields.keys() - defaults.keys():
+        default, by_skin = (
+            getattr(DEFAULT_SKIN, field),
+            {name: getattr(skin, field) for name, skin in SKINS.items()},
+        )
+        different = [f"{name} {value:g}" for name, value in by_skin.items() if value != default]
+        defaults[field] = ", ".join([f"{default:g}", *different])
+    return defaults
 
 
 if TYPE_CHECKING:
@@ -35,11 +47,10 @@ if TYPE_CHECKING:
 
     PigmentOptions = Options
 else:
-    PigmentOptions = model_options(Pigments, names=_NAMES, defaults=_defaults())
+    PigmentOptions = model_options(Pigments, names=_OPTION_NAMES, defaults=_default_pigments())
 
 Clamp = Literal["layer", "none"]
 Model = Literal["counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
-Flag = Annotated[bool, Parameter(negative="")]
 
 _TERMS, _PHOTONS, _MAX_PHOTONS = 6, 1_000_000, 10**10
 
@@ -61,12 +72,12 @@ def profile(
     variances: Literal["shared", "per-channel"] = "shared",
     keep_energy: Flag = False,
     through: str | None = None,
-    output: Output = None,
+    output: OptionalOutputPath = None,
     plot: Path | None = None,
     check: Flag = False,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> int:
-    """Compute how light spreads below a skin, and fit Gaussians to it.
+    """Compute the diffusion profile of a skin or medium, and fit Gaussians to it.
 
     Examples:
 
@@ -81,77 +92,79 @@ def profile(
     Parameters
     ----------
     name:
-        A medium (dj3, skin1, skin2, marble ...), a skin of pigments (spectral, light, medium, dark), the
-        published table gpu-gems-3, or a .toml file: [[layers]], a table [skin], or what -o wrote.
+        Medium (dj3, skin1, skin2, marble ...), pigmented skin (spectral, light, medium, dark), the published
+        table gpu-gems-3, or a .toml file with [[layers]], with a table [skin], or written by -o.
     model:
-        counted is photons counted beforehand, for one semi-infinite layer of index 1 or 1.4 [its default];
-        layered is diffusion with continuous flux [the default of all else], layered-point finite at its
-        centre; dipole and better-dipole take one semi-infinite layer; multipole is the deck's; montecarlo
-        is the truth.
+        Model of the profile. counted: tabulated photon counts, for one semi-infinite layer of index 1 or 1.4,
+        where it is the default; layered: layered diffusion, the default for all other media; layered-point:
+        the same with a finite value at r = 0; dipole, better-dipole: one semi-infinite layer; multipole: the
+        model of the 2007 talk; montecarlo: photons traced now, the reference.
     clamp:
-        Where the multipole puts the source of a layer thinner than a mean free path: inside it (layer), or
-        below it as printed (none).
+        Source depth of the multipole in layers thinner than one mean free path: inside the layer (layer), or
+        below it, as published (none).
     eta:
-        Index of refraction of the layers; 1 for a matched surface [1.4].
+        Index of refraction of the layers; 1 for an index-matched surface. [default: 1.4]
     photons:
-        Monte Carlo photons for each channel or wavelength [1000000].
+        Number of Monte Carlo photons per channel or wavelength. [default: 1000000]
     seed:
-        Of the photons' random numbers [0].
+        Seed of the Monte Carlo random numbers. [default: 0]
     anisotropy:
-        Mean cosine g of the photons' scattering; the reduced scattering stays what it is.
+        Mean scattering cosine g of Monte Carlo photons, at constant reduced scattering.
     oiliness:
-        Strength of the surface reflection; nothing below depends on it.
+        Oiliness of the surface; it has no effect on the profile.
     fit:
-        How many Gaussians to fit, 1 to 8 [6].
+        Number of Gaussians to fit, 1 to 8. [default: 6]
     fit_kind:
-        Also fit the normalised profile of Burley, or a separable kernel, and state their errors.
+        Additional fit to report: Burley's normalised diffusion, or a separable kernel.
     variances:
-        One set of widths for all channels, as a renderer wants it, or a set for each.
+        Variances of the Gaussians: the same for all channels, as the renderer needs them, or per channel.
     keep_energy:
-        Have the weights sum to the total reflectance; those of counted do.
+        Constrain the weights to sum to the total reflectance; always on for the model counted.
     through:
-        Also give the colour that comes through these thicknesses, such as 0.5,1,2 [mm].
+        Thicknesses at which to report the transmitted colour, such as 0.5,1,2 [mm].
     output:
-        Profile to write (.toml), for --profile of render.
+        Profile to write (.toml), for `dermis render --profile`.
     plot:
-        Picture to write (.png, .svg or .pdf): r R(r) of each channel with its fit.
+        Plot to write (.png, .svg or .pdf): r R(r) of each channel and its fit.
     check:
-        Add Monte Carlo points with error bars to the plot.
+        Add Monte Carlo results with error bars to the plot.
     """
     from dermis.cli.profile_report import Report, draw_plot, gaussian_fit, other_fit
-    from dermis.optics.diffusion.models import counted_error, known_error
-    from dermis.optics.half_space import COUNTED
-    from dermis.optics.profiles import find_table
-    from dermis.optics.radial import profile_of_table
+    from dermis.optics.diffusion.models import error_against_photons, known_error
+    from dermis.optics.half_space import COUNTED_MODEL
+    from dermis.optics.profiles import find_gaussians
+    from dermis.optics.radial import gaussian_radial_profile
 
-    given = pigments | ({"oiliness": oiliness} if oiliness is not None else {})
+    tissue_options = pigments | drop_none(oiliness=oiliness)
+    changed = tissue_options or eta is not None
     _check_outputs(output, plot, check)
     thicknesses = () if through is None else parse_lengths("--through", through)
-    light = _tracing_options(photons, seed, anisotropy, check or model == "montecarlo")
-    table = find_table(name)
+    tracing = _tracing_options(photons, seed, anisotropy, check or model == "montecarlo")
+    table = find_gaussians(name)
     if table is not None:
-        _refuse_tissue_options(name, given | {"model": model, "eta": eta, "check": check or None})
-        tissue, radial, counted = None, replace(profile_of_table(table), name=name), None
-        error, spectrum = None, None
+        _refuse_tissue_options(name, tissue_options | {"model": model, "eta": eta, "check": check or None})
+        tissue, radial, monte_carlo = None, replace(gaussian_radial_profile(table), name=name), None
+        model_error, spectrum = None, None
     else:
-        tissue = _tissue(name, given, eta)
-        radial = _profile(tissue, model, clamp, light)
-        counted = _profile(tissue, "montecarlo", clamp, light) if check and model != "montecarlo" else None
-        usual = name if not given and eta is None else ""
-        error = counted_error(radial, counted) if counted else known_error(radial.model, usual)
+        tissue = _tissue(name, tissue_options, eta)
+        radial = _profile(tissue, model, clamp, tracing)
+        monte_carlo, model_error = None, known_error(radial.model, "" if changed else name)
+        if check and model != "montecarlo":
+            monte_carlo = _profile(tissue, "montecarlo", clamp, tracing)
+            model_error = error_against_photons(radial, monte_carlo)
         spectrum = _spectrum(tissue, model, clamp)
-    kept = keep_energy or radial.model == COUNTED
-    own, terms = (table, _TERMS) if fit is None else (None, fit)
-    fitted = gaussian_fit(radial, own, terms, shared=variances == "shared", keep_energy=kept)
-    found = Report(radial, tissue, fitted, other_fit(radial, fit_kind), thicknesses, error, spectrum)
+    conserve = keep_energy or radial.model == COUNTED_MODEL
+    table_fit, terms = (table, _TERMS) if fit is None else (None, fit)
+    fitted = gaussian_fit(radial, table_fit, terms, shared=variances == "shared", keep_energy=conserve)
+    report = Report(radial, tissue, fitted, other_fit(radial, fit_kind), thicknesses, model_error, spectrum)
     if output is not None:
-        found.save(output)
+        report.save(output)
     if plot is not None:
-        draw_plot(plot, found, counted)
+        draw_plot(plot, report, monte_carlo)
     if as_json:
-        print_json(found.as_json())
+        print_json(report.as_json())
     else:
-        print_lines(*found.lines())
+        print_lines(*report.lines())
         for warning in radial.warnings:
             note(f"warning: {warning}")
     return 0
@@ -165,34 +178,35 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
     if plot is not None:
         check_output(plot, (".png", ".svg", ".pdf"))
     elif check:
-        refuse("--check", "a plot to add photons to", "no --plot came", "Add --plot picture.png")
+        refuse("--check", "the option --plot", "it is missing", "Add --plot picture.png")
 
 
-def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, traced: bool) -> Options:
-    """Return the options of tracing; print a note when no photons will be traced."""
-    if not traced and (photons, seed, anisotropy) != (None, None, 0.0):
-        note("note: no photons are traced without --model montecarlo or --check")
+def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, is_traced: bool) -> Options:
+    """Return the options of the Monte Carlo simulation; print a note if it will not run."""
+    if not is_traced and (photons, seed, anisotropy) != (None, None, 0.0):
+        note("note: --photons, --seed and --anisotropy have no effect without --model montecarlo or --check")
     return {
-        "photons": whole_number("--photons", _PHOTONS if photons is None else photons, 1, _MAX_PHOTONS),
-        "seed": whole_number("--seed", seed or 0, 0, 2**63 - 1),
-        "g": number("--anisotropy", anisotropy, -1.0, 1.0, "a mean cosine"),
+        "photons": checked_integer("--photons", _PHOTONS if photons is None else photons, 1, _MAX_PHOTONS),
+        "seed": checked_integer("--seed", seed or 0, 0, 2**63 - 1),
+        "g": checked_number("--anisotropy", anisotropy, -1.0, 1.0, "a mean cosine"),
     }
 
 
-def _refuse_tissue_options(name: str, given: Options) -> None:
-    for option, value in given.items():
+def _refuse_tissue_options(name: str, options: Options) -> None:
+    for option, value in options.items():
         if value is not None:
-            expected, came = "a medium or a skin of pigments", f"{name} is a table of Gaussians"
-            refuse(option_name(option, _NAMES), expected, came, "Leave it out")
+            expected, actual = "a medium or a pigmented skin", f"{name} is a table of Gaussians"
+            refuse(option_name(option, _OPTION_NAMES), expected, actual, "Remove the option")
 
 
-def _tissue(name: str, given: Options, eta: float | None) -> Tissue:
+def _tissue(name: str, options: Options, eta: float | None) -> Tissue:
     from dermis.optics.tissue import load_tissue
 
-    structure = given.get("structure")
-    tissue = load_tissue(name, structure, {key: value for key, value in given.items() if key != "structure"})
+    pigments = dict(options)
+    structure = pigments.pop("structure", None)
+    tissue = load_tissue(name, structure, pigments)
     if structure is not None and tissue.parameters is None:
-        refuse("--skin", "a skin made of pigments", f"{name} is a medium", "Leave it out")
+        refuse("--skin", "a pigmented skin", f"{name} is a medium", "Remove the option")
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
 
@@ -202,10 +216,10 @@ def _spectrum(tissue: Tissue, model: Model | None, clamp: Clamp) -> Floats | Non
     return tissue.spectrum(model, clamp)
 
 
-def _profile(tissue: Tissue, model: Model | None, clamp: Clamp, light: Options) -> RadialProfile:
+def _profile(tissue: Tissue, model: Model | None, clamp: Clamp, tracing: Options) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
     from dermis.apps.truths.slab_mc import monte_carlo_profile
 
-    with progress("tracing photons") as report:
-        return monte_carlo_profile(tissue.medium, tissue.rgb, report=report, **light)
+    with progress_bar("tracing photons") as report:
+        return monte_carlo_profile(tissue.medium, tissue.rgb, progress=report, **tracing)

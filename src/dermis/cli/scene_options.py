@@ -1,4 +1,4 @@
-"""The options of a scene, as `dermis render`, `animate` and `view` take them, and the scene they make."""
+"""Scene options shared by `dermis render`, `animate` and `view`, and the scene that they describe."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from dermis.base.errors import refuse
 from dermis.cli.head_options import (
     EYE,
     HEAD_OPTION_NAMES,
+    BoneAngleOptions,
     EyeOptions,
     HeadOptions,
     LookAtOption,
-    BoneAngleOptions,
     Weights,
     check_head,
-    pose_with_gaze,
     note_eyes,
     parse_bone_angles,
     parse_weights,
     pose_from_options,
+    pose_with_gaze,
 )
-from dermis.cli.options import Options, check, option_name, model_options, refuse_options
+from dermis.cli.options import Options, check_fields, model_options, option_name, refuse_options
 from dermis.scene.environment import Environment
-from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, names_regions
-from dermis.scene.settings import PHOTOGRAPHED, Settings
+from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, has_region_table
+from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS, Settings
 from dermis.scene.skin import PRESETS, Skin
 from dermis.scene.techniques import TECHNIQUES
 
@@ -48,14 +48,15 @@ ENVIRONMENT_OPTION_NAMES |= {"name": "env", "rotation_degrees": "env_rotation"}
 
 if not TYPE_CHECKING:
     SkinPreset = Literal[tuple(PRESETS)] | None
-    SkinOptions, SettingsOptions = model_options(Skin), model_options(Settings, defaults=PHOTOGRAPHED)
+    SkinOptions = model_options(Skin)
+    SettingsOptions = model_options(Settings, defaults=PHOTOGRAPHIC_SETTINGS)
     EnvironmentOptions = model_options(Environment, names=ENVIRONMENT_OPTION_NAMES)
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
 class SceneOptions:
-    """Options of a scene as they were typed, by the fields of the models."""
+    """Scene options from the command line, as dictionaries of model fields."""
 
     settings: SettingsOptions = field(default_factory=dict)
     skin: SkinOptions = field(default_factory=dict)
@@ -63,21 +64,24 @@ class SceneOptions:
         SkinPreset,
         Parameter(
             name="--skin",
-            help="Skin to start from: default, or deck-2007 as the talk had it: one lobe of strength 0.18, "
-            "alike all over, over Lambertian skin.",
+            help="Preset of the skin: default, or deck-2007 for the skin of the 2007 talk: one specular lobe "
+            "of strength 0.18, without regions, over Lambertian skin.",
         ),
     ] = None
     lights: Annotated[
         str | None,
         Parameter(
-            help="A rig (studio, window, top, rim, backlit, rembrandt, laser, none) or a TOML file with "
-            "[[lights]]; studio unless --env is given."
+            help="Lighting rig (studio, window, top, rim, backlit, rembrandt, laser, none) or a TOML file "
+            "with [[lights]]. [default: studio, or none with --env]"
         ),
     ] = None
-    around: EnvironmentOptions = field(default_factory=dict)
+    environment: EnvironmentOptions = field(default_factory=dict)
     camera: Annotated[
         str | None,
-        Parameter(help="portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera]."),
+        Parameter(
+            help="Camera: portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera]. "
+            "[default: portrait]"
+        ),
     ] = None
     head: HeadOptions = field(default_factory=dict)
     eye: EyeOptions = None
@@ -89,117 +93,123 @@ class SceneOptions:
 DEFAULTS = SceneOptions()
 
 
-def assemble_scene(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
-    """Return the scene and settings of a head or of a scene's file, with the given options on top.
+def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
+    """Return the scene and settings of a head or scene file, with the options applied.
 
-    Settings that neither states are those of `PHOTOGRAPHED`.
+    Settings without a value in the file or in the options get the values of `PHOTOGRAPHIC_SETTINGS`.
     """
     from dermis.scene import Scene, load_camera
 
-    weights, turns = parse_weights(given.pose or ()), parse_bone_angles(given.bone or ())
-    if given.eye:
-        given = replace(given, head=given.head | {"eye": parse_weights(given.eye, EYE)}, eye=None)
-    _check(name, given)
-    scene, settings = _base_scene(name, given)
-    note_eyes(scene.head, given.head.get("eyes"))
-    if weights or turns:
+    weights, bone_angles = parse_weights(options.pose or ()), parse_bone_angles(options.bone or ())
+    if options.eye:
+        options = replace(options, head=options.head | {"eye": parse_weights(options.eye, EYE)}, eye=None)
+    _check_values(name, options)
+    scene, settings = _base_scene(name, options)
+    note_eyes(scene.head, options.head.get("eyes"))
+    if weights or bone_angles:
         from dermis.mesh.pose import laid_over
 
-        scene = replace(scene, pose=laid_over(pose_from_options(weights, turns, scene.head, name), scene.pose))
-    environment = _environment(scene.environment, given.around)
-    made = Scene(
+        scene = replace(
+            scene, pose=laid_over(pose_from_options(weights, bone_angles, scene.head, name), scene.pose)
+        )
+    environment = _merge_environment(scene.environment, options.environment)
+    assembled = Scene(
         scene.head,
-        lights=_lights(scene, given.lights, environment, replaced="name" in given.around),
-        camera=scene.camera if given.camera is None else load_camera(given.camera, scene.head),
-        skin=Skin(**(scene.skin.model_dump() | PRESETS[given.surface or "default"] | given.skin)),
+        lights=_select_lights(scene, options.lights, environment, replaced="name" in options.environment),
+        camera=scene.camera if options.camera is None else load_camera(options.camera, scene.head),
+        skin=Skin(**(scene.skin.model_dump() | PRESETS[options.surface or "default"] | options.skin)),
         environment=environment,
         pose=scene.pose,
     )
-    if given.look_at is not None:
-        made = replace(made, pose=pose_with_gaze(given.look_at, made))
-    shown = Settings(**{**PHOTOGRAPHED, **settings.model_dump(exclude_unset=True), **given.settings})
-    _note_profile_map(made.skin, shown)
-    return made, shown
+    if options.look_at is not None:
+        assembled = replace(assembled, pose=pose_with_gaze(options.look_at, assembled))
+    final_settings = Settings(
+        **{**PHOTOGRAPHIC_SETTINGS, **settings.model_dump(exclude_unset=True), **options.settings}
+    )
+    _note_profile_map(assembled.skin, final_settings)
+    return assembled, final_settings
 
 
-def note_subdivision(name: str, given: SceneOptions, head: Head) -> None:
-    """Print a line on stderr about levels of subdivision that were chosen for the picture.
+def note_subdivision(name: str, options: SceneOptions, head: Head) -> None:
+    """Print a note on stderr if the subdivision level was chosen automatically.
 
-    name : of the head or of the scene's file, whose head this is
+    name : head or scene file as named on the command line
     """
     from dermis.scene.files import head_table
-    from dermis.scene.heads import LEAST_OF_PEOPLE, is_person
+    from dermis.scene.heads import MIN_HUMAN_LEVELS, is_person_name
 
-    told = head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else given.head
-    least = LEAST_OF_PEOPLE if is_person(head.name) else 0
-    if told.get("subdivide", AUTO) == AUTO and head.levels > least:
+    head_options = head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else options.head
+    least = MIN_HUMAN_LEVELS if is_person_name(head.name) else 0
+    if head_options.get("subdivide", AUTO) == AUTO and head.levels > least:
         count = f"{len(head.mesh.triangles):,} triangles"
-        note(f"note: --subdivide {head.levels}: {count}, for a smooth outline in this picture")
+        note(f"note: --subdivide {head.levels} for a smooth outline in this picture: {count}")
 
 
-def _check(name: str, given: SceneOptions) -> None:
-    """Refuse impossible options before the head is loaded, which takes longer."""
+def _check_values(name: str, options: SceneOptions) -> None:
+    """Validate the options before the head is loaded, because loading takes longer."""
     from dermis.environment.panorama import panorama_file
     from dermis.optics.profiles import load_profile
 
-    looks = given.head.get("eye", {})
-    check(EyeTable, looks, {field_: f"eye {field_}" for field_ in looks})
-    check_head(name, given.head)
-    check(Skin, given.skin)
-    check(Settings, given.settings)
-    check(Environment, {"name": "uniform"} | given.around, ENVIRONMENT_OPTION_NAMES)
-    if "profile" in given.skin:
-        load_profile(given.skin["profile"])
-    for other in given.skin.get("other_profiles", ()):
+    eye_values = options.head.get("eye", {})
+    check_fields(EyeTable, eye_values, {field_: f"eye {field_}" for field_ in eye_values})
+    check_head(name, options.head)
+    check_fields(Skin, options.skin)
+    check_fields(Settings, options.settings)
+    check_fields(Environment, {"name": "uniform"} | options.environment, ENVIRONMENT_OPTION_NAMES)
+    if "profile" in options.skin:
+        load_profile(options.skin["profile"])
+    for other in options.skin.get("other_profiles", ()):
         load_profile(other)
-    if "name" in given.around:
-        panorama_file(given.around["name"])
+    if "name" in options.environment:
+        panorama_file(options.environment["name"])
 
 
 def _note_profile_map(skin: Skin, settings: Settings) -> None:
-    """Print a line on stderr where a map of profiles has no effect."""
-    if skin.profile_map and not TECHNIQUES[settings.technique].mixes:
-        note(f"note: {settings.technique} takes the first profile alone; texture-space mixes them by the map")
+    """Print a note on stderr if the profile map has no effect with the technique."""
+    if skin.profile_map and not TECHNIQUES[settings.technique].mixes_profiles:
+        note(f"note: {settings.technique} uses only the first profile; texture-space mixes them by the map")
 
 
-def _base_scene(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
-    """Return the scene of a file, or a head's scene with defaults."""
+def _base_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
+    """Return the scene of a file, or a scene of the head with default settings."""
     from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import head_and_skin
     from dermis.scene.smoothness import SmoothIn
 
     if Path(name).suffix.lower() == ".toml":
-        refuse_options(given.head, HEAD_OPTION_NAMES, "with a scene file", "Write it into the file's [head]")
-        return load_scene(Path(name), camera=given.camera, size=given.settings.get("size"))
-    alike = {"regions": NO_REGIONS} if given.surface == "deck-2007" else {}
-    table = HeadTable(**{"name": name, **alike, **given.head})
-    if names_regions(vars(table)) and "rho_s" in given.skin:
-        came = "it came with --regions, which says it for each region"
-        refuse(option_name("rho_s"), "one or the other", came, "Leave one out, or use --oiliness")
-    seen = partial(load_camera, given.camera or "portrait")
-    picture = SmoothIn(seen, Settings(**given.settings).size)
+        refuse_options(
+            options.head, HEAD_OPTION_NAMES, "with a scene file", "Write it into the file's [head]"
+        )
+        return load_scene(Path(name), camera=options.camera, size=options.settings.get("size"))
+    region_options = {"regions": NO_REGIONS} if options.surface == "deck-2007" else {}
+    table = HeadTable(**{"name": name, **region_options, **options.head})
+    if has_region_table(vars(table)) and "rho_s" in options.skin:
+        actual = "it is given with --regions, which sets it for each region"
+        refuse(option_name("rho_s"), "only one of the two", actual, "Remove one, or use --oiliness")
+    camera_for = partial(load_camera, options.camera or "portrait")
+    picture = SmoothIn(camera_for, Settings(**options.settings).size)
     head, skin = head_and_skin(table, Skin(), Path(), picture)
     return Scene(head, skin=skin), Settings()
 
 
-def _environment(before: Environment | None, around: Options) -> Environment | None:
-    if around and before is None and "name" not in around:
-        option = option_name(next(iter(around)), ENVIRONMENT_OPTION_NAMES)
-        refuse(option, "an environment with it", "there is none", "Add --env, or [environment] to the scene")
-    if not around:
-        return before
-    return Environment(**((before.model_dump() if before else {}) | around))
+def _merge_environment(scene_environment: Environment | None, options: Options) -> Environment | None:
+    if options and scene_environment is None and "name" not in options:
+        option = option_name(next(iter(options)), ENVIRONMENT_OPTION_NAMES)
+        refuse(option, "an environment", "there is none", "Add --env, or [environment] to the scene")
+    if not options:
+        return scene_environment
+    return Environment(**((scene_environment.model_dump() if scene_environment else {}) | options))
 
 
-def _lights(
+def _select_lights(
     scene: Scene, name: str | None, environment: Environment | None, *, replaced: bool
 ) -> tuple[Light, ...]:
-    """Return the given rig; no lights where only an environment is given; else the scene's lights."""
+    """Return the lights of --lights; none if only an environment is given; else those of the scene."""
     from dermis.scene import load_lights
 
     if name is None:
         return () if replaced else tuple(scene.lights)
     lights = load_lights(name)
     if not lights and environment is None:
-        refuse("--lights", "some light", f"{name!r} has none", "Add --env, or choose another rig")
+        refuse("--lights", "at least one light", f"{name!r} has none", "Add --env, or choose another rig")
     return lights

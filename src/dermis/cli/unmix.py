@@ -1,21 +1,17 @@
-"""`dermis unmix`: from a picture of skin's colour to melanin and blood, and to the same skin with others."""
+"""The command `dermis unmix`: melanin and blood from skin colour, and recolouring."""
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
-from cyclopts import Parameter
-
-from dermis.base.console import print_json, print_lines, progress
-from dermis.cli.options import Adapter, OutputPath, Json, given
+from dermis.base.console import print_json, print_lines, progress_bar
+from dermis.cli.options import AdapterOption, Flag, JsonOption, OutputPath, drop_none
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
     from dermis.apps.inverse.unmixing.unmix import Change, Unmixed
-
-_Share = Annotated[str | None, Parameter(show_default=False)]
 
 
 def unmix(
@@ -23,8 +19,8 @@ def unmix(
     /,
     *,
     output: OutputPath = Path("maps"),
-    melanin: _Share = None,
-    blood: _Share = None,
+    melanin: str | None = None,
+    blood: str | None = None,
     oxygen: float | None = None,
     eumelanin: float | None = None,
     find: Literal["none", "oxygen"] = "none",
@@ -32,16 +28,16 @@ def unmix(
     model_eumelanin: float = DEFAULT_SKIN.eumelanin,
     epidermis_mm: float = DEFAULT_SKIN.epidermis_mm,
     noise: float = 0.01,
-    shading: Annotated[bool, Parameter(negative="")] = False,
-    widths: Annotated[bool, Parameter(negative="")] = False,
-    adapter: Adapter = "auto",
-    as_json: Json = False,
+    shading: Flag = False,
+    widths: Flag = False,
+    adapter: AdapterOption = "auto",
+    as_json: JsonOption = False,
 ) -> int:
-    """Find the melanin and blood of each texel of a picture of skin's colour, and recolour it.
+    """Estimate melanin and blood of each texel of a skin colour map, and recolour it.
 
-    Written are melanin.exr and blood.exr (shares of the volume, as dermis profile takes them), how well each
-    can be known (melanin_sd.exr, blood_sd.exr), and residual.exr: the colour over that of the model, which
-    holds paint, hair, and all else that is no such skin.
+    The command writes melanin.exr and blood.exr (volume fractions, as in `dermis profile`), their standard
+    deviations melanin_sd.exr and blood_sd.exr, and residual.exr, the ratio of the colour map to the model
+    colour, which contains paint, hair and everything else that is not such skin.
 
     Examples:
 
@@ -58,33 +54,35 @@ def unmix(
     Parameters
     ----------
     colour_map:
-        Albedo of skin: PNG, JPEG or TIFF in sRGB, or EXR (linear, 0 to 1).
+        Albedo of the skin: PNG, JPEG or TIFF in sRGB, or EXR (linear, 0 to 1).
     output:
-        Folder for the maps, which is made.
+        Folder of the maps, created if necessary.
     melanin:
-        Recolour: x2 for twice as much, 0.1 for a median of that share of the volume.
+        Recolour: a factor such as x2, or the new median volume fraction such as 0.1.
     blood:
-        Recolour: likewise.
+        Recolour: a factor such as x2, or the new median volume fraction such as 0.02.
     oxygen:
-        Recolour: share of the haemoglobin that carries oxygen, 0 to 1.
+        Recolour: new oxygen saturation of the blood, 0 to 1.
     eumelanin:
-        Recolour: share of the melanin that is brown to black, 0 to 1.
+        Recolour: new fraction of the melanin that is eumelanin, 0 to 1.
     find:
-        oxygen: find that too, as far as colour tells; 0.1 around the model's is held likely.
+        oxygen: estimate the oxygen saturation too, with a prior of standard deviation 0.1 around
+        --model-oxygen.
     model_oxygen:
-        Of the skin in the picture, 0 to 1.
+        Oxygen saturation of the skin in the colour map, 0 to 1.
     model_eumelanin:
-        Of the skin in the picture, 0 to 1.
+        Eumelanin fraction of the skin in the colour map, 0 to 1.
     epidermis_mm:
-        Thickness of its epidermis [mm].
+        Thickness of the epidermis [mm].
     noise:
-        Standard deviation of a channel, relative; what is known of melanin and blood follows from it.
+        Relative standard deviation of the colour channels, which determines the uncertainty of the result
+        [-].
     shading:
-        Take slow changes of brightness for light, and divide by them; shading.exr has them.
+        Treat slow changes of brightness as shading and divide by them; written as shading.exr.
     widths:
-        Write three diffusion profiles and the map that mixes them, for dermis render --profile-map.
+        Also write three diffusion profiles and their mixing map, for `dermis render --profile-map`.
     adapter:
-        Which adapter computes: auto, cpu or part of a name.
+        Adapter to compute on: auto, cpu or part of a name.
     """
     from dermis.apps.inverse.unmixing.profile_widths import save_widths, widths_of
     from dermis.apps.inverse.unmixing.unmix import SUMMARY, save_maps
@@ -93,57 +91,55 @@ def unmix(
 
     started = time.perf_counter()
     check_folder(output, SUMMARY)
-    change = _change(melanin, blood, oxygen, eumelanin)
+    change = _parse_change(melanin, blood, oxygen, eumelanin)
     skin = SkinParameters(oxygen=model_oxygen, eumelanin=model_eumelanin, epidermis_mm=epidermis_mm)
-    with progress("unmixing") as told:
-        found = unmixed(
+    with progress_bar("unmixing") as report_progress:
+        result = unmixed(
             colour_map,
             skin=skin,
             third=find,
             noise=noise,
             shading=shading,
             adapter=adapter,
-            told=told,
+            told=report_progress,
         )
-    recoloured = None if change is None else found.recoloured(change, adapter)
-    written = save_maps(output, found, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))
+    recoloured = None if change is None else result.recoloured(change, adapter)
+    written = save_maps(output, result, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))
     if widths:
-        written += save_widths(output, widths_of(found))
-    _report(found, written, time.perf_counter() - started, as_json)
+        written += save_widths(output, widths_of(result))
+    _report(result, written, time.perf_counter() - started, as_json)
     return 0
 
 
-def _change(
+def _parse_change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
 ) -> Change | None:
-    """Return the change of colour that was typed, None for none."""
+    """Return the change of colour given by the options, None if there is none."""
     from dermis.apps.inverse.unmixing.unmix import Change, parse_share
-    from dermis.base.quantities import number
+    from dermis.base.quantities import checked_number
 
-    changed = given(oxygen=oxygen, eumelanin=eumelanin)
-    for name, value in changed.items():
-        number(f"--{name}", value, 0.0, 1.0, "a share")
-    for name, words in given(melanin=melanin, blood=blood).items():
-        changed[name] = parse_share(f"--{name}", words)
-    return Change(**changed) if changed else None
+    values = drop_none(oxygen=oxygen, eumelanin=eumelanin)
+    for name, value in values.items():
+        checked_number(f"--{name}", value, 0.0, 1.0, "a fraction")
+    for name, text in drop_none(melanin=melanin, blood=blood).items():
+        values[name] = parse_share(f"--{name}", text)
+    return Change(**values) if values else None
 
 
-def _report(found: Unmixed, written: list[Path], seconds: float, as_json: bool) -> None:
-    told = found.summary() | {"files": [str(one) for one in written], "seconds": round(seconds, 3)}
+def _report(result: Unmixed, written: list[Path], seconds: float, as_json: bool) -> None:
+    summary = result.summary() | {"files": [str(path) for path in written], "seconds": round(seconds, 3)}
     if as_json:
-        print_json(told)
+        print_json(summary)
         return
-    height, width = found.melanin.shape
-    lines = [f"{width} x {height} texels, {100.0 * told['skin']:.0f} % of them like skin ({seconds:.1f} s)"]
-    if "melanin" in told:
+    height, width = result.melanin.shape
+    lines = [f"{width} x {height} texels, {100.0 * summary['skin']:.0f} % of them skin ({seconds:.1f} s)"]
+    if "melanin" in summary:
         for name in ("melanin", "blood"):
-            one = told[name]
+            values = summary[name]
             lines.append(
-                f"  {name:8} median {one['median']:.4f}, 5 to 95 %: {one['p5']:.4f} to {one['p95']:.4f}, "
-                f"known to {one['sd']:.4f}"
+                f"  {name:8} median {values['median']:.4f}, 5 to 95 %: {values['p5']:.4f} to "
+                f"{values['p95']:.4f}, standard deviation {values['sd']:.4f}"
             )
-        off = told["delta_e"]
-        apart = f"{off['median']:.2f} (median), {off['p95']:.2f} (95 %)"
-        lines.append(f"  the model's colours are off by CIEDE2000 {apart}")
-    lines += [f"  {one}" for one in written]
-    print_lines(*lines)
+        error = summary["delta_e"]
+        lines.append(f"  colour error CIEDE2000 {error['median']:.2f} (median), {error['p95']:.2f} (95 %)")
+    print_lines(*lines, *(f"  {path}" for path in written))
