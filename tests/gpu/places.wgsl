@@ -1,5 +1,5 @@
 // The place of each texel of two targets, the second's by as many times as the override says.
-//#include "covering.wgsl"
+//#include "full_screen_triangle.wgsl"
 
 override TIMES: f32 = 1.0;
 

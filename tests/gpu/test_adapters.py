@@ -18,13 +18,13 @@ from dermis.gpu import list_adapters, open_device
 from dermis.gpu.adapters import (
     DEFAULT_LIMITS,
     INSTALL_HINT,
-    WANTED_FEATURES,
-    alike_adapters,
-    fitting_adapters,
+    OPTIONAL_FEATURES,
+    select_adapters,
+    similar_adapters,
 )
 
 
-def fake(name: str, kind: str, backend: str = "Vulkan", features: tuple[str, ...] = WANTED_FEATURES) -> Any:
+def fake(name: str, kind: str, backend: str = "Vulkan", features: tuple[str, ...] = OPTIONAL_FEATURES) -> Any:
     info = {"device": name, "description": f"{name} driver", "adapter_type": kind, "backend_type": backend}
     return SimpleNamespace(info=info, features=set(features))
 
@@ -61,49 +61,49 @@ PLAIN_GPU = fake("Old", "DiscreteGPU", features=())
 )
 def test_auto_takes_the_best(machine: Any, handles: tuple[Any, ...], chosen: str) -> None:
     machine(*handles)
-    assert fitting_adapters("auto")[0][0].name == chosen
+    assert select_adapters("auto")[0][0].name == chosen
 
 
 def test_cpu_takes_the_software_adapter_with_all_features(machine: Any) -> None:
     machine(GPU, fake("softpipe", "CPU", features=()), CPU)
-    (adapter, *_), reason = fitting_adapters("cpu")
-    assert (adapter.name, adapter.missing) == ("llvmpipe", ())
+    (adapter, *_), reason = select_adapters("cpu")
+    assert (adapter.name, adapter.missing_features) == ("llvmpipe", ())
     assert "software" in reason
 
 
 @pytest.mark.parametrize("wanted", ["gefo", "GEFORCE", "GeForce driver"])
 def test_part_of_a_name_is_enough(machine: Any, wanted: str) -> None:
     machine(CPU, GPU)
-    assert fitting_adapters(wanted)[0][0].name == "GeForce"
+    assert select_adapters(wanted)[0][0].name == "GeForce"
 
 
 def test_adapters_of_one_name_are_told_apart_by_their_numbers(machine: Any) -> None:
     first, second = fake("H200", "DiscreteGPU"), fake("H200", "DiscreteGPU")
     machine(CPU, first, second)
     assert [one.number for one in list_adapters()] == [0, 1, 2]
-    assert fitting_adapters("#0")[0][0].handle is first
-    assert [one.handle for one in fitting_adapters("#1")[0]] == [second]
+    assert select_adapters("#0")[0][0].handle is first
+    assert [one.handle for one in select_adapters("#1")[0]] == [second]
     with pytest.raises(DermisError, match=r"adapter '#3': .*#0 H200 \(Vulkan\).*#2 llvmpipe"):
-        fitting_adapters("#3")
+        select_adapters("#3")
 
 
 def test_all_gpus_of_the_best_kind_are_taken_once_each(machine: Any) -> None:
     twice = [fake("H200", "DiscreteGPU"), fake("H200", "DiscreteGPU")]
     machine(CPU, fake("Iris", "IntegratedGPU"), *twice, fake("H200", "DiscreteGPU", "D3D12"), CPU)
-    assert [one.handle for one in alike_adapters("auto")] == twice
-    assert [one.handle for one in alike_adapters("#1")] == twice[1:]
-    assert [one.name for one in alike_adapters("cpu")] == ["llvmpipe"]
+    assert [one.handle for one in similar_adapters("auto")] == twice
+    assert [one.handle for one in similar_adapters("#1")] == twice[1:]
+    assert [one.name for one in similar_adapters("cpu")] == ["llvmpipe"]
 
 
 def test_missing_features_are_told() -> None:
-    assert module._describe(fake("x", "CPU", features=("shader-f16",))).missing == WANTED_FEATURES
+    assert module._describe(fake("x", "CPU", features=("shader-f16",))).missing_features == OPTIONAL_FEATURES
 
 
 @pytest.mark.parametrize("wanted", ["auto", "cpu", "GeForce"])
 def test_no_adapter_at_all(machine: Any, wanted: str) -> None:
     machine()
     with pytest.raises(DermisError, match="Vulkan") as caught:
-        fitting_adapters(wanted)
+        select_adapters(wanted)
     assert INSTALL_HINT in str(caught.value)
 
 
@@ -111,15 +111,15 @@ def test_no_adapter_at_all(machine: Any, wanted: str) -> None:
 def test_opengl_alone_is_taken_only_by_its_name(machine: Any, wanted: str) -> None:
     machine(fake("Mesa", "CPU", "OpenGL"))
     with pytest.raises(DermisError, match="OpenGL") as caught:
-        fitting_adapters(wanted)
+        select_adapters(wanted)
     assert INSTALL_HINT in str(caught.value)
-    assert fitting_adapters("mesa")[0][0].backend == "OpenGL"
+    assert select_adapters("mesa")[0][0].backend == "OpenGL"
 
 
 def test_no_software_adapter(machine: Any) -> None:
     machine(GPU)
     with pytest.raises(DermisError, match="GeForce") as caught:
-        fitting_adapters("cpu")
+        select_adapters("cpu")
     assert INSTALL_HINT in str(caught.value)
 
 

@@ -12,10 +12,10 @@ import pytest
 
 from dermis.base.errors import DermisError
 from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture
-from dermis.gpu.bind_groups import ResourceCache, key_of
-from dermis.gpu.command_list import Timed
+from dermis.gpu.bind_groups import ResourceCache, resource_key
+from dermis.gpu.command_list import Timing
 from dermis.gpu.failures import gpu_failures
-from dermis.gpu.textures import half_store_rounding, texture_from
+from dermis.gpu.textures import half_store_rounding, texture_from_array
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 SIZE = (37, 21)  # no multiple of a tile
@@ -28,7 +28,7 @@ def scale(device: Device) -> ComputeProgram:
 
 def test_passes_follow_each_other(device: Device, scale: ComputeProgram) -> None:
     image = np.random.default_rng(1).random(SIZE[::-1]).astype(np.float32)
-    textures = [texture_from(device, image, "r32float")]
+    textures = [texture_from_array(device, image, "r32float")]
     frame = CommandList(device)
     for factor in (2.0, 3.0, 0.5):
         textures.append(make_texture(device, SIZE, "r32float"))
@@ -59,7 +59,7 @@ def test_stage_times_add_up_to_the_total(device: Device, scale: ComputeProgram) 
     assert times["one"] + times["two"] == pytest.approx(times["total"])
 
 
-def staged_times(device: Device, scale: ComputeProgram, timed: Timed) -> tuple[dict[str, float] | None, int]:
+def staged_times(device: Device, scale: ComputeProgram, timed: Timing) -> tuple[dict[str, float] | None, int]:
     """Times of a frame of two stages in turn, and how many timestamps it took."""
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
     frame = CommandList(device, timed=timed)
@@ -68,7 +68,7 @@ def staged_times(device: Device, scale: ComputeProgram, timed: Timed) -> tuple[d
         frame.compute(stage, scale, bound, SIZE)
     frame.submit()
     frame.wait()
-    return frame.stage_ms(), len(frame._stamps._stages) if frame._stamps else 0
+    return frame.stage_ms(), len(frame._timestamps._stages) if frame._timestamps else 0
 
 
 def test_a_frame_timed_as_a_whole_is_not_divided(
@@ -104,8 +104,10 @@ def record_of(scale: ComputeProgram, value: float) -> Any:
 
 def test_a_record_keeps_its_place_and_no_other_one_gets_it(device: Device, scale: ComputeProgram) -> None:
     uniforms, record = Uniforms(device), record_of(scale, 1.25)
-    first, same = (uniforms.place(record) for _ in range(2))
-    others = [uniforms.place(record_of(scale, 1.5)) for _ in range(4)]  # each gone when the next one is made
+    first, same = (uniforms.position(record) for _ in range(2))
+    others = [
+        uniforms.position(record_of(scale, 1.5)) for _ in range(4)
+    ]  # each released before the next
     assert first == same and len({first, *others}) == 5
 
 
@@ -117,13 +119,13 @@ def test_memory_for_records_is_used_again(device: Device, scale: ComputeProgram)
         bound = {"factor": record_of(scale, value), "image": image, "scaled": into}
         frame.compute("scale", scale, bound, SIZE)
         frame.submit()
-        spare.append(len(device.spare_records))
+        spare.append(len(device.spare_chunks))
     assert spare[0] > 0 and len(set(spare)) == 1
 
 
 def test_one_frame_may_have_more_uniforms_than_a_buffer_holds(device: Device, scale: ComputeProgram) -> None:
     count = CHUNK_BYTES // 256 + 3
-    image = texture_from(device, np.ones((1, 1), np.float32), "r32float")
+    image = texture_from_array(device, np.ones((1, 1), np.float32), "r32float")
     frame, made = CommandList(device), [make_texture(device, (1, 1), "r32float") for _ in range(count)]
     for value, into in enumerate(made):
         frame.compute(
@@ -136,7 +138,7 @@ def test_one_frame_may_have_more_uniforms_than_a_buffer_holds(device: Device, sc
 
 def test_frames_in_flight_keep_their_uniforms(device: Device, scale: ComputeProgram) -> None:
     """All frames write to one buffer; each must read its own numbers, whichever was recorded first."""
-    image = texture_from(device, np.ones((64, 64), np.float32), "r32float")
+    image = texture_from_array(device, np.ones((64, 64), np.float32), "r32float")
     made = [make_texture(device, (64, 64), "r32float") for _ in range(20)]
     frames = [CommandList(device, timed=False) for _ in made]
     for value, (frame, into) in enumerate(zip(frames, made, strict=True)):
@@ -163,17 +165,17 @@ def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
         into = make_texture(device, SIZE, "r32float")
         bound = {"factor": record_of(program, 1), "image": image, "scaled": into}
         group, _ = program.bind_group(bound, uniforms)
-        assert len(program.kept_groups) == 1
+        assert len(program.bind_groups) == 1
         gone = weakref.ref(group)
         del group, into, bound
-        assert len(program.kept_groups) == 0 and gone() is None
-    assert program.kept_groups.followed <= 2  # the image and the uniforms
+        assert len(program.bind_groups) == 0 and gone() is None
+    assert program.bind_groups.resource_count <= 2  # the image and the uniforms
 
 
 def test_what_goes_before_the_submit_is_still_read(device: Device, scale: ComputeProgram) -> None:
     """The library holds on to what a pass binds; here only the result is."""
     into, frame = make_texture(device, SIZE, "r32float"), CommandList(device, timed=False)
-    image = texture_from(device, np.full(SIZE[::-1], 3.0, np.float32), "r32float")
+    image = texture_from_array(device, np.full(SIZE[::-1], 3.0, np.float32), "r32float")
     bound = {"factor": record_of(scale, 2.0), "image": image, "scaled": into}
     frame.compute("scale", scale, bound, SIZE)
     gone = weakref.ref(image)
@@ -190,11 +192,11 @@ class Resource:
 def test_resources_that_go_one_after_another_are_followed_no_more() -> None:
     """Else what takes their place in memory would be taken for them, with groups that bind what is gone."""
     groups, first, second = ResourceCache[str](), Resource(), Resource()
-    groups.keep(key_of([first, second]), [first, second], "group")
+    groups.add(resource_key([first, second]), [first, second], "group")
     del first
-    assert len(groups) == 0 and groups.followed == 1
+    assert len(groups) == 0 and groups.resource_count == 1
     del second
-    assert groups.followed == 0
+    assert groups.resource_count == 0
 
 
 def test_a_forgotten_resource_is_named(device: Device, scale: ComputeProgram) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dermis.gpu import ComputeProgram, Device, open_device
-from dermis.gpu.adapters import DEFAULT_LIMITS, WANTED_FEATURES
+from dermis.gpu.adapters import DEFAULT_LIMITS, OPTIONAL_FEATURES
 
 RAISED = {"max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size"}
 
@@ -30,7 +30,7 @@ def test_limits_are_the_default_ones(device: Device, bare: Device) -> None:
 def test_only_named_features_are_asked_for(device: Device, bare: Device) -> None:
     """wgpu's own devices have `core-features-and-limits` in any case."""
     known = set(device.handle.features) - set(bare.handle.features)
-    assert known <= set(WANTED_FEATURES)
+    assert known <= set(OPTIONAL_FEATURES)
     assert not set(bare.handle.features) & set(device.adapter.handle.features) - {"core-features-and-limits"}
     assert not bare.has_timestamps
 

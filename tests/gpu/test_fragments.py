@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.gpu import CommandList, Device, FragmentProgram, download, make_texture
+from dermis.gpu import CommandList, Device, RenderProgram, download, make_texture
 
 SIZE = (37, 21)
 
 
 def test_every_texel_of_all_targets_is_drawn_at_its_place(device: Device) -> None:
-    program = FragmentProgram(
+    program = RenderProgram(
         device,
         Path(__file__).parent / "places.wgsl",
         constants={"TIMES": 2.0},

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.gpu import CommandList, ComputeProgram, Device, Graph, download, make_texture, scratch
-from dermis.gpu.shader_types import bindings, members_read, struct_dtype
-from dermis.gpu.textures import texture_from
+from dermis.gpu import CommandList, ComputeProgram, Device, Graph, download, make_texture, mark_scratch
+from dermis.gpu.shader_types import bindings, struct_dtype, used_members
+from dermis.gpu.textures import texture_from_array
 
 SIZE = (9, 5)
 
@@ -25,7 +25,7 @@ class Chain:
 
     def __init__(self, device: Device, scale: ComputeProgram, count: int) -> None:
         self.graph, self.scale = Graph(device), scale
-        first = texture_from(device, np.ones(SIZE[::-1], np.float32), "r32float")
+        first = texture_from_array(device, np.ones(SIZE[::-1], np.float32), "r32float")
         self.textures = [first, *(make_texture(device, SIZE, "r32float") for _ in range(count))]
 
     def frame(self, *passes: tuple[int, int, float]) -> list[str]:
@@ -36,7 +36,7 @@ class Chain:
             bound = {"factor": record, "image": self.textures[source], "scaled": self.textures[into]}
             self.graph.compute(f"{source}-{into}", self.scale, bound, SIZE)
         self.graph.submit()
-        return self.graph.ran
+        return self.graph.executed_stages
 
     def value(self, index: int) -> float:
         return float(download(self.graph.device, self.textures[index])[0, 0])
@@ -55,7 +55,7 @@ def test_who_forgets_runs_everything(device: Device, scale: ComputeProgram) -> N
     chain = Chain(device, scale, 2)
     passes = (0, 1, 2.0), (1, 2, 3.0)
     for _ in range(2):
-        chain.graph.forget()
+        chain.graph.invalidate()
         assert chain.frame(*passes) == ["0-1", "1-2"]
     assert chain.frame(*passes) == []
 
@@ -72,7 +72,7 @@ def test_what_another_frame_left_there_is_replaced(device: Device, scale: Comput
 def test_scratch_may_hold_anything(device: Device, scale: ComputeProgram) -> None:
     """No pass runs only for what it leaves there, but for one that reads it."""
     chain = Chain(device, scale, 3)
-    scratch(device, chain.textures[1])
+    mark_scratch(device, chain.textures[1])
     one, other = ((0, 1, 2.0), (1, 2, 3.0)), ((0, 1, 5.0), (1, 3, 3.0))
     chain.frame(*one), chain.frame(*other)
     assert chain.frame(*one) == []
@@ -104,7 +104,7 @@ def test_a_pass_is_the_same_after_however_many_others(device: Device, scale: Com
 @pytest.mark.parametrize("looks_at_view", [True, False])
 def test_a_view_and_its_texture_are_one(device: Device, scale: ComputeProgram, looks_at_view: bool) -> None:
     """Who reads the one sees what was written to the other, also by frames that did not read it."""
-    graph, image = Graph(device), texture_from(device, np.ones(SIZE[::-1], np.float32), "r32float")
+    graph, image = Graph(device), texture_from_array(device, np.ones(SIZE[::-1], np.float32), "r32float")
     whole, copy = (make_texture(device, SIZE, "r32float") for _ in range(2))
     view = whole.create_view()
     read, other = (view, whole) if looks_at_view else (whole, view)
@@ -115,7 +115,7 @@ def test_a_view_and_its_texture_are_one(device: Device, scale: ComputeProgram, l
             bound = {"factor": scale.record("Factor", value=factor), "image": source, "scaled": into}
             graph.compute("scale", scale, bound, SIZE)
         graph.submit()
-        return len(graph.ran)
+        return len(graph.executed_stages)
 
     for factor in (2.0, 3.0):
         assert frame((image, read, factor), (read, copy, 1.0)) == 2
@@ -139,7 +139,7 @@ def test_layers_are_kept_apart_and_their_texture_is_all_of_them(device: Device) 
     options = {"dimension": "2d", "array_layer_count": 1}
     layers = [whole.create_view(base_array_layer=k, **options) for k in range(2)]
     program = ComputeProgram(device, Path(__file__).parent / "scale.wgsl")
-    graph, image = Graph(device), texture_from(device, np.ones(SIZE[::-1], np.float32), "r32float")
+    graph, image = Graph(device), texture_from_array(device, np.ones(SIZE[::-1], np.float32), "r32float")
 
     def frame(*factors: float) -> list[str]:
         graph.begin()
@@ -147,7 +147,7 @@ def test_layers_are_kept_apart_and_their_texture_is_all_of_them(device: Device) 
             bound = {"factor": program.record("Factor", value=factor), "image": image, "scaled": layers[k]}
             graph.compute(f"layer {k}", program, bound, SIZE)
         graph.submit()
-        return graph.ran
+        return graph.executed_stages
 
     assert frame(2.0, 3.0) == ["layer 0", "layer 1"]
     assert [frame(2.0, 3.0), frame(2.0, 4.0)] == [[], ["layer 1"]]
@@ -173,7 +173,7 @@ def test_a_frame_that_failed_is_run_again(
 def test_bytes_that_are_fetched_are_those_after_all_passes(device: Device) -> None:
     graph, buffer = Graph(device), device.buffer(np.arange(4, dtype=np.uint32), "STORAGE")
     graph.begin()
-    fetched = graph.fetch(buffer)
+    fetched = graph.read_back(buffer)
     graph.submit()
     assert fetched.array().view(np.uint32).tolist() == [0, 1, 2, 3]
 
@@ -187,9 +187,9 @@ def test_accesses_are_what_shaders_declare() -> None:
     }
     for declaration, expected in declared.items():
         (one,) = bindings(f"@group(0) @binding(0) {declaration}")
-        assert (one.holds, one.reads, one.writes) == expected, declaration
+        assert (one.has_content, one.reads, one.writes) == expected, declaration
     (sampler,) = bindings("@group(0) @binding(0) var x: sampler;")
-    assert not sampler.holds and not sampler.writes
+    assert not sampler.has_content and not sampler.writes
 
 
 STRUCT = "struct S { a: f32, b: vec3f, c: f32 }\n@group(0) @binding(0) var<uniform> one: S;\n"
@@ -205,7 +205,7 @@ STRUCT = "struct S { a: f32, b: vec3f, c: f32 }\n@group(0) @binding(0) var<unifo
     ],
 )
 def test_only_members_that_are_read_count(code: str, read: set[str]) -> None:
-    reader, dtype = members_read(STRUCT + code, "one"), struct_dtype(STRUCT, "S")
+    reader, dtype = used_members(STRUCT + code, "one"), struct_dtype(STRUCT, "S")
     plain = np.zeros((), dtype)
     for member in ("a", "b", "c"):
         changed = np.zeros((), dtype)

@@ -11,7 +11,7 @@ from scipy.ndimage import map_coordinates
 from tolerances import TWIN
 
 from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.images.colour import encode_srgb
 
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -22,8 +22,8 @@ def run(device: Device, image: NDArray[np.float64], places: NDArray[np.float64])
     size = places.shape[1], places.shape[0]
     read, encoded = (make_texture(device, size, "rgba32float") for _ in range(2))
     bound = {
-        "image": texture_from(device, image, "rgba32float"),
-        "places": texture_from(device, places, "rg32float"),
+        "image": texture_from_array(device, image, "rgba32float"),
+        "places": texture_from_array(device, places, "rg32float"),
         "read": read,
         "encoded": encoded,
     }

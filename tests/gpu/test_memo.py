@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dermis.gpu import Memo
-from dermis.gpu.memo import same
+from dermis.gpu.memo import are_equal
 
 
 class Log:
@@ -27,7 +27,7 @@ class Log:
     def asked(self, memo: Memo, keys: str) -> str:
         """The keys for which something is made when all of these are asked for."""
         self.made = ""
-        assert "".join(memo.keep(self.make, key) for key in keys) == keys.upper()
+        assert "".join(memo.get(self.make, key) for key in keys) == keys.upper()
         return self.made
 
 
@@ -44,11 +44,11 @@ def test_room_is_made_before_a_thing_is() -> None:
     memo, log, left = Memo(2), Log(), list[Any]()
 
     def make(key: str) -> str:
-        left[:] = [made.value for made in memo._kept[make, ""]]
+        left[:] = [made.value for made in memo._results[make, ""]]
         return log.make(key)
 
     for key, others in (("a", []), ("b", ["A"]), ("c", ["B"]), ("b", ["B"])):
-        memo.keep(make, key)
+        memo.get(make, key)
         assert left == others
     assert log.made == "abc"
 
@@ -59,7 +59,7 @@ def test_what_nobody_asks_for_goes_after_some_rounds(depth: int, asked: int, rou
     for more, expected in ((0, ""), (rounds, "a")):
         log.asked(memo, "a")
         for _ in range(more + 1):
-            memo.end()
+            memo.end_frame()
         assert log.asked(memo, "a") == expected
 
 
@@ -68,11 +68,11 @@ def test_parts_of_what_is_asked_for_stay() -> None:
     memo, log = Memo(), Log()
 
     def whole() -> str:
-        return memo.keep(log.make, "a")
+        return memo.get(log.make, "a")
 
     for _ in range(5):
-        assert memo.keep(whole) == "A"
-        memo.end()
+        assert memo.get(whole) == "A"
+        memo.end_frame()
     assert log.asked(memo, "a") == ""
 
 
@@ -81,30 +81,30 @@ def test_parts_of_what_is_asked_for_are_those_used_last() -> None:
     memo, log = Memo(2), Log()
 
     def whole(key: str) -> str:
-        return memo.keep(log.make, key)
+        return memo.get(log.make, key)
 
     for key in "abac":
-        assert memo.keep(whole, key) == key.upper()
+        assert memo.get(whole, key) == key.upper()
     assert log.asked(memo, "acb") == "b"
 
 
 def test_forgetting_makes_everything_again() -> None:
     memo, log = Memo(3), Log()
     log.asked(memo, "abc")
-    memo.forget()
+    memo.clear()
     assert log.asked(memo, "abc") == "abc"
 
 
 def test_owners_keep_their_own() -> None:
     memo, log = Memo(), Log()
     for owner, key in (("left", "a"), ("right", "b"), ("left", "a"), ("right", "b")):
-        assert memo.keep(log.make, key, of=owner) == key.upper()
+        assert memo.get(log.make, key, owner=owner) == key.upper()
     assert log.made == "ab"
 
 
 def test_what_makes_no_other_result_is_not_compared() -> None:
     memo = Memo()
-    assert [memo.keep(max, 1, using=(more,)) for more in (5, 7)] == [5, 5]
+    assert [memo.get(max, 1, untracked=(more,)) for more in (5, 7)] == [5, 5]
 
 
 @dataclass(frozen=True)
@@ -143,8 +143,8 @@ def test_arguments_are_the_same_by_what_they_say() -> None:
         ([Value(1, ones)], [Value(1, 2 * ones)]),
         ([1, 2], (1, 2)),
     ]
-    assert [same(a, b) for a, b in alike] == [True] * len(alike)
-    assert [same(a, b) for a, b in others] == [False] * len(others)
+    assert [are_equal(a, b) for a, b in alike] == [True] * len(alike)
+    assert [are_equal(a, b) for a, b in others] == [False] * len(others)
 
 
 @pytest.fixture
@@ -164,8 +164,8 @@ def test_what_failed_is_not_found_again(executor: ThreadPoolExecutor) -> None:
 
     for _ in range(2):
         with pytest.raises(MemoryError, match="no more of it"):
-            memo.wait(memo.soon(executor, fail))
-    assert [memo.wait(memo.soon(executor, fail)) for _ in range(2)] == [7, 7]
+            memo.result(memo.submit(executor, fail))
+    assert [memo.result(memo.submit(executor, fail)) for _ in range(2)] == [7, 7]
     assert len(tries) == 3
 
 
@@ -182,6 +182,6 @@ def test_equal_arguments_are_compared_by_what_they_say_only_once() -> None:
         __hash__ = None  # type: ignore[assignment]
 
     memo, one, other = Memo(), Counted(), Counted()
-    assert memo.keep(id, one) == memo.keep(id, other) == id(one)
+    assert memo.get(id, one) == memo.get(id, other) == id(one)
     assert Counted.compared == 1
-    assert memo.keep(id, other) == id(one) and Counted.compared == 1
+    assert memo.get(id, other) == id(one) and Counted.compared == 1

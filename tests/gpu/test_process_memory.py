@@ -74,8 +74,8 @@ def test_what_takes_no_device_works_under_a_limit(folder: Path, words: list[str]
 
 
 def test_more_threads_take_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "_limit", lambda: 3.0 * GB)
-    monkeypatch.setattr(memory, "_taken", lambda: 0.5 * GB)
+    monkeypatch.setattr(memory, "_address_space_limit", lambda: 3.0 * GB)
+    monkeypatch.setattr(memory, "_address_space_used", lambda: 0.5 * GB)
     monkeypatch.setenv("LP_NUM_THREADS", "2")
     memory.check_software()
     monkeypatch.setenv("LP_NUM_THREADS", "16")
@@ -90,6 +90,6 @@ def test_a_group_has_less_than_the_machine(monkeypatch: pytest.MonkeyPatch, tmp_
     group.mkdir()
     (tmp_path / "memory.max").write_text("max\n")
     (group / "memory.max").write_text("1000000\n")
-    monkeypatch.setattr(memory, "_GROUPS", tmp_path)
-    monkeypatch.setattr(memory, "_own_groups", lambda: ["job"])
+    monkeypatch.setattr(memory, "_CGROUPS", tmp_path)
+    monkeypatch.setattr(memory, "_own_cgroups", lambda: ["job"])
     assert memory.main_memory() == 1e6 < machine < math.inf

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import wgpu
 
-from dermis.gpu import ComputeProgram, Device, compiled, program
+from dermis.gpu import ComputeProgram, Device, cached_program, program
 
 SHADER = Path(__file__).parent / "scale.wgsl"
 
@@ -41,7 +41,7 @@ class Made:
     def found(self, device: Device, models: Sequence[int]) -> list[Any]:
         """Programs of these models, one after the other."""
         return [
-            compiled(device, "shader", (("MODEL", model),), partial(self.compile, {"MODEL": model}))
+            cached_program(device, "shader", (("MODEL", model),), partial(self.compile, {"MODEL": model}))
             for model in models
         ]
 
@@ -49,7 +49,7 @@ class Made:
 @pytest.fixture
 def made(device: Device, monkeypatch: pytest.MonkeyPatch) -> Made:
     monkeypatch.setattr(device, "programs", {})
-    monkeypatch.setattr(program, "_MOST_VARIANTS", 3)
+    monkeypatch.setattr(program, "_CACHED_VARIANTS", 3)
     return Made()
 
 
@@ -68,4 +68,4 @@ def test_shaders_get_the_constants_that_they_have(tmp_path: Path) -> None:
     path = tmp_path / "own.wgsl"
     path.write_text("override STRIP: u32 = 1;\noverride WIDE: u32 = 0;\n", encoding="utf-8")
     given = (("STRIP", 16), ("WIDE", 2), ("OTHER", 3))
-    assert program.declared(path, (), given) == {"STRIP": 16, "WIDE": 2}
+    assert program.used_constants(path, (), given) == {"STRIP": 16, "WIDE": 2}

@@ -44,7 +44,7 @@ class Chain:
     def drawn(self, value: float, factor: float = 3.0) -> Any:
         """What the passes make of an image of one value."""
         upload(self.graph.device, self.textures[0], np.full(SIZE[::-1], value, np.float32))
-        self.graph.forget()  # it does not know of uploads
+        self.graph.invalidate()  # it does not know of uploads
         self.repeated(factor)
         return download(self.graph.device, self.textures[2])
 
@@ -110,7 +110,7 @@ def test_a_recording_whose_arguments_live_may_be_void_too(device: Device, scale:
 
     for value in (1.0, 2.0):
         upload(device, chain.textures[0], np.full(SIZE[::-1], value, np.float32))
-        graph.forget()
+        graph.invalidate()
         graph.begin()
         graph.repeat(record, chain.textures[0], chain.textures[2])
         graph.submit()
@@ -132,7 +132,7 @@ def test_only_compute_passes_can_be_recorded(device: Device) -> None:
 def test_stages_of_repeated_passes_are_timed(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale)
     for _ in range(2):
-        chain.graph.forget()
+        chain.graph.invalidate()
         chain.graph.begin()
         chain.graph.repeat(chain.record, *chain.textures, 3.0)
         frame = chain.graph.submit(timed=True)

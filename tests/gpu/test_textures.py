@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
 from dermis.gpu import Device, download, make_texture, upload
-from dermis.gpu.textures import _FORMATS, texture_from
+from dermis.gpu.textures import _FORMATS, texture_from_array
 
 MAPS = sorted(set(_FORMATS) - {"depth32float"})  # depth is drawn, never uploaded
 
@@ -24,7 +24,7 @@ def noise(shape: tuple[int, int], texel: str, seed: int = 0) -> NDArray[np.gener
 @pytest.mark.parametrize("size", [(64, 4), (67, 5), (1, 1), (3, 70)])
 def test_round_trip(device: Device, texel: str, size: tuple[int, int]) -> None:
     array = noise(size[::-1], texel)
-    back = download(device, texture_from(device, array, texel))
+    back = download(device, texture_from_array(device, array, texel))
     assert back.dtype == array.dtype
     assert np.array_equal(back, array)
 
@@ -49,7 +49,7 @@ def test_every_layer(device: Device) -> None:
 
 def test_a_view_of_an_array_uploads_its_own_values(device: Device) -> None:
     array = noise((20, 22), "r32float")[::2, 1::2]
-    assert np.array_equal(download(device, texture_from(device, array, "r32float")), array)
+    assert np.array_equal(download(device, texture_from_array(device, array, "r32float")), array)
 
 
 def test_new_textures_are_black(device: Device) -> None:

@@ -101,8 +101,8 @@ def test_numbers_of_python_are_filled_in(tmp_path: Path) -> None:
     [
         ("//#include <gone>", "the list <gone>"),
         ("//#each gone: {name}", "the list <gone>"),
-        ("//#fill {gone}", "a word of a, but {gone} came"),
-        ("//#each pets: {gone}", "a word of name, NAME, number, but {gone} came"),
+        ("//#fill {gone}", "a word of a, but got {gone}"),
+        ("//#each pets: {gone}", "a word of name, NAME, number, but got {gone}"),
     ],
 )
 def test_what_nobody_gives_is_named(tmp_path: Path, text: str, error: str) -> None:

@@ -1,4 +1,4 @@
-"""A small toolkit over wgpu: it knows adapters, shaders, textures and passes, and nothing of skin."""
+"""Toolkit over wgpu: adapters, devices, shaders, textures, passes and the frame graph."""
 
 from dermis.gpu.adapters import Adapter, list_adapters
 from dermis.gpu.command_list import CommandList
@@ -6,20 +6,20 @@ from dermis.gpu.dependencies import mark_scratch
 from dermis.gpu.device import Device, open_device
 from dermis.gpu.graph import Graph
 from dermis.gpu.memo import Memo
-from dermis.gpu.program import ComputeProgram, Constants, FragmentProgram, RasterProgram, compiled
+from dermis.gpu.program import ComputeProgram, Constants, RenderProgram, cached_program
 from dermis.gpu.recorder import DrawTarget, Recorder
-from dermis.gpu.textures import download, make_texture, texture_from, upload, view_of
+from dermis.gpu.textures import download, make_texture, make_view, texture_from_array, upload
 from dermis.gpu.types import (
     Bindable,
     Bindings,
     Buffer,
     MutableBindings,
-    Record,
     Resource,
     Sampler,
     Texture,
     TextureOrView,
     TextureView,
+    UniformRecord,
 )
 
 __all__ = [
@@ -32,25 +32,24 @@ __all__ = [
     "Constants",
     "Device",
     "DrawTarget",
-    "FragmentProgram",
     "Graph",
     "Memo",
     "MutableBindings",
-    "RasterProgram",
-    "Record",
     "Recorder",
+    "RenderProgram",
     "Resource",
     "Sampler",
     "Texture",
     "TextureOrView",
     "TextureView",
-    "compiled",
+    "UniformRecord",
+    "cached_program",
     "download",
     "list_adapters",
     "make_texture",
-    "open_device",
+    "make_view",
     "mark_scratch",
-    "texture_from",
+    "open_device",
+    "texture_from_array",
     "upload",
-    "view_of",
 ]

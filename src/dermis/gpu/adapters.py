@@ -1,7 +1,7 @@
-"""Adapters: which there are, their native descriptions and limits.
+"""Graphics adapters of the machine and their limits, and faster start of wgpu.
 
-C types that wgpu requests by name are registered in advance: cffi parses each new name together with all
-typedefs of the header, in some ten milliseconds, and a first frame requests seventy-five.
+C types that wgpu looks up by name are registered in advance: cffi parses each new name together with all
+typedefs of the header, which takes some ten milliseconds, and a first frame looks up seventy-five.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from dermis.gpu.memory import check_drivers
 from dermis.gpu.types import Untyped
 
 _TYPEDEF = "typedef "
-_NUMBERS = ("char", "uint8_t", "uint32_t", "uintptr_t", "intptr_t")
+_INTEGER_TYPES = ("char", "uint8_t", "uint32_t", "uintptr_t", "intptr_t")
 OPTIONAL_FEATURES = ("timestamp-query",)
-"""Optional features, requested where the adapter has them; everything works without them."""
+"""Optional features of WebGPU that are requested where the adapter has them."""
 INSTALL_HINT = "On Debian or Ubuntu: sudo apt-get install mesa-vulkan-drivers"
 DEFAULT_LIMITS = {
     "max-texture-dimension-1d": 8192,
@@ -55,41 +55,41 @@ DEFAULT_LIMITS = {
     "max-compute-workgroups-per-dimension": 65535,
     "max-immediate-size": 0,
 }
-"""Limits that WebGPU guarantees on every machine ("Limits" in its specification)."""
-_NEEDED = tuple(
+"""Limits that WebGPU guarantees on every machine (section "Limits" of its specification)."""
+_REQUIRED_LIMITS = tuple(
     name for name in DEFAULT_LIMITS if any(word in name for word in ("stage", "compute", "group", "layout"))
 )
-"""What programs rely on; sizes of textures and buffers may be smaller."""
-_KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
+"""Limits that programs rely on; those of texture and buffer sizes may be lower."""
+_RANKED_KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
 
 
 def register_wgpu_types() -> None:
-    """Register the types; to be called before wgpu is used."""
-    with contextlib.suppress(ImportError):  # other builds of wgpu need nothing
+    """Register the types of wgpu's native library; to be called before wgpu is used."""
+    with contextlib.suppress(ImportError):  # other builds of wgpu need no registration
         from wgpu.backends.wgpu_native import ffi
 
         register_types(ffi)
 
 
 def register_types(ffi: Any) -> int:
-    """Register names of pointers, arrays and callbacks with cffi; returns how many.
+    """Register names of pointers, arrays and callbacks with cffi and return their number.
 
-    This uses cffi's internals. Where those differ it does nothing, and the first frame takes longer.
+    This uses cffi's internals. If they differ, nothing is registered and the first frame takes longer.
     """
     try:
         with ffi._lock:  # as its own callers do
             declared = ffi._parser._declarations
-            made = {name: (ffi._get_cached_btype(kind), False) for name, kind in _types(declared)}
-            made |= {name: (ffi._get_cached_btype(kind), True) for name, kind in _callbacks(declared)}
-        for name, found in made.items():
-            ffi._parsed_types.setdefault(name, found)
+            types = {name: (ffi._get_cached_btype(kind), False) for name, kind in _types(declared)}
+            types |= {name: (ffi._get_cached_btype(kind), True) for name, kind in _callbacks(declared)}
+        for name, parsed in types.items():
+            ffi._parsed_types.setdefault(name, parsed)
     except Exception:  # another cffi may raise anything
         return 0
-    return len(made)
+    return len(types)
 
 
 def _types(declared: Any) -> Iterator[tuple[str, Any]]:
-    """Names of types as wgpu spells them, with cffi's descriptions of the types."""
+    """Yield names of types as wgpu spells them, with cffi's descriptions of the types."""
     from cffi import model  # type: ignore[import-untyped]
 
     named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
@@ -98,36 +98,36 @@ def _types(declared: Any) -> Iterator[tuple[str, Any]]:
             yield from ((f"{name} *{space}", model.PointerType(kind)) for space in ("", " "))
         if isinstance(kind, model.StructType | model.PointerType | model.EnumType):
             yield f"{name}[]", model.ArrayType(kind, None)
-    for name in _NUMBERS:
+    for name in _INTEGER_TYPES:
         yield name, model.PrimitiveType(name)
         yield f"{name} *", model.PointerType(model.PrimitiveType(name))
         yield f"{name} []", model.ArrayType(model.PrimitiveType(name), None)
 
 
 def _callbacks(declared: Any) -> Iterator[tuple[str, Any]]:
-    """Signatures of callbacks as wgpu spells them, with cffi's descriptions of the function pointers."""
+    """Yield signatures of callbacks as wgpu spells them, with cffi's descriptions of the pointers."""
     from cffi import model
 
     named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
     handles = {kind.get_c_name(): name for name, kind in named.items() if isinstance(kind, model.PointerType)}
     for name, kind in named.items():
         if name.endswith("Callback"):
-            spelled = ", ".join(argument.get_c_name() for argument in kind.args)
+            arguments = ", ".join(argument.get_c_name() for argument in kind.args)
             for structure, handle in handles.items():
-                spelled = spelled.replace(structure, handle)
-            yield f"{kind.result.get_c_name()}({spelled})", kind
+                arguments = arguments.replace(structure, handle)
+            yield f"{kind.result.get_c_name()}({arguments})", kind
 
 
 @dataclass(frozen=True)
 class Adapter:
-    """One way to reach a graphics processor (or a software one).
+    """A graphics processor, or a software one, as reached through one backend.
 
     name, driver : as the driver spells them
     kind : "DiscreteGPU" | "IntegratedGPU" | "VirtualGPU" | "CPU" | "Unknown"
     backend : "Vulkan" | "Metal" | "D3D12" | "OpenGL"
-    features : the wanted features that it has
-    handle : wgpu's own object
-    number : its place in `list_adapters`, by which "#1" names it: GPUs of one name are told apart by it
+    features : those of `OPTIONAL_FEATURES` that it has
+    handle : wgpu's object
+    number : index in `list_adapters`; "#1" selects the adapter with the number 1, as GPUs may share a name
     """
 
     name: str
@@ -139,15 +139,15 @@ class Adapter:
     number: int = 0
 
     @property
-    def missing(self) -> tuple[str, ...]:
-        """Wanted features that it lacks."""
+    def missing_features(self) -> tuple[str, ...]:
+        """Return the optional features that the adapter lacks."""
         return tuple(f for f in OPTIONAL_FEATURES if f not in self.features)
 
 
 def list_adapters() -> list[Adapter]:
-    """Every adapter, the best first: real GPUs before software, then the one with more features.
+    """Return all adapters, the best first: GPUs before software, then by number of features.
 
-    Raises DermisError where drivers fail, or would for want of address space.
+    Raises DermisError if drivers fail, or would fail for lack of address space.
     """
     check_drivers()
     try:
@@ -156,74 +156,76 @@ def list_adapters() -> list[Adapter]:
         refuse("wgpu", "its native library to load", f"it does not: {error}", "Install the package again")
     register_wgpu_types()
     try:
-        with _quiet_drivers():
-            found = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
+        with _silenced_stderr():
+            adapters = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
     except Exception as error:  # a broken driver may raise anything
         refuse("graphics drivers", "a list of adapters", f"they fail: {error}", INSTALL_HINT)
-    found.sort(key=lambda a: (_rank(a.kind), len(a.missing), a.backend == "OpenGL"))
-    return [replace(one, number=number) for number, one in enumerate(found)]
+    adapters.sort(key=lambda a: (_rank(a.kind), len(a.missing_features), a.backend == "OpenGL"))
+    return [replace(one, number=number) for number, one in enumerate(adapters)]
 
 
-def select_adapters(wanted: str) -> tuple[list[Adapter], str]:
-    """Adapters for `wanted`, the best first, and the reason for the choice.
+def select_adapters(selector: str) -> tuple[list[Adapter], str]:
+    """Return the adapters that a selector fits, the best first, and the reason for the choice.
 
-    wanted : "auto", "cpu", part of a name, or "#1" for the one at that place of `list_adapters`, from 0 on
+    selector : "auto", "cpu", part of a name, or "#1" for the adapter with that number, counted from 0
 
-    Raises DermisError when there is none.
+    Raises DermisError if there is none.
     """
     adapters = list_adapters()
-    # OpenGL renders wrongly or not at all, so it has to be asked for by name.
-    right = [a for a in adapters if a.backend != "OpenGL"]
-    if not adapters or (wanted in ("auto", "cpu") and not right):
-        came = "this machine shows only OpenGL's" if adapters else "this machine shows none"
-        refuse("adapter", "a Vulkan, Metal or DX12 adapter", came, INSTALL_HINT)
-    if match := re.fullmatch(r"#(\d{1,4})", wanted):
+    # OpenGL renders wrongly or not at all, so it has to be selected by name.
+    reliable = [a for a in adapters if a.backend != "OpenGL"]
+    if not adapters or (selector in ("auto", "cpu") and not reliable):
+        actual = "this machine shows only OpenGL's" if adapters else "this machine shows none"
+        refuse("adapter", "a Vulkan, Metal or DX12 adapter", actual, INSTALL_HINT)
+    if match := re.fullmatch(r"#(\d{1,4})", selector):
         return [_numbered(adapters, int(match[1]))], f"it is the one with the number {match[1]}"
-    if wanted == "auto":
-        return right, "it is the fastest kind, with the most features"
-    if wanted == "cpu":
-        fitting, reason = [a for a in right if a.kind == "CPU"], "software was asked for"
+    if selector == "auto":
+        return reliable, "it is the fastest kind, with the most features"
+    if selector == "cpu":
+        fitting, reason = [a for a in reliable if a.kind == "CPU"], "software was requested"
     else:
-        fitting = [a for a in adapters if wanted.lower() in f"{a.name} {a.driver} {a.backend}".lower()]
-        reason = f"its name contains {wanted!r}"
+        fitting = [a for a in adapters if selector.lower() in f"{a.name} {a.driver} {a.backend}".lower()]
+        reason = f"its name contains {selector!r}"
     if not fitting:
         names = ", ".join(f"{a.name} ({a.backend})" for a in adapters)
-        hint = INSTALL_HINT if wanted == "cpu" else "Choose auto, cpu, a part of one of those names, or #0"
-        refuse(f"adapter {wanted!r}", "one of this machine's adapters", f"it has {names}", hint)
+        hint = INSTALL_HINT if selector == "cpu" else "Choose auto, cpu, a part of one of those names, or #0"
+        refuse(f"adapter {selector!r}", "one of this machine's adapters", f"it has {names}", hint)
     return fitting, reason
 
 
-def similar_adapters(wanted: str) -> list[Adapter]:
-    """The best adapter for `wanted` and those of its kind and backend, a GPU once whatever lists it too.
+def similar_adapters(selector: str) -> list[Adapter]:
+    """Return the best adapter for a selector and all others of its kind and backend.
+
+    As all have one backend, no GPU is listed twice.
 
     Raises DermisError as `select_adapters`.
     """
-    (best, *others), _ = select_adapters(wanted)
+    (best, *others), _ = select_adapters(selector)
     if best.kind == "CPU":
         return [best]
     return [best, *(one for one in others if (one.kind, one.backend) == (best.kind, best.backend))]
 
 
 def check_limits(adapter: str, offered: Mapping[str, int]) -> None:
-    """Raises DermisError for an adapter that cannot run the programs of a frame.
+    """Raise DermisError for an adapter that cannot run the programs of a frame.
 
-    adapter, offered : its name and its limits
+    adapter, offered : name and limits of the adapter
     """
-    for name in _NEEDED:
-        least = DEFAULT_LIMITS[name]
-        if offered.get(name, least) < least:
-            expected = f"{name} of at least {least}, as WebGPU promises"
-            remedy = "Choose another adapter, which dermis doctor lists, or update its driver"
-            refuse(f"adapter {adapter}", expected, f"it has {offered[name]}", remedy)
+    for name in _REQUIRED_LIMITS:
+        minimum = DEFAULT_LIMITS[name]
+        if offered.get(name, minimum) < minimum:
+            expected = f"{name} of at least {minimum}, as WebGPU promises"
+            advice = "Choose another adapter, which dermis doctor lists, or update its driver"
+            refuse(f"adapter {adapter}", expected, f"it has {offered[name]}", advice)
 
 
 def device_limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
-    """WebGPU's default limits; the adapter's own where it offers less or the limit is to be raised."""
-    fitting = {
+    """Return WebGPU's default limits, with the adapter's own for `raised` and where it offers less."""
+    limits = {
         name: (max if name.startswith("min-") else min)(default, offered.get(name, default))
         for name, default in DEFAULT_LIMITS.items()
     }
-    return fitting | {name: offered[name] for name in raised}
+    return limits | {name: offered[name] for name in raised}
 
 
 def _numbered(adapters: list[Adapter], number: int) -> Adapter:
@@ -246,15 +248,15 @@ def _describe(handle: Untyped) -> Adapter:
 
 
 def _rank(kind: str) -> int:
-    return _KINDS.index(kind) if kind in _KINDS else _KINDS.index("Unknown")
+    return _RANKED_KINDS.index(kind if kind in _RANKED_KINDS else "Unknown")
 
 
 @contextlib.contextmanager
-def _quiet_drivers() -> Iterator[None]:
-    """Drivers without a display write warnings to the process's stderr; they would spoil ours."""
+def _silenced_stderr() -> Iterator[None]:
+    """Discard the process's stderr, to which drivers write warnings if there is no display."""
     try:
         saved = os.dup(2)
-    except OSError:  # no stderr to spoil
+    except OSError:  # there is no stderr
         yield
         return
     sink = os.open(os.devnull, os.O_WRONLY)

@@ -1,4 +1,4 @@
-"""Bind groups, made by the native library: a frame of another head needs dozens of new ones."""
+"""Bind groups, created by direct calls of the native library, as a new head needs dozens of them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _DIMENSIONS = {"2d": 2, "2d-array": 3}  # WGPUTextureViewDimension
 
 _ALL_LEVELS = _ALL_LAYERS = 0xFFFFFFFF
 
-_WHOLE = 1  # WGPUTextureAspect_All
+_ASPECT_ALL = 1  # WGPUTextureAspect_All
 
 Key = tuple[int, ...]
 
@@ -25,39 +25,42 @@ T = TypeVar("T")
 
 
 class BindGroup:
-    """A bind group of the library, which keeps alive what is bound; released with this.
+    """A bind group, which keeps the bound resources alive.
 
-    _internal : the library's, as `wgpu` calls it too
+    _internal : handle in the native library, as in wgpu's objects; released with this object
     """
 
     __slots__ = ("__weakref__", "_internal")
 
     def __init__(self, device: Device, layout: Native, entries: Sized) -> None:
-        described = device.ffi.new("WGPUBindGroupDescriptor *")
-        described.layout, described.entries, described.entryCount = layout._internal, entries, len(entries)
-        made = device.checked.wgpuDeviceCreateBindGroup(device.handle._internal, described)
-        self._internal = device.ffi.gc(made, device.lib.wgpuBindGroupRelease)
+        descriptor = device.ffi.new("WGPUBindGroupDescriptor *")
+        descriptor.layout, descriptor.entries, descriptor.entryCount = layout._internal, entries, len(entries)
+        handle = device.checked.wgpuDeviceCreateBindGroup(device.handle._internal, descriptor)
+        self._internal = device.ffi.gc(handle, device.lib.wgpuBindGroupRelease)
 
 
-def make_group(
+def make_bind_group(
     device: Device,
     layout: Native,
     bindings: Sequence[Binding],
     values: Sequence[Untyped],
     records: Sequence[int],
 ) -> BindGroup:
-    """The bind group of values for bindings.
+    """Create the bind group of some values.
 
-    values : a buffer, a texture, a view of one or a sampler each
-    records : bytes of the records that the last ones, uniform buffers, have places for
+    values : a buffer, texture, texture view or sampler for each binding; the last ones are uniform buffers
+    records : sizes of the records in the uniform buffers [byte]
     """
     entries = device.ffi.new("WGPUBindGroupEntry[]", len(values))
-    plain = len(values) - len(records)
+    first_uniform = len(values) - len(records)
     for k, (binding, value) in enumerate(zip(bindings, values, strict=True)):
         entry, kind = entries[k], binding.entry
         entry.binding = binding.index
         if "buffer" in kind:
-            entry.buffer, entry.size = value._internal, value.size if k < plain else records[k - plain]
+            entry.buffer, entry.size = (
+                value._internal,
+                value.size if k < first_uniform else records[k - first_uniform],
+            )
         elif "sampler" in kind:
             entry.sampler = value._internal
         else:
@@ -66,77 +69,78 @@ def make_group(
 
 
 class ResourceCache(Generic[T]):
-    """Bind groups and the like, keyed by the identity of the resources that they bind.
+    """Cache keyed by the identity of resources, from which an entry goes with the first of its resources.
 
-    A bind group keeps its resources' memory alive, so it is dropped as soon as one of them is no longer held
-    elsewhere.
+    A bind group keeps the memory of its resources allocated, so it has to be dropped as soon as one of them
+    is no longer used elsewhere.
     """
 
     def __init__(self) -> None:
-        self._kept: dict[Key, T] = {}
-        self._users: dict[int, tuple[weakref.ref[object], set[Key]]] = {}
+        self._entries: dict[Key, T] = {}
+        self._keys: dict[int, tuple[weakref.ref[object], set[Key]]] = {}  # of each resource, by its id
 
     def __len__(self) -> int:
-        return len(self._kept)
+        """Return the number of entries."""
+        return len(self._entries)
 
     @property
-    def followed(self) -> int:
-        """Number of resources that entries depend on."""
-        return len(self._users)
+    def resource_count(self) -> int:
+        """Return the number of resources that entries depend on."""
+        return len(self._keys)
 
     def find(self, key: Key) -> T | None:
-        """The entry for a key from `key_of`, None without one."""
-        return self._kept.get(key)
+        """Return the entry for a key from `resource_key`, or None."""
+        return self._entries.get(key)
 
-    def keep(self, key: Key, resources: Sequence[object], made: T) -> None:
-        """Keep an entry for as long as all of its key's resources live."""
-        self._kept[key] = made
+    def add(self, key: Key, resources: Sequence[object], entry: T) -> None:
+        """Add an entry, which is kept for as long as all of its resources live."""
+        self._entries[key] = entry
         for resource in resources:
-            self._user(resource).add(key)
+            self._keys_of(resource).add(key)
 
-    def _user(self, resource: object) -> set[Key]:
-        """The keys that contain a resource; new resources are watched until they are released."""
-        name = id(resource)
-        if name not in self._users:
+    def _keys_of(self, resource: object) -> set[Key]:
+        """Return the keys that contain a resource; the release of a new one is watched from now on."""
+        identity = id(resource)
+        if identity not in self._keys:
             this = weakref.ref(self)
 
-            def gone(_: object) -> None:
-                kept = this()
-                if kept is not None:
-                    kept._forget(name)
+            def on_release(_: object) -> None:
+                cache = this()
+                if cache is not None:
+                    cache._drop(identity)
 
-            self._users[name] = weakref.ref(resource, gone), set()
-        return self._users[name][1]
+            self._keys[identity] = weakref.ref(resource, on_release), set()
+        return self._keys[identity][1]
 
-    def _forget(self, name: int) -> None:
-        _, keys = self._users.pop(name)
+    def _drop(self, identity: int) -> None:
+        _, keys = self._keys.pop(identity)
         for key in keys:
-            self._kept.pop(key, None)
-            for other in set(key) & self._users.keys():
-                self._users[other][1].discard(key)
+            self._entries.pop(key, None)
+            for other in set(key) & self._keys.keys():
+                self._keys[other][1].discard(key)
 
 
-def key_of(resources: Sequence[object]) -> Key:
-    """The key for these resources in this order."""
+def resource_key(resources: Sequence[object]) -> Key:
+    """Return the cache key for these resources in this order."""
     return tuple(map(id, resources))
 
 
 def _view(device: Device, value: TextureOrView, texture: Entry) -> object:
-    """The library's view of a whole texture, made once for each dimension; a view's own."""
+    """Return the handle of a view, or of a texture's default view, created once for each dimension."""
     if is_texture(value):
-        return _whole_view(device, value, texture["view_dimension"])
+        return _default_view(device, value, texture["view_dimension"])
     return value._internal
 
 
-def _whole_view(device: Device, texture: Texture, dimension: str) -> object:
-    views = device.shared("whole views", WeakKeyDictionary[Texture, dict[str, object]]).setdefault(
+def _default_view(device: Device, texture: Texture, dimension: str) -> object:
+    views = device.cached("default views", WeakKeyDictionary[Texture, dict[str, object]]).setdefault(
         texture, {}
     )
     if dimension not in views:
-        described = device.ffi.new("WGPUTextureViewDescriptor *")
-        described.dimension, described.aspect = _DIMENSIONS[dimension], _WHOLE
-        described.mipLevelCount = _ALL_LEVELS
-        described.arrayLayerCount = 1 if dimension == "2d" else _ALL_LAYERS
-        made = device.checked.wgpuTextureCreateView(texture._internal, described)
-        views[dimension] = device.ffi.gc(made, device.lib.wgpuTextureViewRelease)
+        descriptor = device.ffi.new("WGPUTextureViewDescriptor *")
+        descriptor.dimension, descriptor.aspect = _DIMENSIONS[dimension], _ASPECT_ALL
+        descriptor.mipLevelCount = _ALL_LEVELS
+        descriptor.arrayLayerCount = 1 if dimension == "2d" else _ALL_LAYERS
+        handle = device.checked.wgpuTextureCreateView(texture._internal, descriptor)
+        views[dimension] = device.ffi.gc(handle, device.lib.wgpuTextureViewRelease)
     return views[dimension]

@@ -1,4 +1,4 @@
-"""Frames written down so that another program can run them."""
+"""Capture of frames, so that another program can run them."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 from dermis.gpu.device import Device
 from dermis.gpu.graph import Graph
-from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram
-from dermis.gpu.recorder import DrawTarget, Groups, Recorder
-from dermis.gpu.shader_types import Binding, record_type
+from dermis.gpu.program import ComputeProgram, Program, RenderProgram
+from dermis.gpu.recorder import DrawTarget, Recorder, Workgroups
+from dermis.gpu.shader_types import Binding, uniform_type
 from dermis.gpu.textures import download
 from dermis.gpu.types import (
     Bindable,
     Bindings,
     Buffer,
-    Record,
     TextureOrView,
+    UniformRecord,
     Untyped,
     is_buffer,
     is_sampler,
@@ -36,19 +36,20 @@ Ts = TypeVarTuple("Ts")
 Description = dict[str, Any]
 """Plain data for JSON."""
 Bound = list[int]
-"""In the order of the program's bindings: numbers of resources, and -1 - k for the take's record k."""
+"""For each binding of the program the index of a resource, or -1 - k for record k of the frame."""
 
 
 @dataclass
 class CapturedPass:
-    """One pass.
+    """A pass of a captured frame.
 
-    program, bound : None and empty where the host writes bytes into a resource
-    groups : workgroups, or vertices of a raster pass
-    completes : number of the resource that it completes from its own content, -1 for none
-    raster : of a raster pass its layer, index buffer, depth view and its start, and target; -1 for none
-    written : resource and bytes that the host writes
-    unit : number of the recording that it is part of, which runs as a whole; a pass alone has one of its own
+    program, bound : index of the program and what it binds; None and empty where the host writes to a buffer
+    groups : workgroups along each axis, or number of vertices of a render pass
+    completes : index of the resource that the pass extends in place (see `Recorder.dispatch`), -1 for none
+    raster : for a render pass its layer, clear depth, and indices of index buffer, depth view and target; -1
+        for none
+    written : buffer and bytes that the host writes
+    unit : index of the recording that the pass belongs to, which runs as a whole; other passes have their own
     """
 
     stage: str
@@ -63,36 +64,39 @@ class CapturedPass:
 
 @dataclass
 class CapturedFrame:
-    """A frame.
+    """Passes of a captured frame and the uniform records that they read.
 
-    records : what passes read besides resources, each with the structure that names its members
+    records : name of the WGSL struct and content of each record
     """
 
     passes: list[CapturedPass] = field(default_factory=list)
-    records: list[tuple[str, Record]] = field(default_factory=list)
-    _known: dict[int, int] = field(default_factory=dict)
+    records: list[tuple[str, UniformRecord]] = field(default_factory=list)
+    _record_index: dict[int, int] = field(default_factory=dict)
 
     def add(self, one: CapturedPass, unit: int | None) -> None:
-        """Add a pass, of a recording if it is part of one."""
-        before = self.passes[-1].unit if self.passes else -1
-        one.unit = before + 1 if unit is None else unit
+        """Add a pass.
+
+        unit : index of the recording that it belongs to, if any
+        """
+        last = self.passes[-1].unit if self.passes else -1
+        one.unit = last + 1 if unit is None else unit
         self.passes.append(one)
 
-    def record(self, struct: str, record: Record) -> int:
-        """The number of a record."""
-        if id(record) not in self._known:
-            self._known[id(record)] = len(self.records)
-            self.records.append((struct, record))  # which keeps it, and with it its id
-        return self._known[id(record)]
+    def record(self, struct: str, record: UniformRecord) -> int:
+        """Return the index of a record, which is added if it is new."""
+        if id(record) not in self._record_index:
+            self._record_index[id(record)] = len(self.records)
+            self.records.append((struct, record))  # kept alive, so that its id stays unique
+        return self._record_index[id(record)]
 
 
 class FrameCapture(Graph):
-    """Takes down frames that are declared on it, none of which runs.
+    """Recorder that captures the frames declared on it instead of running them.
 
-    shaders : texts
-    programs : each a shader with its constants, bindings and, if it rasterises, its targets
-    resources : each described, see `described`
-    structs : by their names, the records' members
+    shaders : texts of the shaders
+    programs : shader, constants, bindings and, for render programs, targets of each program
+    resources : description of each resource, see `describe_resource`
+    structs : dtypes of the records by the name of their struct
     """
 
     def __init__(self, device: Device) -> None:
@@ -102,55 +106,64 @@ class FrameCapture(Graph):
         self.resources: list[Description] = []
         self.structs: dict[str, np.dtype[np.generic]] = {}
         self._objects: list[Bindable] = []
-        self._numbers: dict[int, int] = {}
-        self._take = CapturedFrame()
+        self._resource_index: dict[int, int] = {}
+        self._frame = CapturedFrame()
         self._unit: int | None = None
-        self._taken: dict[int, int] = {}
-        self._kept: list[Program] = []
+        self._program_index: dict[int, int] = {}
+        self._program_objects: list[Program] = []  # kept alive, so that their ids stay unique
 
-    def take(self, declare: Callable[[FrameCapture], object]) -> CapturedFrame:
-        """The frame that `declare` declares."""
-        self._take = take = CapturedFrame()
+    def capture(self, declare: Callable[[FrameCapture], object]) -> CapturedFrame:
+        """Return the frame that `declare(self)` declares."""
+        self._frame = frame = CapturedFrame()
         self._unit = None
         declare(self)
-        return take
+        return frame
 
-    def content(self, number: int) -> list[NDArray[np.uint8]]:
-        """The bytes that a resource holds now: of a texture those of each layer, mip by mip."""
-        return content_of(self.device, self._objects[number])
+    def read_content(self, index: int) -> list[NDArray[np.uint8]]:
+        """Return the bytes of a buffer, or of each layer of a texture, mip level by mip level."""
+        value = self._objects[index]
+        if not is_texture(value):
+            return [np.frombuffer(self.device.handle.queue.read_buffer(value), np.uint8)]
+        parts = product(range(value.mip_level_count), range(value.size[2]))
+        texels = [download(self.device, value, mip=mip, layer=layer) for mip, layer in parts]
+        return [np.ascontiguousarray(one).view(np.uint8).reshape(-1) for one in texels]
 
-    def object(self, number: int) -> Untyped:
-        """A resource by its number."""
-        return self._objects[number]
+    def resource_at(self, index: int) -> Untyped:
+        """Return a resource by its index."""
+        return self._objects[index]
 
     def resource(self, value: Bindable) -> int:
-        """The number of a texture, view, buffer or sampler."""
-        if id(value) not in self._numbers:
+        """Return the index of a texture, view, buffer or sampler, which is added if it is new."""
+        if id(value) not in self._resource_index:
             if is_view(value):
-                found: Description = {"kind": "view", "part": value.part, "of": self.resource(value.texture)}
+                found: Description = {
+                    "kind": "view",
+                    "part": value.layer_and_mip,
+                    "of": self.resource(value.texture),
+                }
             else:
-                found = description_of(self.device, value)
-            self._numbers[id(value)] = len(self.resources)
+                found = describe_resource(self.device, value)
+            self._resource_index[id(value)] = len(self.resources)
             self.resources.append(found)
             self._objects.append(value)
-        return self._numbers[id(value)]
+        return self._resource_index[id(value)]
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
+        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
-        """Take a pass down."""
-        taken = self._pass(stage, program, resources, groups)
-        taken.completes = self.resource(resources[completes]) if completes else -1
+        """Capture a compute pass."""
+        captured = self._add_pass(stage, program, resources, groups)
+        captured.completes = self.resource(resources[in_place]) if in_place else -1
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
-        """Take down what the host writes."""
+        """Capture a write from the host."""
         written = self.resource(buffer), data
-        self._take.add(CapturedPass(stage, None, [], (len(data),), written=written), self._unit)
+        self._frame.add(CapturedPass(stage, None, [], (len(data),), written=written), self._unit)
 
     def draw(
         self,
         stage: str,
-        program: RasterProgram,
+        program: RenderProgram,
         resources: Bindings,
         vertices: int,
         target: DrawTarget,
@@ -158,58 +171,58 @@ class FrameCapture(Graph):
         indices: Buffer | None = None,
         layer: int = 0,
     ) -> None:
-        """Write down a pass that rasterises."""
-        attached = {"indices": indices, "depth": target.depth, "target": target.colour}
-        numbers = {name: -1 if one is None else self.resource(one) for name, one in attached.items()}
-        taken = self._pass(stage, program, resources, (vertices,))
-        taken.raster = {"layer": layer, "far": target.far, **numbers}
+        """Capture a render pass of triangles."""
+        attachments = {"indices": indices, "depth": target.depth, "target": target.colour}
+        numbers = {name: -1 if one is None else self.resource(one) for name, one in attachments.items()}
+        captured = self._add_pass(stage, program, resources, (vertices,))
+        captured.raster = {"layer": layer, "far": target.far, **numbers}
 
     def fill(
-        self, stage: str, program: FragmentProgram, resources: Bindings, targets: Sequence[TextureOrView]
+        self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Nothing that is taken down fills targets."""
-        raise NotImplementedError(f"{stage}: passes that fill targets are not taken down")
+        """Raise NotImplementedError: no player can run passes that fill targets."""
+        raise NotImplementedError(f"{stage}: passes that fill targets cannot be captured")
 
     def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Take down the passes of `record(tape, *args)`, which run as a whole."""
+        """Capture the passes of `record(self, *args)`, which run as a whole."""
         if self._unit is not None:
             return record(self, *args)
-        passes = self._take.passes
+        passes = self._frame.passes
         self._unit = passes[-1].unit + 1 if passes else 0
         try:
             return record(self, *args)
         finally:
             self._unit = None
 
-    def _pass(
+    def _add_pass(
         self, stage: str, program: Program, resources: Bindings, groups: tuple[int, ...]
     ) -> CapturedPass:
         bound = [self._bound(program, one, resources[one.name]) for one in program.bindings]
-        taken = CapturedPass(stage, self._program(program), bound, groups)
-        self._take.add(taken, self._unit)
-        return taken
+        captured = CapturedPass(stage, self._program(program), bound, groups)
+        self._frame.add(captured, self._unit)
+        return captured
 
     def _bound(self, program: Program, binding: Binding, value: Bindable) -> int:
         if not isinstance(value, np.ndarray):
             return self.resource(value)
-        struct = record_type(program.source.text, binding.name)
+        struct = uniform_type(program.source.text, binding.name)
         self.structs[struct] = value.dtype
-        return -1 - self._take.record(struct, cast("Record", value))
+        return -1 - self._frame.record(struct, cast("UniformRecord", value))
 
     def _program(self, program: Program) -> int:
-        if id(program) not in self._taken:
-            self._taken[id(program)] = len(self.programs)
-            self._kept.append(program)
+        if id(program) not in self._program_index:
+            self._program_index[id(program)] = len(self.programs)
+            self._program_objects.append(program)
             self.programs.append(
                 {
                     "name": program.name,
                     "shader": self._shader(program.source.text),
                     "constants": dict(program.constants),
                     "bindings": [(one.index, one.name, one.entry) for one in program.bindings],
-                    "raster": program.drawn if isinstance(program, RasterProgram) else None,
+                    "raster": program.raster if isinstance(program, RenderProgram) else None,
                 }
             )
-        return self._taken[id(program)]
+        return self._program_index[id(program)]
 
     def _shader(self, text: str) -> int:
         if text not in self.shaders:
@@ -217,8 +230,8 @@ class FrameCapture(Graph):
         return self.shaders.index(text)
 
 
-def description_of(device: Device, value: Bindable) -> Description:
-    """What it takes to make a resource: its kind, sizes and uses by WebGPU's numbers, or options."""
+def describe_resource(device: Device, value: Bindable) -> Description:
+    """Return what is needed to create a resource: its kind, and its sizes and usage flags or its options."""
     if is_texture(value):
         size, mips = list(value.size), value.mip_level_count
         sizes = {"format": value.format, "size": size, "mips": mips, "usage": int(value.usage)}
@@ -227,12 +240,3 @@ def description_of(device: Device, value: Bindable) -> Description:
         return {"kind": "buffer", "size": value.size, "usage": int(value.usage)}
     assert is_sampler(value)
     return {"kind": "sampler", "options": device.sampler_options(value)}
-
-
-def content_of(device: Device, value: Bindable) -> list[NDArray[np.uint8]]:
-    """The bytes of a buffer, or of a texture's layers, mip by mip and in a mip layer by layer."""
-    if not is_texture(value):
-        return [np.frombuffer(device.handle.queue.read_buffer(value), np.uint8)]
-    parts = product(range(value.mip_level_count), range(value.size[2]))
-    texels = [download(device, value, mip=mip, layer=layer) for mip, layer in parts]
-    return [np.ascontiguousarray(one).view(np.uint8).reshape(-1) for one in texels]

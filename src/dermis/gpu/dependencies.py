@@ -30,7 +30,7 @@ class ResourceState:
     parent : state of the texture, for a view
     views : states of a texture's views
     version : version of the current content
-    scratch : whether the resource only carries data between passes, so that its content after a frame is unused
+    scratch : whether the resource only carries data between passes, so that nothing reads it after a frame
     """
 
     parent: ResourceState | None = None
@@ -62,7 +62,7 @@ class Access:
 
     id : unique number of this program with these resources
     reads, writes : states of the resources; a resource that is both read and written is in both
-    dispatches : dispatches of earlier frames with their bind groups, by stage, workgroups and record positions
+    dispatches : dispatches of earlier frames with bind groups, by stage, workgroups and record positions
     """
 
     id: int
@@ -144,7 +144,9 @@ class Dependencies:
         while True:
             stale = self._stale_given(valid)
             running = [writes for (*_, writes), now in zip(self.passes, stale, strict=True) if now]
-            overwritten = {state for writes in running for state in writes if not stale[self._last_writer[state]]}
+            overwritten = {
+                state for writes in running for state in writes if not stale[self._last_writer[state]]
+            }
             if not overwritten & valid:
                 return stale
             valid -= overwritten

@@ -1,4 +1,4 @@
-"""An opened adapter, with what every pass needs: limits, uniform buffers, samplers."""
+"""Devices: opened adapters with their limits, buffers and samplers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dermis.gpu.memory import allocation, check_software
 from dermis.gpu.types import Bindable, Buffer, Sampler, Untyped
 
 if TYPE_CHECKING:
-    from dermis.gpu.dependencies import Slot
+    from dermis.gpu.dependencies import ResourceState
     from dermis.gpu.readback import BufferReadback
 
 T = TypeVar("T")
@@ -32,11 +32,12 @@ _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size",
 
 
 def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
-    """Open "auto" (the best), "cpu" (software) or the first adapter whose name contains the text.
+    """Open an adapter as a device.
 
-    bare : True requests nothing beyond what WebGPU guarantees everywhere
+    adapter : "auto" (the best), "cpu" (software), part of an adapter's name, or "#1" for its number
+    bare : True requests only the limits that WebGPU guarantees everywhere, and no optional feature
 
-    Raises DermisError when there is no such adapter or when it does not open.
+    Raises DermisError if there is no such adapter or if it does not open.
     """
     (*others, last), reason = select_adapters(adapter)
     for one in others:
@@ -52,14 +53,15 @@ class Device:
     largest sizes of textures and buffers are the adapter's own. It has those of `OPTIONAL_FEATURES` that the
     adapter offers.
 
+    reason : reason for the choice of the adapter
     bare : True keeps the default sizes too, and requests no feature
     executor : threads for work outside Python (compiling, reading, copying); jobs that have not started are
         cancelled when the device is dropped
     ffi, lib, checked : the native library, called directly in each frame to save the overhead of wgpu's
         Python; calls of `checked` raise the library's errors, for passes when their encoder is submitted
-    slots : what textures, buffers and views hold, see access.py
+    resource_states : versions of the content of textures, buffers and views, see dependencies.py
     programs : compiled shaders, see program.py
-    spare_records : memory for records that no frame uses at the moment; allocating it takes longer
+    spare_chunks : host memory for uniforms that no frame uses at the moment; allocating it takes longer
     """
 
     def __init__(self, adapter: Adapter, reason: str, *, bare: bool = False) -> None:
@@ -69,7 +71,7 @@ class Device:
         self.ffi, self.lib, self.checked, self._encoder = ffi, lib, libf, GPUCommandEncoder
         self.adapter = adapter
         self.reason = reason
-        logging.getLogger("wgpu").addFilter(_is_news)
+        logging.getLogger("wgpu").addFilter(_is_no_loss_note)
         if adapter.kind == "CPU":
             check_software()
         check_limits(adapter.name, adapter.handle.limits)
@@ -82,7 +84,7 @@ class Device:
             self._unwritten = self.handle.create_buffer(size=4, usage="COPY_DST")
         except Exception as error:
             raise DermisError(
-                f"adapter {adapter.name}: expected it to open, but its driver says: {error}. "
+                f"adapter {adapter.name}: expected it to open, but its driver reports: {error}. "
                 "Close other programs that use the GPU or choose --adapter cpu."
             ) from error
         raised = (int(limits[name]) for name in _RAISED_LIMITS)
@@ -92,80 +94,80 @@ class Device:
         weakref.finalize(self, self.executor.shutdown, wait=False, cancel_futures=True)
         self._timestamps: tuple[Untyped, Buffer] | None = None
         self._uniform_chunks: list[Buffer] = []
-        self.spare_records: list[bytearray] = []
-        self.slots: weakref.WeakKeyDictionary[Bindable, Slot] = weakref.WeakKeyDictionary()
-        self.programs: dict[Hashable, Any] = {}  # as many types as there are kinds of programs
-        self._shared: dict[str, Any] = {}  # of the types that their makers return
+        self.spare_chunks: list[bytearray] = []
+        self.resource_states: weakref.WeakKeyDictionary[Bindable, ResourceState] = weakref.WeakKeyDictionary()
+        self.programs: dict[Hashable, Any] = {}  # programs of different types
+        self._cached: dict[str, Any] = {}
         self._staging: dict[int, list[Buffer]] = {}
-        self.fetching: set[BufferReadback] = set()
+        self.pending_readbacks: set[BufferReadback] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Sampler] = {}
 
-    def shared(self, name: str, make: Callable[[], T]) -> T:
-        """A small object by its name, made on first use and kept as long as the device."""
-        if name not in self._shared:
-            self._shared[name] = make()
-        found: T = self._shared[name]
+    def cached(self, name: str, make: Callable[[], T]) -> T:
+        """Return a small object by its name, which is made on first use and lives as long as the device."""
+        if name not in self._cached:
+            self._cached[name] = make()
+        found: T = self._cached[name]
         return found
 
     def write(self, buffer: Buffer, data: bytearray | bytes, size: int) -> None:
-        """Put the first `size` bytes of the data into a buffer before the next submit."""
+        """Write the first `size` bytes of the data to a buffer before the next submission."""
         start = self.ffi.from_buffer(data)
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
 
     def command_encoder(self) -> Untyped:
-        """wgpu's encoder, without the description that it would make of no label."""
-        made = self.checked.wgpuDeviceCreateCommandEncoder(self.handle._internal, self.ffi.NULL)
-        return self._encoder("", made, self.handle)
+        """Return a new command encoder, created faster than by wgpu as it has no label."""
+        handle = self.checked.wgpuDeviceCreateCommandEncoder(self.handle._internal, self.ffi.NULL)
+        return self._encoder("", handle, self.handle)
 
     def submit(self, encoder: Untyped) -> int:
-        """Submit what an encoder has recorded; returns the number of the submission, for `wait`.
+        """Submit the commands of an encoder and return the number of the submission, for `wait`.
 
-        Raises GPUError, of a device that is lost too: the library would end the process.
+        Raises GPUError for errors of the commands, and for a lost device, where the library would abort.
         """
-        done = self.checked.wgpuCommandEncoderFinish(encoder._internal, self.ffi.NULL)
-        commands = self.ffi.gc(done, self.lib.wgpuCommandBufferRelease)
-        listed = self.ffi.new("WGPUCommandBuffer[]", [commands])
-        self._touch()
+        finished = self.checked.wgpuCommandEncoderFinish(encoder._internal, self.ffi.NULL)
+        commands = self.ffi.gc(finished, self.lib.wgpuCommandBufferRelease)
+        command_list = self.ffi.new("WGPUCommandBuffer[]", [commands])
+        self._check_alive()
         # wgpu's own submit returns no number, without which one can only wait for all submissions.
-        return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, listed))
+        return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, command_list))
 
     def wait(self, submitted: int | None = None) -> None:
-        """Wait for all submissions up to the one with this number from `submit`, or for all."""
+        """Wait for all submissions up to the one with this number from `submit`; None waits for all."""
         number = self.ffi.NULL if submitted is None else self.ffi.new("WGPUSubmissionIndex *", submitted)
         self.checked.wgpuDevicePoll(self.handle._internal, True, number)
 
     @property
     def is_lost(self) -> bool:
-        """Whether its driver lost it, or it was destroyed."""
+        """Return whether the driver has lost the device or it was destroyed."""
         import wgpu
 
         try:
-            self._touch()
+            self._check_alive()
         except wgpu.GPUError:
             return True
         return False
 
-    def _touch(self) -> None:
-        """Write nothing, which the library refuses where the device is lost."""
+    def _check_alive(self) -> None:
+        """Write zero bytes, for which the library raises GPUError if the device is lost."""
         self.write(self._unwritten, b"", 0)
 
     @cached_property
     def timestamp_period_ns(self) -> float:
-        """Length of a timestamp's tick [ns]; wgpu returns the native API's ticks."""
+        """Return the duration of a timestamp tick [ns]."""
         return float(self.lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
     def uniform_chunk(self, index: int, size: int) -> Buffer:
-        """One of the frames' uniform buffers, of `size` bytes; made on first use."""
+        """Return one of the uniform buffers that all frames share, created on first use with `size` bytes."""
         while len(self._uniform_chunks) <= index:
             self._uniform_chunks.append(self.uniform_buffer(size))
         return self._uniform_chunks[index]
 
     def uniform_buffer(self, size: int) -> Buffer:
-        """A new uniform buffer of `size` bytes."""
+        """Create a uniform buffer of `size` bytes."""
         return self.buffer(np.zeros(size, np.uint8), "UNIFORM")
 
-    def staging(self, size: int) -> Buffer:
-        """A staging buffer of at least `size` bytes, one given back if there is any."""
+    def acquire_staging(self, size: int) -> Buffer:
+        """Return a staging buffer of at least `size` bytes, a released one if possible."""
         size = -(-size // _STAGING_STEP) * _STAGING_STEP
         spare = self._staging.get(size)
         if spare:
@@ -174,24 +176,24 @@ class Device:
             "copy for reading", size, "MAP_READ", partial(self.handle.create_buffer, size=size)
         )
 
-    def give_back(self, buffer: Buffer) -> None:
-        """Keep a buffer from `staging` for reuse at its size; the first of another size drops the others."""
+    def release_staging(self, buffer: Buffer) -> None:
+        """Keep a staging buffer for reuse; the first one of another size drops the others."""
         if buffer.size not in self._staging:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)
 
     def buffer(self, data: NDArray[np.generic], usage: str, name: str = "buffer") -> Buffer:
-        """A new buffer with the array's bytes.
+        """Create a buffer with the bytes of an array.
 
         usage : wgpu's name ("STORAGE", "UNIFORM")
-        name : to be told where there is no room for it, as of `space`
+        name : name of the buffer in the error when it does not fit into memory
         """
         data = np.ascontiguousarray(data)
         create = partial(self.handle.create_buffer_with_data, data=data)
         return self._buffer(name, data.nbytes, usage, create)
 
-    def space(self, size: int, name: str = "buffer") -> Buffer:
-        """A new buffer of zeros that shaders write [byte]."""
+    def storage_buffer(self, size: int, name: str = "buffer") -> Buffer:
+        """Create a storage buffer of `size` zero bytes."""
         return self._buffer(name, size, "STORAGE", partial(self.handle.create_buffer, size=size))
 
     def _buffer(self, name: str, size: int, usage: str, create: Callable[..., Buffer]) -> Buffer:
@@ -199,23 +201,23 @@ class Device:
 
         flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST
         flags |= 0 if usage == "MAP_READ" else wgpu.BufferUsage.COPY_SRC
-        most = self.max_storage_bytes if usage == "STORAGE" else self.max_buffer_bytes
-        with allocation(self.adapter.name, name, size, most):
+        limit = self.max_storage_bytes if usage == "STORAGE" else self.max_buffer_bytes
+        with allocation(self.adapter.name, name, size, limit):
             return create(usage=flags)
 
     def sampler(self, **options: str) -> Sampler:
-        """A sampler with wgpu's options; made once for each set of them."""
+        """Return the sampler with these options of wgpu, created on first use."""
         key = tuple(sorted(options.items()))
         if key not in self._samplers:
             self._samplers[key] = self.handle.create_sampler(**options)
         return self._samplers[key]
 
     def sampler_options(self, sampler: Sampler) -> dict[str, str]:
-        """The options that a sampler was made with."""
+        """Return the options that a sampler was created with."""
         return next(dict(key) for key, made in self._samplers.items() if made is sampler)
 
     def timestamp_pool(self) -> tuple[Untyped, Buffer]:
-        """The query set for a frame's timestamps and the buffer that they are resolved into."""
+        """Return the query set for the timestamps of a frame and the buffer that they are resolved into."""
         import wgpu
 
         if self._timestamps is None:
@@ -225,5 +227,5 @@ class Device:
         return self._timestamps
 
 
-def _is_news(record: logging.LogRecord) -> bool:
+def _is_no_loss_note(record: logging.LogRecord) -> bool:
     return not record.getMessage().startswith(_LOSS_NOTES)

@@ -1,4 +1,4 @@
-"""What goes wrong on a device, told in the package's own errors; and devices that are lost, opened again."""
+"""Errors of devices as the package's own, and devices that are reopened when they are lost."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from dermis.base.errors import DermisError, notify
 from dermis.gpu.device import Device, open_device
 
 T = TypeVar("T")
-_REMEDY = "Close other programs that use the GPU, or try --adapter cpu"
+_ADVICE = "Close other programs that use the GPU, or try --adapter cpu"
 
 
 class DeviceError(DermisError):
-    """The device failed, or has no room: another one, or this one later, may do the same work."""
+    """Failure of a device, after which the same work may succeed on another one, or later."""
 
 
 class DeviceLostError(DeviceError):
-    """A device that is gone, with all that was on it: its driver was reset, updated, or gave up."""
+    """Loss of a device with all that was on it: its driver was reset or updated, or failed."""
 
     def __init__(self, device: Device) -> None:
         self.name = device.adapter.name
-        super().__init__(f"{self.name}: expected the device to last, but its driver lost it. {_REMEDY}.")
+        super().__init__(f"{self.name}: expected the device to last, but its driver lost it. {_ADVICE}.")
 
-    def again(self) -> DeviceError:
-        """What to say when the device that was opened after it is lost too."""
+    def lost_twice(self) -> DeviceError:
+        """Return the error for the case that the reopened device is lost too."""
         return DeviceError(
-            f"device: expected {self.name} to last for a frame, but it was lost twice. {_REMEDY}."
+            f"device: expected {self.name} to last for a frame, but it was lost twice. {_ADVICE}."
         )
 
 
 @contextlib.contextmanager
 def gpu_failures(device: Device) -> Iterator[None]:
-    """Turn the driver's errors (out of memory, invalid call) into a DermisError.
+    """Turn errors of the driver (out of memory, invalid call) into DeviceError.
 
-    Raises DeviceLostError where the device is lost, whatever was the first to fail for it.
+    Raises DeviceLostError if the device is lost, whichever error that caused.
     """
     import wgpu
 
@@ -50,7 +50,7 @@ def gpu_failures(device: Device) -> Iterator[None]:
         if not isinstance(error, wgpu.GPUError | MemoryError):
             raise
         raise DeviceError(
-            f"{device.adapter.name}: expected the frame to run, but the driver says: {error}. "
+            f"{device.adapter.name}: expected the frame to run, but the driver reports: {error}. "
             "Lower --size, --samples or --atlas, close other programs that use the GPU, or try --adapter cpu."
         ) from error
 
@@ -58,40 +58,40 @@ def gpu_failures(device: Device) -> Iterator[None]:
 class ReopeningDevice:
     """A device that is opened again when it is lost.
 
-    opening : opens one
-    adopt : told of each that is opened, to make anew what was on the one before
-    reopens : False leaves a lost device to the caller, for those who keep things on it
+    open_device : function that opens a device
+    on_open : function that is called with each opened device, to create the resources on it
+    reopens : False raises DeviceLostError instead, for callers that keep resources of their own on the device
     """
 
     def __init__(
-        self, opening: Callable[[], Device], adopt: Callable[[Device], None], *, reopens: bool = True
+        self, open_device: Callable[[], Device], on_open: Callable[[Device], None], *, reopens: bool = True
     ) -> None:
-        self._opening, self._adopt, self._reopens = opening, adopt, reopens
+        self._open_device, self._on_open, self._reopens = open_device, on_open, reopens
         self._device: Device | None = None
         self.run(lambda: None)
 
     def run(self, job: Callable[[], T]) -> T:
-        """What `job()` returns; it is done once more on another device where it loses this one.
+        """Return `job()`, which is run a second time on a reopened device if this one is lost.
 
-        Raises DermisError when it loses both, and for what `gpu_failures` tells.
+        Raises DermisError if both are lost, and as `gpu_failures` does.
         """
         try:
             return self._run(job)
         except DeviceLostError as lost:
             if not self._reopens:
                 raise
-            notify(f"{lost.name} was lost by its driver; it is opened again, and the frame begun anew")
+            notify(f"{lost.name} was lost by its driver; it is opened again, and the frame is restarted")
         try:
             return self._run(job)
         except DeviceLostError as lost:
-            raise lost.again() from lost
+            raise lost.lost_twice() from lost
 
     def _run(self, job: Callable[[], T]) -> T:
-        device = self._device or self._opening()
+        device = self._device or self._open_device()
         try:
             with gpu_failures(device):
                 if self._device is None:
-                    self._adopt(device)
+                    self._on_open(device)
                     self._device = device
                 return job()
         except DeviceLostError:
@@ -100,31 +100,31 @@ class ReopeningDevice:
 
 
 class LazyDevice:
-    """A device for several jobs, opened for the first of them, and once more where it is lost.
+    """A device for several jobs, opened for the first of them and reopened when it is lost.
 
-    adapter : as `open_device` takes it
+    adapter : as for `open_device`
     """
 
     def __init__(self, adapter: str) -> None:
         self._adapter = adapter
-        self._opened: list[Device] = []
-        self._kept: ReopeningDevice | None = None
+        self._open: list[Device] = []
+        self._reopening: ReopeningDevice | None = None
 
     def run(self, job: Callable[[Device], T]) -> T:
-        """What a job returns on the device.
+        """Return `job(device)`.
 
         Raises DermisError as `open_device` and `ReopeningDevice.run`.
         """
-        if self._kept is None:
-            self._kept = ReopeningDevice(partial(open_device, self._adapter), self._adopt)
-        return self._kept.run(lambda: job(self._opened[0]))
+        if self._reopening is None:
+            self._reopening = ReopeningDevice(partial(open_device, self._adapter), self._on_open)
+        return self._reopening.run(lambda: job(self._open[0]))
 
-    def _adopt(self, device: Device) -> None:
-        self._opened[:] = [device]
+    def _on_open(self, device: Device) -> None:
+        self._open[:] = [device]
 
 
 def run_on_device(adapter: str, job: Callable[[Device], T]) -> T:
-    """What a job returns on a device that is opened for it, and once more where it is lost.
+    """Return `job(device)` on a device that is opened for it and reopened when it is lost.
 
     Raises DermisError as `open_device` and `ReopeningDevice.run`.
     """

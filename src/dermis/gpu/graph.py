@@ -1,38 +1,38 @@
-"""The frame graph: stages declare passes in order, only stale passes run, and a frame can be listed."""
+"""Frame graph: passes are declared in order, only stale passes run, and a frame can be listed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 from typing import TypeVar, TypeVarTuple
 
 import numpy as np
 
 from dermis.gpu.command_list import CommandList, Timing
-from dermis.gpu.dependencies import Access, Declared, Dependencies, Slot, resource_state
+from dermis.gpu.dependencies import Access, Dependencies, PassAccess, ResourceState, resource_state
 from dermis.gpu.device import Device
-from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram
+from dermis.gpu.program import ComputeProgram, Program, RenderProgram
 from dermis.gpu.readback import BufferReadback
-from dermis.gpu.recorder import DrawTarget, Groups, Recorder
-from dermis.gpu.replay import Recordings
+from dermis.gpu.recorder import DrawTarget, Recorder, Workgroups
+from dermis.gpu.replay import RecordingCache
 from dermis.gpu.types import Bindable, Bindings, Buffer, TextureOrView, is_buffer, is_texture, is_view
 from dermis.gpu.uniforms import Uniforms
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-_MOST_KNOWN = 8  # kinds of frames in turn: pictures, their readback, and those of several views
+_CACHED_DEPENDENCIES = 8  # of frames that alternate: pictures, readbacks, and those of several views
 
 
 @dataclass
 class ListedPass:
-    """One pass.
+    """A pass of a listed frame.
 
-    shader : name of its file
+    shader : name of the shader file
     constants : pipeline constants
-    bindings : by name in the shader: number of a resource, "sampler", or "record 128" with its bytes
-    groups : workgroups, or vertices of a raster pass
-    recorded : whether it is part of a recording, whose records do not change
-    ran : whether it ran in that frame
+    bindings : by name in the shader: index of a resource, "sampler", or "record 128" with the size [byte]
+    groups : workgroups along each axis, or number of vertices of a render pass
+    recorded : whether the pass is part of a recording, whose records do not change
+    ran : whether the pass ran in that frame
     """
 
     stage: str
@@ -46,15 +46,15 @@ class ListedPass:
 
 @dataclass
 class Listing:
-    """Passes in order, and the resources that they bind.
+    """Passes of a frame in order, and the resources that they bind.
 
-    resources : each described: "rgba32float 512 x 512 x 7", "buffer 4096"
+    resources : descriptions such as "rgba32float 512 x 512 x 7" or "buffer 4096"
     """
 
     passes: list[ListedPass] = field(default_factory=list)
     resources: list[str] = field(default_factory=list)
-    _numbers: dict[int, int] = field(default_factory=dict)
-    _indices: list[int] = field(default_factory=list)
+    _resource_index: dict[int, int] = field(default_factory=dict)
+    _pass_index: list[int] = field(default_factory=list)
 
     def add(
         self,
@@ -67,65 +67,54 @@ class Listing:
     ) -> None:
         """Add a pass.
 
-        index : of the graph's pass that it belongs to
+        index : index of the graph's pass that it belongs to
         """
         bindings = {one.name: self._bound(resources[one.name]) for one in program.bindings}
         listed = ListedPass(stage, program.name, dict(program.constants), bindings, tuple(groups), recorded)
         self.passes.append(listed)
-        self._indices.append(index)
+        self._pass_index.append(index)
 
     def add_write(self, stage: str, buffer: Buffer, size: int, index: int) -> None:
-        """Write down that the host puts `size` bytes into a buffer."""
+        """Add a write of `size` bytes from the host to a buffer."""
         self.passes.append(ListedPass(stage, "from the host", {}, {"written": self._bound(buffer)}, (size,)))
-        self._indices.append(index)
+        self._pass_index.append(index)
 
     def finish(self, ran: Sequence[bool]) -> None:
-        """Note which of the graph's passes ran."""
-        for one, index in zip(self.passes, self._indices, strict=True):
+        """Set which of the graph's passes ran."""
+        for one, index in zip(self.passes, self._pass_index, strict=True):
             one.ran = ran[index]
-
-    def as_dict(self) -> dict[str, object]:
-        """The listing as plain data for JSON."""
-        return {"resources": self.resources, "passes": [asdict(one) for one in self.passes]}
-
-    def lines(self) -> Iterator[str]:
-        """A line for each pass."""
-        for one in self.passes:
-            bound = " ".join(f"{name}={value}" for name, value in one.bindings.items())
-            mark = "ran " if one.ran else "kept"
-            yield f"{mark} {one.stage}: {one.shader} {'x'.join(map(str, one.groups))} {bound}"
 
     def _bound(self, value: Bindable) -> int | str:
         if isinstance(value, np.ndarray):
             return f"record {value.nbytes}"
-        described = _described(value)
-        if described == "sampler":
-            return described
-        if id(value) not in self._numbers:
-            self._numbers[id(value)] = len(self.resources)
-            self.resources.append(described)
-        return self._numbers[id(value)]
+        description = _describe(value)
+        if description == "sampler":
+            return description
+        if id(value) not in self._resource_index:
+            self._resource_index[id(value)] = len(self.resources)
+            self.resources.append(description)
+        return self._resource_index[id(value)]
 
 
 class ListingRecorder(Recorder):
-    """Lists the passes of a recording.
+    """Recorder that adds the passes of a recording to a listing.
 
-    index : of the recording among the graph's passes
+    index : index of the recording among the graph's passes
     """
 
     def __init__(self, device: Device, listing: Listing, index: int) -> None:
         self.device, self._listing, self._index = device, listing, index
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
+        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
-        """Add a pass with its number of workgroups along each axis."""
+        """Add a compute pass to the listing."""
         self._listing.add(stage, program, resources, groups, self._index, recorded=True)
 
 
-def _described(value: Bindable) -> str:
+def _describe(value: Bindable) -> str:
     if is_view(value):
-        return f"view of {_described(value.texture)}"
+        return f"view of {_describe(value.texture)}"
     if is_texture(value):
         width, height, layers = value.size
         return f"{value.format} {width} x {height} x {layers}"
@@ -134,59 +123,61 @@ def _described(value: Bindable) -> str:
 
 @dataclass(slots=True)
 class DeclaredPass:
-    """One pass of a frame, or a recorded run of them.
+    """A pass of a frame, or the recorded passes of one `repeat`.
 
-    run : does it
-    key : what its result follows from besides the content that it reads
+    stages : names of the stages
+    run : function that adds the pass to a command list
+    key : everything that the output depends on besides the resources that the pass reads
     """
 
     stages: tuple[str, ...]
     run: Callable[[CommandList], None]
     key: Hashable
-    declared: Declared
+    access: PassAccess
 
 
 class Graph(Recorder):
-    """Declares the passes of each frame with the methods of `CommandList`, and runs those that are stale.
+    """Frame graph that runs only the stale ones of the passes that are declared on it.
 
-    A pass' reads and writes come from its shader's bindings. The version that it writes follows from its
-    program, its resources and their versions, the workgroups, and the constants that the shader reads. A pass
-    is skipped while its outputs hold that version, and also when no pass that runs needs them.
+    The resources that a pass reads and writes follow from the bindings of its shader. The version that it
+    writes follows from its program, its resources and their versions, the workgroups, and the uniforms that
+    the shader reads. A pass is skipped while its outputs have that version, and when no pass that runs needs
+    them.
 
-    ran : stages of the passes that the last frame ran, in order
-    listing : when it is set, the passes of the next frame are written down there
+    executed_stages : stages of the passes that the last frame ran, in order
+    listing : if set, the passes of the next frame are added to it
     """
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self.recordings = Recordings()
-        self.ran: list[str] = []
+        self.recordings = RecordingCache()
+        self.executed_stages: list[str] = []
         self.listing: Listing | None = None
         self._epoch = 0
         self._passes: list[DeclaredPass] = []
         self._uniforms = Uniforms(device)
-        self._known: list[Dependencies] = []
-        self._fetches: list[tuple[tuple[Buffer, ...], BufferReadback]] = []
+        self._dependencies: list[Dependencies] = []  # of earlier frames, the latest new one first
+        self._readbacks: list[tuple[tuple[Buffer, ...], BufferReadback]] = []
 
-    def forget(self) -> None:
-        """Take all content for unknown: the next frame runs every pass."""
+    def invalidate(self) -> None:
+        """Mark the content of all resources as unknown, so that the next frame runs every pass."""
         self._epoch += 1
 
     def begin(self) -> None:
         """Begin a frame."""
         self._passes.clear()
         self._uniforms.clear()
-        self._fetches.clear()
+        self._readbacks.clear()
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
+        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
         """Declare a compute pass, see `Recorder.dispatch`."""
         access = program.access(resources)
         writes = access.writes
-        if completes:
-            filled = resource_state(self.device, resources[completes])
-            writes = tuple(slot for slot in writes if slot is not filled)
+        if in_place:
+            unchanged = resource_state(self.device, resources[in_place])
+            writes = tuple(state for state in writes if state is not unchanged)
 
         def run(frame: CommandList) -> None:
             frame.dispatch(stage, program, resources, groups, access=access)
@@ -194,20 +185,20 @@ class Graph(Recorder):
         self._add(stage, program, resources, groups, access, writes, run)
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
-        """Declare what the host writes, see `Recorder.write`."""
-        slot = resource_state(self.device, buffer)
+        """Declare a write from the host, see `Recorder.write`."""
+        state = resource_state(self.device, buffer)
 
         def run(frame: CommandList) -> None:
             frame.write(stage, buffer, data)
 
         if self.listing is not None:
             self.listing.add_write(stage, buffer, len(data), len(self._passes))
-        self._passes.append(DeclaredPass((stage,), run, data, (0, (), (slot,))))
+        self._passes.append(DeclaredPass((stage,), run, data, (0, (), (state,))))
 
     def draw(
         self,
         stage: str,
-        program: RasterProgram,
+        program: RenderProgram,
         resources: Bindings,
         vertices: int,
         target: DrawTarget,
@@ -215,21 +206,23 @@ class Graph(Recorder):
         indices: Buffer | None = None,
         layer: int = 0,
     ) -> None:
-        """Declare a pass that rasterises, see `Recorder.draw`."""
-        attached = (target.depth, target.colour)
-        writes = tuple(resource_state(self.device, one) for one in attached if one is not None)
+        """Declare a render pass of triangles, see `Recorder.draw`."""
+        attachments = (target.depth, target.colour)
+        writes = tuple(resource_state(self.device, one) for one in attachments if one is not None)
 
-        def run(commands: CommandList) -> None:
-            commands.draw(stage, program, resources, vertices, target, indices=indices, layer=layer)
+        def run(frame: CommandList) -> None:
+            frame.draw(stage, program, resources, vertices, target, indices=indices, layer=layer)
 
         access = program.access(resources)
-        taken = None if indices is None else resource_state(self.device, indices)
-        self._add(stage, program, resources, (vertices,), access, writes, run, (layer, target.far, taken))
+        index_state = None if indices is None else resource_state(self.device, indices)
+        self._add(
+            stage, program, resources, (vertices,), access, writes, run, (layer, target.far, index_state)
+        )
 
     def fill(
-        self, stage: str, program: FragmentProgram, resources: Bindings, targets: Sequence[TextureOrView]
+        self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Declare a pass that fills targets, see `Recorder.fill`."""
+        """Declare a render pass for each texel of its targets, see `Recorder.fill`."""
         writes = tuple(resource_state(self.device, one) for one in targets)
 
         def run(frame: CommandList) -> None:
@@ -238,59 +231,63 @@ class Graph(Recorder):
         self._add(stage, program, resources, (3,), program.access(resources), writes, run)
 
     def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Declare the passes that `record(graph, *args)` declares, recorded once for the same arguments.
+        """Declare the compute passes of `record(graph, *args)`, which is called once per set of arguments.
 
-        Compute passes only. The recording runs as a whole or not at all, and takes Python next to no time.
+        Either all passes of the recording run or none. Replaying them takes Python next to no time.
         """
-        recording, result = self.recordings.find(self.device, record, args)
+        recording, result = self.recordings.get(self.device, record, args)
         if self.listing is not None:
             record(ListingRecorder(self.device, self.listing, len(self._passes)), *args)
-        access, steps = recording.access, recording.steps
-        declared = access.number, access.reads, access.writes
+        access, dispatches = recording.access, recording.dispatches
         self._passes.append(
-            DeclaredPass(recording.stages, lambda frame: frame.run(steps), access.number, declared)
+            DeclaredPass(
+                recording.stages,
+                lambda frame: frame.run(dispatches),
+                access.id,
+                (access.id, access.reads, access.writes),
+            )
         )
         return result
 
-    def fetch(self, *buffers: Buffer) -> BufferReadback:
-        """The bytes of buffers, one after the other, as all the frame's passes leave them."""
-        fetched = BufferReadback(self.device, sum(buffer.size for buffer in buffers))
-        self._fetches.append((buffers, fetched))
-        return fetched
+    def read_back(self, *buffers: Buffer) -> BufferReadback:
+        """Return a readback of buffers, one after the other, with their content after the frame."""
+        readback = BufferReadback(self.device, sum(buffer.size for buffer in buffers))
+        self._readbacks.append((buffers, readback))
+        return readback
 
     def submit(self, timed: Timing = False) -> CommandList:
-        """Run what has to be run; returns the frame, which knows how long it took."""
+        """Run the stale passes and return their command list, which has the times of the stages."""
         frame = CommandList(self.device, timed=timed, uniforms=self._uniforms)
         try:
-            needed = self._dependencies()
-            versions = needed.versions(self._epoch, [one.key for one in self._passes])
-            runs = needed.due(versions)
-            due = [one for one, now in zip(self._passes, runs, strict=True) if now]
+            dependencies = self._find_dependencies()
+            versions = dependencies.versions(self._epoch, [one.key for one in self._passes])
+            is_stale = dependencies.stale(versions)
+            stale = [one for one, now in zip(self._passes, is_stale, strict=True) if now]
             if self.listing is not None:
-                self.listing.finish(runs)
+                self.listing.finish(is_stale)
                 self.listing = None
-            for one in due:
+            for one in stale:
                 one.run(frame)
-            for buffers, fetched in self._fetches:
-                frame.fetch(buffers, fetched)
+            for buffers, readback in self._readbacks:
+                frame.read_back(buffers, readback)
             frame.submit()
         except Exception:
-            self.forget()
+            self.invalidate()
             raise
         finally:
-            self._passes, self._fetches = [], []  # which keep resources alive
-        needed.ran(runs, versions)
-        self.ran = [stage for one in due for stage in one.stages]
+            self._passes, self._readbacks = [], []  # which keep resources alive
+        dependencies.set_versions(is_stale, versions)
+        self.executed_stages = [stage for one in stale for stage in one.stages]
         return frame
 
-    def _dependencies(self) -> Dependencies:
-        """Of the passes that are declared."""
-        declared = [one.declared for one in self._passes]
-        for known in self._known:
-            if known.declared == declared:
+    def _find_dependencies(self) -> Dependencies:
+        """Return the dependencies of the declared passes, from the cache for a frame like an earlier one."""
+        passes = [one.access for one in self._passes]
+        for known in self._dependencies:
+            if known.passes == passes:
                 return known
-        self._known = [Dependencies(declared), *self._known][:_MOST_KNOWN]
-        return self._known[0]
+        self._dependencies = [Dependencies(passes), *self._dependencies][:_CACHED_DEPENDENCIES]
+        return self._dependencies[0]
 
     def _add(
         self,
@@ -299,11 +296,11 @@ class Graph(Recorder):
         resources: Bindings,
         size: tuple[int, ...],
         access: Access,
-        writes: tuple[Slot, ...],
+        writes: tuple[ResourceState, ...],
         run: Callable[[CommandList], None],
-        more: tuple[Hashable, ...] = (),
+        more_keys: tuple[Hashable, ...] = (),
     ) -> None:
         if self.listing is not None:
             self.listing.add(stage, program, resources, size, len(self._passes))
-        key = access.number, size, more, program.numbers(resources, self._uniforms)
-        self._passes.append(DeclaredPass((stage,), run, key, (access.number, access.reads, writes)))
+        key = access.id, size, more_keys, program.uniform_values(resources, self._uniforms)
+        self._passes.append(DeclaredPass((stage,), run, key, (access.id, access.reads, writes)))

@@ -1,4 +1,4 @@
-"""A cache of what the CPU makes for frames: uploaded maps, fitted tables, textures to write to."""
+"""A cache of what the CPU prepares for frames: uploaded maps, fitted tables, textures to write to."""
 
 from __future__ import annotations
 
@@ -13,132 +13,142 @@ import numpy as np
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-Role = tuple[Callable[..., object], str]
+Key = tuple[Callable[..., object], str]
+"""A function and the owner that it is called for."""
 
 
 @dataclass(eq=False, slots=True)
-class Made:
-    """What a function returned for some arguments.
+class CachedResult:
+    """Result of a function for some arguments.
 
-    parts : what was kept while it was made, which is in use as long as this is
-    roles : its own and those of all its parts
+    parts : results that the function itself took from the cache; they stay in use as long as this one
+    keys : key of this result and of all its parts
     """
 
     args: tuple[object, ...]
     value: Any = None  # of the type that the function returns
-    parts: list[tuple[Role, Made]] = field(default_factory=list)
-    roles: set[Role] = field(default_factory=set)
+    parts: list[tuple[Key, CachedResult]] = field(default_factory=list)
+    keys: set[Key] = field(default_factory=set)
 
 
 class Memo:
-    """Results of functions by their arguments; a function is called again only when an argument changes.
+    """Cache of function results, in which a function is called again only when an argument changes.
 
-    depth : how many results of each function are kept, for callers that alternate between a few
-    rounds : after which a function is forgotten that nobody asked for; depth squared where that is more
+    cache_size : number of results that are kept per function, for callers that alternate between a few
+    cache_ttl : number of frames after which the results of an unused function are dropped, at least
+        `cache_size` squared
     """
 
-    def __init__(self, depth: int = 1, rounds: int = 1) -> None:
-        self._depth = depth
-        self._kept: dict[Role, list[Made]] = {}
-        self._asked: deque[set[Role]] = deque([set()], maxlen=max(rounds, depth * depth))
-        self._making: list[Made] = []
-        self._found: list[tuple[Role, Made]] = []  # in this round, parts not among them
+    def __init__(self, cache_size: int = 1, cache_ttl: int = 1) -> None:
+        self._cache_size = cache_size
+        self._results: dict[Key, list[CachedResult]] = {}  # of each function, the most recently used first
+        self._recent_keys: deque[set[Key]] = deque([set()], maxlen=max(cache_ttl, cache_size * cache_size))
+        self._pending: list[CachedResult] = []  # the function calls that are running, innermost last
+        self._hits: list[tuple[Key, CachedResult]] = []  # of this frame, without parts
 
     @overload
-    def keep(self, make: Callable[[*Ts], T], *args: *Ts, of: str = "") -> T: ...
+    def get(self, function: Callable[[*Ts], T], *args: *Ts, owner: str = "") -> T: ...
 
     @overload
-    def keep(self, make: Callable[..., T], *args: object, using: tuple[object, ...], of: str = "") -> T: ...
+    def get(
+        self, function: Callable[..., T], *args: object, untracked: tuple[object, ...], owner: str = ""
+    ) -> T: ...
 
-    def keep(self, make: Callable[..., T], *args: object, using: tuple[object, ...] = (), of: str = "") -> T:
-        """What `make(*args, *using)` returned, made unless these are among the arguments used last.
+    def get(
+        self, function: Callable[..., T], *args: object, untracked: tuple[object, ...] = (), owner: str = ""
+    ) -> T:
+        """Return `function(*args, *untracked)`, from the cache where it was called with equal `args`.
 
-        using : what it also takes, and what makes no other result where the arguments are the same
-        of : whose it is, where several are in use in turn
+        untracked : further arguments, which do not change the result and are not compared
+        owner : name of what the result belongs to, where several are in use in turn
         """
-        role = make, of
-        kept = self._kept.setdefault(role, [])
+        key = function, owner
+        results = self._results.setdefault(key, [])
         found = None
-        for one in kept:
-            if same(one.args, args):
+        for one in results:
+            if are_equal(one.args, args):
                 found = one
                 break
         if found is not None:
-            found.args = args  # equal ones may be others: from now on these are recognised at once
+            found.args = args  # these may be equal copies, which are recognised faster from now on
         else:
-            self._settle(role)
-            kept[:] = kept[: self._depth - 1]  # before making, which may need the space
-            found = self._made(make, args, using)
-            found.roles.add(role)
-            self._touch(role, found)
-        if self._making:
-            self._making[-1].parts.append((role, found))
-            self._making[-1].roles |= found.roles
-            self._touch(role, found)
+            self._mark_hits_used(key)
+            results[:] = results[: self._cache_size - 1]  # before the call, which may need the space
+            found = self._call(function, args, untracked)
+            found.keys.add(key)
+            self._mark_used(key, found)
+        if self._pending:
+            self._pending[-1].parts.append((key, found))
+            self._pending[-1].keys |= found.keys
+            self._mark_used(key, found)
         else:
-            self._found.append((role, found))
+            self._hits.append((key, found))
         value: T = found.value
         return value
 
-    def soon(self, executor: Executor, make: Callable[[*Ts], T], *args: *Ts, of: str = "") -> Future[T]:
-        """What `make(*args)` returns, begun on another thread unless it is kept; for `wait`."""
-        return self.keep(_begin, executor, make, args, of=of)
+    def submit(
+        self, executor: Executor, function: Callable[[*Ts], T], *args: *Ts, owner: str = ""
+    ) -> Future[T]:
+        """Return the future of `function(*args)`, which runs on another thread unless it is cached."""
+        return self.get(_submit, executor, function, args, owner=owner)
 
-    def wait(self, begun: Future[T]) -> T:
-        """What was begun, as soon as it is there."""
+    def result(self, future: Future[T]) -> T:
+        """Wait for the result of a future from `submit`; a failed call is dropped from the cache."""
         try:
-            return begun.result()
+            return future.result()
         except Exception:
-            self.forget()  # what failed must not be found again
+            self.clear()
             raise
 
-    def end(self) -> None:
-        """End a round: let go of what nobody has asked for in the last rounds."""
-        if self._depth > 1:
-            self._settle()
-        self._asked[-1].update(*(made.roles for _, made in self._found))
-        self._found.clear()
-        used = set().union(*self._asked)
-        if len(used) < len(self._kept):
-            self._kept = {role: kept for role, kept in self._kept.items() if role in used}
-        self._asked.append(set())
+    def end_frame(self) -> None:
+        """End a frame and drop the results of functions that the most recent frames did not use."""
+        if self._cache_size > 1:
+            self._mark_hits_used()
+        self._recent_keys[-1].update(*(result.keys for _, result in self._hits))
+        self._hits.clear()
+        used = set().union(*self._recent_keys)
+        if len(used) < len(self._results):
+            self._results = {key: results for key, results in self._results.items() if key in used}
+        self._recent_keys.append(set())
 
-    def forget(self) -> None:
-        """Make everything again."""
-        self._kept.clear()
-        self._found.clear()
+    def clear(self) -> None:
+        """Drop all results."""
+        self._results.clear()
+        self._hits.clear()
 
-    def _made(self, make: Callable[..., object], args: tuple[object, ...], using: tuple[object, ...]) -> Made:
-        made = Made(args)
-        self._making.append(made)
+    def _call(
+        self, function: Callable[..., object], args: tuple[object, ...], untracked: tuple[object, ...]
+    ) -> CachedResult:
+        result = CachedResult(args)
+        self._pending.append(result)
         try:
-            made.value = make(*args, *using)
+            result.value = function(*args, *untracked)
         finally:
-            self._making.pop()
-        return made
+            self._pending.pop()
+        return result
 
-    def _settle(self, among: Role | None = None) -> None:
-        """Let what this round has found be what was used last, where others are to go."""
-        for role, made in self._found:
-            if among is None or among in made.roles:
-                self._touch(role, made)
+    def _mark_hits_used(self, key: Key | None = None) -> None:
+        """Mark the results of this frame as most recently used: all, or those that involve a key."""
+        for one, result in self._hits:
+            if key is None or key in result.keys:
+                self._mark_used(one, result)
 
-    def _touch(self, role: Role, made: Made) -> None:
-        """It and its parts are what was used last."""
-        self._asked[-1].add(role)
-        kept = self._kept.setdefault(role, [])
-        if not kept or kept[0] is not made:
-            kept[:] = [made, *(one for one in kept if one is not made)][: self._depth]
-        for part in made.parts:
-            self._touch(*part)
-
-
-def _begin(executor: Executor, make: Callable[[*Ts], T], args: tuple[*Ts]) -> Future[T]:
-    return executor.submit(make, *args)
+    def _mark_used(self, key: Key, result: CachedResult) -> None:
+        """Mark a result and its parts as most recently used."""
+        self._recent_keys[-1].add(key)
+        results = self._results.setdefault(key, [])
+        if not results or results[0] is not result:
+            results[:] = [result, *(one for one in results if one is not result)][: self._cache_size]
+        for part in result.parts:
+            self._mark_used(*part)
 
 
-def same(a: Any, b: Any) -> bool:
-    """Equality of values by what they say, arrays and dataclasses included; of other things by identity."""
+def _submit(executor: Executor, function: Callable[[*Ts], T], args: tuple[*Ts]) -> Future[T]:
+    return executor.submit(function, *args)
+
+
+def are_equal(a: Any, b: Any) -> bool:
+    """Return whether two objects are equal: by value for arrays and dataclasses, else by identity."""
     if a is b:
         return True
     if type(a) is not type(b):
@@ -146,13 +156,13 @@ def same(a: Any, b: Any) -> bool:
     if isinstance(a, tuple | list):
         if len(a) != len(b):
             return False
-        for x, y in zip(a, b, strict=True):  # noqa: SIM110 most are the very same: no call for these
-            if x is not y and not same(x, y):
+        for x, y in zip(a, b, strict=True):  # noqa: SIM110 most items are identical, which needs no call
+            if x is not y and not are_equal(x, y):
                 return False
         return True
     if isinstance(a, np.ndarray):
         return bool(a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes())
-    if not is_value(a):
+    if not has_value_equality(a):
         return False
     kind: Any = type(a)  # mypy takes no type of Any for hashable
     names = field_names(kind)
@@ -160,17 +170,17 @@ def same(a: Any, b: Any) -> bool:
         return bool(a == b)
     for name in names:
         x, y = getattr(a, name), getattr(b, name)
-        if x is not y and not same(x, y):
+        if x is not y and not are_equal(x, y):
             return False
     return True
 
 
 @cache
 def field_names(kind: type) -> tuple[str, ...] | None:
-    """Of a dataclass; kept by kind, as others are slow to say that they are none."""
+    """Return the names of a dataclass's fields; None for other types."""
     return tuple(one.name for one in fields(kind)) if is_dataclass(kind) else None
 
 
-def is_value(thing: object) -> bool:
-    """Whether it stands for what it says, and not for itself as textures do."""
-    return type(thing).__eq__ is not object.__eq__
+def has_value_equality(value: object) -> bool:
+    """Return whether an object's type defines equality by value, as textures for example do not."""
+    return type(value).__eq__ is not object.__eq__

@@ -1,4 +1,4 @@
-"""Memory of devices and of the process: what is held, what is left, and errors where it runs out."""
+"""Memory of devices and of the process: how much is used, how much is free, and errors when it runs out."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from dermis.gpu.types import Buffer
 if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
-_LISTING = 0.5e9, 0.15e9
-"""Bytes of address space to load all drivers, and for each thread of Mesa's; measured with Mesa 22.3."""
+_LISTING_BYTES = 0.5e9, 0.15e9
+"""Address space that loading all drivers takes, and per thread of Mesa's adapter; measured with Mesa 22.3."""
 
-_SOFTWARE = 0.9e9, 0.22e9
-"""The same to open the software adapter and draw the package's human at 512x512, atlas 1024."""
+_SOFTWARE_BYTES = 0.9e9, 0.22e9
+"""Address space to render the package's human in software at 512x512, atlas 1024, and per thread."""
 
-_MOST_THREADS = 16  # of Mesa's software adapter
+_MAX_THREADS = 16  # of Mesa's software adapter
 
-_GROUPS = Path("/sys/fs/cgroup")
+_CGROUPS = Path("/sys/fs/cgroup")
 
-_LEAST_PROBED = 1 << 20  # bytes
+_MIN_PROBE_BYTES = 1 << 20
 
-_SAID = "out of memory", "not enough memory"  # by the library, whose class of error differs
+_OUT_OF_MEMORY = "out of memory", "not enough memory"  # in errors of the library, whose classes differ
 
 _RAISE_LIMIT = "Raise it: ulimit -v unlimited"
 
@@ -39,41 +39,40 @@ _SMALLER_FRAME = (
 
 
 class OutOfMemoryError(DermisError):
-    """Something that does not fit onto a device.
+    """A resource that does not fit into the memory of a device.
 
-    expected, came : sentences without a full stop, for who knows of a better remedy
-    size : of what did not fit [byte]
+    expected, actual : sentences without a full stop, for callers that have better advice
+    size : size of the resource [byte]
     """
 
-    def __init__(self, expected: str, came: str, size: float, remedy: str = _SMALLER_FRAME) -> None:
-        super().__init__(f"{expected}, but {came}. {remedy}.")
-        self.expected, self.came, self.size = expected, came, size
+    def __init__(self, expected: str, actual: str, size: float, advice: str = _SMALLER_FRAME) -> None:
+        super().__init__(f"{expected}, but {actual}. {advice}.")
+        self.expected, self.actual, self.size = expected, actual, size
 
 
 @contextlib.contextmanager
-def allocation(device: str, name: str, size: float, most: float) -> Iterator[None]:
-    """Tell what it was where something is not made.
+def allocation(device: str, name: str, size: float, limit: float) -> Iterator[None]:
+    """Raise OutOfMemoryError, which names the resource, if the resource created here does not fit.
 
-    device, name : of the adapter, and of what is made
-    size, most : how large it is, and how large it may be [byte]
-
-    Raises OutOfMemoryError.
+    device, name : names of the adapter and of the resource
+    size, limit : size of the resource, and largest size that the device allows [byte]
     """
     import wgpu
 
     expected = f"{device}: expected room for the {name}, {format_bytes(size)}"
-    if size > most:
-        raise OutOfMemoryError(expected, f"it takes at most {format_bytes(most)} at once", size)
+    if size > limit:
+        raise OutOfMemoryError(expected, f"it takes at most {format_bytes(limit)} at once", size)
     try:
         yield
     except (wgpu.GPUError, MemoryError) as error:
-        if isinstance(error, wgpu.GPUError) and not any(words in str(error).lower() for words in _SAID):
+        text = str(error).lower()
+        if isinstance(error, wgpu.GPUError) and not any(words in text for words in _OUT_OF_MEMORY):
             raise
         raise OutOfMemoryError(expected, "it has none left", size) from error
 
 
 def allocated_bytes() -> int:
-    """Bytes of all textures and buffers that are not yet released."""
+    """Return the size of all textures and buffers that are not yet released [byte]."""
     import wgpu
 
     found = wgpu.diagnostics.object_counts.get_dict()
@@ -85,116 +84,108 @@ def check_memory(
     needed: float,
     option: str,
     sizes: str,
-    remedy: Callable[[float], str] = lambda _: _SMALLER,
+    advice: Callable[[float], str] = lambda _: _SMALLER,
 ) -> None:
     """Refuse sizes that do not fit into main memory, where software adapters keep textures.
 
     needed : bytes; the system kills a process that takes too much
-    option, sizes : named in the message
-    remedy : what fits into a number of bytes
+    option, sizes : words for the message
+    advice : function that returns the advice for the number of available bytes
 
     Raises DermisError.
     """
     if device.adapter.kind != "CPU":
         return
-    here = available_memory()
-    if needed > here:
-        came = f"{sizes} need {needed / 1e9:.0f} GB"
-        refuse(option, f"a frame within {here / 1e9:.0f} GB", came, remedy(here))
+    available = available_memory()
+    if needed > available:
+        actual = f"{sizes} need {needed / 1e9:.0f} GB"
+        refuse(option, f"a frame within {available / 1e9:.0f} GB", actual, advice(available))
 
 
-def probe_memory(device: Device, most: float) -> float:
-    """Bytes, up to `most`, that a device has room for: found by taking them, and given back."""
-    taken: list[Buffer] = []
-    total, size = 0, min(int(most), device.max_storage_bytes) // 4 * 4
-    while size >= _LEAST_PROBED and total < most:
+def probe_memory(device: Device, limit: float) -> float:
+    """Return the free memory of a device up to a limit [byte], found by allocating and releasing it."""
+    buffers: list[Buffer] = []
+    total, size = 0, min(int(limit), device.max_storage_bytes) // 4 * 4
+    while size >= _MIN_PROBE_BYTES and total < limit:
         try:
-            taken.append(device.space(size, "probe"))
+            buffers.append(device.storage_buffer(size, "probe"))
             total += size
         except OutOfMemoryError:
             size = size // 8 * 4
-    for buffer in taken:
+    for buffer in buffers:
         buffer.destroy()
     return float(total)
 
 
 def check_drivers() -> None:
-    """Raises DermisError where drivers could not be loaded, and tells what the software adapter takes too."""
-    if _limit() < math.inf and not _has_drivers():
-        _check(_bytes(_LISTING), _bytes(_SOFTWARE))
+    """Raise DermisError if the limit of address space is too low to load the graphics drivers."""
+    if _address_space_limit() < math.inf and not _has_drivers():
+        _check_address_space(_per_threads(_LISTING_BYTES), _per_threads(_SOFTWARE_BYTES))
 
 
 def check_software() -> None:
-    """Raises DermisError where the software adapter could not draw; others are not known."""
-    if _limit() < math.inf:
-        _check(_bytes(_SOFTWARE))
+    """Raise DermisError if the limit of address space is too low to render in software."""
+    if _address_space_limit() < math.inf:
+        _check_address_space(_per_threads(_SOFTWARE_BYTES))
 
 
 def available_memory() -> float:
-    """Bytes that the process may still take: of its address space, main memory and its group's share."""
-    return min(_address_room(), main_memory())
+    """Return the memory that the process may still take, by address space, machine and cgroup [byte]."""
+    return min(_address_space_limit() - _address_space_used(), main_memory())
 
 
 def main_memory() -> float:
-    """Bytes of the machine, or of the process's group where it has less; infinite where that is unknown."""
+    """Return the memory of the machine, or of the process's cgroup if less; infinite if unknown [byte]."""
     known = [math.inf]
     with contextlib.suppress(AttributeError, ValueError):  # on Windows
         known.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     with contextlib.suppress(OSError, ValueError):
-        known += _group_limits()
+        known += _cgroup_limits()
     return min(known)
 
 
 def format_bytes(size: float) -> str:
-    """Bytes as people write them."""
+    """Return a number of bytes as text in MB or GB."""
     return f"{size / 1e9:.1f} GB" if size >= 1e8 else f"{size / 1e6:.1f} MB"
 
 
-def _group_limits() -> list[float]:
-    """What control groups allow (cgroup v2 and v1)."""
-    own = [_GROUPS / name for name in _own_groups()]
-    folders = [folder for one in own for folder in (one, *one.parents) if folder.is_relative_to(_GROUPS)]
-    files = [*(folder / "memory.max" for folder in folders), _GROUPS / "memory" / "memory.limit_in_bytes"]
+def _cgroup_limits() -> list[float]:
+    """Return the memory limits of the process's control groups (v2 and v1) [byte]."""
+    own = [_CGROUPS / name for name in _own_cgroups()]
+    folders = [folder for one in own for folder in (one, *one.parents) if folder.is_relative_to(_CGROUPS)]
+    files = [*(folder / "memory.max" for folder in folders), _CGROUPS / "memory" / "memory.limit_in_bytes"]
     texts = [file.read_text().strip() for file in files if file.is_file()]
     return [float(text) for text in texts if text.isdigit()]
 
 
-def _own_groups() -> list[str]:
+def _own_cgroups() -> list[str]:
     lines = Path("/proc/self/cgroup").read_text().splitlines()
     return [line.removeprefix("0::").lstrip("/") for line in lines if line.startswith("0::")]
 
 
-def _check(needed: float, later: float = 0.0) -> None:
-    """Refuse a limit below what is needed.
-
-    later : bytes that are needed after these
-    """
-    limit, taken = _limit(), _taken()
-    if taken + needed > limit:
-        whole = _gigabytes(math.ceil((taken + needed + later) / 1e8) * 1e8)
-        wanted = f"at least {whole} for graphics drivers and a frame in software"
-        came = f"the limit is {_gigabytes(limit)}, of which {_gigabytes(taken)} are taken"
-        refuse("address space (ulimit -v)", wanted, came, _RAISE_LIMIT)
+def _check_address_space(needed: float, needed_later: float = 0.0) -> None:
+    limit, used = _address_space_limit(), _address_space_used()
+    if used + needed > limit:
+        total = format_bytes(math.ceil((used + needed + needed_later) / 1e8) * 1e8)
+        expected = f"at least {total} for graphics drivers and a frame in software"
+        actual = f"the limit is {format_bytes(limit)}, of which {format_bytes(used)} are taken"
+        refuse("address space (ulimit -v)", expected, actual, _RAISE_LIMIT)
 
 
 def _has_drivers() -> bool:
-    """Whether this process has loaded drivers before."""
+    """Return whether this process has already loaded drivers."""
     try:
         return "libvulkan" in Path("/proc/self/maps").read_text()
     except OSError:  # not on Linux
         return False
 
 
-def _bytes(needed: tuple[float, float]) -> float:
-    return needed[0] + needed[1] * _threads()
+def _per_threads(needed: tuple[float, float]) -> float:
+    return needed[0] + needed[1] * _software_threads()
 
 
-def _address_room() -> float:
-    return _limit() - _taken()
-
-
-def _limit() -> float:
-    """Of the process's address space [bytes]."""
+def _address_space_limit() -> float:
+    """Return the limit of the process's address space [byte]."""
     try:
         import resource
     except ImportError:  # on Windows
@@ -203,19 +194,14 @@ def _limit() -> float:
     return math.inf if limit == resource.RLIM_INFINITY else float(limit)
 
 
-def _taken() -> float:
-    """Bytes of address space."""
+def _address_space_used() -> float:
     try:
         return float(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     except OSError:  # not on Linux
         return 0.0
 
 
-def _threads() -> int:
-    """Of Mesa's software adapter."""
-    asked = os.environ.get("LP_NUM_THREADS", "")
-    return int(asked) if asked.isdigit() else min(os.cpu_count() or 1, _MOST_THREADS)
-
-
-def _gigabytes(count: float) -> str:
-    return f"{count / 1e9:.1f} GB"
+def _software_threads() -> int:
+    """Return the number of threads that Mesa's software adapter uses."""
+    threads = os.environ.get("LP_NUM_THREADS", "")
+    return int(threads) if threads.isdigit() else min(os.cpu_count() or 1, _MAX_THREADS)

@@ -1,4 +1,4 @@
-"""Compiled shaders: WGSL in, pipeline and bindings by name out."""
+"""Programs: compiled WGSL shaders whose resources are bound by name."""
 
 from __future__ import annotations
 
@@ -13,32 +13,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
-from dermis.gpu.bind_groups import UNIFORM, BindGroup, ResourceCache, key_of, make_group
-from dermis.gpu.dependencies import Access, new_number, resource_state
+from dermis.gpu.bind_groups import UNIFORM, BindGroup, ResourceCache, make_bind_group, resource_key
+from dermis.gpu.dependencies import Access, resource_state, unique_id
 from dermis.gpu.device import Device
-from dermis.gpu.shader_types import Binding, bindings, members_read, record_of
-from dermis.gpu.types import Bindable, Bindings, Native, Record, Untyped
+from dermis.gpu.shader_types import Binding, bindings, make_record, used_members
+from dermis.gpu.types import Bindable, Bindings, Native, UniformRecord, Untyped
 from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Folder, Source, compose
 
 Records = Mapping[str, NDArray[np.generic]]
-"""The uniforms of bindings, where a shader is known to declare them so."""
+"""Bindings of a shader's uniforms only."""
 
 P = TypeVar("P")
 
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 
-_LARGE_RECORD = 2048  # bytes; a skin is smaller, of which few shaders read all
+_LARGE_RECORD = 2048  # bytes; the record of a skin is smaller, of which few shaders read all
 
-_MOST_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
+_CACHED_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
 
 Constants = tuple[tuple[str, float], ...]
-"""Names and values of pipeline constants, a shader's `override`s; those left out keep their default."""
+"""Names and values of pipeline constants (`override` in WGSL); others keep their default."""
 
 
 class Program:
-    """What compute and raster programs share: the composed text, its bindings and their layouts.
+    """Base class of programs: a composed shader with its bindings and layouts.
 
+    path : WGSL file
+    folders : folders in which its includes are looked up
+    constants : pipeline constants by name
     stages : wgpu's names of the stages that see the bindings
     """
 
@@ -53,87 +56,92 @@ class Program:
     ) -> None:
         self.device, self.name = device, path.stem
         self.constants = dict(constants or {})
-        self.source = source_of(path, folders)
+        self.source = shader_source(path, folders)
         self.bindings: tuple[Binding, ...] = bindings(self.source.text)
         self._module = self._compile(path)
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
         self._others = [b for b in self.bindings if not _is_uniform(b)]
-        self._read = _reader([b.name for b in self._others])
-        self._numbers_of = [(one.name, members_read(self.source.text, one.name)) for one in self._uniforms]
-        self.kept_groups: ResourceCache[BindGroup] = ResourceCache()
+        self._get_others = _getter([b.name for b in self._others])
+        self._used_members = [(one.name, used_members(self.source.text, one.name)) for one in self._uniforms]
+        self.bind_groups: ResourceCache[BindGroup] = ResourceCache()
         self._accesses: ResourceCache[Access] = ResourceCache()
         self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
-    def record(self, struct: str, **values: object) -> Record:
-        """A zeroed record of one of the shader's structs with the given members filled in."""
-        return record_of(self.source.text, struct, **values)
+    def record(self, struct: str, **values: object) -> UniformRecord:
+        """Return a record of one of the shader's structs: zeros, with the given members set."""
+        return make_record(self.source.text, struct, **values)
 
-    def places(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
-        """Where the records are among the uniforms."""
+    def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
+        """Return the positions of the bound records in uniform memory [byte]."""
         records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
-            return tuple([uniforms.place(records[name]) for name, _ in self._numbers_of])
+            return tuple([uniforms.position(records[name]) for name, _ in self._used_members])
         except KeyError as missing:
-            raise self._unbound(missing) from None
+            raise self._unbound_error(missing) from None
 
     def bind_group(self, resources: Bindings, uniforms: Uniforms) -> tuple[BindGroup, list[int]]:
-        """A bind group of resources by their name in the shader, and the offsets of its uniforms.
+        """Return a bind group and the offsets of its uniforms.
 
-        A resource is a buffer, a texture, a texture view, a sampler, or a numpy record, which finds a place
-        among the uniforms.
+        resources : buffers, textures, texture views, samplers and numpy records by their names in the
+            shader; records are placed in uniform memory
         """
-        found = [uniforms.at(place) for place in self.places(resources, uniforms)]
-        bound = [*self._bound(resources), *(buffer for buffer, _ in found)]
-        key = key_of(bound)
-        group = self.kept_groups.find(key)
+        located = [uniforms.locate(position) for position in self.record_positions(resources, uniforms)]
+        bound = [*self._bound(resources), *(buffer for buffer, _ in located)]
+        key = resource_key(bound)
+        group = self.bind_groups.find(key)
         if group is None:
             group = self._make_group(bound, resources)
-            self.kept_groups.keep(key, bound, group)
-        return group, [offset for _, offset in found]
+            self.bind_groups.add(key, bound, group)
+        return group, [offset for _, offset in located]
 
     def access(self, resources: Bindings) -> Access:
-        """What a pass of this program with these resources reads and writes, records aside."""
+        """Return the resources that a pass of this program reads and writes; records do not count."""
         bound = self._bound(resources)
-        key = key_of(bound)
+        key = resource_key(bound)
         found = self._accesses.find(key)
         if found is None:
             named = list(zip(self._others, bound, strict=True))
             reads = tuple(
-                resource_state(self.device, value) for one, value in named if one.holds and one.reads
+                resource_state(self.device, value) for one, value in named if one.has_content and one.reads
             )
             writes = tuple(resource_state(self.device, value) for one, value in named if one.writes)
-            found = Access(new_number(), reads, writes)
-            self._accesses.keep(key, bound, found)
+            found = Access(unique_id(), reads, writes)
+            self._accesses.add(key, bound, found)
         return found
 
-    def numbers(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
-        """What the shader reads of the records; all of large ones, whose hash several passes share."""
+    def uniform_values(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
+        """Return the bytes of the bound records that the shader reads.
+
+        Large records are returned whole, as several passes share their hash.
+        """
         found: list[Hashable] = []
         records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
-            for name, read in self._numbers_of:
+            for name, select in self._used_members:
                 raw = uniforms.bytes_of(records[name])
-                found.append(raw if len(raw) > _LARGE_RECORD else read(raw))
+                found.append(raw if len(raw) > _LARGE_RECORD else select(raw))
         except KeyError as missing:
-            raise self._unbound(missing) from None
+            raise self._unbound_error(missing) from None
         return tuple(found)
 
     def _bound(self, resources: Bindings) -> Sequence[Bindable]:
-        """What is bound besides records, in the shader's order."""
+        """Return the resources without records, in the order of the shader's bindings."""
         try:
-            return self._read(resources)
+            return self._get_others(resources)
         except KeyError as missing:
-            raise self._unbound(missing) from None
+            raise self._unbound_error(missing) from None
 
-    def _unbound(self, missing: KeyError) -> KeyError:
+    def _unbound_error(self, missing: KeyError) -> KeyError:
         return KeyError(f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it")
 
     def _make_group(self, bound: Sequence[Bindable], resources: Bindings) -> BindGroup:
-        """The group of what the others are, and then the uniforms' buffers."""
+        """Return the bind group of the other resources followed by the buffers of the uniforms."""
         records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]
-        return make_group(self.device, self._group_layout, (*self._others, *self._uniforms), bound, sizes)
+        return make_bind_group(
+            self.device, self._group_layout, (*self._others, *self._uniforms), bound, sizes
+        )
 
     def _compile(self, path: Path) -> Untyped:
         try:
@@ -155,7 +163,7 @@ class Program:
 
 
 class ComputeProgram(Program):
-    """A compute shader with the entry point `main`; `constants` are the shader's `override`s."""
+    """A compute shader with the entry point `main`, compiled on another thread."""
 
     stages = ("COMPUTE",)
 
@@ -174,21 +182,21 @@ class ComputeProgram(Program):
 
     @cached_property
     def pipeline(self) -> Native:
-        """Compiled from when the program is made, while others load what it is to work on."""
+        """Return the pipeline; wait for its compilation if necessary."""
         pipeline: Native = self._compiled.result()
         return pipeline
 
     def groups_for(self, size: tuple[int, int], tile: int = 8) -> tuple[int, int]:
-        """Workgroups that cover an image of `size` with tiles of `tile` squared."""
+        """Return the number of workgroups of tile x tile invocations that cover an image of `size`."""
         return math.ceil(size[0] / tile), math.ceil(size[1] / tile)
 
 
-class RasterProgram(Program):
-    """A vertex shader `vertex`, and a fragment shader `fragment` when there is a colour target.
+class RenderProgram(Program):
+    """A shader with the entry points `vertex` and, if there are colour targets, `fragment`.
 
-    target : format of the colour target, or None for depth only
-    depth_compare : wgpu's name ("less", "greater")
-    drawn : both
+    targets : formats of the colour targets; none to draw only depth
+    depth_compare : depth test by wgpu's name ("less", "greater"); None for no depth attachment
+    raster : depth test and first target, for a player of captured frames
     """
 
     stages = "VERTEX", "FRAGMENT"
@@ -200,83 +208,57 @@ class RasterProgram(Program):
         folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
         *,
-        target: str | None,
-        depth_compare: str,
-    ) -> None:
-        super().__init__(device, path, folders, constants)
-        self.drawn = {"target": target, "depth_compare": depth_compare}
-        fragment = {"module": self._module, "entry_point": "fragment", "targets": [{"format": target}]}
-        self.pipeline = device.handle.create_render_pipeline(
-            layout=self._layout,
-            vertex={"module": self._module, "entry_point": "vertex", "constants": self.constants},
-            fragment=fragment if target else None,
-            primitive={"topology": "triangle-list", "cull_mode": "none"},
-            depth_stencil={
-                "format": "depth32float",
-                "depth_write_enabled": True,
-                "depth_compare": depth_compare,
-            },
-        )
-
-
-class FragmentProgram(Program):
-    """A shader whose `fragment` fills whole targets; its `vertex` makes the one triangle that covers them.
-
-    targets : their formats
-    """
-
-    stages = ("FRAGMENT",)
-
-    def __init__(
-        self,
-        device: Device,
-        path: Path,
-        folders: Sequence[Folder] = (),
-        constants: Mapping[str, float] | None = None,
-        *,
         targets: Sequence[str],
+        depth_compare: str | None = None,
     ) -> None:
         super().__init__(device, path, folders, constants)
-        stage = {"module": self._module, "entry_point": "fragment", "constants": self.constants}
+        self.raster = {"target": next(iter(targets), None), "depth_compare": depth_compare}
+        stage = {"module": self._module, "constants": self.constants}
+        fragment = {**stage, "entry_point": "fragment", "targets": [{"format": texel} for texel in targets]}
+        depth = {"format": "depth32float", "depth_write_enabled": True, "depth_compare": depth_compare}
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
-            vertex={"module": self._module, "entry_point": "vertex"},
-            fragment={**stage, "targets": [{"format": texel} for texel in targets]},
+            vertex={**stage, "entry_point": "vertex"},
+            fragment=fragment if targets else None,
             primitive={"topology": "triangle-list"},
+            depth_stencil=depth if depth_compare else None,
         )
 
 
-def compiled(device: Device, shader: Hashable, constants: Constants, make: Callable[[], P]) -> P:
-    """What `make` compiles of a shader with these pipeline constants, unless it is one of those used last.
+def cached_program(device: Device, shader: Hashable, constants: Constants, make: Callable[[], P]) -> P:
+    """Return a program of a shader with these pipeline constants, compiled unless it was used recently.
 
-    shader : what tells it from others
+    shader : key that identifies the shader
+    make : function that compiles the program
     """
     variants: dict[Constants, P] = device.programs.setdefault(shader, {})
     found = variants.pop(constants, None)
     if found is None:
         found = make()
-    variants[constants] = found  # the last one
-    if len(variants) > _MOST_VARIANTS:
+    variants[constants] = found  # the most recently used one is last
+    if len(variants) > _CACHED_VARIANTS:
         del variants[next(iter(variants))]
     return found
 
 
-def declared(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
-    """Those of some pipeline constants that the shader has."""
-    text = source_of(path, folders).text
+def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
+    """Return those pipeline constants that a shader declares."""
+    text = shader_source(path, folders).text
     return {name: value for name, value in constants if f"override {name}:" in text}
 
 
-def source_of(path: Path, folders: Sequence[Folder]) -> Source:
-    """The composed text of a shader, which may include the toolkit's own."""
+def shader_source(path: Path, folders: Sequence[Folder]) -> Source:
+    """Return the composed text of a shader, which may include the toolkit's own files."""
     return compose(path, (*folders, _TOOLKIT_SHADERS))
 
 
-def _reader(names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
-    """Takes what is named out of what is given."""
+def _getter(names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
+    """Return a function that takes the named resources out of bindings."""
     if len(names) > 1:
         return itemgetter(*names)
-    return lambda resources: [resources[name] for name in names]  # of one name it would give no sequence
+    return lambda resources: [
+        resources[name] for name in names
+    ]  # itemgetter returns no sequence for one name
 
 
 def _is_uniform(binding: Binding) -> bool:

@@ -1,4 +1,4 @@
-"""Asynchronous readback: copies of buffers that the CPU reads while the device keeps working."""
+"""Asynchronous readback of buffers, which the CPU reads while the device continues to work."""
 
 from __future__ import annotations
 
@@ -13,38 +13,40 @@ from dermis.gpu.failures import DeviceLostError
 
 
 class BufferReadback:
-    """A copy of a buffer that becomes readable when a submission is done.
+    """Copy of a buffer that becomes readable when a submission is finished.
 
-    wgpu's own mapping makes a thread wait for the newest submission; here only the reader waits, and only for
-    the submission that fills the copy.
+    wgpu's own mapping waits for the newest submission on another thread; here only the reader waits, and only
+    for the submission that fills the copy.
+
+    size : bytes
     """
 
     def __init__(self, device: Device, size: int) -> None:
         self.device, self._size, self._submitted = device, size, 0
         self._status: int | None = None
-        self._name: object = None  # what the driver's callback gets
-        self.buffer = device.staging(size)
+        self._handle: object = None  # argument of the driver's callback, which has to stay alive
+        self.buffer = device.acquire_staging(size)
 
-    def begin(self, submitted: int) -> None:
-        """Map the copy for reading once the submission of that number is done."""
+    def start(self, submitted: int) -> None:
+        """Request the mapping of the copy after the submission with this number from `Device.submit`."""
         ffi, lib = self.device.ffi, self.device.lib
         info = ffi.new("WGPUBufferMapCallbackInfo *")
-        info.mode, info.callback = lib.WGPUCallbackMode_AllowProcessEvents, _when_mapped()
-        self._submitted, self._name = submitted, ffi.new_handle(self)
-        info.userdata1 = self._name
-        self.device.fetching.add(self)  # has to live until the driver calls back
-        asked = self.buffer._internal, lib.WGPUMapMode_Read, 0, self.buffer.size, info[0]
-        self.device.checked.wgpuBufferMapAsync(*asked)
+        info.mode, info.callback = lib.WGPUCallbackMode_AllowProcessEvents, _map_callback()
+        self._submitted, self._handle = submitted, ffi.new_handle(self)
+        info.userdata1 = self._handle
+        self.device.pending_readbacks.add(self)  # has to live until the callback
+        arguments = self.buffer._internal, lib.WGPUMapMode_Read, 0, self.buffer.size, info[0]
+        self.device.checked.wgpuBufferMapAsync(*arguments)
 
-    def arrive(self, status: int) -> None:
-        """Take the driver's answer to `begin`."""
-        self._status, self._name = status, None
-        self.device.fetching.discard(self)
+    def on_mapped(self, status: int) -> None:
+        """Store the result of the mapping, as the driver's callback."""
+        self._status, self._handle = status, None
+        self.device.pending_readbacks.discard(self)
 
     def array(self) -> NDArray[np.uint8]:
-        """The bytes; waits for them. To be called once.
+        """Wait for the bytes and return them; can be called once.
 
-        Raises DeviceLostError without a device, DermisError when it fails otherwise.
+        Raises DeviceLostError if the device is lost and DermisError for other failures.
         """
         ffi, checked = self.device.ffi, self.device.checked
         self._check()
@@ -52,28 +54,26 @@ class BufferReadback:
         self._check()
         if self._status != self.device.lib.WGPUMapAsyncStatus_Success:
             name = self.device.adapter.name
-            raise DermisError(
-                f"{name}: expected to read what it computed, but its driver refuses. Try again."
-            )
+            raise DermisError(f"{name}: expected to read its results, but its driver refuses. Try again.")
         start = checked.wgpuBufferGetConstMappedRange(self.buffer._internal, 0, self.buffer.size)
         copied = np.frombuffer(ffi.buffer(start, self._size), np.uint8).copy()
         checked.wgpuBufferUnmap(self.buffer._internal)
-        self.device.give_back(self.buffer)
+        self.device.release_staging(self.buffer)
         return copied
 
     def _check(self) -> None:
-        """Raise DeviceLostError without a device, for whose buffers the library ends the process."""
+        """Raise DeviceLostError for a lost device, whose buffers the library must not touch: it aborts."""
         if self.device.is_lost:
             raise DeviceLostError(self.device)
 
 
 @cache
-def _when_mapped() -> object:
-    """The driver's callback, one for all copies: making one takes as long as a stage of a frame."""
+def _map_callback() -> object:
+    """Return the driver's callback, which all copies share as its creation takes long."""
     from wgpu.backends.wgpu_native import ffi
 
     @ffi.callback("void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)")  # type: ignore[untyped-decorator]
-    def mapped(status: int, _: object, fetched: object, __: object) -> None:
-        ffi.from_handle(fetched).arrive(status)
+    def on_mapped(status: int, _: object, readback: object, __: object) -> None:
+        ffi.from_handle(readback).on_mapped(status)
 
-    return mapped
+    return on_mapped

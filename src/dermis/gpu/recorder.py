@@ -1,4 +1,4 @@
-"""The interface for passes of a frame, however they are run, replayed or written down."""
+"""Interface of everything that takes the passes of a frame: to run, replay, capture or list them."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar, TypeVarTuple
 
 from dermis.gpu.device import Device
-from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram
+from dermis.gpu.program import ComputeProgram, RenderProgram
 from dermis.gpu.types import Bindings, Buffer, TextureOrView, TextureView
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-Groups = tuple[int, int, int]
+Workgroups = tuple[int, int, int]
 """Number of workgroups along each axis."""
 
 
 class DrawTarget(NamedTuple):
-    """Attachments of a pass that rasterises, which are cleared first.
+    """Attachments of a render pass, which are cleared first.
 
-    far : depth with which the depth attachment is cleared
-    colour : None for depth alone
+    depth : depth attachment
+    far : value that the depth attachment is cleared to
+    colour : colour attachment; None to draw only depth
     """
 
     depth: TextureView
@@ -29,21 +30,22 @@ class DrawTarget(NamedTuple):
 
 
 class Recorder(ABC):
-    """A receiver of passes: a command list, a graph, a recording, a capture or a listing.
+    """A recorder of passes: a command list, a graph, a recording, a capture or a listing.
 
-    All take compute passes; recordings and listings of recordings take no others.
+    All record compute passes; recordings and listings of recordings refuse all others.
     """
 
     device: Device
 
     @abstractmethod
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
+        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
-        """Add a pass that runs `program` in a number of workgroups.
+        """Add a compute pass.
 
-        completes : name of a resource that the pass completes from its own content, as gutters are, and that
-            therefore counts as unchanged
+        groups : number of workgroups along each axis
+        in_place : name of a resource that the pass only extends from its own content, as gutters are, so that
+            its version does not change
         """
 
     def compute(
@@ -53,22 +55,22 @@ class Recorder(ABC):
         resources: Bindings,
         size: tuple[int, int],
         tile: int = 8,
-        completes: str = "",
+        in_place: str = "",
     ) -> None:
-        """Add a pass of size[0] x size[1] invocations, in workgroups of tile x tile."""
-        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), completes)
+        """Add a compute pass of at least size[0] x size[1] invocations, in workgroups of tile x tile."""
+        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), in_place)
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
-        """Put bytes from the host into the start of a buffer, before all passes.
+        """Write bytes from the host to the start of a buffer, before all passes of the frame.
 
-        data : the same object in each frame costs nothing, as Python keeps the hash of bytes
+        data : pass the same object in each frame if possible, as Python caches the hash of bytes
         """
-        raise self._compute_only(stage)
+        raise self._refusal(stage)
 
     def draw(
         self,
         stage: str,
-        program: RasterProgram,
+        program: RenderProgram,
         resources: Bindings,
         vertices: int,
         target: DrawTarget,
@@ -76,22 +78,22 @@ class Recorder(ABC):
         indices: Buffer | None = None,
         layer: int = 0,
     ) -> None:
-        """Add a pass that rasterises `vertices` / 3 triangles.
+        """Add a render pass of `vertices` / 3 triangles.
 
-        indices : numbers of the vertices for the shader; None counts them
-        layer : instance index for the shader
+        indices : index buffer; None numbers the vertices in order
+        layer : instance index that the shader gets
         """
-        raise self._compute_only(stage)
+        raise self._refusal(stage)
 
     def fill(
-        self, stage: str, program: FragmentProgram, resources: Bindings, targets: Sequence[TextureOrView]
+        self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Add a pass that runs `program` for each texel of its targets."""
-        raise self._compute_only(stage)
+        """Add a render pass that runs `program` for each texel of its targets."""
+        raise self._refusal(stage)
 
     def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Add the compute passes of `record(recorder, *args)`, which return the same for equal arguments."""
+        """Add the compute passes of `record(recorder, *args)`, which depend only on its arguments."""
         return record(self, *args)
 
-    def _compute_only(self, stage: str) -> NotImplementedError:
-        return NotImplementedError(f"{stage}: {type(self).__name__} takes compute passes alone")
+    def _refusal(self, stage: str) -> NotImplementedError:
+        return NotImplementedError(f"{stage}: {type(self).__name__} takes compute passes only")

@@ -1,4 +1,4 @@
-"""Runs of compute passes whose bindings stay the same: recorded once, then replayed."""
+"""Recordings of compute passes, which later frames replay while the bound resources stay the same."""
 
 from __future__ import annotations
 
@@ -11,84 +11,81 @@ from typing import Any, TypeVar, TypeVarTuple
 import numpy as np
 
 from dermis.gpu.bind_groups import BindGroup
-from dermis.gpu.command_list import Step, step_of
-from dermis.gpu.dependencies import Access, Slot, new_number, resource_state
+from dermis.gpu.command_list import Dispatch, make_dispatch
+from dermis.gpu.dependencies import Access, ResourceState, resource_state, unique_id
 from dermis.gpu.device import Device
-from dermis.gpu.memo import field_names, is_value, same
+from dermis.gpu.memo import are_equal, field_names, has_value_equality
 from dermis.gpu.program import ComputeProgram
-from dermis.gpu.recorder import Groups, Recorder
+from dermis.gpu.recorder import Recorder, Workgroups
 from dermis.gpu.types import Bindings, Buffer, Native
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-_MOST = 4  # recordings of a function: two states, each in motion and still
+_CACHED_RECORDINGS = 4  # of a function: two states, each in motion and still
 
 
 class Recording(Recorder):
-    """Takes dispatches as a graph does, and keeps them with the numbers they read.
+    """Dispatches with their bind groups and uniforms.
 
-    It keeps no texture alive: what it would bind goes when its last owner does. The recording is void then,
-    and its numbers go too.
+    A recording keeps no resource alive. When a resource that it binds is released, the recording becomes
+    invalid and its uniform buffers are released too.
     """
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self.steps: list[Step] = []
+        self.dispatches: list[Dispatch] = []
         self._chunks: list[Buffer] = []
         self._uniforms: Uniforms | None = Uniforms(device, partial(_chunk, device, self._chunks))
         self._pipelines: list[Native] = []
-        self._bound: list[weakref.ref[BindGroup]] = []
-        self._reads: dict[Slot, None] = {}
-        self._writes: dict[Slot, None] = {}
+        self._bind_groups: list[weakref.ref[BindGroup]] = []
+        self._reads: dict[ResourceState, None] = {}
+        self._writes: dict[ResourceState, None] = {}
 
     @cached_property
     def access(self) -> Access:
-        """What it finds written and what it leaves written, scratch aside; once it is finished."""
-        left = tuple(slot for slot in self._writes if not slot.scratch)
-        return Access(new_number(), tuple(self._reads), left)
+        """Return what the finished recording reads and writes, without scratch resources that it writes."""
+        writes = tuple(state for state in self._writes if not state.scratch)
+        return Access(unique_id(), tuple(self._reads), writes)
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
-        """Each once."""
-        return tuple(dict.fromkeys(step.stage for step in self.steps))
+        """Return the names of the stages, each once."""
+        return tuple(dict.fromkeys(one.stage for one in self.dispatches))
 
     @property
-    def is_void(self) -> bool:
-        """Whether something that it binds is gone."""
-        return len(self.steps) != len(self._pipelines)
+    def is_valid(self) -> bool:
+        """Return whether all resources that the recording binds still exist."""
+        return len(self.dispatches) == len(self._pipelines)
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Groups, completes: str = ""
+        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
-        """Keep a pass, as `Graph.dispatch` declares one."""
-        chunks, steps = self._chunks, self.steps  # and not the recording, which would keep itself alive
+        """Record a compute pass, see `Recorder.dispatch`."""
+        chunks, dispatches = self._chunks, self.dispatches  # a reference to self would keep it alive
 
-        def void(_: object) -> None:
+        def invalidate(_: object) -> None:
             chunks.clear()
-            steps.clear()
+            dispatches.clear()
 
         assert self._uniforms is not None, "a recording is made once"
         group, offsets = program.bind_group(resources, self._uniforms)
-        self._bound.append(weakref.ref(group, void))
+        self._bind_groups.append(weakref.ref(group, invalidate))
         self._pipelines.append(program.pipeline)
-        steps.append(step_of(stage, program, group, offsets, groups))
-        self._note(program, resources, completes)
-
-    def _note(self, program: ComputeProgram, resources: Bindings, completes: str) -> None:
+        dispatches.append(make_dispatch(stage, program, group, offsets, groups))
         access = program.access(resources)
-        for slot in access.reads:
-            if slot not in self._writes and slot not in access.writes:
-                self._reads[slot] = None
-        filled = resource_state(self.device, resources[completes]) if completes else None
-        self._writes |= dict.fromkeys(slot for slot in access.writes if slot is not filled)
+        for state in access.reads:
+            if state not in self._writes and state not in access.writes:
+                self._reads[state] = None
+        unchanged = resource_state(self.device, resources[in_place]) if in_place else None
+        self._writes |= dict.fromkeys(state for state in access.writes if state is not unchanged)
 
     def finish(self) -> None:
-        """Put the numbers in their place."""
+        """Upload the uniforms; no pass can be added after this."""
         assert self._uniforms is not None
         self._uniforms.upload()
         self._uniforms.finish()
-        self._uniforms = None  # it holds on to the buffers
+        self._uniforms = None  # it keeps the buffers alive
 
 
 def _chunk(device: Device, chunks: list[Buffer], index: int) -> Buffer:
@@ -97,69 +94,68 @@ def _chunk(device: Device, chunks: list[Buffer], index: int) -> Buffer:
     return chunks[index]
 
 
-class Recordings:
-    """For each function the recordings used last, for who goes back and forth between some."""
+class RecordingCache:
+    """Most recent recordings of each function, for callers that alternate between a few arguments."""
 
     def __init__(self) -> None:
-        self._known: dict[Callable[..., object], list[tuple[object, Recording, Any]]] = {}
+        self._recordings: dict[Callable[..., object], list[tuple[object, Recording, Any]]] = {}
 
-    def find(
+    def get(
         self, device: Device, record: Callable[[Recorder, *Ts], T], args: tuple[*Ts]
     ) -> tuple[Recording, T]:
-        """What `record` did for these arguments and what it returned; it is called when that is not known."""
-        known = self._known.setdefault(record, [])
-        found = next((one for one in known if not one[1].is_void and _alike(one[0], args)), None)
+        """Return the passes that `record` adds for these arguments and its result, calling it if needed."""
+        known = self._recordings.setdefault(record, [])
+        found = next((one for one in known if one[1].is_valid and _matches(one[0], args)), None)
         if found is None:
             recording = Recording(device)
             result = record(recording, *args)
             recording.finish()
-            assert not recording.is_void, "what was just bound is gone"
-            found = _held_weakly(args), recording, result
+            assert recording.is_valid, "a resource was released right after it was bound"
+            found = _weak_copy(args), recording, result
         if not known or known[0] is not found:
-            known[:] = [found, *(one for one in known if one is not found)][:_MOST]
+            known[:] = [found, *(one for one in known if one is not found)][:_CACHED_RECORDINGS]
         return found[1], found[2]
 
 
 @dataclass(frozen=True)
-class _Values:
-    """The fields of a dataclass, held weakly."""
+class _WeakFields:
+    """Type and weakly referenced fields of a dataclass."""
 
     kind: type
     fields: tuple[object, ...]
 
 
-def _held_weakly(value: object) -> object:
-    """A value, with references in the place of what it would keep alive."""
+def _weak_copy(value: object) -> object:
+    """Return a copy that refers to devices' resources, and other objects without value equality, weakly."""
     if isinstance(value, tuple):
-        return tuple(map(_held_weakly, value))
+        return tuple(map(_weak_copy, value))
     if isinstance(value, np.ndarray):
         return value.copy()
-    if not is_value(value):
+    if not has_value_equality(value):
         return weakref.ref(value) if value is not None else None
     if not is_dataclass(value):
         return value
-    held = _fields(value)
-    return _Values(type(value), held) if any(map(_is_weak, held)) else value
-
-
-def _is_weak(held: object) -> bool:
-    return isinstance(held, weakref.ref | _Values) or (isinstance(held, tuple) and any(map(_is_weak, held)))
-
-
-def _fields(value: object) -> tuple[object, ...]:
     kind: Any = type(value)
-    return tuple(_held_weakly(getattr(value, name)) for name in field_names(kind) or ())
+    fields = tuple(_weak_copy(getattr(value, name)) for name in field_names(kind) or ())
+    return _WeakFields(kind, fields) if any(map(_is_weak, fields)) else value
 
 
-def _alike(held: object, value: object) -> bool:
-    if isinstance(held, weakref.ref):
-        return held() is value
-    if isinstance(held, tuple):
-        return isinstance(value, tuple) and len(held) == len(value) and all(map(_alike, held, value))
-    if isinstance(held, _Values):
+def _is_weak(copy: object) -> bool:
+    return isinstance(copy, weakref.ref | _WeakFields) or (
+        isinstance(copy, tuple) and any(map(_is_weak, copy))
+    )
+
+
+def _matches(copy: object, value: object) -> bool:
+    """Return whether a copy made by `_weak_copy` is of this value."""
+    if isinstance(copy, weakref.ref):
+        return copy() is value
+    if isinstance(copy, tuple):
+        return isinstance(value, tuple) and len(copy) == len(value) and all(map(_matches, copy, value))
+    if isinstance(copy, _WeakFields):
         kind: Any = type(value)
-        if kind is not held.kind:
+        if kind is not copy.kind:
             return False
         parts = (getattr(value, name) for name in field_names(kind) or ())
-        return all(map(_alike, held.fields, parts))
-    return same(held, value)
+        return all(map(_matches, copy.fields, parts))
+    return are_equal(copy, value)

@@ -1,7 +1,7 @@
-"""What a WGSL text declares: struct layouts as numpy dtypes, and bindings by name.
+"""Declarations of a WGSL text: struct layouts as NumPy dtypes, and bindings by name.
 
-The shader is the only place where a struct or a binding is written down; Python reads it from there,
-so the two cannot drift apart. Alignment rules: WGSL specification, section "Memory Layout".
+Structs and bindings are declared only in shaders, from which Python reads them, so that the two cannot
+differ. Alignment rules: WGSL specification, section "Memory Layout".
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from dermis.base.errors import DermisError
-from dermis.gpu.types import Record
+from dermis.gpu.types import UniformRecord
 
 Entry = dict[str, str]
-"""Part of wgpu's layout entry for a kind of resource: its type, format or dimensions."""
+"""Part of wgpu's bind group layout entry: type, format or dimensions of a resource."""
 _COMMENT = re.compile(r"//[^\n]*")
 _STRUCT = re.compile(r"struct\s+(\w+)\s*\{([^}]*)\}")
 _MEMBER = re.compile(r"(\w+)\s*:\s*(array<\s*\w+\s*,\s*\d+\s*>|\w+(?:<\w+>)?)")
@@ -45,56 +45,58 @@ _TYPES: dict[str, tuple[str, tuple[int, ...], int, int]] = {
 
 @dataclass(frozen=True)
 class Binding:
-    """One resource of a shader: the index of its binding and wgpu's layout entry for it."""
+    """A resource that a shader declares: index of the binding and wgpu's layout entry for it."""
 
     index: int
     name: str
     entry: dict[str, Entry]
 
     @property
-    def holds(self) -> bool:
-        """Whether it has content, as all but samplers have."""
+    def has_content(self) -> bool:
+        """Return whether the resource has content, as all except samplers have."""
         return "sampler" not in self.entry
 
     @property
     def writes(self) -> bool:
-        """Whether the shader may change what is bound."""
+        """Return whether the shader may write the resource."""
         return "storage_texture" in self.entry or self.entry.get("buffer") == {"type": "storage"}
 
     @property
     def reads(self) -> bool:
-        """Whether the shader may read what is bound: all but write-only textures."""
+        """Return whether the shader may read the resource, as all except write-only textures."""
         return bool(self.entry.get("storage_texture", {}).get("access") != "write-only")
 
 
 @cache
 def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
-    """The numpy dtype of a WGSL struct, with the offsets that the shader uses.
+    """Return the NumPy dtype of a WGSL struct, with the offsets that the shader uses.
 
-    A mat4x4f is written as its transpose (WGSL stores columns); arrays of structs nest.
+    A mat4x4f is stored as its transpose, as WGSL stores columns; arrays of structs nest.
     """
     dtype, _ = _struct(dict(_STRUCT.findall(_COMMENT.sub("", text))), name)
     return dtype
 
 
-def record_of(text: str, struct: str, **values: object) -> Record:
-    """A zeroed record of one of a text's structs with the given members filled in."""
+def make_record(text: str, struct: str, **values: object) -> UniformRecord:
+    """Return a record of one of a text's structs: zeros, with the given members set."""
     record = np.zeros((), dtype=struct_dtype(text, struct))
     for member, value in values.items():
         record[member] = value
     return record
 
 
-def record_type(text: str, name: str) -> str:
-    """The type of the record bound by a name."""
+def uniform_type(text: str, name: str) -> str:
+    """Return the name of the struct of a uniform binding."""
     (struct,) = re.findall(rf"var<uniform>\s*{name}\s*:\s*(\w+)", _COMMENT.sub("", text))
     return str(struct)
 
 
-def members_read(text: str, name: str) -> Callable[[bytes], Hashable]:
-    """Takes out of the bytes of a record bound by that name the members that the shader's text names.
+def used_members(text: str, name: str) -> Callable[[bytes], Hashable]:
+    """Return a function that selects the bytes of the members that a shader reads of a uniform record.
 
-    All of it where the text hands the record on as a whole, or it is no struct.
+    It selects all bytes if the shader passes the record to a function, or if it is no struct.
+
+    name : name of the uniform in the shader
     """
     code = _COMMENT.sub("", text)
     declared = re.compile(rf"var<uniform>\s*{name}\s*:\s*(\w+)")
@@ -102,16 +104,16 @@ def members_read(text: str, name: str) -> Callable[[bytes], Hashable]:
     (struct,) = declared.findall(code)
     if not used or "" in used or struct not in dict(_STRUCT.findall(code)):
         return lambda raw: raw
-    return itemgetter(*_runs(struct_dtype(text, struct), set(used)))
+    return itemgetter(*_member_slices(struct_dtype(text, struct), set(used)))
 
 
-def _runs(dtype: np.dtype[np.void], members: Set[str]) -> Iterator[slice]:
-    """Where members that follow each other lie."""
+def _member_slices(dtype: np.dtype[np.void], members: Set[str]) -> Iterator[slice]:
+    """Yield the byte range of each run of consecutive members."""
     fields = dict(dtype.fields or {})
     for used, names in groupby(fields, members.__contains__):
         if used:
-            lie = [(fields[name][1], fields[name][0].itemsize) for name in names]
-            yield slice(lie[0][0], sum(lie[-1]))
+            extents = [(fields[name][1], fields[name][0].itemsize) for name in names]
+            yield slice(extents[0][0], sum(extents[-1]))
 
 
 def _struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:
@@ -152,7 +154,7 @@ def _round_up(value: int, step: int) -> int:
 
 
 def bindings(text: str) -> tuple[Binding, ...]:
-    """Every resource that the shader declares, by index: all in group 0, as each group costs time per frame.
+    """Return the resources that a shader declares, by index; all are in bind group 0.
 
     Float textures are unfilterable unless `// filtered` follows their declaration; samplers filter unless
     `// non-filtering` follows theirs.
@@ -161,7 +163,7 @@ def bindings(text: str) -> tuple[Binding, ...]:
         Binding(int(index), name, _entry((space or "").replace(" ", ""), kind.replace(" ", ""), note))
         for index, space, name, kind, note in _BINDING.findall(text)
     ]
-    return tuple(sorted(found, key=lambda b: b.index))
+    return tuple(sorted(found, key=lambda one: one.index))
 
 
 def _entry(space: str, kind: str, note: str) -> dict[str, Entry]:

@@ -1,4 +1,4 @@
-"""Textures from arrays and back."""
+"""Creation, upload and download of textures."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def make_texture(
     use: str = "compute",
     name: str = "texture",
 ) -> Texture:
-    """An empty 2-D texture (an array when `layers` > 1).
+    """Create an empty 2-D texture (an array if `layers` > 1).
 
     size : (width, height) [texel]
     texel : wgpu's format name
     use : "compute" (stored to and read), "raster" (drawn to and read), "map" (uploaded and read)
-    name : to be told where there is no room for it
+    name : name of the texture in errors
 
-    Raises DermisError for sizes over the device's limit, OutOfMemoryError where its memory has no room.
+    Raises DermisError for sizes over the device's limit, OutOfMemoryError if its memory is full.
     """
     import wgpu
 
@@ -74,28 +74,28 @@ def make_texture(
         "raster": wgpu.TextureUsage.RENDER_ATTACHMENT,
         "map": wgpu.TextureUsage.COPY_DST,
     }[use]
-    described = f"{name} of {size[0]}x{size[1]}x{layers} {texel}"
+    description = f"{name} of {size[0]}x{size[1]}x{layers} {texel}"
     texels = layers * sum(max(1, size[0] >> mip) * max(1, size[1] >> mip) for mip in range(mips))
-    with allocation(device.adapter.name, described, FORMAT_BYTES[texel] * texels, math.inf):
-        made: Texture = device.handle.create_texture(
+    with allocation(device.adapter.name, description, FORMAT_BYTES[texel] * texels, math.inf):
+        texture: Texture = device.handle.create_texture(
             size=(*size, layers), format=texel, usage=usage, mip_level_count=mips, dimension="2d"
         )
-    return made
+    return texture
 
 
-def view_of(texture: Texture, *, layer: int = 0, mip: int = 0) -> TextureView:
-    """A 2-D view of one mip level of one layer, which tells them as its `part`."""
+def make_view(texture: Texture, *, layer: int = 0, mip: int = 0) -> TextureView:
+    """Create a 2-D view of one mip level of one layer, with these two as its `layer_and_mip`."""
     view = texture.create_view(
         dimension="2d", base_array_layer=layer, array_layer_count=1, base_mip_level=mip, mip_level_count=1
     )
-    view.part = layer, mip
+    view.layer_and_mip = layer, mip
     return view
 
 
 def upload(
     device: Device, texture: Texture, array: NDArray[np.generic], *, mip: int = 0, layer: int = 0
 ) -> None:
-    """Fill one mip level of one layer with an (h, w) or (h, w, c) array of the texture's own type."""
+    """Write an (h, w) or (h, w, c) array to one mip level of one layer of a texture."""
     kind, channels = _FORMATS[texture.format]
     data = np.ascontiguousarray(array, dtype=kind)
     height, width = data.shape[:2]
@@ -110,19 +110,21 @@ def upload(
 
 
 def texel_bytes(texture: Texture) -> int:
-    """Bytes of one texel of a texture."""
+    """Return the size of one texel of a texture [byte]."""
     return FORMAT_BYTES[texture.format]
 
 
-def texture_from(device: Device, array: NDArray[np.generic], texel: str, name: str = "texture") -> Texture:
-    """A texture for reading that holds the (h, w) or (h, w, c) array."""
+def texture_from_array(
+    device: Device, array: NDArray[np.generic], texel: str, name: str = "texture"
+) -> Texture:
+    """Create a texture for reading with the texels of an (h, w) or (h, w, c) array."""
     texture = make_texture(device, (array.shape[1], array.shape[0]), texel, use="map", name=name)
     upload(device, texture, array)
     return texture
 
 
 def download(device: Device, texture: Texture, *, mip: int = 0, layer: int = 0) -> NDArray[Any]:
-    """One mip level of one layer as an (h, w, c) array, or (h, w) for one channel."""
+    """Return one mip level of one layer of a texture as an (h, w, c) array, or (h, w) for one channel."""
     kind, channels = _FORMATS[texture.format]
     width, height = max(1, texture.size[0] >> mip), max(1, texture.size[1] >> mip)
     pitch = width * channels * np.dtype(kind).itemsize
@@ -139,7 +141,7 @@ def download(device: Device, texture: Texture, *, mip: int = 0, layer: int = 0) 
 
 
 def half_store_rounding(device: Device) -> str:
-    """ "nearest", "toward zero" or "other": how stores to rgba16float round."""
+    """Return how stores to rgba16float textures round: "nearest", "toward zero" or "other"."""
     program = ComputeProgram(device, Path(__file__).parent / "wgsl" / "store_probe.wgsl")
     texture = make_texture(device, (_PROBE_SIDE, _PROBE_SIDE), "rgba16float")
     frame = CommandList(device)

@@ -1,7 +1,6 @@
-"""Types of what shaders are bound to, as far as this package uses it.
+"""Protocols for the textures, buffers and samplers of wgpu, which has no types for mypy.
 
-wgpu's objects have no types for mypy. They fit these protocols, which the types of their native handles tell
-from each other.
+The protocols differ in the types of their native handles.
 """
 
 from __future__ import annotations
@@ -50,16 +49,16 @@ class Texture(Protocol):
 class TextureView(Protocol):
     """A view of layers and mip levels of a texture.
 
-    part : layer and mip level, of a view made by `view_of`
+    layer_and_mip : layer and mip level of a view that `make_view` created
     """
 
     _internal: ViewHandle
     texture: Texture
-    part: tuple[int, int]
+    layer_and_mip: tuple[int, int]
 
 
 class Buffer(Protocol):
-    """A buffer.
+    """A buffer on a device.
 
     size : bytes
     usage : flags of `wgpu.BufferUsage`
@@ -74,7 +73,7 @@ class Buffer(Protocol):
 
 
 class Sampler(Protocol):
-    """A sampler, see `Device.sampler`."""
+    """A texture sampler, see `Device.sampler`."""
 
     _internal: SamplerHandle
 
@@ -86,36 +85,36 @@ class Native(Protocol):
 
 
 Untyped = Any
-"""Objects of wgpu with many methods, for which mypy has no types: devices, encoders, passes, query sets."""
-Record = NDArray[np.void]
-"""A struct of a shader in uniform memory: a structured array of no dimensions, as `Program.record` makes."""
+"""Objects of wgpu without a protocol here: devices, encoders, passes, query sets."""
+UniformRecord = NDArray[np.void]
+"""A struct of a shader in uniform memory: a structured array without dimensions, see `Program.record`."""
 TextureOrView = Texture | TextureView
-"""What a pass reads as a texture or stores to."""
+"""A texture that a pass reads or stores to, or a view of one."""
 Resource = Texture | TextureView | Buffer
-"""What has content on the device."""
+"""Anything with content on the device."""
 Bindable = Resource | Sampler | NDArray[np.generic]
-"""What a name in a shader can be bound to; arrays are records for uniform memory."""
+"""Anything that a name in a shader can be bound to; arrays are records for uniform memory."""
 Bindings = Mapping[str, Bindable]
-"""What a shader is bound to, by the names in its text."""
+"""Resources and records by their names in the shader."""
 MutableBindings = dict[str, Bindable]
-"""Bindings that are filled one by one."""
+"""Bindings that can be added to."""
 
 
 def is_texture(value: Bindable) -> TypeGuard[Texture]:
-    """Return whether it is a texture, and no view of one."""
+    """Return whether a resource is a texture, not a view."""
     return hasattr(value, "mip_level_count")
 
 
 def is_view(value: Bindable) -> TypeGuard[TextureView]:
-    """Return whether it is a view of a texture."""
+    """Return whether a resource is a texture view."""
     return hasattr(value, "texture")
 
 
 def is_buffer(value: Bindable) -> TypeGuard[Buffer]:
-    """Return whether it is a buffer."""
+    """Return whether a resource is a buffer."""
     return hasattr(value, "write_mapped")
 
 
 def is_sampler(value: Bindable) -> TypeGuard[Sampler]:
-    """Return whether it is a sampler."""
+    """Return whether a resource is a sampler."""
     return not (is_texture(value) or is_view(value) or is_buffer(value) or isinstance(value, np.ndarray))

@@ -1,12 +1,12 @@
-"""WGSL files with directives, and compile errors that name file and line.
+"""Preprocessor for WGSL files, with compile errors that name file and line.
 
-A directive takes a whole line:
+Each directive is a line of its own:
 
-- `//#include "name.wgsl"`: another file, inserted once;
-- `//#include <list>`: the file of each member of a list;
-- `//#each list: text`: the text once for each member, with its {name}, {NAME}, {number} and words filled in;
-- `//#fill text`: the text with a number from Python for each {word};
-- `//#if NAME`, `//#else`, `//#end`: lines for programs with that option, and for those without it.
+- `//#include "name.wgsl"`: inserts another file, once;
+- `//#include <list>`: inserts the file of each member of a list;
+- `//#each list: text`: inserts the text for each member with its {name}, {NAME}, {number} and words;
+- `//#fill text`: inserts the text with a number from Python for each {word};
+- `//#if NAME`, `//#else`, `//#end`: keep lines for programs with that option, or without it.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ Words = tuple[tuple[str, str], ...]
 
 
 class Member(NamedTuple):
-    """One of a list of shaders to which others may be added.
+    """Member of a list of shaders, such as one model of a registry.
 
-    name : as in scene files; in shaders {name} has underscores for hyphens, and {NAME} is in capitals
-    file : of its shader; None where it has none of its own
-    words : replacements for other {words} in repeated lines
+    name : name in scene files; in shaders, {name} has underscores for hyphens and {NAME} is in capitals
+    file : shader file; None if the member has none
+    words : replacements for other {words} in `//#each` lines
     """
 
     name: str
@@ -46,11 +46,11 @@ class Member(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ShaderFolder(os.PathLike[str]):
-    """A folder of shaders with the lists, numbers and options that directives use.
+    """A folder of shaders with the lists, numbers and options of its directives.
 
-    lists : members of each list, called for whenever a shader is composed
-    numbers : constants that Python uses too, called for likewise
-    options : names for which `//#if` holds, in shaders of all folders
+    lists : functions that return the members of each list, called whenever a shader is composed
+    numbers : function that returns the constants that shaders share with Python, called likewise
+    options : names for which `//#if` is true, in shaders of all folders
     """
 
     path: Path
@@ -59,6 +59,7 @@ class ShaderFolder(os.PathLike[str]):
     options: frozenset[str] = frozenset()
 
     def __fspath__(self) -> str:
+        """Return the path as a string."""
         return str(self.path)
 
 
@@ -67,28 +68,28 @@ Folder = os.PathLike[str]
 
 @dataclass(frozen=True)
 class Source:
-    """A composed shader: its text and, line by line, the file and line it came from."""
+    """A composed shader: its text, and the file and line number that each of its lines comes from."""
 
     text: str
     origin: tuple[tuple[str, int], ...]
 
     def locate(self, message: str) -> str:
-        """The compiler's message with its line numbers turned into file:line."""
+        """Return a message of the compiler with its line numbers replaced by file:line."""
 
-        def named(match: re.Match[str]) -> str:
+        def replacement(match: re.Match[str]) -> str:
             line = int(match[1])
             if not 0 < line <= len(self.origin):
                 return match[0]
             file, number = self.origin[line - 1]
             return f"{file}:{number}:{match[2]}"
 
-        return _ERROR_LINE.sub(named, message)
+        return _ERROR_LINE.sub(replacement, message)
 
 
 def compose(path: Path, folders: Sequence[Folder]) -> Source:
-    """The shader at `path` with its directives carried out.
+    """Return the shader at `path` with its directives expanded.
 
-    folders : where includes are looked up that are not beside the including file
+    folders : folders in which includes are looked up that are not beside the including file
 
     Raises DermisError for a missing file, list, {word} or `//#end`.
     """
@@ -96,12 +97,14 @@ def compose(path: Path, folders: Sequence[Folder]) -> Source:
     lists = {name: tuple(members()) for folder in shared for name, members in folder.lists.items()}
     numbers = {name: repr(value) for folder in shared for name, value in folder.numbers().items()}
     options = frozenset[str]().union(*(folder.options for folder in shared))
-    meant = _Meaning(tuple(map(Path, folders)), tuple(lists.items()), tuple(numbers.items()), options)
-    return _compose(path, meant)
+    definitions = _Definitions(
+        tuple(map(Path, folders)), tuple(lists.items()), tuple(numbers.items()), options
+    )
+    return _compose(path, definitions)
 
 
-class _Meaning(NamedTuple):
-    """What directives find in folders."""
+class _Definitions(NamedTuple):
+    """Folders, lists, numbers and options that directives refer to."""
 
     folders: tuple[Path, ...]
     lists: tuple[tuple[str, tuple[Member, ...]], ...]
@@ -110,32 +113,35 @@ class _Meaning(NamedTuple):
 
 
 @cache
-def _compose(path: Path, meant: _Meaning) -> Source:
-    composed = _Composed(meant)
-    composed.insert(path)
-    text, origin = zip(*composed.lines, strict=True) if composed.lines else ((), ())
+def _compose(path: Path, definitions: _Definitions) -> Source:
+    composer = _Composer(definitions)
+    composer.insert(path)
+    text, origin = zip(*composer.lines, strict=True) if composer.lines else ((), ())
     return Source("\n".join(text), origin)
 
 
-class _Composed:
-    """lines : each with the file and line that it came from"""
+class _Composer:
+    """Expansion of one shader's directives.
 
-    def __init__(self, meant: _Meaning) -> None:
-        self._folders, self._options = meant.folders, meant.options
-        self._lists, self._numbers = dict(meant.lists), dict(meant.numbers)
-        self._seen: set[Path] = set()
+    lines : lines so far, each with the file and line number that it comes from
+    """
+
+    def __init__(self, definitions: _Definitions) -> None:
+        self._folders, self._options = definitions.folders, definitions.options
+        self._lists, self._numbers = dict(definitions.lists), dict(definitions.numbers)
+        self._included: set[Path] = set()
         self.lines: list[tuple[str, tuple[str, int]]] = []
 
     def insert(self, path: Path) -> None:
-        if path in self._seen:
+        if path in self._included:
             return
-        self._seen.add(path)
-        holds: list[bool] = []  # of each `//#if` that is open
+        self._included.add(path)
+        conditions: list[bool] = []  # of each open `//#if`
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
             directive = _DIRECTIVE.match(line)
             if directive and (directive["option"] or directive["turn"]):
-                self._choose(holds, directive, path)
-            elif not all(holds):
+                self._update_conditions(conditions, directive, path)
+            elif not all(conditions):
                 continue
             elif directive is None:
                 self.lines.append((line, (path.name, number)))
@@ -146,54 +152,53 @@ class _Composed:
                     if member.file is not None:
                         self.insert(member.file)
             else:
-                self.lines += [(text, (path.name, number)) for text in self._filled(directive, path)]
+                self.lines += [(text, (path.name, number)) for text in self._expanded(directive, path)]
 
-        if holds:
+        if conditions:
             raise DermisError(f"{path.name}: expected //#end after //#if, but the file ends.")
 
-    def _choose(self, holds: list[bool], directive: re.Match[str], asker: Path) -> None:
-        """Begin, turn or end the lines of an option."""
+    def _update_conditions(self, conditions: list[bool], directive: re.Match[str], file: Path) -> None:
+        """Apply an `//#if`, `//#else` or `//#end`."""
         if option := directive["option"]:
-            holds.append(option in self._options)
-        elif not holds:
-            raise DermisError(f"{asker.name}: expected //#if before //#{directive['turn']}, but none came.")
+            conditions.append(option in self._options)
+        elif not conditions:
+            raise DermisError(f"{file.name}: expected //#if before //#{directive['turn']}, but got none.")
         elif directive["turn"] == "else":
-            holds[-1] = not holds[-1]
+            conditions[-1] = not conditions[-1]
         else:
-            holds.pop()
+            conditions.pop()
 
-    def _filled(self, directive: re.Match[str], asker: Path) -> list[str]:
-        """The lines that a directive expands to."""
+    def _expanded(self, directive: re.Match[str], file: Path) -> list[str]:
+        """Return the lines that `//#each` or `//#fill` expands to."""
         if text := directive["filled"]:
-            return [directive["indent"] + _fill(text, self._numbers, asker)]
-        members = enumerate(self._members(directive["list"], asker))
-        each = [_naming(member, number) for number, member in members]
-        return [directive["indent"] + _fill(directive["text"], words, asker) for words in each]
+            return [directive["indent"] + _fill(text, self._numbers, file)]
+        members = enumerate(self._members(directive["list"], file))
+        each = [_words(member, number) for number, member in members]
+        return [directive["indent"] + _fill(directive["text"], words, file) for words in each]
 
-    def _find(self, name: str, asker: Path) -> Path:
-        for folder in (asker.parent, *self._folders):
+    def _find(self, name: str, file: Path) -> Path:
+        for folder in (file.parent, *self._folders):
             if (folder / name).is_file():
                 return folder / name
-        came = f'expected to find the include "{name}", but no shader folder has it.'
-        raise DermisError(f"{asker.name}: {came}")
+        raise DermisError(f'{file.name}: expected to find the include "{name}", but no shader folder has it.')
 
-    def _members(self, name: str, asker: Path) -> Sequence[Member]:
+    def _members(self, name: str, file: Path) -> Sequence[Member]:
         if name not in self._lists:
             raise DermisError(
-                f"{asker.name}: expected to find the list <{name}>, but no shader folder has it."
+                f"{file.name}: expected to find the list <{name}>, but no shader folder has it."
             )
         return self._lists[name]
 
 
-def _naming(member: Member, number: int) -> dict[str, str]:
+def _words(member: Member, number: int) -> dict[str, str]:
     name = member.name.replace("-", "_")
     return {"name": name, "NAME": name.upper(), "number": f"{number}u", **dict(member.words)}
 
 
-def _fill(text: str, words: Mapping[str, str], asker: Path) -> str:
-    def meant(match: re.Match[str]) -> str:
+def _fill(text: str, words: Mapping[str, str], file: Path) -> str:
+    def replacement(match: re.Match[str]) -> str:
         if match[1] not in words:
-            raise DermisError(f"{asker.name}: expected a word of {', '.join(words)}, but {match[0]} came.")
+            raise DermisError(f"{file.name}: expected a word of {', '.join(words)}, but got {match[0]}.")
         return words[match[1]]
 
-    return _WORD.sub(meant, text)
+    return _WORD.sub(replacement, text)

@@ -1,4 +1,4 @@
-// Stores known numbers to a half-float texture, to see which way the adapter rounds.
+// Stores known numbers to a half-float texture, from which the rounding of stores is found.
 
 @group(0) @binding(0) var<uniform> size: vec4u;
 @group(0) @binding(1) var rounded: texture_storage_2d<rgba16float, write>;
