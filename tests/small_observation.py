@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from dermis.apps.batch.records import encode_record
-from dermis.apps.batch.shards import Shard, ShardWriter, shards_of
-from dermis.apps.batch.spec import Spec, spec_of
+from dermis.apps.batch.shards import Shard, ShardWriter, list_shards
+from dermis.apps.batch.spec import Spec, parse_spec
 from dermis.frame.observation import Landmarks, Observation
 from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.outputs import OUTPUTS
@@ -21,7 +21,7 @@ OUTPUT_NAMES = "depth", "normal", "uv", "triangle", "motion", "alpha"
 def small_spec(**values: Any) -> Spec:
     """Seven images in shards of three."""
     told = {"count": 7, "shard_size": 3, "size": SIZE, "outputs": OUTPUT_NAMES}
-    return spec_of({**told, **values})
+    return parse_spec({**told, **values})
 
 
 def observation(number: int, alpha: bool = False, outputs: tuple[str, ...] = OUTPUT_NAMES) -> Observation:
@@ -71,5 +71,5 @@ def write_shard(out: Path, shard: Shard, spec: Spec) -> None:
 def write_all(out: Path, spec: Spec) -> None:
     """A data set without its index."""
     out.mkdir(parents=True, exist_ok=True)
-    for shard in shards_of(spec):
+    for shard in list_shards(spec):
         write_shard(out, shard, spec)

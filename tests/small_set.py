@@ -7,10 +7,10 @@ from pathlib import Path
 
 from small_head import obj_text
 
-from dermis.apps.batch.run import Report, run
+from dermis.apps.batch.run import RunReport, run
 from dermis.apps.batch.spec import Spec, load_spec
-from dermis.apps.batch.worker import Work, WorkerSlot
-from dermis.apps.batch.worker_pool import Processes
+from dermis.apps.batch.worker import RunOptions, WorkerSlot
+from dermis.apps.batch.worker_pool import ProcessPool
 
 COUNT = 10
 SHARD_SIZE = 2
@@ -62,10 +62,10 @@ def read(path: Path) -> Spec:
     return load_spec(path)
 
 
-def drawn(spec: Spec, out: Path, workers: int = 1, encoders: int = 0, **more: object) -> Report:
+def drawn(spec: Spec, out: Path, workers: int = 1, encoders: int = 0, **more: object) -> RunReport:
     """Run to the end with processes."""
     keep_going = bool(more.pop("keep_going", False))
-    return run(Work(spec, out, encoders, keep_going), Processes([HERE] * workers), **more)  # type: ignore[arg-type]
+    return run(RunOptions(spec, out, encoders, keep_going), ProcessPool([HERE] * workers), **more)  # type: ignore[arg-type]
 
 
 def contents(out: Path) -> dict[str, bytes]:

@@ -27,5 +27,5 @@ def small_spec(small_folder: Path) -> Spec:
 def undisturbed(small_folder: Path, small_spec: Spec) -> dict[str, bytes]:
     """Files of the data set by their names."""
     report = drawn(small_spec, small_folder / "undisturbed")
-    assert report.is_whole and not report.failed
+    assert report.is_complete and not report.failed
     return contents(small_folder / "undisturbed")

@@ -15,22 +15,22 @@ GATE = "HELD_UNTIL"
 """Variable: the file."""
 
 
-def serve(pipe: Any, slot: Any, work: Any) -> None:
+def run_worker(pipe: Any, slot: Any, options: Any) -> None:
     """Serve as a worker does, but hold."""
     gate, usual = Path(os.environ[GATE]), Worker.render_shard
 
     def render_shard(worker: Worker, *given: Any) -> Any:
-        while any(work.out.glob("shard-*.tar")) and not gate.exists():
+        while any(options.out.glob("shard-*.tar")) and not gate.exists():
             time.sleep(0.01)
         return usual(worker, *given)
 
     with patch.object(Worker, "render_shard", render_shard):
-        worker_pool.serve(pipe, slot, work)
+        worker_pool.run_worker(pipe, slot, options)
 
 
 def main() -> None:
     """Run the command with such workers."""
     from dermis.cli import main as command
 
-    with patch.object(worker_pool, "serve", serve):
+    with patch.object(worker_pool, "run_worker", run_worker):
         command()

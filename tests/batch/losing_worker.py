@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from dermis.apps.batch.worker import serve as draw
+from dermis.apps.batch.worker import run_worker as draw
 from dermis.frame import renderer as renderer_module
 from dermis.gpu import CommandList, Device, open_device
 
@@ -16,7 +16,7 @@ FOLDER, WORKERS = "LOSING_FOLDER", "LOSING_WORKERS"
 """Variables: where each such worker leaves a file, and how many of them there are."""
 
 
-def serve(pipe: Any, *given: Any) -> None:
+def run_worker(pipe: Any, *given: Any) -> None:
     """What a worker does, whose first two devices are lost unless there were enough such workers."""
     folder = Path(os.environ[FOLDER])
     number = len(list(folder.iterdir()))

@@ -11,10 +11,10 @@ from scipy import stats
 
 from dermis.apps.batch.distributions import Distribution, parse_distribution
 from dermis.apps.batch.goodness_of_fit import fit_test, fit_tests
-from dermis.apps.batch.index import INDEX
-from dermis.apps.batch.spec import Spec, example_text, load_spec, spec_of
+from dermis.apps.batch.index import INDEX_FILE
+from dermis.apps.batch.spec import Spec, example_toml, load_spec, parse_spec
 from dermis.base.errors import DermisError
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 
 COUNT = 2000
 LAWS: dict[str, tuple[Any, Any]] = {
@@ -30,9 +30,9 @@ def index(folder: Path, spec: Spec) -> Path:
     """An index of what the spec draws, without any pictures."""
     rows = [spec.parameters(k) for k in range(spec.count)]
     names = sorted({name for row in rows for name in row})
-    arrow = needed("pyarrow", "a test")
+    arrow = import_extra("pyarrow", "a test")
     columns = {name: [row.get(name) for row in rows] for name in names}
-    needed("pyarrow.parquet", "a test").write_table(arrow.table(columns), folder / INDEX)
+    import_extra("pyarrow.parquet", "a test").write_table(arrow.table(columns), folder / INDEX_FILE)
     return folder
 
 
@@ -40,19 +40,19 @@ def index(folder: Path, spec: Spec) -> Path:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of the example, with two images of each person."""
     made = tmp_path_factory.mktemp("drawn")
-    text = example_text().replace("images_per_person = 1 ", "images_per_person = 2 ")
+    text = example_toml().replace("images_per_person = 1 ", "images_per_person = 2 ")
     (made / "spec.toml").write_text(text)
     return index(made, load_spec(made / "spec.toml", count=COUNT))
 
 
 def test_two_thousand_draws_agree_with_their_spec(folder: Path) -> None:
     found = {one.parameter: one for one in fit_tests(folder, load_spec(folder / "spec.toml"))}
-    assert len(found) > 30 and all(one.agrees for one in found.values())
-    chances = np.array([one.chance for one in found.values()])
+    assert len(found) > 30 and all(one.passes for one in found.values())
+    chances = np.array([one.p_value for one in found.values()])
     assert chances.min() > 1e-3 and 0.3 < np.median(chances) < 0.8, "chances of what is so are even"
-    assert found["person.age"].draws == COUNT // 2, "people count once"
-    assert found["gaze.yaw_deg"].draws < 0.4 * COUNT, "what only some images have"
-    assert found["head.yaw_deg"].distance < 3 * found["head.yaw_deg"].usual
+    assert found["person.age"].sample_count == COUNT // 2, "people count once"
+    assert found["gaze.yaw_deg"].sample_count < 0.4 * COUNT, "what only some images have"
+    assert found["head.yaw_deg"].distance < 3 * found["head.yaw_deg"].expected_distance
 
 
 @pytest.mark.parametrize(
@@ -69,13 +69,13 @@ def test_another_statement_is_found_out(folder: Path, stated_so: str, parameter:
     """The same index, held against a spec that says something else of one parameter."""
     table, _, key = parameter.rpartition(".")
     lines, inside = [], ""
-    for line in example_text().splitlines():
+    for line in example_toml().splitlines():
         inside = line.partition("]")[0][1:] if line.startswith("[") else inside
         lines.append(stated_so if inside == table and line.startswith(f"{key} =") else line)
     assert stated_so in lines
     (folder / "other.toml").write_text("\n".join(lines))
     spec = load_spec(folder / "other.toml")
-    assert [one.parameter for one in fit_tests(folder, spec) if not one.agrees] == [parameter]
+    assert [one.parameter for one in fit_tests(folder, spec) if not one.passes] == [parameter]
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -87,7 +87,7 @@ def test_distances_are_those_of_kolmogorov_and_smirnov(name: str) -> None:
         stats.kstest(values, law.cdf, method="asymp"),
     )
     assert found.distance == pytest.approx(truth.statistic, abs=1e-4)
-    assert found.chance == pytest.approx(truth.pvalue, rel=0.02)
+    assert found.p_value == pytest.approx(truth.pvalue, rel=0.02)
     mean, sd = map(float, found.stated.split(", "))
     assert mean == pytest.approx(law.mean(), abs=2e-3 * law.std()) and sd == pytest.approx(
         law.std(), rel=2e-3
@@ -98,26 +98,26 @@ def test_usual_is_the_mean_distance() -> None:
     law: Distribution = parse_distribution({"uniform": [0, 1]})
     rng = np.random.default_rng(2)
     found = [fit_test("x", law, list(rng.uniform(size=400))) for _ in range(100)]
-    assert np.mean([one.distance for one in found]) == pytest.approx(found[0].usual, rel=0.1)
+    assert np.mean([one.distance for one in found]) == pytest.approx(found[0].expected_distance, rel=0.1)
 
 
 def test_values_that_nothing_states_are_no_chance() -> None:
     law = parse_distribution({"choice": ["a", "b"], "weights": [1, 0]})
-    assert fit_test("x", law, ["a"] * 9).chance == 1.0
-    assert not fit_test("x", law, ["a"] * 9 + ["b"]).agrees
+    assert fit_test("x", law, ["a"] * 9).p_value == 1.0
+    assert not fit_test("x", law, ["a"] * 9 + ["b"]).passes
     steps = parse_distribution({"choice": [0, 1 / 3, {"uniform": [5, 6]}]})
     even = list(np.linspace(5, 6, 50))
-    assert fit_test("x", steps, [0.0, 0.333333] * 50 + even).chance > 0.5, "numbers are rounded"
-    assert not fit_test("x", steps, [0.0, 0.34, 5.5] * 50).agrees
+    assert fit_test("x", steps, [0.0, 0.333333] * 50 + even).p_value > 0.5, "numbers are rounded"
+    assert not fit_test("x", steps, [0.0, 0.34, 5.5] * 50).passes
 
 
 def test_backgrounds_without_an_environment_count_as_gradients(tmp_path: Path) -> None:
     kinds = {"kind": {"choice": ["environment", "gradient", "none"]}}
     around = {"name": {"choice": ["none", "uniform"]}}
-    spec = spec_of({"count": 500, "background": kinds, "environment": around})
-    assert all(one.agrees for one in fit_tests(index(tmp_path, spec), spec))
+    spec = parse_spec({"count": 500, "background": kinds, "environment": around})
+    assert all(one.passes for one in fit_tests(index(tmp_path, spec), spec))
 
 
 def test_an_index_is_needed(tmp_path: Path) -> None:
     with pytest.raises(DermisError, match=r"expected a data set with index\.parquet"):
-        list(fit_tests(tmp_path, spec_of({})))
+        list(fit_tests(tmp_path, parse_spec({})))

@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from dermis.apps.batch.child_processes import start
+from dermis.apps.batch.child_processes import start_process
 
 FOLDER = Path(__file__).parent
 DRIVER = """
 import os, sys, time
 sys.path.insert(0, sys.argv[1])
-from dermis.apps.batch.child_processes import start
+from dermis.apps.batch.child_processes import start_process
 from test_children import talk
-child = start(talk)
+child = start_process(talk)
 child.pipe.recv_bytes()
 child.pipe.close()  # as a process that is ended lets go of one thing after the other
 time.sleep(0.2)
@@ -42,12 +42,12 @@ def test_linear_algebra_has_one_thread_unless_the_user_says(
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     if asked:
         monkeypatch.setenv("OPENBLAS_NUM_THREADS", asked)
-    child = start(tell_threads)
+    child = start_process(tell_threads)
     try:
         assert child.pipe.recv() == had
         assert os.environ.get("OPENBLAS_NUM_THREADS") == asked  # of this process, as it was
     finally:
-        child.end()
+        child.kill()
 
 
 def test_whose_driver_is_gone_ends_in_silence() -> None:

@@ -12,14 +12,14 @@ import pytest
 from small_set import COUNT, SHARDS, contents, read, write_spec
 
 from dermis.apps.batch import dask_cluster as module
-from dermis.apps.batch.dask_cluster import Cluster
-from dermis.apps.batch.run import Progress, Report, run
+from dermis.apps.batch.dask_cluster import DaskCluster
+from dermis.apps.batch.run import Progress, RunReport, run
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.worker import Work
+from dermis.apps.batch.worker import RunOptions
 from dermis.base.errors import DermisError
 
 Files = dict[str, bytes]
-pytestmark = pytest.mark.filterwarnings("ignore")  # dask's own
+pytestmark = pytest.marker.filterwarnings("ignore")  # dask's own
 
 
 @pytest.fixture(scope="module")
@@ -36,13 +36,19 @@ def cluster() -> Iterator[Any]:
         yield made
 
 
-def drawn(cluster: Any, spec: Spec, out: Path, told: Callable[[Progress], None] = lambda now: None) -> Report:
-    return run(Work(spec, out, encoders=1), Cluster(cluster.scheduler_address, None, "cpu"), told=told)
+def drawn(
+    cluster: Any, spec: Spec, out: Path, told: Callable[[Progress], None] = lambda now: None
+) -> RunReport:
+    return run(
+        RunOptions(spec, out, encoders=1),
+        DaskCluster(cluster.scheduler_address, None, "cpu"),
+        on_progress=told,
+    )
 
 
 def test_they_write_the_same(cluster: Any, small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     report = drawn(cluster, small_spec, tmp_path)
-    assert (report.images, report.shards, report.is_whole) == (COUNT, SHARDS, True)
+    assert (report.images, report.shards, report.is_complete) == (COUNT, SHARDS, True)
     assert contents(tmp_path) == undisturbed
 
 
@@ -56,7 +62,7 @@ def test_one_that_is_killed_loses_nothing(
             killed.append(next(iter(cluster.workers.values())).pid)
             os.kill(killed[0], 9)
 
-    assert drawn(cluster, small_spec, tmp_path, told).is_whole
+    assert drawn(cluster, small_spec, tmp_path, told).is_complete
     assert killed and contents(tmp_path) == undisturbed
 
 
@@ -69,25 +75,27 @@ def test_a_bad_head_ends_the_run(cluster: Any, tmp_path: Path) -> None:
 def test_files_that_differ_on_a_worker_are_refused(cluster: Any, tmp_path: Path) -> None:
     spec = read(write_spec(tmp_path))
     (tmp_path / "head.obj").write_text((tmp_path / "large.obj").read_text())
-    with pytest.raises(DermisError, match=r"files: head\.obj: expected the file of hash"):
+    with pytest.raises(DermisError, match=r"files: head\.obj: expected a file with SHA-256"):
         drawn(cluster, spec, tmp_path / "out")
 
 
 def test_a_disk_of_its_own_is_refused(tmp_path: Path) -> None:
-    client = SimpleNamespace(run=lambda sees, mark: {"tcp://a": sees(mark), "tcp://b": False})
+    client = SimpleNamespace(
+        run=lambda path_exists, marker: {"tcp://a": path_exists(marker), "tcp://b": False}
+    )
     with (
-        module._mark(tmp_path) as mark,
+        module._shared_marker(tmp_path) as marker,
         pytest.raises(DermisError, match=r"a disk that all workers share.*tcp://b"),
     ):
-        module._check_disks(client, mark)
+        module._check_shared_disk(client, marker)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_scheduler_that_is_not_there_is_told(
     small_spec: Spec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "_WAIT_S", 0.5)
+    monkeypatch.setattr(module, "_TIMEOUT_S", 0.5)
     with pytest.raises(DermisError, match=r"a scheduler of dask\.distributed"):
-        run(Work(small_spec, tmp_path), Cluster("tcp://127.0.0.1:9", None))
+        run(RunOptions(small_spec, tmp_path), DaskCluster("tcp://127.0.0.1:9", None))
     with pytest.raises(DermisError, match=r"cluster\.json: expected the file that dask's scheduler wrote"):
-        run(Work(small_spec, tmp_path), Cluster(None, tmp_path / "cluster.json"))
+        run(RunOptions(small_spec, tmp_path), DaskCluster(None, tmp_path / "cluster.json"))

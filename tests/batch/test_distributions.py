@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from dermis.apps.batch.distributions import Distribution, parse_distribution
-from dermis.apps.batch.sampling import rounded, uniform
+from dermis.apps.batch.sampling import hashed_uniform, round_significant
 
 COUNT = 5000
-SHARES = [uniform(3, k, "tests") for k in range(COUNT)]
+SHARES = [hashed_uniform(3, k, "tests") for k in range(COUNT)]
 LIKE: list[tuple[Any, Any]] = [
     ({"uniform": [-2, 5]}, stats.uniform(-2, 7)),
     ({"log_uniform": [0.01, 10]}, stats.loguniform(0.01, 10)),
@@ -25,7 +25,7 @@ LIKE: list[tuple[Any, Any]] = [
     ({"truncated": [40, 18, 25, 85]}, stats.truncnorm(-15 / 18, 45 / 18, 40, 18)),
 ]
 REFUSED: list[tuple[Any, str]] = [
-    ({"uniform": [1, 1]}, "less than the high"),
+    ({"uniform": [1, 1]}, "less than the upper"),
     ({"uniform": [1]}, "2 numbers"),
     ({"uniform": 1}, "2 numbers"),
     ({"uniform": [0, math.inf]}, "none beyond"),
@@ -33,7 +33,7 @@ REFUSED: list[tuple[Any, str]] = [
     ({"log_uniform": [0, 1]}, "above 0"),
     ({"normal": [0, 0]}, "deviation above 0"),
     ({"truncated": [0, -1, 0, 1]}, "deviation above 0"),
-    ({"truncated": [0, 1, 2, 1]}, "less than the high"),
+    ({"truncated": [0, 1, 2, 1]}, "less than the upper"),
     ({"truncated": [0, 1, 9, 10]}, "at least 1e-06"),
     ({"choice": []}, "values to choose"),
     ({"choice": "abc"}, "a list in choice"),
@@ -66,14 +66,14 @@ ANY = SIMPLE | st.builds(
 
 def drawn(told: Any) -> list[Any]:
     found = parse_distribution(told)
-    return [found.at(share) for share in SHARES]
+    return [found.quantile(share) for share in SHARES]
 
 
 @pytest.mark.parametrize(("told", "law"), LIKE, ids=lambda one: str(one)[:40])
 def test_values_follow_the_law_that_is_stated(told: Any, law: Any) -> None:
     values = drawn(told)
     assert stats.kstest(values, law.cdf).pvalue > 0.01
-    low, high = parse_distribution(told).ends
+    low, high = parse_distribution(told).support
     assert isinstance(low, float) and low <= min(values) and max(values) <= high
 
 
@@ -91,9 +91,12 @@ def test_choices_of_distributions_are_mixtures() -> None:
 
 def test_uniform_numbers_are_even_and_streams_apart() -> None:
     assert stats.kstest(SHARES, "uniform").pvalue > 0.01
-    others = [uniform(3, k, "another") for k in range(COUNT)]
+    others = [hashed_uniform(3, k, "another") for k in range(COUNT)]
     assert abs(np.corrcoef(SHARES, others)[0, 1]) < 0.04
-    assert (uniform(1, 2, "a"), uniform(0, 0, "person.seed")) == (0.7628581707482375, 0.782964648251052)
+    assert (hashed_uniform(1, 2, "a"), hashed_uniform(0, 0, "person.seed")) == (
+        0.7628581707482375,
+        0.782964648251052,
+    )
 
 
 @pytest.mark.parametrize(("told", "said"), REFUSED, ids=lambda one: str(one)[:40])
@@ -107,12 +110,12 @@ def test_any_value_lies_between_the_ends_and_any_text_says_the_same(told: Any, s
     found = parse_distribution(told)
     assert isinstance(found, Distribution)
     assert parse_distribution(found.spec_value()) == found
-    low, high = min(found.ends), max(found.ends)  # type: ignore[type-var]
-    assert low <= found.at(share) <= high  # type: ignore[operator]
+    low, high = min(found.support), max(found.support)  # type: ignore[type-var]
+    assert low <= found.quantile(share) <= high  # type: ignore[operator]
 
 
 @given(st.floats(-1e9, 1e9))
 def test_six_digits_are_kept(value: float) -> None:
-    assert rounded(value) == pytest.approx(value, rel=5.1e-6)
-    assert rounded(rounded(value)) == rounded(value)
-    assert str(rounded(-0.0)) == "0.0"
+    assert round_significant(value) == pytest.approx(value, rel=5.1e-6)
+    assert round_significant(round_significant(value)) == round_significant(value)
+    assert str(round_significant(-0.0)) == "0.0"

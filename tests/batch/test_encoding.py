@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dermis.apps.batch.child_processes import LostProcessError
-from dermis.apps.batch.encoder_pool import Encoders
+from dermis.apps.batch.encoder_pool import EncoderPool
 from dermis.base.errors import DermisError
 
 
@@ -30,8 +30,8 @@ def jobs(*numbers: int) -> Iterator[tuple[int, np.ndarray]]:
 
 def test_order_and_bytes_are_those_of_no_process_at_all() -> None:
     numbers = range(9)
-    with Encoders(0, encode) as here, Encoders(2, encode) as there:
-        expected, found = list(here.encoded(jobs(*numbers))), list(there.encoded(jobs(*numbers)))
+    with EncoderPool(0, encode) as here, EncoderPool(2, encode) as there:
+        expected, found = list(here.encode_all(jobs(*numbers))), list(there.encoded(jobs(*numbers)))
     assert [(number, one["raw"]) for number, one in found] == [
         (number, one["raw"]) for number, one in expected
     ]
@@ -47,19 +47,19 @@ def test_jobs_are_asked_for_only_a_few_ahead() -> None:
             asked.append(1)
             yield job
 
-    with Encoders(1, encode) as encoders:
-        found = encoders.encoded(watched())
+    with EncoderPool(1, encode) as encoders:
+        found = encoders.encode_all(watched())
         next(found)
         assert len(asked) <= 4
         found.close()  # type: ignore[attr-defined]
-        assert [number for number, _ in encoders.encoded(jobs(1, 2))] == [1, 2]
+        assert [number for number, _ in encoders.encode_all(jobs(1, 2))] == [1, 2]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
 def test_one_that_dies_is_told_and_others_come_in_its_place() -> None:
-    with Encoders(1, encode) as encoders:
+    with EncoderPool(1, encode) as encoders:
         with pytest.raises(LostProcessError, match="SIGKILL"):
-            list(encoders.encoded(jobs(1, 90, 2)))
+            list(encoders.encode_all(jobs(1, 90, 2)))
         with pytest.raises(DermisError, match="image 80"):
-            list(encoders.encoded(jobs(1, 80, 2)))
-        assert [number for number, _ in encoders.encoded(jobs(1, 2))] == [1, 2]
+            list(encoders.encode_all(jobs(1, 80, 2)))
+        assert [number for number, _ in encoders.encode_all(jobs(1, 2))] == [1, 2]

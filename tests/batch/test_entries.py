@@ -9,8 +9,14 @@ import numpy as np
 import pytest
 from small_observation import OUTPUT_NAMES, observation, small_spec
 
-from dermis.apps.batch.output_encoding import Encoding, decode_output, encode_output, file_kind, stored_as
-from dermis.apps.batch.reader import decoded
+from dermis.apps.batch.output_encoding import (
+    Encoding,
+    decode_output,
+    encode_output,
+    file_format,
+    storage_description,
+)
+from dermis.apps.batch.reader import decode_image
 from dermis.apps.batch.records import encode_record
 from dermis.base.errors import DermisError
 from dermis.scene.outputs import OUTPUTS
@@ -28,10 +34,10 @@ def image(number: int, **spec: Any) -> tuple[Any, dict[str, bytes]]:
 @pytest.mark.parametrize("name", ALL)
 def test_each_output_comes_back_as_exactly_as_is_said(name: str, encoding: Encoding) -> None:
     values = observation(4, outputs=(name,)).outputs[name]
-    kind, output = file_kind(name, encoding), OUTPUTS[name]
+    kind, output = file_format(name, encoding), OUTPUTS[name]
     found = decode_output(name, kind, encode_output(name, values, encoding))
     assert found.shape == values.shape and found.dtype == output.kind
-    told = stored_as(name, encoding)
+    told = storage_description(name, encoding)
     if "16-bit PNG" in told:
         assert output.levels is not None
         np.testing.assert_allclose(found, values, rtol=1e-6, atol=0.51 * output.levels.step)
@@ -46,7 +52,7 @@ def test_the_background_comes_back_exactly(name: str) -> None:
     output = OUTPUTS[name]
     values = np.full((3, 4, output.channels or 2), output.background, output.kind)
     values = values[..., 0] if output.channels == 1 else values
-    found = decode_output(name, file_kind(name, "png"), encode_output(name, values, "png"))
+    found = decode_output(name, file_format(name, "png"), encode_output(name, values, "png"))
     np.testing.assert_array_equal(found, values)
 
 
@@ -64,7 +70,7 @@ def test_names_and_order_of_the_files() -> None:
 
 def test_all_that_is_known_comes_back() -> None:
     seen, files = image(1)
-    found = decoded(files)
+    found = decode_image(files)
     assert found["number"] == 1 and found["parameters"] == small_spec().parameters(1)
     np.testing.assert_array_equal(found["picture"], seen.picture)
     for ours, theirs in zip(found["camera"], seen.camera, strict=True):
@@ -81,7 +87,7 @@ def test_all_that_is_known_comes_back() -> None:
 def test_what_is_not_known_is_none_and_places_without_one_are_nan() -> None:
     spec, seen = small_spec(), observation(2)
     seen.landmarks["ibug-68"].pixels[1] = np.nan
-    found = decoded(encode_record(2, seen, spec.parameters(2), spec))
+    found = decode_image(encode_record(2, seen, spec.parameters(2), spec))
     assert found["gaze"] is None
     assert np.isnan(found["landmarks"]["ibug-68"].pixels[1]).all()
     assert np.isfinite(found["landmarks"]["ibug-68"].pixels[0]).all()

@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dermis.apps.batch.sampling import mixed, mixture, performed, uniform
-from dermis.human.expressions import EXPRESSIONS, targets_of
+from dermis.apps.batch.sampling import expression_weights, hashed_uniform, load_movements, random_expression
+from dermis.human.expressions import EXPRESSIONS, expand_targets
 from dermis.human.person import Human
 
 MANY = 3000
@@ -24,7 +24,7 @@ AGAINST = (
 
 
 def drawn(seed: int) -> dict[str, float]:
-    return {name: one for name, one in mixed(partial(uniform, seed, 0)).items() if one > 0}
+    return {name: one for name, one in random_expression(partial(hashed_uniform, seed, 0)).items() if one > 0}
 
 
 def none(name: str) -> float:
@@ -38,9 +38,9 @@ def targets() -> set[str]:
 
 def test_all_that_the_package_moves_the_human_has(targets: set[str]) -> None:
     moved = [name for weights in EXPRESSIONS.values() for name in weights]
-    moved += [name for part in mixture().values() for one in part for name in one.moves]
-    assert set(targets_of(moved)) <= targets
-    assert targets_of(["mouthSmile", "jawOpen", "mouthLeft"]) == (
+    moved += [name for part in load_movements().values() for one in part for name in one.target_weights]
+    assert set(expand_targets(moved)) <= targets
+    assert expand_targets(["mouthSmile", "jawOpen", "mouthLeft"]) == (
         "mouthSmileLeft",
         "mouthSmileRight",
         "jawOpen",
@@ -49,16 +49,16 @@ def test_all_that_the_package_moves_the_human_has(targets: set[str]) -> None:
 
 
 def test_chances_of_a_part_leave_it_room_to_rest() -> None:
-    for part in mixture().values():
-        assert 0 < sum(one.chance for one in part) < 1
-        assert all(0 < one.most <= 1 and 0 <= one.shuts <= 1 for one in part)
+    for part in load_movements().values():
+        assert 0 < sum(one.probability for one in part) < 1
+        assert all(0 < one.max_weight <= 1 and 0 <= one.jaw_closing <= 1 for one in part)
 
 
 def test_in_mixtures_nothing_works_against_itself() -> None:
     found = [drawn(seed) for seed in range(MANY)]
     assert not [one for one in found for pair in AGAINST if pair <= one.keys()]
-    for name, chance in (("mouthSmile", 0.35), ("jawLeft", 0.04), ("browInnerUp", 0.35)):
-        assert np.mean([name in one for one in found]) == pytest.approx(chance, abs=0.03)
+    for name, probability in (("mouthSmile", 0.35), ("jawLeft", 0.04), ("browInnerUp", 0.35)):
+        assert np.mean([name in one for one in found]) == pytest.approx(probability, abs=0.03)
     shut = [one["jawOpen"] for one in found if "jawOpen" in one and one.get("mouthPress", 0) > 0.45]
     free = [
         one["jawOpen"]
@@ -70,16 +70,18 @@ def test_in_mixtures_nothing_works_against_itself() -> None:
 
 def test_left_and_right_differ_by_the_asymmetry_alone() -> None:
     smile = EXPRESSIONS["smile"]
-    even = performed(smile, 1.0, 0.0, 0.0, none)
+    even = expression_weights(smile, 1.0, 0.0, 0.0, none)
     assert even["mouthSmileLeft"] == even["mouthSmileRight"] == smile["mouthSmile"]
-    leaning = performed(smile, 0.5, 0.2, 0.0, none)
+    leaning = expression_weights(smile, 0.5, 0.2, 0.0, none)
     assert leaning["mouthSmileLeft"] == pytest.approx(0.6 * smile["mouthSmile"])
     assert leaning["mouthSmileRight"] == pytest.approx(0.4 * smile["mouthSmile"])
-    middle = performed({"jawOpen": 0.5, "mouthLeft": 0.5}, 1.0, 1.0, 0.0, none)
+    middle = expression_weights({"jawOpen": 0.5, "mouthLeft": 0.5}, 1.0, 1.0, 0.0, none)
     assert middle == {"jawOpen": 0.5, "mouthLeft": 0.5}
-    assert performed({"mouthSmileLeft": 0.4}, 1.0, 0.5, 0.0, none) == {"mouthSmileLeft": pytest.approx(0.6)}
+    assert expression_weights({"mouthSmileLeft": 0.4}, 1.0, 0.5, 0.0, none) == {
+        "mouthSmileLeft": pytest.approx(0.6)
+    }
 
 
 def test_weights_stay_within_what_faces_do() -> None:
-    found = performed({"jawOpen": 0.9, "browDown": 0.0}, 1.5, -1.0, 1.0, lambda name: 6.0)
+    found = expression_weights({"jawOpen": 0.9, "browDown": 0.0}, 1.5, -1.0, 1.0, lambda name: 6.0)
     assert found == {"jawOpen": 1.0, "browDownLeft": 0.0, "browDownRight": 0.0}

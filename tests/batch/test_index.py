@@ -13,10 +13,10 @@ from small_observation import observation, small_spec, write_all, write_shard
 from dermis.apps.batch.datasheet import write_datasheet
 from dermis.apps.batch.index import write_index
 from dermis.apps.batch.records import encode_record
-from dermis.apps.batch.shards import ShardWriter, shards_of
+from dermis.apps.batch.shards import ShardWriter, list_shards
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import DermisError
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 
 FIRST = ["number", "key", "shard", "camera.K", "camera.R", "camera.t", "head_pose", "gaze"]
 
@@ -38,7 +38,7 @@ def drawn_spec() -> Spec:
 def described(drawn_spec: Spec, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Its shards without pictures, with index and data sheet."""
     folder = tmp_path_factory.mktemp("indexed")
-    for shard in shards_of(drawn_spec):
+    for shard in list_shards(drawn_spec):
         with ShardWriter(folder, shard, drawn_spec, "an adapter") as writer:
             for number in range(shard.first, shard.stop):
                 if number == 7:
@@ -53,7 +53,7 @@ def described(drawn_spec: Spec, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 def table(folder: Path) -> Any:
-    return needed("pyarrow.parquet", "a test").read_table(folder / "index.parquet")
+    return import_extra("pyarrow.parquet", "a test").read_table(folder / "index.parquet")
 
 
 def test_each_image_has_a_row_with_all_its_parameters(described: Path, drawn_spec: Spec) -> None:
@@ -124,7 +124,7 @@ def test_programs_read_what_outputs_labels_and_landmarks_mean(described: Path) -
 
 def test_an_index_of_some_shards_has_their_rows(tmp_path: Path) -> None:
     spec = small_spec(outputs=())
-    write_shard(tmp_path, shards_of(spec)[1], spec)
+    write_shard(tmp_path, list_shards(spec)[1], spec)
     write_index(tmp_path, spec)
     assert table(tmp_path)["number"].to_pylist() == [3, 4, 5]
 

@@ -13,7 +13,7 @@ from small_set import HERE, SHARDS, contents, drawn
 from dermis.apps.batch.spec import Spec
 from dermis.cli import main
 
-OPENED_AGAIN, REPLACED = "it is opened again", "it was lost twice"
+OPENED_AGAIN, LOST_TWICE = "it is opened again", "it was lost twice"
 ATTEMPTS = 2
 SHARD = "shard-00003"  # the only one that is drawn, as the others are there
 
@@ -29,7 +29,7 @@ def begun(
         if not name.startswith((SHARD, "index", "README")):
             (out / name).parent.mkdir(parents=True, exist_ok=True)
             (out / name).write_bytes(data)
-    monkeypatch.setattr("dermis.apps.batch.worker_pool.serve", losing_worker.serve)
+    monkeypatch.setattr("dermis.apps.batch.worker_pool.run_worker", losing_worker.run_worker)
     monkeypatch.setenv(losing_worker.FOLDER, str(lost))
     return out, lost
 
@@ -46,8 +46,8 @@ def test_another_worker_draws_the_shard(
         report = drawn(small_spec, out)
     notes = [str(one.message) for one in told]
     assert [OPENED_AGAIN in note for note in notes] == [True, False], notes
-    assert REPLACED in notes[1] and notes[1].endswith("its shard is drawn again")
-    assert (report.shards, report.skipped, report.is_whole) == (1, SHARDS - 1, True)
+    assert LOST_TWICE in notes[1] and notes[1].endswith("its shard is rendered again")
+    assert (report.shards, report.skipped, report.is_complete) == (1, SHARDS - 1, True)
     assert len(list(lost.iterdir())) == 1 and contents(out) == undisturbed
 
 
@@ -59,14 +59,14 @@ def test_the_command_ends_with_2_where_all_do(
 ) -> None:
     out, lost = begun
     before = contents(out)
-    monkeypatch.setattr("dermis.apps.batch.worker_pool.MOST_ATTEMPTS", ATTEMPTS)
+    monkeypatch.setattr("dermis.apps.batch.worker_pool.MAX_ATTEMPTS", ATTEMPTS)
     monkeypatch.setenv(losing_worker.WORKERS, "9")
     words = ["batch", str(small_folder / "spec.toml"), "-o", str(out), "--adapter", HERE.adapter]
     monkeypatch.setattr(sys, "argv", ["dermis", *words, "--workers", "1", "--encoders", "0"])
     with pytest.raises(SystemExit) as ended:
         main()
     said = capsys.readouterr().err
-    assert ended.value.code == 2 and OPENED_AGAIN in said and "its shard is drawn again" in said
-    assert re.search(rf"shard 3: .* but {ATTEMPTS} failed, .*{REPLACED}.*\. What is whole is kept", said)
+    assert ended.value.code == 2 and OPENED_AGAIN in said and "its shard is rendered again" in said
+    assert re.search(rf"shard 3: .* but {ATTEMPTS} failed, .*{LOST_TWICE}.*\. Complete shards are kept", said)
     assert ".." not in said and ".;" not in said
     assert len(list(lost.iterdir())) == ATTEMPTS and contents(out) == before

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dermis.apps.batch.preview import dry_run, parameter_rows, table_lines
-from dermis.apps.batch.spec import spec_of
+from dermis.apps.batch.spec import parse_spec
 
 ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
 SPEC = """
@@ -31,7 +31,7 @@ at = {choice = ["camera", "angles"]}
 
 
 def test_rows_tell_what_is_drawn_and_what_comes_of_it() -> None:
-    rows = {row["parameter"]: row for row in parameter_rows(spec_of(tomllib.loads(SPEC) | {"count": 400}))}
+    rows = {row["parameter"]: row for row in parameter_rows(parse_spec(tomllib.loads(SPEC) | {"count": 400}))}
     assert set(rows) == {"camera.yaw_deg", "camera.distance_mm", "gaze.at"}
     distance, gaze = rows["camera.distance_mm"], rows["gaze.at"]
     assert distance["drawn"] == "{uniform = [500.0, 900.0]}" and distance["images"] == 400
@@ -39,14 +39,21 @@ def test_rows_tell_what_is_drawn_and_what_comes_of_it() -> None:
     assert distance["mean"] == pytest.approx(700, abs=20) and len(distance["first"]) == 16
     assert sum(gaze["counts"].values()) == 400 and set(gaze["counts"]) == {"camera", "angles"}
     lines = table_lines(list(rows.values()))
-    assert len(lines) == 4 and lines[0].split() == ["parameter", "drawn", "images", "min", "mean", "max"]
+    assert len(lines) == 4 and lines[0].split() == [
+        "parameter",
+        "distribution",
+        "images",
+        "min",
+        "mean",
+        "max",
+    ]
     assert f"camera {gaze['counts']['camera']}" in lines[
         -1
     ] or f"camera {gaze['counts']['camera']}" in "".join(lines)
 
 
 def test_the_contact_sheet_shows_the_first_images_small() -> None:
-    rows, sheet = dry_run(spec_of(tomllib.loads(SPEC)), ADAPTER)
+    rows, sheet = dry_run(parse_spec(tomllib.loads(SPEC)), ADAPTER)
     assert rows and sheet.dtype == np.uint8 and sheet.shape == (96, 3 * 192 + 2 * 4, 3)
     pictures: list[Any] = [sheet[:, k * 196 : k * 196 + 192] for k in range(3)]
     for picture in pictures:

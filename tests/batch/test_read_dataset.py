@@ -19,10 +19,10 @@ from small_observation import OUTPUT_NAMES, observation, small_spec, write_all
 import dermis
 from dermis.apps.batch.index import write_index
 from dermis.apps.batch.output_encoding import encode_output
-from dermis.apps.batch.reader import decoded
+from dermis.apps.batch.reader import decode_image
 from dermis.apps.batch.records import encode_record
 from dermis.base.errors import DermisError
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 from dermis.frame.observation import Landmarks
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "dataset_files.md"
@@ -93,7 +93,7 @@ def test_what_the_documentation_shows_runs(tmp_path: Path, monkeypatch: pytest.M
 def test_webdataset_decodes_pictures_and_records_itself(tmp_path: Path) -> None:
     spec = small_spec(outputs=("depth",))
     write_all(tmp_path, spec)
-    webdataset = needed("webdataset", "a test")
+    webdataset = import_extra("webdataset", "a test")
     shards = sorted(map(str, tmp_path.glob("shard-*.tar")))
     pipeline = webdataset.WebDataset(shards, shardshuffle=False).decode("rgb8")
     for one in pipeline.to_tuple("png", "json"):
@@ -101,13 +101,13 @@ def test_webdataset_decodes_pictures_and_records_itself(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_shards_and_shards_that_are_none_are_refused(tmp_path: Path, written: Path) -> None:
-    with pytest.raises(DermisError, match="no shard is in it"):
+    with pytest.raises(DermisError, match="it contains no shard"):
         dermis.read_dataset(tmp_path)
     with pytest.raises(DermisError, match="the folder of a data set, but it cannot be read"):
         dermis.read_dataset(tmp_path / "none")
-    with pytest.raises(DermisError, match=r"numbers of the 3 shards in .* but 3 came"):
+    with pytest.raises(DermisError, match=r"numbers of the 3 shards in .* but got 3"):
         dermis.read_dataset(written, shards=[3])
-    with pytest.raises(DermisError, match="a data set, but a NoneType came"):
+    with pytest.raises(DermisError, match="a data set, but got a NoneType"):
         dermis.read_dataset(None)  # type: ignore[arg-type]
     with pytest.raises(DermisError, match="shuffle: expected a whole number"):
         dermis.read_dataset(written, shuffle="yes")  # type: ignore[arg-type]
@@ -132,13 +132,13 @@ def replaced(name: str, data: bytes) -> Any:
     ("change", "said"),
     [
         (lambda members: members[:-1], "its end is missing"),
-        (lambda members: [("../../evil.png", b""), *members], r"it holds '\.\./\.\./evil\.png'"),
-        (lambda members: [("/etc/passwd", b""), *members], "it holds '/etc/passwd'"),
-        (lambda members: [*members, members[0]], "two files in it have one name"),
+        (lambda members: [("../../evil.png", b""), *members], r"it contains '\.\./\.\./evil\.png'"),
+        (lambda members: [("/etc/passwd", b""), *members], "it contains '/etc/passwd'"),
+        (lambda members: [*members, members[0]], "two of its files have the same name"),
         (lambda members: [one for one in members if one[0] != "000000000.png"], r"its \.png is missing"),
         (lambda members: [one for one in members if one[0] != "000000000.json"], r"its \.json is missing"),
-        (lambda members: [("000000000.picture.png", b""), *members], r"\.picture\.png is none"),
-        (lambda members: [("000000000.cls", b"1"), *members], r"\.cls is none"),
+        (lambda members: [("000000000.picture.png", b""), *members], r"found \.picture\.png"),
+        (lambda members: [("000000000.cls", b"1"), *members], r"found \.cls"),
         (replaced("000000000.png", b"\x89PNG\r\n\x1a\n"), r"000000000\.png: .* cannot be decoded"),
         (replaced("000000000.depth.png", b"GIF89a"), r"000000000\.depth\.png: .* cannot be decoded"),
         (replaced("000000000.json", b"{}"), "a record of an image, but it cannot be understood"),
@@ -164,11 +164,11 @@ def test_records_and_sizes_that_do_not_fit_are_refused(tmp_path: Path) -> None:
         with pytest.raises(DermisError, match=said):
             list(dermis.read_dataset(tmp_path))
 
-    refused("the record of image 0, but that of 5 came", number=5)
+    refused("the record of image 0, but got that of 5", number=5)
     refused("neither a number nor a text", parameters={"a": {"b": 1}})
     refused(r"an array has shape \(2, 2\), not \(3, 3\)", camera={**record["camera"], "K": [[1, 2], [3, 4]]})
-    refused("texts for numbers", head_pose=[["1"] * 4] * 3)
-    refused("true and false", landmarks={"a": {"pixels": [], "positions_mm": [], "visible": [1]}})
+    refused("texts in place of numbers", head_pose=[["1"] * 4] * 3)
+    refused("neither true nor false", landmarks={"a": {"pixels": [], "positions_mm": [], "visible": [1]}})
     refused("cannot be understood", gaze=[[0, 0, 1], [0, 1]])
     small = encode_output("depth", np.ones((3, 4), np.float32), "png")
     repacked(path, replaced("000000000.json", json.dumps(record).encode()))
@@ -184,7 +184,7 @@ def test_links_and_folders_in_a_tar_are_refused(tmp_path: Path) -> None:
         link = tarfile.TarInfo("000000000.png")
         link.type, link.linkname = tarfile.SYMTYPE, "/etc/passwd"
         shard.addfile(link)
-    with pytest.raises(DermisError, match=r"'000000000\.png', which is no regular file"):
+    with pytest.raises(DermisError, match=r"'000000000\.png', which is not a regular file"):
         list(dermis.read_dataset(tmp_path))
 
 
@@ -192,5 +192,5 @@ def test_no_landmarks_of_a_set_are_read_too() -> None:
     seen = observation(0)
     none = Landmarks((), np.empty((0, 3), np.float32), np.empty((0, 2)), np.empty(0, bool))
     spec, seen = small_spec(), replace(seen, landmarks={"ibug-68": none})
-    found = decoded(encode_record(0, seen, spec.parameters(0), spec))["landmarks"]["ibug-68"]
+    found = decode_image(encode_record(0, seen, spec.parameters(0), spec))["landmarks"]["ibug-68"]
     assert found.pixels.shape == (0, 2) and found.positions_mm.shape == (0, 3) and found.visible.shape == (0,)

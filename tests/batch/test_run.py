@@ -13,8 +13,8 @@ from small_set import COUNT, HERE, SHARD_SIZE, SHARDS, contents, drawn, read, wr
 
 from dermis.apps.batch.run import Progress, run
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.worker import Work
-from dermis.apps.batch.worker_pool import Processes
+from dermis.apps.batch.worker import RunOptions
+from dermis.apps.batch.worker_pool import ProcessPool
 from dermis.base.errors import DermisError
 
 Files = dict[str, bytes]
@@ -45,7 +45,7 @@ def test_two_workers_that_have_encoders_write_the_same(
 ) -> None:
     told: list[tuple[int, int]] = []
     report = drawn(
-        small_spec, tmp_path / "out", 2, 1, told=lambda now: told.append((now.images, now.to_draw))
+        small_spec, tmp_path / "out", 2, 1, on_progress=lambda now: told.append((now.images, now.total))
     )
     assert contents(tmp_path / "out") == undisturbed
     assert (report.images, report.shards, report.skipped) == (COUNT, SHARDS, 0)
@@ -54,9 +54,9 @@ def test_two_workers_that_have_encoders_write_the_same(
 
 def test_parts_make_the_whole_in_any_order(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     first = drawn(small_spec, tmp_path, part=(1, 2))
-    assert not first.is_whole and "index.parquet" not in contents(tmp_path)
+    assert not first.is_complete and "index.parquet" not in contents(tmp_path)
     second = drawn(small_spec, tmp_path, part=(0, 2))
-    assert second.is_whole and first.shards + second.shards == SHARDS
+    assert second.is_complete and first.shards + second.shards == SHARDS
     assert contents(tmp_path) == undisturbed
 
 
@@ -84,30 +84,30 @@ def test_a_shard_that_was_damaged_is_drawn_again(
 def test_killed_workers_lose_nothing(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     rng = random.Random(1)
     moments = set(rng.sample(range(1, COUNT - 1), 2))
-    with pytest.warns(UserWarning, match=r"SIGKILL; its shard is drawn again"):
-        report = drawn(small_spec, tmp_path, 2, 1, told=killing(moments, rng))
-    assert report.is_whole and contents(tmp_path) == undisturbed
+    with pytest.warns(UserWarning, match=r"SIGKILL; its shard is rendered again"):
+        report = drawn(small_spec, tmp_path, 2, 1, on_progress=killing(moments, rng))
+    assert report.is_complete and contents(tmp_path) == undisturbed
 
 
 def test_a_shard_that_no_worker_survives_is_given_up(
     small_spec: Spec, undisturbed: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dermis.apps.batch.worker_pool.MOST_ATTEMPTS", 2)
+    monkeypatch.setattr("dermis.apps.batch.worker_pool.MAX_ATTEMPTS", 2)
     put(undisturbed, tmp_path)
     lost = next(name for name in sorted(undisturbed) if name.startswith("shard-"))
     (tmp_path / lost).unlink()
     always = lambda now: [one.kill() for one in multiprocessing.active_children()]  # noqa: E731
     with (
-        pytest.warns(UserWarning, match="drawn again"),
+        pytest.warns(UserWarning, match="rendered again"),
         pytest.raises(DermisError, match=r"shard 0: .*2 failed.*SIGKILL"),
     ):
-        drawn(small_spec, tmp_path, told=always)
+        drawn(small_spec, tmp_path, on_progress=always)
     assert contents(tmp_path).keys() == undisturbed.keys() - {lost}
 
 
 def test_another_data_set_is_refused(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     put(undisturbed, tmp_path)
-    with pytest.raises(DermisError, match=r"spec\.toml in it is another's"):
+    with pytest.raises(DermisError, match=r"its spec\.toml differs"):
         drawn(small_spec.replace(seed=4), tmp_path)
     assert contents(tmp_path) == undisturbed
 
@@ -144,7 +144,7 @@ def test_a_full_disk_keeps_what_is_whole(small_spec: Spec, undisturbed: Files, t
     resource.setrlimit(resource.RLIMIT_FSIZE, (2048, before[1]))  # its error is another's, its way the same
     try:
         with pytest.raises(DermisError, match="cannot be written"):
-            run(Work(small_spec, tmp_path), Processes([HERE]))
+            run(RunOptions(small_spec, tmp_path), ProcessPool([HERE]))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert contents(tmp_path).keys() == undisturbed.keys() - set(lost)

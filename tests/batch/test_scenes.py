@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from dermis.apps.batch.cameras import face_points
-from dermis.apps.batch.lighting import colour_of, lights_of
-from dermis.apps.batch.scenes import SceneMaker, sampled_person
-from dermis.apps.batch.spec import Spec, example_text, spec_of
+from dermis.apps.batch.lighting import blackbody_colour, sampled_lights
+from dermis.apps.batch.scenes import SceneBuilder, sampled_person
+from dermis.apps.batch.spec import Spec, example_toml, parse_spec
 from dermis.base.errors import DermisError
 from dermis.human.person import Human
-from dermis.human.person_file import write_numbers
+from dermis.human.person_file import write_person_json
 from dermis.mesh.pose import Pose
 from dermis.mesh.rotations import angles_matrix
 from dermis.scene.lights import light_presets, preset_lights
@@ -47,14 +47,14 @@ offset_y = {uniform = [-1, 1]}
 
 
 def spec(text: str, **more: Any) -> Spec:
-    return spec_of(tomllib.loads(text) | {"count": 100} | more)
+    return parse_spec(tomllib.loads(text) | {"count": 100} | more)
 
 
 @pytest.fixture(scope="module")
 def wild() -> tuple[Spec, list[tuple[dict[str, Any], Scene]]]:
     made = spec(WILD)
-    maker = SceneMaker(made)
-    return made, [(one, maker.scene(one)[0]) for one in map(made.parameters, range(40))]
+    builder = SceneBuilder(made)
+    return made, [(one, builder.build(one)[0]) for one in map(made.parameters, range(40))]
 
 
 def seen(scene: Scene, places: Any, size: tuple[int, int]) -> Any:
@@ -77,7 +77,7 @@ def test_the_whole_face_is_in_the_picture_whatever_is_drawn(wild: Any) -> None:
 
 def test_cameras_are_as_drawn_where_the_face_fits() -> None:
     drawn = spec("[camera]\nyaw_deg = 90\npitch_deg = 30\ndistance_mm = 1000\nframe_mm = 500\noffset_x = 0.2")
-    scene, settings = SceneMaker(drawn).scene(drawn.parameters(0))
+    scene, settings = SceneBuilder(drawn).build(drawn.parameters(0))
     camera, head = scene.camera, scene.head
     face = head.control.some_posed(face_points(head), scene.motion) - np.array(head.centre_mm)
     middle = 0.5 * (face.min(axis=0) + face.max(axis=0))
@@ -88,12 +88,12 @@ def test_cameras_are_as_drawn_where_the_face_fits() -> None:
     (x, _), width = seen(scene, middle[None] + head.centre_mm, settings.size)[0], settings.size[0]
     assert (x + 0.5) / width == pytest.approx(0.5 + 0.5 * 0.2, abs=2e-3)
     lens = spec("[camera]\nfocal_mm = 48\ndistance_mm = 1200")
-    assert SceneMaker(lens).scene(lens.parameters(0))[0].camera.frame_mm == pytest.approx(600)
+    assert SceneBuilder(lens).build(lens.parameters(0))[0].camera.frame_mm == pytest.approx(600)
 
 
 def test_roll_turns_the_camera_clockwise() -> None:
     upright, rolled = (
-        SceneMaker(one).scene(one.parameters(0))[0] for one in (spec(""), spec("[camera]\nroll_deg = 20"))
+        SceneBuilder(one).build(one.parameters(0))[0] for one in (spec(""), spec("[camera]\nroll_deg = 20"))
     )
     assert np.dot(rolled.camera.up, upright.camera.up) == pytest.approx(np.cos(np.radians(20)), abs=1e-6)
     assert rolled.camera.up[0] > 0.3  # the head's left, which is right in the picture
@@ -112,7 +112,7 @@ def test_eyes_look_at_the_camera_or_by_the_angles() -> None:
     told = "[head]\nyaw_deg = 20\n[camera]\nyaw_deg = 10\n"
     at_camera, aside = spec(told), spec(told + "[gaze]\nat = 'angles'\nyaw_deg = -15\npitch_deg = 10")
     for drawn in (at_camera, aside):
-        scene, _ = SceneMaker(drawn).scene(drawn.parameters(0))
+        scene, _ = SceneBuilder(drawn).build(drawn.parameters(0))
         assert scene.head.eyes is not None and scene.motion is not None
         frames = scene.head.eyes.frames(scene.head.control, scene.motion)
         for frame in frames:
@@ -128,9 +128,9 @@ def test_eyes_look_at_the_camera_or_by_the_angles() -> None:
 
 def test_a_scene_depends_on_its_parameters_alone(wild: Any) -> None:
     drawn, scenes = wild
-    maker = SceneMaker(drawn)
+    builder = SceneBuilder(drawn)
     for k in (30, 2):
-        again, before = maker.scene(drawn.parameters(k))[0], scenes[k][1]
+        again, before = builder.build(drawn.parameters(k))[0], scenes[k][1]
         assert again.camera == before.camera and again.lights == before.lights and again.skin == before.skin
         assert again.motion is not None and again.motion.weights.tobytes() == before.motion.weights.tobytes()
         assert again.head.positions_mm.tobytes() == before.head.positions_mm.tobytes()
@@ -158,16 +158,16 @@ def test_people_that_cannot_be_are_refused(given: dict[str, Any]) -> None:
 
 def test_heads_are_taken_from_files_of_people_and_of_scenes(tmp_path: Path) -> None:
     (tmp_path / "people").mkdir()
-    write_numbers(tmp_path / "people" / "one.json", Human(age=60))
+    write_person_json(tmp_path / "people" / "one.json", Human(age=60))
     (tmp_path / "people" / "two.toml").write_text('[head]\nname = "human:4"\n[skin]\noiliness = 0.9\n')
     told = tomllib.loads(
         "count = 9\nsize = 64\n[person]\nhead = {files = 'people/*'}\n[skin]\nroughness = 0.4"
     )
-    made = spec_of(told, tmp_path)
+    made = parse_spec(told, tmp_path)
     named = {made.parameters(k)["person.head"]: made.parameters(k) for k in range(9)}
     assert sorted(named) == ["people/one.json", "people/two.toml"] == sorted(made.files)
-    maker = SceneMaker(made)
-    one, two = (maker.scene(named[name])[0] for name in sorted(named))
+    builder = SceneBuilder(made)
+    one, two = (builder.build(named[name])[0] for name in sorted(named))
     assert one.head.name.endswith("one.json") and one.skin.oiliness == 0
     assert two.head.name == "human:4" and (two.skin.oiliness, two.skin.roughness) == (0.9, 0.4)
 
@@ -178,23 +178,26 @@ def test_pose_is_what_expression_and_weights_say() -> None:
     parameters = drawn.parameters(0)
     weights = {name[5:]: value for name, value in parameters.items() if name.startswith("pose.")}
     assert weights == {"eyeBlinkLeft": 1, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5, "jawOpen": 0.2}
-    scene, _ = SceneMaker(drawn).scene(parameters)
+    scene, _ = SceneBuilder(drawn).build(parameters)
     assert isinstance(scene.pose, Pose) and weights.items() <= scene.pose.weights.items()
     unknown = spec("[pose]\nnoseGrow = 0.5")
     with pytest.raises(DermisError, match="noseGrow"):
-        SceneMaker(unknown).scene(unknown.parameters(0))
+        SceneBuilder(unknown).build(unknown.parameters(0))
 
 
 def test_lights_are_of_the_rig_that_is_drawn() -> None:
     told = "yaw_deg = 90\npitch_deg = 0\ndistance_mm = 1000\nstrength = 2\nkelvin = 3000"
-    key, fill, rim = lights_of(spec(f"[light]\nkind = 'rig'\n[light.key]\n{told}").parameters(0))
+    key, fill, rim = sampled_lights(spec(f"[light]\nkind = 'rig'\n[light.key]\n{told}").parameters(0))
     assert key.position == pytest.approx((1000, 0, 0), abs=1e-6)
     assert np.dot(key.irradiance, (0.2126, 0.7152, 0.0722)) == pytest.approx(2 * np.pi)
     assert key.irradiance[0] > key.irradiance[2] and fill.position[2] > 0 > rim.position[2]
-    assert colour_of(6500) == pytest.approx((1, 1, 1)) and colour_of(12000)[2] > 1 > colour_of(12000)[0]
+    assert (
+        blackbody_colour(6500) == pytest.approx((1, 1, 1))
+        and blackbody_colour(12000)[2] > 1 > blackbody_colour(12000)[0]
+    )
     for kind in light_presets():
         around = "[environment]\nname = 'uniform'\n" * (kind == "none")
-        turned = lights_of(
+        turned = sampled_lights(
             spec(f"{around}[light]\nkind = '{kind}'\nturn_deg = 90\nstrength = 0.5").parameters(0)
         )
         for light, plain in zip(turned, preset_lights(kind), strict=True):
@@ -207,33 +210,33 @@ def test_lights_are_of_the_rig_that_is_drawn() -> None:
 def test_background_and_environment_come_together() -> None:
     around = "[environment]\nname = {choice = ['none', 'uniform']}\nstrength = 0.5\n"
     drawn = spec(f"images_per_person = 9\n{around}[background]\nkind = 'environment'\nblur = 0.3")
-    maker = SceneMaker(drawn)
+    builder = SceneBuilder(drawn)
     for k in range(8):
         parameters = drawn.parameters(k)
         assert (parameters["background.kind"] == "environment") == (
             parameters["environment.name"] == "uniform"
         )
-        scene, settings = maker.scene(parameters)
+        scene, settings = builder.build(parameters)
         assert (settings.background == "environment") == (scene.environment is not None)
         assert settings.background_blur == (0.3 if scene.environment else 0.0)
     plain = spec("[background]\nkind = 'colour'\nred = 0.1\ngreen = 0.2\nblue = 0.3")
-    assert SceneMaker(plain).scene(plain.parameters(0))[1].background == (0.1, 0.2, 0.3)
+    assert SceneBuilder(plain).build(plain.parameters(0))[1].background == (0.1, 0.2, 0.3)
 
 
 def test_every_image_of_the_example_is_a_scene() -> None:
-    drawn = spec_of(tomllib.loads(example_text()))
-    maker = SceneMaker(drawn)
+    drawn = parse_spec(tomllib.loads(example_toml()))
+    builder = SceneBuilder(drawn)
     for k in range(3):
-        scene, settings = maker.scene(drawn.parameters(k))
+        scene, settings = builder.build(drawn.parameters(k))
         assert scene.lights and settings.size == (512, 512) and settings.exposure == "auto"
 
 
 def test_drawn_people_are_let_go_of_when_the_next_one_comes() -> None:
     """They never come again; sixteen of them took half a gigabyte."""
-    spec = spec_of({"count": 2, "size": [32, 32], "person": {"hair": {"style": "none"}}})
-    maker = SceneMaker(spec)
-    first = weakref.ref(maker.scene(spec.parameters(0))[0].head)
+    spec = parse_spec({"count": 2, "size": [32, 32], "person": {"hair": {"style": "none"}}})
+    builder = SceneBuilder(spec)
+    first = weakref.ref(builder.build(spec.parameters(0))[0].head)
     assert first() is not None
-    maker.scene(spec.parameters(1))
+    builder.build(spec.parameters(1))
     gc.collect()
     assert first() is None

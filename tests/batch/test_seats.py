@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 
 from dermis.apps.batch import worker_pool as seats
-from dermis.apps.batch.dask_worker import taken_rank
+from dermis.apps.batch.dask_worker import local_rank
 from dermis.apps.batch.worker_pool import SlotRequest
 
 
 def pretend(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbers: int) -> None:
     found = [SimpleNamespace(kind=kind, number=number) for number in numbers]
     by_name: dict[str, Any] = {f"#{one.number}": [one] for one in found} | {"auto": found}
-    monkeypatch.setattr(seats, "alike_adapters", by_name.__getitem__)
+    monkeypatch.setattr(seats, "similar_adapters", by_name.__getitem__)
     monkeypatch.setattr(seats, "available_cores", lambda: cores)
 
 
@@ -49,7 +49,7 @@ def test_a_software_adapter_shares_the_cores(
 
 
 def test_ranks_of_a_host_are_its_own_and_free_again() -> None:
-    with taken_rank() as first, taken_rank() as second:
+    with local_rank() as first, local_rank() as second:
         assert (first, second) == (0, 1)
-    with taken_rank() as again:
+    with local_rank() as again:
         assert again == 0

@@ -19,23 +19,23 @@ from scipy import stats
 
 import dermis
 from dermis.apps.batch.sampling import Parameters
-from dermis.apps.batch.spec import Spec, example_text, load_spec, spec_of
+from dermis.apps.batch.spec import Spec, example_toml, load_spec, parse_spec
 from dermis.base.errors import DermisError
 
 COUNT = 5000
 REFUSED = {
     "camera = 3": "camera: expected a table with distance_mm",
     "[camera]\nyaw = 3": "camera: yaw: expected one of distance_mm",
-    "[camera]\nyaw_deg = {uniform = [1, 0]}": "camera: yaw_deg: expected a low end",
-    "[camera]\npitch_deg = {normal = [0, 20]}": "camera: pitch_deg: .* normal reaches to 6 sd",
+    "[camera]\nyaw_deg = {uniform = [1, 0]}": "camera: yaw_deg: expected a lower limit",
+    "[camera]\npitch_deg = {normal = [0, 20]}": "camera: pitch_deg: .* normal extends 6 sd",
     "[light.key]\nyaw_deg = 500": r"light\.key: yaw_deg: expected numbers from -180 to 180",
     '[light]\nkind = "candle"': "light: kind: expected one of rig, ",
-    '[light]\nkind = "none"': "light: expected some light in each image",
+    '[light]\nkind = "none"': "light: expected light in each image",
     "[light]\nkind = {files = '*.toml'}": "light: kind: expected one of rig, ",
     "[person]\nage = 20": "person: age: expected numbers from 25 to 90",
     "[person]\nage = 'old'": "person: age: expected numbers",
-    "[person]\nafrican = 0": "person: expected a share of african",
-    '[person]\nhead = "human"\nage = 30': r"person\.age: expected people that are drawn",
+    "[person]\nafrican = 0": "person: expected a fraction of african",
+    '[person]\nhead = "human"\nage = 30': r"person\.age: expected sampled people",
     "[person.skin]\nshine = 1": r"person\.skin: shine: expected one of melanin",
     "[person.skin]\nmelanin = 2": r"person\.skin: melanin: expected a number from 0 to 1",
     "[person.hair]\nstyle = 'mohawk'": r"person\.hair: style: expected one of none",
@@ -58,10 +58,10 @@ REFUSED = {
     "counts = 1": "spec: counts: expected count",
     "folder = '/'": "folder: expected no such key",
     "outputs = ['smell']": "output: expected one of depth",
-    "landmarks = ['dlib']": "landmarks: expected some of ibug-68",
-    "landmarks = ['none.csv']": r"landmarks: .* tables of name,vertex .*'none\.csv' came",
+    "landmarks = ['dlib']": "landmarks: expected any of ibug-68",
+    "landmarks = ['none.csv']": r"landmarks: .* tables of name,vertex .*got 'none\.csv'",
     "format = 'zip'": "spec: format",
-    "[[correlated]]\nof = ['camera.yaw_deg', 'x']\ncorrelation = 0.5": "correlated: of: .*'x' is none",
+    "[[correlated]]\nof = ['camera.yaw_deg', 'x']\ncorrelation = 0.5": "correlated: of: .*got 'x'",
     "[[correlated]]\nof = ['camera.yaw_deg']\ncorrelation = 0.5": "correlated: .*2 to 50 names",
     "[[correlated]]\nof = ['camera.yaw_deg', 'head.yaw_deg']\ncorrelation = 1": "correlated: .*definite",
     "[[correlated]]\nof = ['a', 'b']\ncorrelation = [[1, 0]]": "correlated: .*2 rows of 2",
@@ -79,12 +79,12 @@ FIRST = {
 
 
 def spec(text: str = "", **more: Any) -> Spec:
-    return spec_of(tomllib.loads(text) | {"count": COUNT} | more)
+    return parse_spec(tomllib.loads(text) | {"count": COUNT} | more)
 
 
 @pytest.fixture(scope="module")
 def example() -> Spec:
-    return spec_of(tomllib.loads(example_text()) | {"count": COUNT})
+    return parse_spec(tomllib.loads(example_toml()) | {"count": COUNT})
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +103,7 @@ def test_what_cannot_be_drawn_is_refused_by_table_and_key(text: str, tmp_path: P
 
 def test_the_example_is_a_spec_and_says_what_it_does(tmp_path: Path) -> None:
     file = tmp_path / "spec.toml"
-    file.write_text(example_text(), encoding="utf-8")
+    file.write_text(example_toml(), encoding="utf-8")
     drawn = load_spec(file)
     assert (drawn.count, drawn.size, drawn.shard_size, drawn.files) == (1000, (512, 512), 1000, {})
     assert load_spec(file, count=3, seed=9, size=(64, 32)).size == (64, 32)
@@ -113,12 +113,12 @@ def test_the_example_is_a_spec_and_says_what_it_does(tmp_path: Path) -> None:
 
 
 def test_files_that_the_example_mentions_could_be_taken(tmp_path: Path) -> None:
-    text = example_text()
+    text = example_toml()
     for line in [line[2:] for line in text.splitlines() if line.startswith("# name = ")]:
         (tmp_path / "panoramas").mkdir(exist_ok=True)
         (tmp_path / "panoramas" / "sky.hdr").write_bytes(b"light")
         told = tomllib.loads(text) | {"environment": tomllib.loads(line.partition("  #")[0])}
-        assert spec_of(told, tmp_path).parameters(0)["environment.name"] in (
+        assert parse_spec(told, tmp_path).parameters(0)["environment.name"] in (
             "lebombo", "royal_esplanade", "panoramas/sky.hdr",
         )  # fmt: skip
 
@@ -179,11 +179,11 @@ def test_images_share_people_as_many_as_are_stated() -> None:
 
 def test_other_processes_draw_the_same(example: Spec) -> None:
     code = (
-        "import json, tomllib; from dermis.apps.batch.spec import example_text, spec_of; "
-        "spec = spec_of(tomllib.loads(example_text()) | {'count': 5000}); "
-        "print(json.dumps([spec.text(), *(spec.parameters(k) for k in (4999, 0, 17))]))"
+        "import json, tomllib; from dermis.apps.batch.spec import example_toml, parse_spec; "
+        "spec = parse_spec(tomllib.loads(example_toml()) | {'count': 5000}); "
+        "print(json.dumps([spec.to_toml(), *(spec.parameters(k) for k in (4999, 0, 17))]))"
     )
-    own = json.dumps([example.text(), *(example.parameters(k) for k in (4999, 0, 17))])
+    own = json.dumps([example.to_toml(), *(example.parameters(k) for k in (4999, 0, 17))])
     source = Path(dermis.__file__).parents[1]
     for hashes in ("1", "2"):
         environment = {**os.environ, "PYTHONHASHSEED": hashes, "PYTHONPATH": str(source)}
@@ -202,9 +202,9 @@ def test_the_first_image_of_the_example_stays_what_it_was(example: Spec) -> None
 
 
 def test_text_is_canonical(example: Spec) -> None:
-    text = example.text()
-    again = spec_of(tomllib.loads(text))
-    assert again == example and again.text() == text and again.digest() == example.digest()
+    text = example.to_toml()
+    again = parse_spec(tomllib.loads(text))
+    assert again == example and again.to_toml() == text and again.digest() == example.digest()
     assert [again.parameters(k) for k in range(9)] == [example.parameters(k) for k in range(9)]
     assert example.replace(seed=5).digest() != example.digest()
 
@@ -245,9 +245,9 @@ TABLES = st.fixed_dictionaries(
 @settings(deadline=None, max_examples=60)
 @given(TABLES)
 def test_any_spec_is_the_same_after_its_text(tables: dict[str, Any]) -> None:
-    made = spec_of(tables)
-    again = spec_of(tomllib.loads(made.text()))
-    assert again == made and again.text() == made.text()
+    made = parse_spec(tables)
+    again = parse_spec(tomllib.loads(made.to_toml()))
+    assert again == made and again.to_toml() == made.to_toml()
     assert again.parameters(0) == made.parameters(0)
 
 
@@ -256,30 +256,30 @@ def test_files_are_sorted_known_by_their_contents_and_checked(tmp_path: Path) ->
         (tmp_path / name).write_bytes(data)
     (tmp_path / "d.hdr").mkdir()
     tables = tomllib.loads("[environment]\nname = {files = '*.hdr'}")
-    first = spec_of(tables, tmp_path)
+    first = parse_spec(tables, tmp_path)
     assert list(first.files) == ["a.hdr", "b.hdr"]
     assert {first.parameters(k)["environment.name"] for k in range(30)} == {"a.hdr", "b.hdr"}
-    assert spec_of(tomllib.loads(first.text()), tmp_path) == first
+    assert parse_spec(tomllib.loads(first.to_toml()), tmp_path) == first
     (tmp_path / "a.hdr").write_bytes(b"other")
-    assert spec_of(tables, tmp_path).digest() != first.digest()
-    with pytest.raises(DermisError, match=r"files: a\.hdr: expected the file of hash"):
-        spec_of(tomllib.loads(first.text()), tmp_path)
+    assert parse_spec(tables, tmp_path).digest() != first.digest()
+    with pytest.raises(DermisError, match=r"files: a\.hdr: expected a file with SHA-256"):
+        parse_spec(tomllib.loads(first.to_toml()), tmp_path)
     (tmp_path / "a.hdr").unlink()
     with pytest.raises(DermisError, match=r"files: a\.hdr: .* there is none"):
-        spec_of(tomllib.loads(first.text()), tmp_path)
+        parse_spec(tomllib.loads(first.to_toml()), tmp_path)
 
 
 def test_tables_of_landmarks_are_known_by_their_contents(tmp_path: Path) -> None:
     table, tables = tmp_path / "points.csv", {"landmarks": ["ibug-68", "points.csv"]}
     table.write_text("# a ball\nname,vertex\ntop,3\n")
-    first = spec_of(tables, tmp_path)
+    first = parse_spec(tables, tmp_path)
     assert list(first.files) == ["points.csv"]
     assert first.landmark_tables == {"ibug-68": "ibug-68", "points.csv": str(table)}
-    assert spec_of(tomllib.loads(first.text()), tmp_path) == first
+    assert parse_spec(tomllib.loads(first.to_toml()), tmp_path) == first
     table.write_text("name,vertex\ntop,4\n")
-    assert spec_of(tables, tmp_path).digest() != first.digest()
-    with pytest.raises(DermisError, match=r"files: points\.csv: expected the file of hash"):
-        spec_of(tomllib.loads(first.text()), tmp_path)
+    assert parse_spec(tables, tmp_path).digest() != first.digest()
+    with pytest.raises(DermisError, match=r"files: points\.csv: expected a file with SHA-256"):
+        parse_spec(tomllib.loads(first.to_toml()), tmp_path)
     table.write_text("name,point\ntop,4\n")
     with pytest.raises(DermisError, match=r"points\.csv: expected landmarks in CSV"):
-        spec_of(tables, tmp_path)
+        parse_spec(tables, tmp_path)

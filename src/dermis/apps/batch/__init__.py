@@ -1,1 +1,1 @@
-"""Data sets: many pictures of people with what is known about each, on one machine or many."""
+"""Rendering of data sets: many pictures with ground truth, on one machine or on several."""

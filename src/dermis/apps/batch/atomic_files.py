@@ -1,4 +1,4 @@
-"""Files that are renamed into place when complete, safe against other processes writing the same."""
+"""Atomic writes of files and folders that several processes may write at the same time."""
 
 from __future__ import annotations
 
@@ -12,57 +12,59 @@ from pathlib import Path
 
 from dermis.base.atomic_write import refuse_output
 
-_TRIES = 5
+_MAX_ATTEMPTS = 5
 _UNFINISHED = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
 def temporary_path(target: Path) -> Path:
-    """A hidden name beside a file or folder, for while it is being written."""
+    """Return an unused hidden path beside a file or folder, for its content while it is written."""
     return target.with_name(f".{target.name}-{secrets.token_hex(6)}.unfinished")
 
 
 def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
-    """Write a file whole or not at all; another process may remove what is unfinished, then it is done again.
+    """Write a file completely or not at all.
 
-    write : does so, to the name that it is given
+    Another process may remove the temporary file while cleaning up; the file is then written again.
 
-    Raises DermisError where it cannot be written.
+    write : function that writes the content to the path that it receives
+
+    Raises DermisError if the file cannot be written.
     """
-    for tries_left in reversed(range(_TRIES)):
-        unfinished = temporary_path(target)
+    for attempts_left in reversed(range(_MAX_ATTEMPTS)):
+        temporary = temporary_path(target)
         try:
-            write(unfinished)
-            sync(unfinished)
-            unfinished.replace(target)
-            sync(target.parent)
+            write(temporary)
+            flush_to_disk(temporary)
+            temporary.replace(target)
+            flush_to_disk(target.parent)
         except FileNotFoundError as fault:
-            if not tries_left or not target.parent.is_dir():
+            if not attempts_left or not target.parent.is_dir():
                 refuse_output(target, fault)
             continue
         except OSError as fault:
             refuse_output(target, fault)
         finally:
-            remove(unfinished)
+            remove_path(temporary)
         return
 
 
-def move_into_place(unfinished: Path, target: Path) -> None:
-    """Give what is whole its name, in place of what has it: a file or a folder.
+def move_into_place(temporary: Path, target: Path) -> None:
+    """Rename a temporary file or folder to its final path, replacing what exists there.
 
-    Raises OSError where that fails.
+    Raises OSError if this fails.
     """
     if target.is_dir() and not target.is_symlink():
-        aside = temporary_path(target)
-        target.rename(aside)
-        unfinished.rename(target)
-        remove(aside)
+        replaced = temporary_path(target)
+        target.rename(replaced)
+        temporary.rename(target)
+        remove_path(replaced)
     else:
-        unfinished.replace(target)
-    sync(target.parent)
+        temporary.replace(target)
+    flush_to_disk(target.parent)
 
 
-def sync(path: Path) -> None:
-    """Wait until a file, or the names in a folder, are on the disk."""
+def flush_to_disk(path: Path) -> None:
+    """Wait until the content of a file, or the entries of a folder, are stored on the disk."""
     if os.name != "posix":
         return  # folders cannot be opened there
     descriptor = os.open(path, os.O_RDONLY)
@@ -72,8 +74,8 @@ def sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def remove(path: Path) -> None:
-    """Remove a file, or a folder with all that it holds; it may not be there."""
+def remove_path(path: Path) -> None:
+    """Remove a file, or a folder with its content, if it exists."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
         return
@@ -82,7 +84,7 @@ def remove(path: Path) -> None:
 
 
 def unfinished_files(folder: Path) -> dict[Path, str]:
-    """What was left unfinished in a folder, with the name that it was to have."""
+    """Return the temporary files in a folder, each with the name of its target."""
     with contextlib.suppress(OSError):
         found = {path: _UNFINISHED.fullmatch(path.name) for path in sorted(folder.iterdir())}
         return {path: match[1] for path, match in found.items() if match}

@@ -1,4 +1,4 @@
-"""Child processes that are spawned without the parent's state and end with their parent."""
+"""Child processes that are spawned without the parent's state and exit with their parent."""
 
 from __future__ import annotations
 
@@ -18,58 +18,58 @@ from dermis.base.errors import DermisError
 
 _CONTEXT = multiprocessing.get_context("spawn")
 _CAN_BLOCK_SIGNALS = hasattr(signal, "pthread_sigmask")
-_PARENT_EXIT_S = 1.0  # that a process may take to end after its pipe has broken
+_PARENT_EXIT_S = 1.0  # wait for the parent's exit after the pipe has broken
 _BLAS_THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 
 
 class LostProcessError(DermisError):
-    """A process that ended before its work was complete; another one does it again."""
+    """Error raised when a process ended before its work was complete; the work can be repeated."""
 
 
 @dataclass(frozen=True)
 class ChildProcess:
-    """Child process and the parent's end of the pipe to it."""
+    """Child process with the parent's end of the pipe to it."""
 
     process: SpawnProcess
     pipe: Connection
 
-    def end(self) -> None:
-        """Kill it at once, whatever it does."""
+    def kill(self) -> None:
+        """Kill the process immediately and close the pipe."""
         self.process.kill()
         self.process.join()
         self.pipe.close()
 
-    def fate(self) -> str:
-        """Describe how a process ended that did not say why."""
+    def exit_reason(self) -> str:
+        """Wait for the process to exit and describe its exit status or signal."""
         self.process.join()
         code = self.process.exitcode or 0
         if code >= 0:
-            return f"it ended with status {code}"
+            return f"it exited with status {code}"
         try:
-            return f"it was ended by {signal.Signals(-code).name}"
+            return f"it was killed by {signal.Signals(-code).name}"
         except ValueError:
-            return f"it was ended by signal {-code}"
+            return f"it was killed by signal {-code}"
 
 
-def start(target: Callable[..., None], *args: object) -> ChildProcess:
-    """Start `target(pipe, *args)` in a child process, which ends when this one does.
+def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
+    """Start `target(pipe, *args)` in a child process, which exits when this process does.
 
-    Ctrl-C, which the terminal sends to all processes, is left to this one. NumPy has one thread in the child.
+    The child ignores Ctrl-C, which a terminal sends to all processes, and uses one thread for linear algebra.
     """
-    ours, theirs = _CONTEXT.Pipe()
-    process = _CONTEXT.Process(target=_begin, args=(target, theirs, args))
+    parent_pipe, child_pipe = _CONTEXT.Pipe()
+    process = _CONTEXT.Process(target=_run_in_child, args=(target, child_pipe, args))
     with _children_allowed(), _sigint_blocked(), _single_threaded_blas():
         process.start()
-    theirs.close()  # only the child holds it now, so that our end reports its death
-    return ChildProcess(process, ours)
+    child_pipe.close()  # only the child holds it now, so that the parent's end reports its death
+    return ChildProcess(process, parent_pipe)
 
 
 def shared_bytes(size: int) -> ctypes.Array[ctypes.c_ubyte]:
-    """Return shared memory for an argument of `start`, which neither process has to release."""
+    """Return shared memory to pass to `start_process`; no process has to release it."""
     return _CONTEXT.RawArray(ctypes.c_ubyte, size)
 
 
-def _begin(target: Callable[..., None], pipe: Connection, args: tuple[object, ...]) -> None:
+def _run_in_child(target: Callable[..., None], pipe: Connection, args: tuple[object, ...]) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_exit_with_parent, args=(parent.sentinel,), daemon=True).start()
@@ -77,7 +77,7 @@ def _begin(target: Callable[..., None], pipe: Connection, args: tuple[object, ..
         target(pipe, *args)
     except (EOFError, ConnectionError):
         if connection.wait([parent.sentinel], _PARENT_EXIT_S):
-            os._exit(1)  # the pipe broke because the parent ended
+            os._exit(1)  # the pipe broke because the parent exited
         raise
 
 
@@ -88,43 +88,43 @@ def _exit_with_parent(sentinel: int) -> None:
 
 @contextmanager
 def _children_allowed() -> Iterator[None]:
-    """Allow children of dask's daemon processes, which multiprocessing forbids; ours end with them anyway."""
-    here = multiprocessing.current_process()
-    was = here.daemon
-    if was:
-        here.daemon = False
+    """Allow daemon processes, such as dask's workers, to start children, which multiprocessing forbids."""
+    current = multiprocessing.current_process()
+    was_daemon = current.daemon
+    if was_daemon:
+        current.daemon = False
     try:
         yield
     finally:
-        if was:
-            here.daemon = True
+        if was_daemon:
+            current.daemon = True
 
 
 @contextmanager
 def _single_threaded_blas() -> Iterator[None]:
-    """Limit NumPy's linear algebra to one thread in children, unless the user sets a number.
+    """Limit linear algebra in child processes to one thread, unless the user has set a number.
 
-    The default is one for each core in each process: for the small systems of a person these spin, and took
-    twice the processor time of everything else.
+    By default each process starts a thread per core, and for small systems these threads spend most of the
+    processor time on waiting.
     """
-    ours = [name for name in _BLAS_THREADS if name not in os.environ]
-    os.environ.update(dict.fromkeys(ours, "1"))
+    unset = [name for name in _BLAS_THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(unset, "1"))
     try:
         yield
     finally:
-        for name in ours:
+        for name in unset:
             del os.environ[name]
 
 
 @contextmanager
 def _sigint_blocked() -> Iterator[None]:
-    """Block SIGINT: a process that is started meanwhile never gets it, this one gets it afterwards."""
+    """Block SIGINT in this process, and permanently in processes that are started inside."""
     if not _CAN_BLOCK_SIGNALS:
         yield
         return
-    resource_tracker.ensure_running()  # which would let them through again when it starts
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    resource_tracker.ensure_running()  # it would unblock the signal if it started later
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)

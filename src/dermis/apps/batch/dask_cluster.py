@@ -1,4 +1,4 @@
-"""Crew of dask.distributed workers, on this machine or many, each with an adapter of its own."""
+"""Worker pool of dask.distributed, on one machine or several, with one adapter per worker."""
 
 from __future__ import annotations
 
@@ -12,44 +12,44 @@ from typing import TYPE_CHECKING
 from dermis.apps.batch.shards import Shard
 from dermis.apps.batch.worker import RunOptions, WorkerEvent
 from dermis.base.errors import DermisError, refuse
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 
 if TYPE_CHECKING:
     from distributed import Client
 
-_RETRIES = 2  # of a shard whose worker reports a loss; dask itself counts those that die
-_WAIT_S = 60.0  # for a scheduler, and for its first worker
+_RETRIES = 2  # per shard, when a worker reports a loss; dask itself counts workers that die
+_TIMEOUT_S = 60.0  # for the scheduler, and for its first worker
 
 
 @dataclass(frozen=True)
-class Cluster:
-    """Crew of dask's workers; each renders one shard at a time.
+class DaskCluster:
+    """Pool of dask workers, each of which renders one shard at a time.
 
-    address : of the scheduler; None with a file
-    file : that the scheduler wrote
-    adapter : as of `SlotRequest`; the workers of a host take those that fit in turn
+    address : address of the scheduler; None if `file` is given
+    file : file written by the scheduler
+    adapter : as in `SlotRequest`; the workers of a host use the matching adapters in turn
     """
 
     address: str | None
     file: Path | None
     adapter: str = "auto"
 
-    def render(self, work: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Render the shards, each as a task, and yield an event for each.
+    def render(self, options: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+        """Render the shards, each as a dask task, and yield an event per completed shard.
 
-        Raises DermisError where no worker is reached, where one sees another disk, and for what no worker
-        can mend.
+        Raises DermisError if no worker can be reached, if a worker does not share the disk, and for errors
+        that another attempt cannot solve.
         """
-        needed("distributed", "--scheduler and --cluster")
+        import_extra("distributed", "--scheduler and --cluster")
         from dermis.apps.batch.dask_worker import ShardPlugin
 
         name = f"dermis-{secrets.token_hex(6)}"
         with self._client() as client:
-            client.register_plugin(ShardPlugin.of(work, self.adapter), name=name)
+            client.register_plugin(ShardPlugin.for_run(options, self.adapter), name=name)
             try:
-                with _mark(work.out) as mark:
-                    _check_disks(client, mark)
-                yield from _events(client, name, shards)
+                with _shared_marker(options.out) as marker:
+                    _check_shared_disk(client, marker)
+                yield from _completions(client, name, shards)
             finally:
                 with suppress(OSError, TimeoutError):  # the scheduler is gone
                     client.unregister_worker_plugin(name)
@@ -59,44 +59,44 @@ class Cluster:
         from distributed import Client
 
         if self.file is not None and not self.file.is_file():
-            refuse(self.file, "the file that dask's scheduler wrote", "it is not there", "Start it first")
-        where = {"address": self.address} if self.file is None else {"scheduler_file": str(self.file)}
+            refuse(self.file, "the file that dask's scheduler wrote", "it does not exist", "Start it first")
+        scheduler = {"address": self.address} if self.file is None else {"scheduler_file": str(self.file)}
         culprit = self.address or self.file
         try:
-            client = Client(**where, timeout=_WAIT_S, set_as_default=False)
+            client = Client(**scheduler, timeout=_TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError) as fault:
             refuse(culprit, "a scheduler of dask.distributed", f"none answers ({fault})", "Start it first")
         with client:
             try:
-                client.wait_for_workers(1, timeout=_WAIT_S)
+                client.wait_for_workers(1, timeout=_TIMEOUT_S)
             except TimeoutError:
                 refuse(culprit, "a scheduler with workers", "it has none", "Start them with dask worker")
             yield client
 
 
 @contextmanager
-def _mark(out: Path) -> Iterator[Path]:
-    """Create a file that all workers that share the disk can see, while the block runs."""
-    place = out.resolve() / f".dermis-{secrets.token_hex(6)}"
-    place.touch()
+def _shared_marker(out: Path) -> Iterator[Path]:
+    """Create a file in the output folder for the duration of the block, to find out which workers see it."""
+    marker = out.resolve() / f".dermis-{secrets.token_hex(6)}"
+    marker.touch()
     try:
-        yield place
+        yield marker
     finally:
-        place.unlink()
+        marker.unlink()
 
 
-def _check_disks(client: Client, mark: Path) -> None:
-    """Refuse a folder that is not the same for all workers."""
-    from dermis.apps.batch.dask_worker import sees
+def _check_shared_disk(client: Client, marker: Path) -> None:
+    """Refuse an output folder that some workers do not see."""
+    from dermis.apps.batch.dask_worker import path_exists
 
-    blind = [address for address, found in client.run(sees, str(mark)).items() if not found]
-    if blind:
-        came = f"{blind[0]} does not see it"
-        refuse(mark.parent, "a folder on a disk that all workers share", came, "Choose another one")
+    failing = [address for address, found in client.run(path_exists, str(marker)).items() if not found]
+    if failing:
+        actual = f"{failing[0]} does not see it"
+        refuse(marker.parent, "a folder on a disk that all workers share", actual, "Choose another one")
 
 
-def _events(client: Client, name: str, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-    """Yield the completion of each shard."""
+def _completions(client: Client, name: str, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    """Yield the completion event of each shard."""
     from distributed import as_completed
 
     from dermis.apps.batch.dask_worker import render_shard
@@ -110,8 +110,8 @@ def _events(client: Client, name: str, shards: Sequence[Shard]) -> Iterator[Work
             shard = tasks.pop(done)
             if done.status != "finished":
                 raise DermisError(
-                    f"shard {shard.index}: expected a worker of dask's to draw it, but they failed: "
-                    f"{done.exception()}. What is whole is kept; give the command again to go on."
+                    f"shard {shard.index}: expected a dask worker to render it, but they failed: "
+                    f"{done.exception()}. Complete shards are kept; run the command again to continue."
                 )
             event: WorkerEvent = done.result()
             if event.refusal:

@@ -1,4 +1,4 @@
-"""Processes that encode the images of a worker, a few images ahead, in order."""
+"""Pool of processes that encode the images of a worker in order."""
 
 from __future__ import annotations
 
@@ -9,87 +9,91 @@ from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection
 from typing import Self
 
-from dermis.apps.batch.child_processes import ChildProcess, LostProcessError, shared_bytes, start
+from dermis.apps.batch.child_processes import ChildProcess, LostProcessError, shared_bytes, start_process
 from dermis.base.errors import DermisError
 
 EncodedImage = tuple[int, dict[str, bytes]]
 Job = tuple[object, ...]
-_JOBS_IN_FLIGHT = 2  # jobs in flight of each process
+_JOBS_IN_FLIGHT = 2  # per process
 _PAGE_BYTES = 4096
-_SIZE_MARGIN = 1 << 18  # bytes by which a job may be larger than the first one
+_SIZE_MARGIN = 1 << 18  # spare bytes, so that slightly larger jobs do not restart the processes
 
 
 class EncoderPool:
     """Pool of processes that call `encode(*job)` in turn.
 
-    count : number of processes; 0 encodes in this one
-    encode : a function that can be pickled
+    count : number of processes; with 0, this process encodes
+    encode : function that can be pickled
     """
 
     def __init__(self, count: int, encode: Callable[..., EncodedImage]) -> None:
         self._count, self._encode, self._size = count, encode, 0
-        self._lanes: list[_EncoderProcess] = []
+        self._processes: list[_EncoderProcess] = []
 
-    def encoded(self, jobs: Iterable[Job]) -> Iterator[EncodedImage]:
-        """Return the results of `encode` in the order of the jobs, which are taken a few ahead.
+    def encode_all(self, jobs: Iterable[Job]) -> Iterator[EncodedImage]:
+        """Yield the results of `encode` in the order of the jobs; a few jobs are taken in advance.
 
-        Raises LostProcessError where one of the processes ends, and errors of `encode`.
+        Raises LostProcessError if one of the processes dies, and DermisError if `encode` does.
         """
         if not self._count:
             yield from (self._encode(*job) for job in jobs)
             return
-        waiting: deque[_EncoderProcess] = deque()
+        pending: deque[_EncoderProcess] = deque()
         try:
-            for turn, job in enumerate(jobs):
-                parts = _parts(job)
-                if (size := sum(_page_aligned(part.nbytes) for part in parts)) > self._size or not self._lanes:
-                    while waiting:
-                        yield waiting.popleft().take()
-                    self._open(size + _SIZE_MARGIN)
-                if len(waiting) == _JOBS_IN_FLIGHT * self._count:
-                    yield waiting.popleft().take()
-                lane = self._lanes[turn % self._count]
-                waiting.append(lane)
-                lane.give(parts)
-            while waiting:
-                yield waiting.popleft().take()
+            for number, job in enumerate(jobs):
+                parts = _serialised(job)
+                size = sum(_page_aligned(part.nbytes) for part in parts)
+                if size > self._size or not self._processes:
+                    while pending:
+                        yield pending.popleft().result()
+                    self._start_processes(size + _SIZE_MARGIN)
+                if len(pending) == _JOBS_IN_FLIGHT * self._count:
+                    yield pending.popleft().result()
+                process = self._processes[number % self._count]
+                pending.append(process)
+                process.submit(parts)
+            while pending:
+                yield pending.popleft().result()
         finally:
-            if waiting:  # their results will not be read
+            if pending:  # results that will not be read
                 self.close()
 
     def close(self) -> None:
-        """End the processes; they are started again when needed."""
-        while self._lanes:
-            self._lanes.pop().child.end()
+        """Kill the processes; `encode_all` starts new ones."""
+        while self._processes:
+            self._processes.pop().child.kill()
 
     def __enter__(self) -> Self:
+        """Return the pool itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Close the pool."""
         self.close()
 
-    def _open(self, size: int) -> None:
-        """Start the processes for jobs of at most `size` bytes."""
+    def _start_processes(self, size: int) -> None:
+        """Start the processes for jobs of up to `size` bytes."""
         self.close()
         self._size = size
         for _ in range(self._count):
-            self._lanes.append(_EncoderProcess(size, self._encode))
+            self._processes.append(_EncoderProcess(size, self._encode))
 
 
 class _EncoderProcess:
-    """Process with shared memory for its jobs, whose places go through the pipe.
+    """Encoder process with shared memory for its jobs.
 
-    Jobs do not go through the pipe, where both ends could wait for each other to read.
+    The pipe carries the offsets of the jobs in that memory only. If it carried the jobs, both ends could
+    block while waiting for each other to read.
     """
 
     def __init__(self, size: int, encode: Callable[..., EncodedImage]) -> None:
         memory = shared_bytes(_JOBS_IN_FLIGHT * size)
-        self._size, self._turn, self._memory = size, 0, memoryview(memory).cast("B")
-        self.child: ChildProcess = start(_serve, memory, encode)
+        self._size, self._submitted, self._memory = size, 0, memoryview(memory).cast("B")
+        self.child: ChildProcess = start_process(_run_encoder, memory, encode)
 
-    def give(self, parts: list[memoryview]) -> None:
-        begin, spans = self._turn % _JOBS_IN_FLIGHT * self._size, []
-        self._turn += 1
+    def submit(self, parts: list[memoryview]) -> None:
+        begin, spans = self._submitted % _JOBS_IN_FLIGHT * self._size, []
+        self._submitted += 1
         for part in parts:
             spans.append((begin, begin + part.nbytes))
             self._memory[begin : begin + part.nbytes] = part
@@ -97,41 +101,43 @@ class _EncoderProcess:
         try:
             self.child.pipe.send(spans)
         except OSError as fault:
-            raise self._lost() from fault
+            raise self._lost_error() from fault
 
-    def take(self) -> EncodedImage:
+    def result(self) -> EncodedImage:
         try:
-            encoded, refusal = self.child.pipe.recv()
+            encoded, message = self.child.pipe.recv()
         except (EOFError, OSError) as fault:
-            raise self._lost() from fault
+            raise self._lost_error() from fault
         if encoded is None:
-            raise DermisError(refusal)
+            raise DermisError(message)
         return encoded  # type: ignore[no-any-return]
 
-    def _lost(self) -> LostProcessError:
-        return LostProcessError(f"a process that encodes images: {self.child.fate()}")
+    def _lost_error(self) -> LostProcessError:
+        return LostProcessError(f"an encoder process: {self.child.exit_reason()}")
 
 
-def _parts(job: Job) -> list[memoryview]:
-    """Return the pickle of a job without its arrays, and the bytes of these."""
+def _serialised(job: Job) -> list[memoryview]:
+    """Return the pickle of a job without its arrays, followed by the bytes of the arrays."""
     arrays: list[pickle.PickleBuffer] = []
-    head = pickle.dumps(job, protocol=5, buffer_callback=arrays.append)
-    return [memoryview(head), *(array.raw() for array in arrays)]
+    pickled = pickle.dumps(job, protocol=5, buffer_callback=arrays.append)
+    return [memoryview(pickled), *(array.raw() for array in arrays)]
 
 
 def _page_aligned(size: int) -> int:
     return -(-size // _PAGE_BYTES) * _PAGE_BYTES
 
 
-def _serve(pipe: Connection, memory: ctypes.Array[ctypes.c_ubyte], encode: Callable[..., EncodedImage]) -> None:
-    """Encode jobs from the pipe, in a process of the pool."""
+def _run_encoder(
+    pipe: Connection, memory: ctypes.Array[ctypes.c_ubyte], encode: Callable[..., EncodedImage]
+) -> None:
+    """Encode the jobs that the pipe announces, in a process of the pool."""
     view = memoryview(memory).cast("B")
     while True:
         try:
-            head, *arrays = [view[begin:end] for begin, end in pipe.recv()]
+            pickled, *arrays = [view[begin:end] for begin, end in pipe.recv()]
         except EOFError:
             return
-        job = pickle.loads(head, buffers=arrays)
+        job = pickle.loads(pickled, buffers=arrays)
         try:
             pipe.send((encode(*job), ""))
         except DermisError as fault:

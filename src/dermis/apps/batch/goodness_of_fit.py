@@ -1,4 +1,4 @@
-"""Goodness of fit of the sampled parameters of a data set to the distributions of its spec."""
+"""Goodness-of-fit tests of a data set's sampled parameters against the distributions of its spec."""
 
 from __future__ import annotations
 
@@ -12,20 +12,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, kolmogorov, ndtr
 
-from dermis.apps.batch.distributions import Choice, Constant, Distribution, Files, Normal, Truncated, Uniform
+from dermis.apps.batch.distributions import (
+    Choice,
+    Constant,
+    Distribution,
+    FileChoice,
+    Normal,
+    TruncatedNormal,
+    Uniform,
+)
 from dermis.apps.batch.index import open_index
 from dermis.apps.batch.sampling import round_significant
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import NONE
-from dermis.human.expressions import targets_of
+from dermis.human.expressions import expand_targets
 
 MIN_P_VALUE = 1e-6
-"""p-value below which the values are reported as not of the distribution."""
-_USUAL = sqrt(np.pi / 2) * np.log(2)  # mean of Kolmogorov's distribution
-_GRID = 10_000  # shares that means are taken over
-_HALF_DIGIT = 5e-6  # of a number, by which six digits move it at most
-_MOST_NAMED = 12  # texts
-_FEWEST = 5.0  # of a kind, expected, that count by themselves in chi-square
+"""p-value below which a test fails."""
+_MEAN_DISTANCE = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
+_QUANTILES = 10_000  # for the moments of a distribution
+_ROUNDING_ERROR = 5e-6  # largest relative error of rounding to six digits
+_MAX_LISTED = 12  # texts
+_MIN_EXPECTED_COUNT = 5.0  # of a cell of the chi-square test; smaller cells are pooled
 
 Array = NDArray[np.float64]
 Values = Sequence[float | str]
@@ -34,30 +42,31 @@ Values = Sequence[float | str]
 class FitTest(NamedTuple):
     """Test of the sampled values of a parameter against its distribution.
 
-    draws : images that have it, or people
-    stated, found : mean and standard deviation, or shares of the values
-    distance : of Kolmogorov and Smirnov, or the greatest difference of two shares [-]
-    usual : mean of such distances for so many draws from the distribution [-]; 0 where there is none
-    chance : p-value of the distance, or of a chi-square test of the shares [-]
+    sample_count : number of samples: images or people
+    expected, observed : mean and standard deviation of numbers, or probabilities of texts
+    distance : Kolmogorov-Smirnov distance, or largest difference of two probabilities [-]
+    expected_distance : mean distance of so many samples of the distribution; 0 if there is none [-]
+    p_value : p-value of the distance, or of a chi-square test of the probabilities [-]
     """
 
     parameter: str
-    draws: int
-    stated: str
-    found: str
+    sample_count: int
+    expected: str
+    observed: str
     distance: float
-    usual: float
-    chance: float
+    expected_distance: float
+    p_value: float
 
     @property
-    def agrees(self) -> bool:
-        return self.chance >= MIN_P_VALUE
+    def passes(self) -> bool:
+        """Return whether the p-value is large enough."""
+        return self.p_value >= MIN_P_VALUE
 
 
 def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
-    """Yield a test of each parameter that varies in the index of a data set.
+    """Yield a test of each parameter that varies, from the index of a data set.
 
-    People count once, however many images show them. Raises DermisError where there is no index.
+    A person counts once, regardless of the number of images. Raises DermisError if there is no index.
     """
     with open_index(out, "the statistics of a data set") as file:
         names = set(file.schema_arrow.names)
@@ -65,114 +74,117 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
         if "person.number" in names:  # rows of the first image of each person
             people = np.array(file.read(columns=["person.number"]).column(0).to_pylist(), np.int64)
             first = np.unique(people, return_index=True)[1]
-        for name, law in spec.distributions.items():
+        for name, distribution in spec.distributions.items():
             column = _column(name)
-            if isinstance(law, Constant) or column not in names:
+            if isinstance(distribution, Constant) or column not in names:
                 continue
             values = np.array(file.read(columns=[column]).column(0).to_pylist(), object)
-            drawn = values[first] if name.startswith("person.") else values
-            there = [value for value in drawn if value is not None]
-            if there:
-                yield _spec_test(name, law, there, spec)
+            sampled = values[first] if name.startswith("person.") else values
+            if present := [value for value in sampled if value is not None]:
+                yield _parameter_test(name, distribution, present, spec)
 
 
-def fit_test(name: str, law: Distribution, values: Values) -> FitTest:
-    """Return the test of values against the distribution that they were sampled from."""
-    if any(isinstance(end, str) for end in law.support):
-        return _shares_test(name, shares(law), [str(value) for value in values])
-    return _numbers_test(name, law, np.sort(np.array(values, np.float64)))
+def fit_test(name: str, distribution: Distribution, values: Values) -> FitTest:
+    """Return the test of values against a distribution."""
+    if any(isinstance(bound, str) for bound in distribution.support):
+        return _text_test(name, text_probabilities(distribution), [str(value) for value in values])
+    return _number_test(name, distribution, np.sort(np.array(values, np.float64)))
 
 
-def cdf(law: Distribution, x: Array, *, closed: bool) -> Array:
-    """Return the cumulative distribution at `x`: the share below, or up to it where closed."""
-    match law:
+def cdf(distribution: Distribution, x: Array, *, closed: bool) -> Array:
+    """Return the probability of values below `x`, or of values up to and including `x` if closed."""
+    match distribution:
         case Constant(value):
-            at = float(value)
-            return ((x >= at) if closed else (x > at)).astype(np.float64)
+            return ((x >= float(value)) if closed else (x > float(value))).astype(np.float64)
         case Uniform(low, high, logarithmic):
             if logarithmic:
                 low, high, x = np.log(low), np.log(high), np.log(np.maximum(x, low))
             return np.clip((x - low) / (high - low), 0.0, 1.0)
         case Normal(mean, sd):
             return np.asarray(ndtr((x - mean) / sd))
-        case Truncated(mean, sd, low, high):
+        case TruncatedNormal(mean, sd, low, high):
             z, first, last = ((one - mean) / sd for one in (np.clip(x, low, high), low, high))
-            if first > 0:  # far from the mean, differences to 1 lose their digits
+            if first > 0:  # upper tails, as 1 minus the lower tail would cancel far above the mean
                 return np.asarray((ndtr(-first) - ndtr(-z)) / (ndtr(-first) - ndtr(-last)))
             return np.asarray((ndtr(z) - ndtr(first)) / (ndtr(last) - ndtr(first)))
-        case Choice(laws, weights):
-            parts = (w * cdf(one, x, closed=closed) for one, w in zip(laws, weights, strict=True))
-            return np.asarray(sum(parts) / sum(weights))
-    raise TypeError(f"{law} has no numbers")
+        case Choice(parts, weights):
+            terms = (w * cdf(part, x, closed=closed) for part, w in zip(parts, weights, strict=True))
+            return np.asarray(sum(terms) / sum(weights))
+    raise TypeError(f"{distribution} is not numeric")
 
 
-def shares(law: Distribution) -> dict[str, float]:
+def text_probabilities(distribution: Distribution) -> dict[str, float]:
     """Return the probability of each text of a distribution."""
-    if isinstance(law, Files):
-        return dict.fromkeys(law.names, 1.0 / len(law.names))
-    found = defaultdict[str, float](float)
-    for one, weight in zip(law.values, law.weights, strict=True) if isinstance(law, Choice) else [(law, 1.0)]:
-        for text, share in ({str(one.at(0.5)): 1.0} if isinstance(one, Constant) else shares(one)).items():
-            found[text] += weight * share
-    total = sum(found.values())
-    return {text: share / total for text, share in found.items() if share}
+    if isinstance(distribution, FileChoice):
+        return dict.fromkeys(distribution.names, 1.0 / len(distribution.names))
+    if isinstance(distribution, Constant):
+        return {str(distribution.value): 1.0}
+    assert isinstance(distribution, Choice)
+    weights = defaultdict[str, float](float)
+    for part, weight in zip(distribution.values, distribution.weights, strict=True):
+        for text, probability in text_probabilities(part).items():
+            weights[text] += weight * probability
+    total = sum(weights.values())
+    return {text: weight / total for text, weight in weights.items() if weight}
 
 
-def _spec_test(name: str, law: Distribution, values: Values, spec: Spec) -> FitTest:
+def _parameter_test(name: str, distribution: Distribution, values: Values, spec: Spec) -> FitTest:
     if name != "background.kind" or NONE not in spec.distributions["environment.name"].support:
-        return fit_test(name, law, values)
-    plain = {"environment": "gradient"}  # without an environment, see `Sampler.parameters`
-    stated = defaultdict[str, float](float)
-    for text, share in shares(law).items():
-        stated[plain.get(text, text)] += share
-    return _shares_test(name, stated, [plain.get(str(value), str(value)) for value in values])
+        return fit_test(name, distribution, values)
+    replacement = {"environment": "gradient"}  # in images without an environment, see `Sampler.parameters`
+    expected = defaultdict[str, float](float)
+    for text, probability in text_probabilities(distribution).items():
+        expected[replacement.get(text, text)] += probability
+    return _text_test(name, expected, [replacement.get(str(value), str(value)) for value in values])
 
 
-def _numbers_test(name: str, law: Distribution, values: Array) -> FitTest:
-    """Return the Kolmogorov-Smirnov test of sorted values, which are rounded to six digits."""
-    count, near = len(values), _HALF_DIGIT * np.abs(values)
+def _number_test(name: str, distribution: Distribution, values: Array) -> FitTest:
+    """Return the Kolmogorov-Smirnov test of sorted values that were rounded to six digits."""
+    count, error = len(values), _ROUNDING_ERROR * np.abs(values)
     up_to = np.searchsorted(values, values, "right") / count
     below = np.searchsorted(values, values, "left") / count
-    over = up_to - cdf(law, values + near, closed=True)
-    under = cdf(law, values - near, closed=False) - below
-    distance = float(max(over.max(), under.max(), 0.0))
-    grid: Array = np.array([law.at((k + 0.5) / _GRID) for k in range(_GRID)], np.float64)
-    chance = float(kolmogorov(sqrt(count) * distance))
-    stated, found = _moments(grid), _moments(values)
-    return FitTest(name, count, stated, found, distance, float(_USUAL / sqrt(count)), chance)
+    above = up_to - cdf(distribution, values + error, closed=True)
+    under = cdf(distribution, values - error, closed=False) - below
+    distance = float(max(above.max(), under.max(), 0.0))
+    probabilities = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
+    quantiles: Array = np.array([distribution.quantile(p) for p in probabilities.tolist()], np.float64)
+    p_value = float(kolmogorov(sqrt(count) * distance))
+    expected, observed = _format_moments(quantiles), _format_moments(values)
+    return FitTest(name, count, expected, observed, distance, float(_MEAN_DISTANCE / sqrt(count)), p_value)
 
 
-def _shares_test(name: str, stated: Mapping[str, float], values: Sequence[str]) -> FitTest:
+def _text_test(name: str, expected: Mapping[str, float], values: Sequence[str]) -> FitTest:
     """Return the chi-square test of texts against their probabilities."""
     count, counts = len(values), Counter(values)
-    distance = max(abs(counts[text] / count - stated.get(text, 0.0)) for text in {*stated, *counts})
-    usual = max(sqrt(2 / np.pi * share * (1 - share) / count) for share in stated.values())
-    chance = 0.0 if counts.keys() - stated.keys() else _chi_square(stated, counts, count)
-    found = {text: counts[text] / count for text in stated}
-    return FitTest(name, count, _listed(stated), _listed(found), distance, usual, chance)
+    distance = max(abs(counts[text] / count - expected.get(text, 0.0)) for text in {*expected, *counts})
+    expected_distance = max(sqrt(2 / np.pi * p * (1 - p) / count) for p in expected.values())
+    p_value = 0.0 if counts.keys() - expected.keys() else _chi_square(expected, counts, count)
+    stated = _format_probabilities(expected)
+    found = _format_probabilities({text: counts[text] / count for text in expected})
+    return FitTest(name, count, stated, found, distance, expected_distance, p_value)
 
 
-def _listed(found: Mapping[str, float]) -> str:
-    return ", ".join(f"{text} {found[text]:.3g}" for text in sorted(found)[:_MOST_NAMED])
+def _format_probabilities(probabilities: Mapping[str, float]) -> str:
+    return ", ".join(f"{text} {probabilities[text]:.3g}" for text in sorted(probabilities)[:_MAX_LISTED])
 
 
-def _chi_square(stated: Mapping[str, float], found: Counter[str], count: int) -> float:
+def _chi_square(expected: Mapping[str, float], observed: Counter[str], count: int) -> float:
     """Return the p-value of counts against their probabilities; rare texts are pooled."""
-    cells = [(found[text], count * share) for text, share in stated.items() if count * share >= _FEWEST]
-    rest = count - sum(one for one, _ in cells), count - sum(mean for _, mean in cells)
-    if rest[1] > _FEWEST or rest[0]:
-        cells.append(rest)
+    cells = [(observed[text], count * p) for text, p in expected.items() if count * p >= _MIN_EXPECTED_COUNT]
+    pooled = count - sum(one for one, _ in cells), count - sum(mean for _, mean in cells)
+    if pooled[1] > _MIN_EXPECTED_COUNT or pooled[0]:
+        cells.append(pooled)
     if len(cells) < 2:
         return 1.0
-    square = sum((one - mean) ** 2 / max(mean, 1.0) for one, mean in cells)
-    return float(chdtrc(len(cells) - 1, square))
+    statistic = sum((one - mean) ** 2 / max(mean, 1.0) for one, mean in cells)
+    return float(chdtrc(len(cells) - 1, statistic))
 
 
-def _moments(values: Array) -> str:
+def _format_moments(values: Array) -> str:
     return f"{round_significant(float(values.mean())):.5g}, {round_significant(float(values.std())):.5g}"
 
 
 def _column(name: str) -> str:
-    """Return the column of a parameter; a pair of targets has two, which are equal."""
+    """Return the index column of a parameter; a left and right pair of targets has two equal columns."""
     start, _, target = name.partition(".")
-    return f"pose.{targets_of([target])[0]}" if start == "pose" else name
+    return f"pose.{expand_targets([target])[0]}" if start == "pose" else name

@@ -1,4 +1,4 @@
-"""Index of a data set: the sampled parameters of each image as a table, and statistics of its columns."""
+"""Index of a data set: a table of the sampled parameters of each image, and statistics of its columns."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.reader import read_record, shard_files
-from dermis.apps.batch.records import RECORD, Record
-from dermis.apps.batch.shards import is_there, shard_path, list_shards
+from dermis.apps.batch.records import RECORD_SUFFIX, Record
+from dermis.apps.batch.shards import list_shards, shard_exists, shard_path
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import refuse
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 from dermis.base.reading import is_file
 
 if TYPE_CHECKING:
@@ -20,25 +20,25 @@ if TYPE_CHECKING:
     import pyarrow.parquet
 
 INDEX_FILE = "index.parquet"
-NUMBERS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
-"""Columns of matrices, flattened row by row, and their lengths."""
-_FIRST = "number", "key", "shard"
-_MOST_NAMED = 12
+MATRIX_COLUMNS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
+"""Columns of flattened matrices (row by row), with the number of elements."""
+_IDENTIFIERS = "number", "key", "shard"
+_MAX_LISTED = 12
 
 Row = dict[str, object]
 
 
 def write_index(out: Path, spec: Spec) -> Path:
-    """Write the index of the shards that are there, a row for each image by its number.
+    """Write the index of the existing shards, with one row per image, and return its path.
 
-    number, key, shard : number of the image, and the file that holds it
-    camera.K, camera.R, camera.t, head_pose, gaze : matrices, row by row
-    the others : parameters by name, null where an image has none
+    The columns "number", "key" and "shard" identify the image and its file; "camera.K", "camera.R",
+    "camera.t", "head_pose" and "gaze" are flattened matrices; all others are parameters, null where an image
+    has none.
 
-    The same shards give the same bytes. Raises DermisError for damaged shards, where pyarrow is missing, and
-    where nothing can be written.
+    Equal shards give equal bytes. Raises DermisError if a shard is damaged, if pyarrow is missing, or if the
+    file cannot be written.
     """
-    parquet, target = needed("pyarrow.parquet", "the index of a data set"), out / INDEX_FILE
+    parquet, target = import_extra("pyarrow.parquet", "the index of a data set"), out / INDEX_FILE
     schema = _schema(out, spec)
 
     def write(path: Path) -> None:
@@ -51,39 +51,41 @@ def write_index(out: Path, spec: Spec) -> Path:
 
 
 def open_index(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
-    """Return the index of a data set, open to be read column by column.
+    """Return the index of a data set, opened for reading by columns.
 
-    Raises DermisError where there is none.
+    purpose : what pyarrow is needed for, named if it is missing
+
+    Raises DermisError if there is no index.
     """
-    parquet = needed("pyarrow.parquet", purpose)
+    parquet = import_extra("pyarrow.parquet", purpose)
     if not is_file(out / INDEX_FILE):
-        refuse(out, f"a data set with {INDEX_FILE}", "it is missing", "Run dermis batch again")
+        refuse(out, f"a data set with {INDEX_FILE}", "it is missing", "Run dermis batch again to write it")
     return parquet.ParquetFile(out / INDEX_FILE)
 
 
-def statistics(out: Path) -> Iterator[tuple[str, int, str]]:
-    """Return the name, the number of images and a summary of each parameter in the index of a data set.
+def parameter_summaries(out: Path) -> Iterator[tuple[str, int, str]]:
+    """Yield name, number of images and a summary of the values of each parameter in the index.
 
-    Raises DermisError where there is no index.
+    Raises DermisError if there is no index.
     """
     with open_index(out, "the statistics of a data set") as file:
         for name in file.schema_arrow.names:
-            if name not in (*_FIRST, *NUMBERS):
+            if name not in (*_IDENTIFIERS, *MATRIX_COLUMNS):
                 column = file.read(columns=[name]).column(0)
                 yield name, len(column) - column.null_count, _summary(column)
 
 
 def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[Row]]:
-    """Yield the rows of each shard that is there and holds images; one of them is held at a time."""
+    """Yield the rows of each existing shard that contains images, one shard at a time."""
     for shard in list_shards(spec):
         path = shard_path(out, shard, spec)
-        if not is_there(out, shard, spec):
+        if not shard_exists(out, shard, spec):
             continue
         with shard_files(path) as images:
             rows = [
-                _row(key, path.name, read_record(files[RECORD](), path / key))
+                _row(key, path.name, read_record(files[RECORD_SUFFIX](), path / key))
                 for key, files in images.items()
-                if RECORD in files
+                if RECORD_SUFFIX in files
             ]
         if rows:
             yield rows
@@ -103,23 +105,23 @@ def _flat(value: object) -> object:
 
 
 def _schema(out: Path, spec: Spec) -> pyarrow.Schema:
-    """Return the columns with their types; those of parameters by name."""
-    arrow = needed("pyarrow", "the index of a data set")
+    """Return the types of all columns; the columns of parameters are sorted by name."""
+    arrow = import_extra("pyarrow", "the index of a data set")
     kinds: dict[str, set[type]] = {}
     for rows in _rows_of_shards(out, spec):
         for row in rows:
             for name, value in row.items():
                 if value is not None:
                     kinds.setdefault(name, set()).add(type(value))
-    parameters = sorted(kinds.keys() - NUMBERS.keys() - set(_FIRST))
+    parameters = sorted(kinds.keys() - MATRIX_COLUMNS.keys() - set(_IDENTIFIERS))
     columns = [("number", arrow.int64()), ("key", arrow.string()), ("shard", arrow.string())]
-    columns += [(name, arrow.list_(arrow.float64(), size)) for name, size in NUMBERS.items()]
+    columns += [(name, arrow.list_(arrow.float64(), size)) for name, size in MATRIX_COLUMNS.items()]
     columns += [(name, _column_type(kinds[name])) for name in parameters]
     return arrow.schema(columns)
 
 
 def _column_type(kinds: set[type]) -> pyarrow.DataType:
-    arrow = needed("pyarrow", "the index of a data set")
+    arrow = import_extra("pyarrow", "the index of a data set")
     if kinds <= {bool}:
         return arrow.bool_()
     if kinds <= {int}:
@@ -130,7 +132,7 @@ def _column_type(kinds: set[type]) -> pyarrow.DataType:
 
 
 def _table(rows: list[Row], schema: pyarrow.Schema) -> pyarrow.Table:
-    arrow = needed("pyarrow", "the index of a data set")
+    arrow = import_extra("pyarrow", "the index of a data set")
     columns = []
     for field in schema:
         values = [row.get(field.name) for row in rows]
@@ -141,22 +143,22 @@ def _table(rows: list[Row], schema: pyarrow.Schema) -> pyarrow.Table:
 
 
 def _summary(column: pyarrow.ChunkedArray) -> str:
-    arrow = needed("pyarrow", "the statistics of a data set")
-    compute = needed("pyarrow.compute", "the statistics of a data set")
+    arrow = import_extra("pyarrow", "the statistics of a data set")
+    compute = import_extra("pyarrow.compute", "the statistics of a data set")
     if arrow.types.is_string(column.type) or arrow.types.is_boolean(column.type):
         counts = {one["values"]: one["counts"] for one in compute.value_counts(column).to_pylist()}
         counts.pop(None, None)
         sorted_counts = sorted(counts.items(), key=lambda one: (-one[1], str(one[0])))
-        named = [f"{value} ({count:,})" for value, count in sorted_counts[:_MOST_NAMED]]
-        more = len(sorted_counts) - len(named)
-        return ", ".join(named) + (f" and {more:,} more" if more else "")
+        listed = [f"{value} ({count:,})" for value, count in sorted_counts[:_MAX_LISTED]]
+        more = len(sorted_counts) - len(listed)
+        return ", ".join(listed) + (f" and {more:,} more" if more else "")
     if arrow.types.is_list(column.type):
         return "lists of numbers"
-    least, most = compute.min_max(column).as_py().values()
-    if least == most:
-        return _number(least)
-    mean, spread = compute.mean(column).as_py(), compute.stddev(column).as_py()
-    return f"{_number(least)} to {_number(most)}, mean {mean:.4g}, standard deviation {spread:.4g}"
+    minimum, maximum = compute.min_max(column).as_py().values()
+    if minimum == maximum:
+        return _number(minimum)
+    mean, deviation = compute.mean(column).as_py(), compute.stddev(column).as_py()
+    return f"{_number(minimum)} to {_number(maximum)}, mean {mean:.4g}, standard deviation {deviation:.4g}"
 
 
 def _number(value: float) -> str:

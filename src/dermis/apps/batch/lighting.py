@@ -1,4 +1,4 @@
-"""Lights of an image: a preset of the package, or sampled key, fill and rim lamps."""
+"""Lights of an image: a rig of the package, or sampled key, fill and rim lamps."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from dermis.images.colour import luminance
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.scene.lights import Light, RectangleLight, preset_lights
 
-_SECOND_NM_K = 1.438777e7  # hc / k
+_PLANCK_C2_NM_K = 1.438777e7  # second radiation constant, hc / k
 _WHITE_K = 6500.0
-_PLACES = "position", "target", "direction", "up"
+_VECTOR_FIELDS = "position", "target", "direction", "up"
 _LAMPS = "key", "fill", "rim"
 _rgb_weights = cache(rgb_weights)
 
 
 def sampled_lights(parameters: Parameters) -> tuple[Light, ...]:
-    """Return the lights of an image by its parameters."""
+    """Return the lights of an image from its sampled parameters."""
     light = table_numbers(parameters, "light")
     strength, turn_deg = light["strength"], light["turn_deg"]
     if not strength:
@@ -30,27 +30,27 @@ def sampled_lights(parameters: Parameters) -> tuple[Light, ...]:
     if parameters["light.kind"] == RIG:
         lamps = (table_numbers(parameters, f"light.{lamp}") for lamp in _LAMPS)
         return tuple(_lamp(lamp, turn_deg, strength) for lamp in lamps)
-    presets = _preset(str(parameters["light.kind"]))
-    return tuple(_rotated(one, turn_deg, strength) for one in presets)
+    presets = _preset_lights(str(parameters["light.kind"]))
+    return tuple(_rotated(light, turn_deg, strength) for light in presets)
 
 
 def direction_from_angles(yaw_deg: float, pitch_deg: float) -> tuple[float, float, float]:
-    """Return the unit vector at a yaw to the head's left of its front and a pitch above it."""
+    """Return the unit vector at a yaw from the head's front to its left, and a pitch upwards [degrees]."""
     yaw, pitch = radians(yaw_deg), radians(pitch_deg)
     return sin(yaw) * cos(pitch), sin(pitch), cos(yaw) * cos(pitch)
 
 
 @lru_cache(maxsize=64)
 def blackbody_colour(kelvin: float) -> tuple[float, float, float]:
-    """Return a black body's light by Planck's law, linear Rec. 709 of luminance 1; white at 6500 K."""
-    white, own = (np.expm1(_SECOND_NM_K / (WAVELENGTHS_NM * one)) for one in (_WHITE_K, kelvin))
-    colour = np.maximum(_rgb_weights() @ (white / own), 0.0)
+    """Return the colour of a black body by Planck's law, linear Rec. 709 of luminance 1, white at 6500 K."""
+    white, body = (np.expm1(_PLANCK_C2_NM_K / (WAVELENGTHS_NM * T)) for T in (_WHITE_K, kelvin))
+    colour = np.maximum(_rgb_weights() @ (white / body), 0.0)
     red, green, blue = map(float, colour / luminance(colour))
     return red, green, blue
 
 
 def _lamp(lamp: Mapping[str, float], turn_deg: float, strength: float) -> Light:
-    """Return a lamp of the rig by its parameters, which face the middle of the head."""
+    """Return a lamp of the rig, which faces the centre of the head."""
     x, y, z = direction_from_angles(lamp["yaw_deg"] + turn_deg, lamp["pitch_deg"])
     distance, size, irradiance = lamp["distance_mm"], lamp["size_mm"], pi * strength * lamp["strength"]
     red, green, blue = (irradiance * one for one in blackbody_colour(lamp["kelvin"]))
@@ -59,7 +59,7 @@ def _lamp(lamp: Mapping[str, float], turn_deg: float, strength: float) -> Light:
 
 
 @cache
-def _preset(kind: str) -> tuple[Light, ...]:
+def _preset_lights(kind: str) -> tuple[Light, ...]:
     return preset_lights(kind)
 
 
@@ -67,7 +67,7 @@ def _rotated(light: Light, degrees: float, strength: float) -> Light:
     """Return a light scaled by a strength and rotated about the upward axis."""
     sine, cosine = sin(radians(degrees)), cos(radians(degrees))
     values: dict[str, object] = {"irradiance": tuple(strength * one for one in light.irradiance)}
-    for name in _PLACES:
+    for name in _VECTOR_FIELDS:
         if hasattr(light, name):
             x, y, z = getattr(light, name)
             values[name] = (cosine * x + sine * z, y, cosine * z - sine * x)

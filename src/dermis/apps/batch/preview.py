@@ -1,4 +1,4 @@
-"""Preview of a data set: its sampled parameters as a table, and a contact sheet of its first images."""
+"""Preview of a data set: a table of its sampled parameters, and a contact sheet of its first images."""
 
 from __future__ import annotations
 
@@ -16,21 +16,23 @@ from dermis.apps.batch.spec import Spec
 from dermis.frame.renderer import Renderer
 from dermis.scene.toml_text import value_text
 
-SHOWN = 16
+SHEET_IMAGES = 16
+"""Images of the contact sheet."""
 MAX_COUNTED = 20_000
-_COLUMNS, _SIDE, _GAP = 4, 192, 4
-_SMALL = {"atlas": 512, "shadow_size": 1024}
-_WIDEST = 60  # letters of a column
-_NUMBERS_OF_PEOPLE = "person.number", "person.seed"
-_MAX_VALUES = 12  # values that are listed
+"""Images from which the statistics of the table are computed."""
+_COLUMNS, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the sheet; lengths in pixels
+_MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # settings of the sheet's images
+_MAX_COLUMN_WIDTH = 60  # characters
+_PERSON_IDS = "person.number", "person.seed"
+_MAX_VALUES = 12  # listed values of a text
 
 
 class _RowFields(TypedDict):
     """Fields of every row.
 
-    drawn : the distribution as TOML
-    first : values of the first 16 images, None where one has none
-    images : number of the first 20,000 that have it
+    drawn : distribution as TOML
+    first : values of the first 16 images, None where an image has none
+    images : number of images with this parameter, among the first 20,000
     """
 
     parameter: str
@@ -40,7 +42,7 @@ class _RowFields(TypedDict):
 
 
 class Row(_RowFields, total=False):
-    """Row of the table: extremes and mean of numbers, or counts by value of texts."""
+    """Row of the parameter table: minimum, mean and maximum of numbers, or counts of texts."""
 
     min: float
     mean: float
@@ -49,60 +51,60 @@ class Row(_RowFields, total=False):
 
 
 def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[Row], NDArray[np.uint8]]:
-    """Return the table of parameters of a data set, and a sheet (h, w, 3) of its first 16 pictures, sRGB.
+    """Return the parameter table of a data set, and an sRGB contact sheet (h, w, 3) of its first 16 images.
 
-    Raises DermisError as `SceneBuilder.scene` and `Renderer.draw` do.
+    Raises DermisError as `SceneBuilder.build` and `Renderer.draw` do.
     """
     return parameter_rows(spec), contact_sheet(spec, adapter)
 
 
 def parameter_rows(spec: Spec) -> list[Row]:
     """Return a row for each parameter that varies."""
-    found = [spec.parameters(k) for k in range(min(spec.count, MAX_COUNTED))]
-    names = dict.fromkeys(name for one in found for name in one)
+    samples = [spec.parameters(k) for k in range(min(spec.count, MAX_COUNTED))]
+    names = dict.fromkeys(name for sample in samples for name in sample)
     varying = [name for name in names if not isinstance(spec.distributions.get(name), Constant)]
-    return [_row(spec, name, found) for name in varying if name not in _NUMBERS_OF_PEOPLE]
+    return [_row(spec, name, samples) for name in varying if name not in _PERSON_IDS]
 
 
 def table_lines(rows: Sequence[Row]) -> list[str]:
-    """Return the rows as lines of a table for people."""
-    cells = [("parameter", "drawn", "images", "min", "mean", "max"), *map(_cells, rows)]
+    """Return the rows as aligned lines of text."""
+    cells = [("parameter", "distribution", "images", "min", "mean", "max"), *map(_cells, rows)]
     widths = [max(len(row[k]) for row in cells if len(row) > 4 or k < 3) for k in range(3)]
     lines = []
     for row in cells:
-        start = [one.ljust(width) for one, width in zip(row, widths, strict=False)]
-        rest = [one.rjust(10) for one in row[3:]] if len(row) > 4 else list(row[3:])
-        lines.append("  ".join([*start, *rest]).rstrip())
+        texts = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
+        values = [cell.rjust(10) for cell in row[3:]] if len(row) > 4 else list(row[3:])
+        lines.append("  ".join([*texts, *values]).rstrip())
     return lines
 
 
 def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
-    """Return the first 16 pictures with their numbers (h, w, 3), sRGB."""
+    """Return an sRGB picture (h, w, 3) of the first 16 images with their numbers."""
     from PIL import Image, ImageDraw
 
-    width, height = (max(_SIDE * side // max(spec.size), 1) for side in spec.size)
-    small = {name: min(value, getattr(spec.render, name)) for name, value in _SMALL.items()}
-    spec = spec.replace(render=spec.render.replace(size=(width, height), **small))
-    count = min(spec.count, SHOWN)
-    across = min(count, _COLUMNS)
-    down = -(-count // across)
-    size = across * (width + _GAP) - _GAP, down * (height + _GAP) - _GAP
+    width, height = (max(_IMAGE_SIDE * side // max(spec.size), 1) for side in spec.size)
+    limited = {name: min(side, getattr(spec.render, name)) for name, side in _MAX_SIDES.items()}
+    spec = spec.replace(render=spec.render.replace(size=(width, height), **limited))
+    count = min(spec.count, SHEET_IMAGES)
+    columns = min(count, _COLUMNS)
+    rows = -(-count // columns)
+    size = columns * (width + _GAP) - _GAP, rows * (height + _GAP) - _GAP
     sheet = Image.new("RGB", size, (20, 20, 20))
     draw = ImageDraw.Draw(sheet)
-    maker, renderer = SceneBuilder(spec), Renderer(adapter)
+    builder, renderer = SceneBuilder(spec), Renderer(adapter)
     for k in range(count):
-        picture = renderer.draw(*maker.scene(spec.parameters(k)), timed=False).srgb8()
-        x, y = (k % across) * (width + _GAP), (k // across) * (height + _GAP)
+        picture = renderer.draw(*builder.build(spec.parameters(k)), timed=False).srgb8()
+        x, y = (k % columns) * (width + _GAP), (k // columns) * (height + _GAP)
         sheet.paste(Image.fromarray(picture), (x, y))
         draw.text((x + 4, y + 2), str(k), fill=(255, 255, 255), stroke_width=1, stroke_fill=(0, 0, 0))
     return np.array(sheet)
 
 
-def _row(spec: Spec, name: str, found: Sequence[Parameters]) -> Row:
-    values = [one[name] for one in found if name in one]
-    drawn = spec.distributions.get(name)
-    text = "" if drawn is None else value_text(drawn.spec_value())
-    first = [one.get(name) for one in found[:SHOWN]]
+def _row(spec: Spec, name: str, samples: Sequence[Parameters]) -> Row:
+    values = [sample[name] for sample in samples if name in sample]
+    distribution = spec.distributions.get(name)
+    text = "" if distribution is None else value_text(distribution.spec_value())
+    first = [sample.get(name) for sample in samples[:SHEET_IMAGES]]
     row: Row = {"parameter": name, "drawn": text, "first": first, "images": len(values)}
     numbers = [value for value in values if not isinstance(value, str)]
     if not numbers:
@@ -111,10 +113,12 @@ def _row(spec: Spec, name: str, found: Sequence[Parameters]) -> Row:
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    drawn = row["drawn"] if len(row["drawn"]) <= _WIDEST else f"{row['drawn'][: _WIDEST - 4]} ..."
-    start = row["parameter"], drawn, str(row["images"])
+    text = row["drawn"]
+    if len(text) > _MAX_COLUMN_WIDTH:
+        text = f"{text[: _MAX_COLUMN_WIDTH - 4]} ..."
+    fields = row["parameter"], text, str(row["images"])
     if "counts" not in row:
-        return *start, *(f"{one:.4g}" for one in (row["min"], row["mean"], row["max"]))
+        return *fields, *(f"{number:.4g}" for number in (row["min"], row["mean"], row["max"]))
     counts = [f"{name} {count}" for name, count in row["counts"].items()]
     more = f", and {len(counts) - _MAX_VALUES} more" if len(counts) > _MAX_VALUES else ""
-    return *start, ", ".join(counts[:_MAX_VALUES]) + more
+    return *fields, ", ".join(counts[:_MAX_VALUES]) + more

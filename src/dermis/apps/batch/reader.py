@@ -1,4 +1,4 @@
-"""Reading of data sets: shards, and the files of each image. Nothing in them is trusted."""
+"""Reader of data sets; files are treated as untrusted."""
 
 from __future__ import annotations
 
@@ -14,32 +14,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.output_encoding import Array, decode_output, decode_png
-from dermis.apps.batch.records import PICTURE, RECORD, LandmarksRecord, Numbers, Record
+from dermis.apps.batch.records import PICTURE_SUFFIX, RECORD_SUFFIX, LandmarksRecord, NestedNumbers, Record
 from dermis.apps.batch.shard_formats import MANIFEST_NAME, TarMember, tar_members
-from dermis.apps.batch.shards import EXPECTED, shard_index
-from dermis.base.atomic_write import reason
-from dermis.base.errors import DermisError, refuse
-from dermis.base.quantities import whole_number
-from dermis.base.reading import MOST_TEXT, named_path, opened, parse_json, read_file, understood
-from dermis.images.sizes import MOST_BYTES
+from dermis.apps.batch.shards import SHARD_DESCRIPTION, shard_index
+from dermis.base.errors import DermisError, error_text, refuse
+from dermis.base.quantities import checked_integer
+from dermis.base.reading import (
+    MAX_TEXT_BYTES,
+    checked_path,
+    open_regular_file,
+    parse_json,
+    parsing,
+    read_file,
+)
+from dermis.images.sizes import MAX_FILE_BYTES
 from dermis.scene.opencv import OpenCvCamera
 
 Image = dict[str, Any]
 """Ground truth of an image by name, see `read_dataset`."""
-Files = dict[str, Callable[[], bytes]]
-"""Functions that read the files of an image, by suffix."""
-_MOST_SHARDS = 10**9
+FileReaders = dict[str, Callable[[], bytes]]
+"""Functions that read the files of an image, by name or suffix."""
+_RESTORE = "Copy or download it again, or render the shard again"
+_MAX_SHARD_NUMBER = 10**9
 _FILE_NAME = re.compile(r"(\d{9})\.([a-z0-9_]{1,40}(?:\.[a-z0-9]{1,10})?)")
 _OUTPUT_NAME = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
-_NO_OUTPUTS = frozenset(("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks"))
+_RESERVED_NAMES = frozenset(("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks"))
 
 
 class LandmarkPoints(NamedTuple):
-    """Landmarks of an image; NaN where one has no place.
+    """Landmarks of an image; NaN for a landmark without a position.
 
-    pixels : (n, 2), x to the right and y down, from the middle of the first pixel
-    positions_mm : (n, 3), from the head's centre
-    visible : (n,) whether nothing lies before it
+    pixels : (n, 2) positions in the picture, x to the right and y down, from the centre of the first pixel
+    positions_mm : (n, 3) positions relative to the head's centre [mm]
+    visible : (n,) whether nothing occludes the landmark
     """
 
     pixels: NDArray[np.float64]
@@ -50,143 +57,170 @@ class LandmarkPoints(NamedTuple):
 def read_dataset(
     path: str | Path, *, shards: Iterable[int] | None = None, shuffle: int | None = None
 ) -> Iterator[Image]:
-    """Return the images of a data set that `dermis batch` has made, with their ground truth.
+    """Return the images of a data set rendered by `dermis batch`, with their ground truth.
 
-    path : its folder, or one of its shards
-    shards : numbers of those to read, such as `range(rank, 100, workers)`; all where None
-    shuffle : a seed, for the shards in random order and the images of each as well; in order where None
+    Parameters
+    ----------
+    path : str or Path
+        Folder of the data set, or one of its shards.
+    shards : iterable of int, optional
+        Numbers of the shards to read, such as `range(rank, 100, workers)`; all by default.
+    shuffle : int, optional
+        Seed for a random order of the shards, and of the images within each; in order by default.
 
-    Each image is a dictionary: "number", "picture" (h, w, 3 or 4, sRGB bytes), "camera" (K, R, t),
-    "head_pose", "gaze", "landmarks" (pixels, positions_mm and visible by the name of their set), "parameters"
-    by name, and the outputs by theirs: "depth", "normal", "label", ...
+    Returns
+    -------
+    iterator of dict
+        Each image has the keys "number", "picture" ((h, w, 3 or 4), sRGB bytes), "camera" (K, R and t in
+        OpenCV's convention), "head_pose" (3, 4), "gaze" ((2, 3) or None), "landmarks" (`LandmarkPoints` by
+        the name of the set), "parameters" (by name), and one key for each output of the data set, such as
+        "depth" or "normal".
 
-    Raises DermisError for a folder without shards, and for shards that are cut off or damaged.
+    Raises
+    ------
+    DermisError
+        For a folder without shards, and for truncated or damaged shards.
+
+    Examples
+    --------
+    Write a shard of one image, and read it:
+
+    >>> import json, tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np, dermis
+    >>> shard = Path(tempfile.mkdtemp(), "shard-00000")
+    >>> shard.mkdir()
+    >>> identity, pose = np.eye(3).tolist(), np.eye(3, 4).tolist()
+    >>> record = {"number": 0, "parameters": {"camera.yaw_deg": 12.5}, "head_pose": pose, "gaze": None}
+    >>> record |= {"camera": {"K": identity, "R": identity, "t": [0, 0, 600]}, "landmarks": {}}
+    >>> _ = (shard / "000000000.json").write_text(json.dumps(record))
+    >>> dermis.write_image(shard / "000000000.png", np.zeros((2, 4, 3), np.float32))
+    >>> _ = (shard / "__whole__").write_text("{}")
+    >>> for image in dermis.read_dataset(shard):
+    ...     print(image["picture"].shape, image["parameters"]["camera.yaw_deg"])
+    (2, 4, 3) 12.5
     """
-    chosen = _chosen(named_path(path, "a data set"), shards)
-    return _images(chosen, None if shuffle is None else Random(whole_number("shuffle", shuffle, 0, 2**64)))
+    chosen = _select_shards(checked_path(path, "a data set"), shards)
+    return _iterate_images(
+        chosen, None if shuffle is None else Random(checked_integer("shuffle", shuffle, 0, 2**64))
+    )
 
 
-def decoded(files: Mapping[str, object], culprit: object = "") -> Image:
-    """Return an image by its files, which are bytes by suffix as the library webdataset gives them.
+def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
+    """Return an image from its files, which are bytes by suffix as the library webdataset provides them.
 
-    culprit : named in messages; the image's key where empty
+    culprit : name of the image in messages; by default its key
 
-    number, parameters : number of the image in the data set, and its sampled parameters by name
-    picture : (h, w, 3 or 4) sRGB bytes
-    camera : K, R and t as OpenCV has them
-    head_pose, gaze : (3, 4) and (2, 3), as of `Observation`; gaze may be None
-    landmarks : `LandmarkPoints` by the name of their set
-    depth, normal, ... : the outputs of the data set, float32 or integers
-
-    Raises DermisError where they are damaged.
+    The keys are those of `read_dataset`. Raises DermisError for damaged files.
     """
-    named = culprit or files.get("__key__", "an image")
-    data = {suffix: one for suffix, one in files.items() if not suffix.startswith("__")}
-    shown, record = (_taken(data, suffix, named) for suffix in (PICTURE, RECORD))
-    found = _decoded_record(record, f"{named}.{RECORD}")
-    picture = found["picture"] = _decoded_picture(f"{named}.{PICTURE}", "", PICTURE, shown)
+    source = culprit or files.get("__key__", "an image")
+    data = {suffix: content for suffix, content in files.items() if not suffix.startswith("__")}
+    encoded, record = (_pop_file(data, suffix, source) for suffix in (PICTURE_SUFFIX, RECORD_SUFFIX))
+    image = _decode_record(record, f"{source}.{RECORD_SUFFIX}")
+    picture = image["picture"] = _decode_picture(f"{source}.{PICTURE_SUFFIX}", "", PICTURE_SUFFIX, encoded)
     if picture.dtype != np.uint8:
-        refuse(named, "a picture of 8 bits", f"it has {picture.dtype}", "Fetch it again")
+        refuse(source, "an 8-bit picture", f"it has {picture.dtype}", "Copy or download it again")
     for suffix, content in sorted(data.items()):
         match = _OUTPUT_NAME.fullmatch(suffix)
-        if match is None or match[1] in _NO_OUTPUTS:
-            refuse(named, "files of outputs", f".{suffix} is none", "Take it out")
-        values = _decoded_picture(f"{named}.{suffix}", match[1], match[2], content)
+        if match is None or match[1] in _RESERVED_NAMES:
+            refuse(source, "files of outputs", f"found .{suffix}", "Remove it")
+        values = _decode_picture(f"{source}.{suffix}", match[1], match[2], content)
         if values.shape[:2] != picture.shape[:2]:
-            came = f".{suffix} has {values.shape[1]} x {values.shape[0]} pixels"
-            refuse(named, "outputs of the picture's size", came, "Fetch it again")
-        found[match[1]] = values
-    return found
+            actual = f".{suffix} has {values.shape[1]} x {values.shape[0]} pixels"
+            refuse(source, "outputs of the picture's size", actual, "Copy or download it again")
+        image[match[1]] = values
+    return image
 
 
 def read_record(data: bytes, culprit: object) -> Record:
     """Return the record of an image; its landmarks are not checked.
 
-    Raises DermisError where it is damaged.
+    Raises DermisError if the record is damaged.
     """
-    if len(data) > MOST_TEXT:
-        refuse(culprit, "a record of an image", f"it has {len(data):,} bytes", "Fetch it again")
+    if len(data) > MAX_TEXT_BYTES:
+        refuse(culprit, "a record of an image", f"it has {len(data):,} bytes", "Copy or download it again")
     record: Record = parse_json(data, culprit, "a record of an image")
-    with _understood(culprit):
+    with _record_errors(culprit):
         if type(record["number"]) is not int:
-            raise ValueError("its number is none")
+            raise ValueError("its number is not an integer")
         for name, value in record["parameters"].items():
             values = value if isinstance(value, list) else [value]
             if not all(isinstance(one, int | float | str | None) for one in values):
                 raise ValueError(f"{name[:60]!r} is neither a number nor a text")
-        _decoded_pose(record)
+        _decode_pose(record)
         return record
 
 
 @contextmanager
-def shard_files(path: Path) -> Iterator[dict[str, Files]]:
-    """Yield the files of each image of a shard by its key, in order, to be read inside the context.
+def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
+    """Yield the files of each image of a shard by its key, in order; they can be read inside the context.
 
-    Raises DermisError for what is no shard, or was cut off.
+    Raises DermisError if the file is not a shard or is truncated.
     """
     if path.is_dir():
         names = sorted(one.name for one in path.iterdir())
-        yield _by_key(path, {name: partial(_from_folder, path / name) for name in names})
+        yield _group_by_image(path, {name: partial(_read_folder_file, path / name) for name in names})
         return
-    with opened(path, EXPECTED) as file:
-        with understood(path, EXPECTED):
+    with open_regular_file(path, SHARD_DESCRIPTION) as file:
+        with parsing(path, SHARD_DESCRIPTION):
             members = list(tar_members(file))
             if len({one.name for one in members}) != len(members):
-                raise ValueError("two files in it have one name")
-        yield _by_key(path, {one.name: partial(_from_tar, path, file, one) for one in members})
+                raise ValueError("two of its files have the same name")
+        yield _group_by_image(path, {one.name: partial(_read_tar_member, path, file, one) for one in members})
 
 
-def _by_key(path: Path, files: Files) -> dict[str, Files]:
+def _group_by_image(path: Path, files: FileReaders) -> dict[str, FileReaders]:
     if MANIFEST_NAME not in files:
-        refuse(path, EXPECTED, "its end is missing", "Fetch it again, or have it drawn again")
-    found: dict[str, Files] = {}
+        refuse(path, SHARD_DESCRIPTION, "its end is missing", _RESTORE)
+    images: dict[str, FileReaders] = {}
     for name, read in files.items():
         match = _FILE_NAME.fullmatch(name)
         if match:
-            found.setdefault(match[1], {})[match[2]] = read
+            images.setdefault(match[1], {})[match[2]] = read
         elif name != MANIFEST_NAME:
-            came = f"it holds {name[:60]!r}"
-            refuse(path, f"{EXPECTED} with files such as 000000012.png", came, "Take it out")
-    return dict(sorted(found.items()))
+            actual = f"it contains {name[:60]!r}"
+            refuse(path, f"{SHARD_DESCRIPTION} with files such as 000000012.png", actual, "Remove that file")
+    return dict(sorted(images.items()))
 
 
-def _from_folder(path: Path) -> bytes:
-    return read_file(path, "a file of a shard", MOST_BYTES)
+def _read_folder_file(path: Path) -> bytes:
+    return read_file(path, "a file of a shard", MAX_FILE_BYTES)
 
 
-def _from_tar(path: Path, file: BinaryIO, member: TarMember) -> bytes:
-    if member.size > MOST_BYTES:
-        came = f"{member.name} has {member.size:,} bytes"
-        refuse(path, f"files of at most {MOST_BYTES:,} bytes", came, "Have it drawn again")
-    file.seek(member.place)
+def _read_tar_member(path: Path, file: BinaryIO, member: TarMember) -> bytes:
+    if member.size > MAX_FILE_BYTES:
+        actual = f"{member.name} has {member.size:,} bytes"
+        refuse(path, f"files of at most {MAX_FILE_BYTES:,} bytes", actual, "Render the shard again")
+    file.seek(member.offset)
     data = file.read(member.size)
     if len(data) != member.size:
-        refuse(path, EXPECTED, "it is cut off", "Fetch it again, or have it drawn again")
+        refuse(path, SHARD_DESCRIPTION, "it is truncated", _RESTORE)
     return data
 
 
-def _chosen(path: Path, shards: Iterable[int] | None) -> list[Path]:
-    """Return the shards to read, by number."""
+def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
+    """Return the paths of the shards to read."""
     if shard_index(path) is not None or path.suffix == ".tar":
         return [path]
     try:
-        named = [(shard_index(one), one) for one in sorted(path.iterdir())]
+        entries = [(shard_index(entry), entry) for entry in sorted(path.iterdir())]
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
-        came = f"it cannot be read ({getattr(fault, 'strerror', None) or fault})"
-        refuse(path, "the folder of a data set", came, "Check its name")
-    found = {index: one for index, one in named if index is not None}
-    if not found:
-        refuse(path, "the folder of a data set", "no shard is in it", "Check its name")
+        actual = f"it cannot be read ({getattr(fault, 'strerror', None) or fault})"
+        refuse(path, "the folder of a data set", actual, "Check its name")
+    by_number = {index: entry for index, entry in entries if index is not None}
+    if not by_number:
+        refuse(path, "the folder of a data set", "it contains no shard", "Check its name")
     if shards is None:
-        return [one for _, one in sorted(found.items())]
-    wanted = [whole_number("shards", number, 0, _MOST_SHARDS) for number in shards]
-    for number in wanted:
-        if number not in found:
-            refuse("shards", f"numbers of the {len(found)} shards in {path}", f"{number} came", "Correct it")
-    return [found[number] for number in wanted]
+        return [shard for _, shard in sorted(by_number.items())]
+    numbers = [checked_integer("shards", number, 0, _MAX_SHARD_NUMBER) for number in shards]
+    for number in numbers:
+        if number not in by_number:
+            expected = f"numbers of the {len(by_number)} shards in {path}"
+            refuse("shards", expected, f"got {number}", "Correct it")
+    return [by_number[number] for number in numbers]
 
 
-def _images(shards: list[Path], rng: Random | None) -> Iterator[Image]:
+def _iterate_images(shards: list[Path], rng: Random | None) -> Iterator[Image]:
     if rng:
         rng.shuffle(shards)
     for path in shards:
@@ -195,72 +229,72 @@ def _images(shards: list[Path], rng: Random | None) -> Iterator[Image]:
             if rng:
                 rng.shuffle(keys)
             for key in keys:
-                found = decoded({suffix: read() for suffix, read in images[key].items()}, path / key)
-                if found["number"] != int(key):
-                    came = f"that of {found['number']} came"
-                    refuse(path / key, f"the record of image {int(key)}", came, "Mend it")
-                yield found
+                image = decode_image({suffix: read() for suffix, read in images[key].items()}, path / key)
+                if image["number"] != int(key):
+                    actual = f"got that of {image['number']}"
+                    refuse(path / key, f"the record of image {int(key)}", actual, _RESTORE)
+                yield image
 
 
-def _taken(files: dict[str, object], suffix: str, culprit: object) -> bytes:
+def _pop_file(files: dict[str, object], suffix: str, culprit: object) -> bytes:
     content = files.pop(suffix, None)
     if not isinstance(content, bytes):
-        refuse(culprit, "an image of a data set", f"its .{suffix} is missing", "Fetch it again")
+        refuse(culprit, "an image of a data set", f"its .{suffix} is missing", "Copy or download it again")
     return content
 
 
-def _decoded_record(data: bytes, culprit: object) -> Image:
+def _decode_record(data: bytes, culprit: object) -> Image:
     record = read_record(data, culprit)
-    with _understood(culprit):
-        landmarks = {name: _landmarks(one) for name, one in record["landmarks"].items()}
-    about = {"number": record["number"], "parameters": record["parameters"]}
-    return about | _decoded_pose(record) | {"landmarks": landmarks}
+    with _record_errors(culprit):
+        landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
+    image = {"number": record["number"], "parameters": record["parameters"]}
+    return image | _decode_pose(record) | {"landmarks": landmarks}
 
 
-def _decoded_pose(record: Record) -> Image:
+def _decode_pose(record: Record) -> Image:
     """Return the arrays of camera, head pose and gaze."""
     camera, gaze = record["camera"], record["gaze"]
-    K, R, t = _array(camera["K"], (3, 3)), _array(camera["R"], (3, 3)), _array(camera["t"], (3,))
+    K, R, t = _to_array(camera["K"], (3, 3)), _to_array(camera["R"], (3, 3)), _to_array(camera["t"], (3,))
     return {
         "camera": OpenCvCamera(K, R, t),
-        "head_pose": _array(record["head_pose"], (3, 4)),
-        "gaze": None if gaze is None else _array(gaze, (2, 3)),
+        "head_pose": _to_array(record["head_pose"], (3, 4)),
+        "gaze": None if gaze is None else _to_array(gaze, (2, 3)),
     }
 
 
-def _landmarks(record: LandmarksRecord) -> LandmarkPoints:
+def _decode_landmarks(record: LandmarksRecord) -> LandmarkPoints:
     if not all(isinstance(one, bool) for one in record["visible"]):
-        raise ValueError("whether landmarks are visible is told otherwise than by true and false")
+        raise ValueError("the visibility of a landmark is neither true nor false")
     visible = np.array(record["visible"], bool)
-    pixels = _array(record["pixels"], (len(visible), 2))
-    return LandmarkPoints(pixels, _array(record["positions_mm"], (len(visible), 3)), visible)
+    pixels = _to_array(record["pixels"], (len(visible), 2))
+    return LandmarkPoints(pixels, _to_array(record["positions_mm"], (len(visible), 3)), visible)
 
 
-def _array(values: Numbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return numbers as an array, NaN where there is null."""
+def _to_array(values: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return nested lists of numbers as an array, with NaN for null."""
     flat: Sequence[object] = values if isinstance(values, list) else [values]
     while flat and isinstance(flat[0], list):
         flat = [one for row in flat if isinstance(row, list) for one in row]
     if any(isinstance(one, str | bool) for one in flat):
-        raise ValueError("it has texts for numbers")
-    found = np.array(values, np.float64)
-    if found.shape != shape and (found.size or 0 not in shape):
-        raise ValueError(f"an array has shape {found.shape}, not {shape}")
-    return found.reshape(shape)
+        raise ValueError("it has texts in place of numbers")
+    array = np.array(values, np.float64)
+    if array.shape != shape and (array.size or 0 not in shape):
+        raise ValueError(f"an array has shape {array.shape}, not {shape}")
+    return array.reshape(shape)
 
 
-def _understood(culprit: object) -> AbstractContextManager[None]:
-    """Return a context that refuses a record of another form."""
-    return understood(culprit, "a record of an image", KeyError, TypeError, AttributeError)
+def _record_errors(culprit: object) -> AbstractContextManager[None]:
+    """Return a context that turns errors of a malformed record into a DermisError."""
+    return parsing(culprit, "a record of an image", KeyError, TypeError, AttributeError)
 
 
-def _decoded_picture(culprit: object, name: str, kind: str, data: object) -> Array:
+def _decode_picture(culprit: object, name: str, kind: str, data: object) -> Array:
     try:
         if not isinstance(data, bytes):
-            raise TypeError("it is not given as bytes")
+            raise TypeError("its content is not of type bytes")
         return decode_output(name, kind, data) if name else decode_png(data)
     except DermisError as fault:  # a package is missing
         raise DermisError(f"{culprit}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data
-        came = f"it cannot be decoded ({reason(fault)})"
-        refuse(culprit, f"a picture as {kind}", came, "Fetch it again, or have it drawn again")
+        actual = f"it cannot be decoded ({error_text(fault)})"
+        refuse(culprit, f"a picture as {kind}", actual, _RESTORE)

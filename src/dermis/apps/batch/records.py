@@ -1,4 +1,4 @@
-"""Files of one image, as bytes."""
+"""Encoding of the files of one image."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from dermis.apps.batch.spec import Spec
 from dermis.frame.observation import Observation
 from dermis.images.codecs import encode_png
 
-PICTURE, RECORD = "png", "json"
-"""Suffixes of the picture, and of the record of all other ground truth besides the outputs."""
-Numbers = list[Union["Numbers", float, None]]
-"""Numbers of an array; null where one is not finite."""
+PICTURE_SUFFIX, RECORD_SUFFIX = "png", "json"
+"""Suffixes of the picture's file and of the record's."""
+NestedNumbers = list[Union["NestedNumbers", float, None]]
+"""Array as nested lists; null where a number is not finite."""
 _PIXEL_DIGITS = 3
 _MM_DIGITS = 4
-_UNIT_DIGITS = 8  # of rotations and directions
+_UNIT_DIGITS = 8  # rotations and directions
 
 
 class CameraRecord(TypedDict):
-    """Camera of OpenCV: K (R X + t)."""
+    """Camera in OpenCV's convention: pixels are K (R X + t)."""
 
-    K: Numbers
-    R: Numbers
-    t: Numbers
+    K: NestedNumbers
+    R: NestedNumbers
+    t: NestedNumbers
 
 
 class LandmarksRecord(TypedDict):
     """Landmarks of an image, see `reader.LandmarkPoints`."""
 
-    pixels: Numbers
-    positions_mm: Numbers
+    pixels: NestedNumbers
+    positions_mm: NestedNumbers
     visible: list[bool]
 
 
@@ -45,49 +45,48 @@ class Record(TypedDict):
     number: int
     parameters: Parameters
     camera: CameraRecord
-    head_pose: Numbers
-    gaze: Numbers | None
+    head_pose: NestedNumbers
+    gaze: NestedNumbers | None
     landmarks: dict[str, LandmarksRecord]
 
 
 def encode_record(
     number: int, observation: Observation, parameters: Parameters, spec: Spec
 ) -> dict[str, bytes]:
-    """Return the files of image `number` by suffix: equal bytes for equal arguments.
+    """Return the files of image `number` by suffix; equal arguments give equal bytes.
 
-    observation : with the outputs of the spec and a picture of sRGB bytes
+    observation : outputs of the spec and an sRGB picture
 
-    png : the picture, with alpha over no background
-    NAME.png, NAME.exr or NAME.npy : each output, see `output_encoding.storage_description`
-    json : the `Record`
+    The suffixes are "png" for the picture, with alpha if it has no background; "NAME.png", "NAME.exr" or
+    "NAME.npy" for each output, see `output_encoding.storage_description`; and "json" for the `Record`.
     """
-    found = {PICTURE: encode_png(observation.picture, quick=True)}
+    files = {PICTURE_SUFFIX: encode_png(observation.picture, quick=True)}
     for name in spec.outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
-        found[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
+        files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
     record = _record(number, observation, parameters, spec)
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    found[RECORD] = f"{text}\n".encode()
-    return found
+    files[RECORD_SUFFIX] = f"{text}\n".encode()
+    return files
 
 
 def _record(number: int, observation: Observation, parameters: Parameters, spec: Spec) -> Record:
     camera, gaze = observation.camera, observation.gaze
-    names = {path: name for name, path in spec.landmark_tables.items()}  # no paths of this machine
+    names = {path: name for name, path in spec.landmark_tables.items()}  # records hold no absolute paths
     return {
         "number": number,
         "parameters": dict(parameters),
         "camera": {
-            "K": _rounded(camera.K, _MM_DIGITS),
-            "R": _rounded(camera.R, _UNIT_DIGITS),
-            "t": _rounded(camera.t, _MM_DIGITS),
+            "K": _rounded_list(camera.K, _MM_DIGITS),
+            "R": _rounded_list(camera.R, _UNIT_DIGITS),
+            "t": _rounded_list(camera.t, _MM_DIGITS),
         },
-        "head_pose": _rounded(observation.head_pose, _UNIT_DIGITS),
-        "gaze": None if gaze is None else _rounded(gaze, _UNIT_DIGITS),
+        "head_pose": _rounded_list(observation.head_pose, _UNIT_DIGITS),
+        "gaze": None if gaze is None else _rounded_list(gaze, _UNIT_DIGITS),
         "landmarks": {
             names.get(path, path): {
-                "pixels": _rounded(one.pixels, _PIXEL_DIGITS),
-                "positions_mm": _rounded(one.positions_mm, _MM_DIGITS),
+                "pixels": _rounded_list(one.pixels, _PIXEL_DIGITS),
+                "positions_mm": _rounded_list(one.positions_mm, _MM_DIGITS),
                 "visible": np.asarray(one.visible, bool).tolist(),
             }
             for path, one in observation.landmarks.items()
@@ -95,9 +94,9 @@ def _record(number: int, observation: Observation, parameters: Parameters, spec:
     }
 
 
-def _rounded(values: ArrayLike, digits: int) -> Numbers:
-    """Return numbers as nested lists, null for those that are not finite; -0 is 0."""
+def _rounded_list(values: ArrayLike, digits: int) -> NestedNumbers:
+    """Return rounded numbers as nested lists, with null for numbers that are not finite and 0 for -0."""
     numbers = np.round(np.asarray(values, np.float64), digits) + 0.0
-    found = numbers.astype(object)
-    found[~np.isfinite(numbers)] = None
-    return list(found.tolist())
+    nullable = numbers.astype(object)
+    nullable[~np.isfinite(numbers)] = None
+    return list(nullable.tolist())

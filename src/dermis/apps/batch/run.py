@@ -1,4 +1,4 @@
-"""Run of a data set: render the missing shards, then write its index and datasheet."""
+"""Run of a data set: render the missing shards, then write the index and the datasheet."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Protocol
 from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.datasheet import write_datasheet
 from dermis.apps.batch.index import write_index
-from dermis.apps.batch.shards import Shard, is_there, is_whole, remove_unfinished, list_shards
+from dermis.apps.batch.shards import Shard, is_intact, list_shards, remove_unfinished, shard_exists
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.worker import Failure, RunOptions, WorkerEvent
 from dermis.base.atomic_write import refuse_output
@@ -23,9 +23,9 @@ SPEC_FILE = "spec.toml"
 
 
 class WorkerPool(Protocol):
-    """Workers: `ProcessPool` of this machine, or those of a `Cluster`."""
+    """Pool of workers: `ProcessPool` on this machine, or `DaskCluster`."""
 
-    def render(self, work: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    def render(self, options: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Render the shards, each completely or not at all, and yield events as they happen."""
         ...
 
@@ -34,24 +34,24 @@ class WorkerPool(Protocol):
 class Progress:
     """Progress of a run.
 
-    images : rendered so far
-    to_draw : images of the shards that were missing at the start
+    images : number of images rendered so far
+    total : number of images in the shards that were missing at the start
     """
 
     images: int = 0
-    to_draw: int = 0
+    total: int = 0
 
 
 @dataclass(frozen=True)
-class Report:
+class RunReport:
     """Result of a run.
 
-    images : in the shards that it wrote, without those that were left out
-    seconds : duration
-    shards : number that it wrote
-    skipped : shards that were complete before
+    images : number of images in the written shards, without those that were left out
+    seconds : duration [s]
+    shards : number of written shards
+    skipped : number of shards that were complete before the run
     failed : images that were left out
-    is_whole : whether all shards of the data set are there, and with them index and datasheet
+    is_complete : whether all shards of the data set, its index and its datasheet exist
     """
 
     images: int
@@ -59,44 +59,44 @@ class Report:
     shards: int
     skipped: int
     failed: tuple[Failure, ...] = ()
-    is_whole: bool = False
+    is_complete: bool = False
 
 
 def run(
-    work: RunOptions,
-    crew: WorkerPool,
+    options: RunOptions,
+    pool: WorkerPool,
     part: tuple[int, int] = (0, 1),
-    told: Callable[[Progress], None] = lambda progress: None,
-) -> Report:
+    on_progress: Callable[[Progress], None] = lambda progress: None,
+) -> RunReport:
     """Render the missing shards of a data set, or of a part of it.
 
-    part : (i, n) for every n-th shard from the i-th on, i from 0: n runs, on any machines, make the data set
-    told : called whenever images were rendered
+    part : (i, n) selects every n-th shard, starting with the i-th (from 0), so that n runs share a data set
+    on_progress : function called after images were rendered
 
-    Raises DermisError for faults of the spec, the disk or the machine; complete shards stay.
+    Raises DermisError for errors of the spec, the disk or the machine; complete shards are kept.
     """
-    began = time.monotonic()
-    claim(work.out, work.spec)
-    every = list_shards(work.spec)
-    mine = every[part[0] :: part[1]]
-    missing = [shard for shard in mine if not is_whole(work.out, shard, work.spec)]
-    remove_unfinished(work.out, mine)
+    start = time.monotonic()
+    claim_folder(options.out, options.spec)
+    all_shards = list_shards(options.spec)
+    selected = all_shards[part[0] :: part[1]]
+    missing = [shard for shard in selected if not is_intact(options.out, shard, options.spec)]
+    remove_unfinished(options.out, selected)
     try:
-        images, failed = _render(crew, work, missing, told)
+        images, failed = _render(pool, options, missing, on_progress)
     finally:
-        remove_unfinished(work.out, mine)
-    whole = all(is_there(work.out, shard, work.spec) for shard in every)
-    if whole:  # every run that sees this writes the same bytes
-        write_index(work.out, work.spec)
-        write_datasheet(work.out, work.spec)
-    seconds = time.monotonic() - began
-    return Report(images, seconds, len(missing), len(mine) - len(missing), failed, whole)
+        remove_unfinished(options.out, selected)
+    complete = all(shard_exists(options.out, shard, options.spec) for shard in all_shards)
+    if complete:  # concurrent runs that reach this point write the same bytes
+        write_index(options.out, options.spec)
+        write_datasheet(options.out, options.spec)
+    seconds = time.monotonic() - start
+    return RunReport(images, seconds, len(missing), len(selected) - len(missing), failed, complete)
 
 
-def claim(out: Path, spec: Spec) -> None:
-    """Make the folder of a data set, or check that it was begun with the same spec.
+def claim_folder(out: Path, spec: Spec) -> None:
+    """Create the folder of a data set, or check that an existing one belongs to the same spec.
 
-    Raises DermisError for a folder of another one, and where nothing can be written.
+    Raises DermisError if the folder belongs to another data set or cannot be written.
     """
     path = out / SPEC_FILE
     try:
@@ -105,27 +105,27 @@ def claim(out: Path, spec: Spec) -> None:
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
         refuse_output(out, fault)
     if not exists:
-        atomic_write(path, lambda trial: trial.write_text(spec.text(), encoding="utf-8"))
-    elif read_text(path, "the spec of a data set") != spec.text():
-        remedy = "Choose another folder, or give the spec that it was begun with"
-        refuse(out, "a folder for this data set", f"{SPEC_FILE} in it is another's", remedy)
+        atomic_write(path, lambda temporary: temporary.write_text(spec.to_toml(), encoding="utf-8"))
+    elif read_text(path, "the spec of a data set") != spec.to_toml():
+        advice = "Choose another folder, or use the spec that the folder was created with"
+        refuse(out, "a folder for this data set", f"its {SPEC_FILE} differs from this spec", advice)
 
 
 def _render(
-    crew: WorkerPool, work: RunOptions, missing: Sequence[Shard], told: Callable[[Progress], None]
+    pool: WorkerPool, options: RunOptions, missing: Sequence[Shard], on_progress: Callable[[Progress], None]
 ) -> tuple[int, tuple[Failure, ...]]:
-    """Return the number of images in the rendered shards, and those left out of them."""
+    """Return the number of images in the rendered shards, and the images that were left out."""
     progress = Progress(0, sum(shard.stop - shard.first for shard in missing))
     failed: list[Failure] = []
     notes = set[str]()
-    for event in crew.render(work, missing) if missing else ():
+    for event in pool.render(options, missing) if missing else ():
         if event.note and event.note not in notes:
             notes.add(event.note)
             notify(event.note)
         if event.retry:
-            notify(f"{event.retry}; its shard is drawn again")
+            notify(f"{event.retry}; its shard is rendered again")
         failed += event.failed
         if event.images:
             progress.images += event.images
-            told(progress)
-    return progress.to_draw - len(failed), tuple(sorted(failed))
+            on_progress(progress)
+    return progress.total - len(failed), tuple(sorted(failed))

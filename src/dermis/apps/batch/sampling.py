@@ -1,30 +1,30 @@
-"""Sampled parameters of each image: hashed random numbers, equal on every machine and in any order."""
+"""Sampling of the parameters of each image by hashing, independent of machine and order."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from math import exp
 
 from scipy.special import ndtr, ndtri
 
 from dermis.apps.batch.distributions import Constant, Distribution
-from dermis.apps.batch.spec_tables import ANGLES, MIXTURE, NONE, RIG, table_of
+from dermis.apps.batch.spec_tables import ANGLES, MIXTURE, NONE, RIG, table_values
 from dermis.base.tables import read_rows
-from dermis.human.expressions import SIDES, Weights, sided, targets_of
+from dermis.human.expressions import SIDES, Weights, expand_sides, expand_targets
 
 Parameters = dict[str, float | int | str]
 _JAW = "jawOpen"
-_SCARCE = 1.5  # power of a uniform number that a weight at random is
-_BITS = 52  # which a double holds with half a step more
-_PERSON = "person."
-_SEEDS = 2**32
+_WEIGHT_POWER = 1.5  # random weights are a uniform number to this power, so that small ones are more frequent
+_BITS = 52  # of the hash that are used: a double represents them exactly, plus half a step
+_PERSON_PREFIX = "person."
+_SEED_COUNT = 2**32
 _DIALS = "intensity", "asymmetry", "variation"
 _LAMPS = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
 _COLOUR = "background.red", "background.green", "background.blue"
-_APPLIES: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
+_CONDITIONAL: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
     (_LAMPS, lambda found: found["light.kind"] == RIG),
     (("gaze.yaw_deg", "gaze.pitch_deg"), lambda found: found["gaze.at"] == ANGLES),
     (("environment.turn", "environment.strength"), lambda found: found["environment.name"] != NONE),
@@ -32,26 +32,28 @@ _APPLIES: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...]
     ("background.blur", lambda found: found["background.kind"] == "environment"),
     ("camera.frame_mm", lambda found: "camera.focal_mm" not in found),
 )
-"""Prefixes of parameters that only some images have, and the condition for them."""
+"""Prefixes of parameters that only some images have, with the condition for having them."""
 
 
 def table_numbers(parameters: Mapping[str, float | int | str], table: str) -> dict[str, float]:
-    """Return the parameters of a table that are numbers, by the rest of their names."""
-    return {name: one for name, one in table_of(parameters, table).items() if not isinstance(one, str)}
+    """Return the numeric parameters of a table, by their names within the table."""
+    return {name: one for name, one in table_values(parameters, table).items() if not isinstance(one, str)}
 
 
-def uniform(seed: int, number: int, name: str) -> float:
-    """Return a uniform number in (0, 1) for a seed, the number of an image or a person, and a name.
+def hashed_uniform(seed: int, number: int, name: str) -> float:
+    """Return a uniform random number in (0, 1) that depends on a seed, a number and a name only.
 
-    A hash of the three as text (BLAKE2b), so that no number depends on another.
+    It is a BLAKE2b hash of the three as text, so that numbers do not depend on each other.
+
+    number : number of an image or a person
     """
     digest = hashlib.blake2b(f"{seed} {number} {name}".encode(), digest_size=8).digest()
-    whole = int.from_bytes(digest, "little") >> (64 - _BITS)
-    return (whole + 0.5) / float(1 << _BITS)
+    step = int.from_bytes(digest, "little") >> (64 - _BITS)
+    return (step + 0.5) / float(1 << _BITS)
 
 
 def round_significant(value: float) -> float:
-    """Round to six significant digits: the last ones of logarithms and roots differ between machines."""
+    """Round to six significant digits, as the last digits of logarithms and roots differ between machines."""
     return float(f"{value:.6g}") + 0.0  # no -0.0
 
 
@@ -59,66 +61,70 @@ def round_significant(value: float) -> float:
 class Movement:
     """Movement of a part of the face: a row of mixture.csv.
 
-    chance : probability of this movement in its part
-    most : greatest weight of its targets
-    shuts : share by which it keeps the jaw from opening
+    probability : probability of this movement within its part [-]
+    max_weight : largest weight of its morph targets [-]
+    target_weights : relative weights of the morph targets
+    jaw_closing : fraction by which it reduces the opening of the jaw [-]
     """
 
-    chance: float
-    most: float
-    moves: Weights
-    shuts: float
+    probability: float
+    max_weight: float
+    target_weights: Weights
+    jaw_closing: float
 
 
 @cache
 def load_movements() -> Mapping[str, tuple[Movement, ...]]:
-    """Return the movements by part of the face."""
-    found: dict[str, tuple[Movement, ...]] = {}
+    """Return the movements of mixture.csv by part of the face."""
+    by_part: dict[str, tuple[Movement, ...]] = {}
     for row in read_rows(str(__package__), "mixture"):
         words = row["moves"].split()
-        weights = {name: float(share) for name, share in zip(words[::2], words[1::2], strict=True)}
-        made = Movement(float(row["chance"]), float(row["most"]), weights, float(row["shuts"]))
-        found[row["part"]] = (*found.get(row["part"], ()), made)
-    return found
+        weights = {name: float(weight) for name, weight in zip(words[::2], words[1::2], strict=True)}
+        movement = Movement(float(row["chance"]), float(row["most"]), weights, float(row["shuts"]))
+        by_part[row["part"]] = (*by_part.get(row["part"], ()), movement)
+    return by_part
 
 
-def random_expression(share: Callable[[str], float]) -> dict[str, float]:
-    """Return random weights, with one movement or none in each part of the face.
+def random_expression(uniform: Callable[[str], float]) -> dict[str, float]:
+    """Return random weights of morph targets, with at most one movement in each part of the face.
 
-    share : uniform number in (0, 1) for a name
+    uniform : function that returns a uniform random number in (0, 1) for a name
     """
-    found: dict[str, float] = {}
-    opening = 1.0
+    weights: dict[str, float] = {}
+    jaw_factor = 1.0
     for part, movements in load_movements().items():
-        left, amount = share(f"{part}.which"), share(f"{part}.weight") ** _SCARCE
-        for one in movements:
-            if 0 <= left < one.chance:
-                found |= {name: one.most * amount * much for name, much in one.moves.items()}
-                opening *= 1.0 - one.shuts * amount
-            left -= one.chance
-    if _JAW in found:
-        found[_JAW] *= opening
-    return found
+        remaining, amount = uniform(f"{part}.which"), uniform(f"{part}.weight") ** _WEIGHT_POWER
+        for movement in movements:
+            if 0 <= remaining < movement.probability:
+                scale = movement.max_weight * amount
+                weights |= {name: scale * weight for name, weight in movement.target_weights.items()}
+                jaw_factor *= 1.0 - movement.jaw_closing * amount
+            remaining -= movement.probability
+    if _JAW in weights:
+        weights[_JAW] *= jaw_factor
+    return weights
 
 
 def expression_weights(
     weights: Weights, intensity: float, asymmetry: float, variation: float, normal: Callable[[str], float]
 ) -> dict[str, float]:
-    """Return the weights of targets, 0 to 1, of an expression varied for one face; see `ExpressionTable`.
+    """Return the weights of morph targets (0 to 1) of an expression, varied for one face.
 
-    normal : standard normal number for a name
+    `ExpressionTable` describes the parameters.
+
+    normal : function that returns a standard normal random number for a name
     """
-    found = {}
+    varied = {}
     for name, weight in weights.items():
-        much = weight * intensity * exp(variation * normal(name)) if weight else 0.0
-        for target in sided(name):
-            side = 0.0 if target == name and not _is_side(name) else 1.0 - 2.0 * target.endswith("Right")
-            found[target] = min(max(much * (1.0 + asymmetry * side), 0.0), 1.0)
-    return found
+        mean = weight * intensity * exp(variation * normal(name)) if weight else 0.0
+        for target in expand_sides(name):
+            side = 0.0 if target == name and not _is_one_sided(name) else 1.0 - 2.0 * target.endswith("Right")
+            varied[target] = min(max(mean * (1.0 + asymmetry * side), 0.0), 1.0)
+    return varied
 
 
-def _is_side(name: str) -> bool:
-    """Return whether it is one of a pair, which mouthLeft and jawRight are not."""
+def _is_one_sided(name: str) -> bool:
+    """Return whether a target has a mirrored counterpart, unlike mouthLeft and jawRight."""
     return name.endswith(SIDES) and not name.startswith(("jaw", "mouthLeft", "mouthRight"))
 
 
@@ -126,53 +132,54 @@ def _is_side(name: str) -> bool:
 class Sampler:
     """Sampler of the parameters of each image.
 
-    images_per_person : consecutive images that show one person
-    distributions : by name of their parameter
-    correlated : by name the weights of the independent normal numbers of others, see `Correlated.rows`
-    expressions : weights by name of the expression
+    images_per_person : number of consecutive images that show the same person
+    distributions : distributions by name of their parameter
+    cholesky_rows : weights of independent normal numbers by parameter, see `CorrelationGroup.cholesky_rows`
+    expressions : weights of morph targets by name of the expression
     """
 
     seed: int
     images_per_person: int
     distributions: Mapping[str, Distribution]
-    correlated: Mapping[str, Mapping[str, float]]
+    cholesky_rows: Mapping[str, Mapping[str, float]]
     expressions: Mapping[str, Weights]
 
     def parameters(self, k: int) -> Parameters:
-        """Return the parameters of image k, which depend on nothing but their own names."""
+        """Return the parameters of image k, which do not depend on other images."""
         person = k // self.images_per_person
         found: Parameters = {"person.number": person}
         if "person.head" not in self.distributions:
-            found["person.seed"] = int(uniform(self.seed, person, "person.seed") * _SEEDS)
-        for name, one in self.distributions.items():
+            found["person.seed"] = int(hashed_uniform(self.seed, person, "person.seed") * _SEED_COUNT)
+        for name, distribution in self.distributions.items():
             if not name.startswith("pose."):
-                found[name] = self._value(k, name, one)
+                found[name] = self._sample(k, name, distribution)
         if found["background.kind"] == "environment" and found["environment.name"] == NONE:
             found["background.kind"] = "gradient"
-        for names, applies in _APPLIES:
+        for prefixes, applies in _CONDITIONAL:
             if not applies(found):
-                found = {name: value for name, value in found.items() if not name.startswith(names)}
-        return found | {f"pose.{name}": weight for name, weight in self._weights(k, found).items()}
+                found = {name: value for name, value in found.items() if not name.startswith(prefixes)}
+        return found | {f"pose.{name}": weight for name, weight in self._target_weights(k, found).items()}
 
-    def _value(self, k: int, name: str, one: Distribution) -> float | str:
-        value = one.at(0.5 if isinstance(one, Constant) else self._quantile(k, name))
+    def _sample(self, k: int, name: str, distribution: Distribution) -> float | str:
+        is_constant = isinstance(distribution, Constant)
+        value = distribution.quantile(0.5 if is_constant else self._probability(k, name))
         return value if isinstance(value, str) else round_significant(value)
 
-    def _quantile(self, k: int, name: str) -> float:
-        """Return the share from 0 to 1 at which a parameter's distribution is read."""
-        weights = self.correlated.get(name)
+    def _probability(self, k: int, name: str) -> float:
+        """Return the cumulative probability at which a parameter's distribution is evaluated."""
+        weights = self.cholesky_rows.get(name)
         if weights is None:
             return self._uniform(k, name)
         return float(ndtr(sum(weight * self._normal(k, other) for other, weight in weights.items())))
 
     def _uniform(self, k: int, name: str) -> float:
-        number = k // self.images_per_person if name.startswith(_PERSON) else k
-        return uniform(self.seed, number, name)
+        number = k // self.images_per_person if name.startswith(_PERSON_PREFIX) else k
+        return hashed_uniform(self.seed, number, name)
 
     def _normal(self, k: int, name: str) -> float:
         return float(ndtri(self._uniform(k, name)))
 
-    def _weights(self, k: int, found: Parameters) -> dict[str, float]:
+    def _target_weights(self, k: int, found: Parameters) -> dict[str, float]:
         """Return the weights of all morph targets that the spec can move."""
         name = str(found["expression.name"])
         if name == MIXTURE:
@@ -180,22 +187,28 @@ class Sampler:
         else:
             weights = self.expressions[name]
         intensity, asymmetry, variation = (float(found[f"expression.{dial}"]) for dial in _DIALS)
-        normal = partial(self._variation, k)
-        made: dict[str, float | str] = {**expression_weights(weights, intensity, asymmetry, variation, normal)}
-        for target, one in table_of(self.distributions, "pose").items():
-            made |= dict.fromkeys(targets_of([target]), self._value(k, f"pose.{target}", one))
-        return {target: round_significant(float(made.get(target, 0.0))) for target in self.targets}
-
-    def _variation(self, k: int, name: str) -> float:
-        return self._normal(k, f"expression.variation.{name}")
+        varied = expression_weights(
+            weights,
+            intensity,
+            asymmetry,
+            variation,
+            lambda name: self._normal(k, f"expression.variation.{name}"),
+        )
+        sampled: dict[str, float | str] = {**varied}
+        for target, distribution in table_values(self.distributions, "pose").items():
+            sampled |= dict.fromkeys(
+                expand_targets([target]), self._sample(k, f"pose.{target}", distribution)
+            )
+        return {target: round_significant(float(sampled.get(target, 0.0))) for target in self.targets}
 
     @cached_property
     def targets(self) -> tuple[str, ...]:
-        """Names of all morph targets that the spec can move, sorted."""
-        names = set(table_of(self.distributions, "pose"))
+        """Return the sorted names of all morph targets that the spec can move."""
+        names = set(table_values(self.distributions, "pose"))
         for name in map(str, self.distributions["expression.name"].support):
             if name == MIXTURE:
-                names |= {target for part in load_movements().values() for one in part for target in one.moves}
+                for movements in load_movements().values():
+                    names.update(*(movement.target_weights for movement in movements))
             else:
                 names |= set(self.expressions[name])
-        return tuple(sorted(targets_of(sorted(names))))
+        return tuple(sorted(expand_targets(sorted(names))))

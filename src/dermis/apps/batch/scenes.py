@@ -1,4 +1,4 @@
-"""Scene of an image by its sampled parameters."""
+"""Scene of an image, built from its sampled parameters."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dermis.apps.batch.cameras import sampled_camera, face_points
-from dermis.apps.batch.lighting import sampled_lights, direction_from_angles
+from dermis.apps.batch.cameras import face_points, sampled_camera
+from dermis.apps.batch.lighting import direction_from_angles, sampled_lights
 from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.spec_tables import ANGLES, NONE, table_of
+from dermis.apps.batch.spec_tables import ANGLES, NONE, table_values
 from dermis.base.reading import is_file
-from dermis.formats.motion.captures import turning_bones
+from dermis.formats.motion.captures import find_rotation_bones
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
@@ -26,28 +26,28 @@ from dermis.mesh.rotations import angles_matrix, matrix_angles
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_scene
 from dermis.scene.gaze import looking_at
-from dermis.scene.heads import LEAST_OF_PEOPLE, load_head
+from dermis.scene.heads import MIN_HUMAN_LEVELS, load_head
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn
 
-_ALL_HAIRS_PIXELS = 1000  # side of pictures that resolve all hairs, at 230 mm
-_LEAST_HAIRS = 0.2
-_FAR_MM = 1e4  # distance of a gaze by angles
+_ALL_HAIRS_PIXELS = 1000  # side of the pictures that get all hairs; they show 230 mm at the closest
+_MIN_HAIR_FRACTION = 0.2
+_GAZE_DISTANCE_MM = 1e4  # distance of the gaze target if the gaze is given by angles
 _SEED, _HEAD = "person.seed", "person.head"
-_KEPT_SAMPLED, _KEPT_NAMED = 1, 8  # sampled people do not return, heads by name do
-_NO_FIELDS = "number", "seed", "head"  # of a `Human`
+_CACHED_SAMPLED_PEOPLE, _CACHED_FILE_HEADS = 1, 8  # a sampled person is not used again, a named head is
+_NOT_FIELDS = "number", "seed", "head"  # parameters that are not fields of `Human`
 
 
 @dataclass(frozen=True)
 class _Person:
-    """Head with what does not depend on the image.
+    """Head with everything that is the same in all of its images.
 
-    points : of its face, see `face_points`
-    bones : by name, the share of a rotation of the head that each takes
-    skin : of the person, before the spec's dials
+    points : control points of the face, see `face_points`
+    bones : fraction of the head's rotation that each bone performs, by name
+    skin : skin of the person, before the spec's [skin] is applied
     """
 
     head: Head
@@ -57,14 +57,14 @@ class _Person:
 
 
 class SceneBuilder:
-    """Maker of the scenes of a data set; keeps people that may return, which changes no result."""
+    """Builder of the scenes of a data set, with a cache of people that does not affect the results."""
 
     def __init__(self, spec: Spec) -> None:
         self.spec = spec
         self._people: OrderedDict[frozenset[tuple[str, float | str]], _Person] = OrderedDict()
 
-    def scene(self, parameters: Parameters) -> tuple[Scene, Settings]:
-        """Return the scene of an image and its settings, which depend on the parameters alone.
+    def build(self, parameters: Parameters) -> tuple[Scene, Settings]:
+        """Return the scene of an image and its settings, which depend on the parameters only.
 
         parameters : see `Spec.parameters`
 
@@ -75,7 +75,7 @@ class SceneBuilder:
         pose = Pose(self._weights(parameters, head), _bone_angles(_head_rotation(parameters), person.bones))
         motion = pose.motion(head.control)
         camera = sampled_camera(parameters, head, person.points, motion, width / height)
-        dials = table_of(parameters, "skin")
+        dials = table_values(parameters, "skin")
         if "profile" in dials:
             dials["profile"] = self._path(dials["profile"])
         scene = Scene(
@@ -89,39 +89,40 @@ class SceneBuilder:
         return scene, self.spec.render.replace(**_background(parameters))
 
     def _person(self, parameters: Parameters) -> _Person:
-        own = table_of(parameters, "person")
-        key = frozenset((name, one) for name, one in own.items() if name != "number")
+        values = table_values(parameters, "person")
+        key = frozenset((name, value) for name, value in values.items() if name != "number")
         if key not in self._people:
-            self._people[key] = self._new_person(parameters)
+            self._people[key] = self._build_person(parameters)
         self._people.move_to_end(key)
-        while len(self._people) > (_KEPT_NAMED if _HEAD in parameters else _KEPT_SAMPLED):
+        while len(self._people) > (_CACHED_FILE_HEADS if _HEAD in parameters else _CACHED_SAMPLED_PEOPLE):
             self._people.popitem(last=False)
         return self._people[key]
 
-    def _new_person(self, parameters: Parameters) -> _Person:
+    def _build_person(self, parameters: Parameters) -> _Person:
         size = self.spec.size
         if _HEAD not in parameters:
             human = sampled_person(parameters)
-            head, skin = human.head(subdivide=_levels(size), hairs=_hairs(size)), skin_of(human)
+            head = human.head(subdivide=_subdivision_levels(size), hairs=_hair_fraction(size))
+            skin = skin_of(human)
         elif Path(name := self._path(parameters[_HEAD])).suffix.lower() == ".toml":
             scene, _ = load_scene(name, size=size)
             head, skin = scene.head, scene.skin
         else:
             head, skin = load_head(name, subdivide=SmoothIn(size=size)), Skin()
-        return _Person(head, face_points(head), turning_bones(head.control.skeleton).head, skin)
+        return _Person(head, face_points(head), find_rotation_bones(head.control.skeleton).head, skin)
 
     def _path(self, name: float | str) -> str:
-        """Return the path of a file in the spec's folder, else the name, of something in the package."""
+        """Return the path of a file in the spec's folder, or the name unchanged if there is no such file."""
         file = self.spec.folder / str(name)
         return str(file) if is_file(file) else str(name)
 
     def _weights(self, parameters: Parameters, head: Head) -> dict[str, float]:
-        """Return weights of the targets that the head has, and of those that the spec's [pose] names."""
-        own = self.spec.own_targets
+        """Return the weights of the morph targets that the head has or that the spec's [pose] names."""
+        posed = self.spec.pose_targets
         return {
             name: weight
             for name, weight in table_numbers(parameters, "pose").items()
-            if weight and (name in own or name in head.control.target_index)
+            if weight and (name in posed or name in head.control.target_index)
         }
 
     def _environment(self, parameters: Parameters) -> Environment | None:
@@ -133,59 +134,60 @@ class SceneBuilder:
 
 
 def sampled_person(parameters: Parameters) -> Human:
-    """Return the person of a seed, with the fields that the parameters give in place of sampled ones."""
+    """Return the person of a seed, with sampled fields replaced by those of the parameters."""
     fields: dict[str, object] = {}
     looks: dict[str, dict[str, object]] = {}
-    for name, value in table_of(parameters, "person").items():
+    for name, value in table_values(parameters, "person").items():
         part, _, field = name.partition(".")
         if field:
             looks.setdefault(part, {})[field] = value
-        elif name not in _NO_FIELDS:
+        elif name not in _NOT_FIELDS:
             fields[name] = value
     return Human.drawn(int(parameters[_SEED]), **fields, **looks)
 
 
 @cache
-def _levels(size: tuple[int, int]) -> int:
-    """Return the levels of subdivision, equal for all sampled people so that they share their topology."""
-    return max(LEAST_OF_PEOPLE, SmoothIn(size=size)(Human().head(subdivide=0)))
+def _subdivision_levels(size: tuple[int, int]) -> int:
+    """Return the subdivision levels, equal for all sampled people so that they share one topology."""
+    return max(MIN_HUMAN_LEVELS, SmoothIn(size=size)(Human().head(subdivide=0)))
 
 
-def _hairs(size: tuple[int, int]) -> float:
-    """Return the share of hairs that grows: no more than a picture of this size resolves."""
-    return min(1.0, max(_LEAST_HAIRS, max(size) / _ALL_HAIRS_PIXELS))
+def _hair_fraction(size: tuple[int, int]) -> float:
+    """Return the fraction of the hairs to generate: as many as a picture of this size can resolve."""
+    return min(1.0, max(_MIN_HAIR_FRACTION, max(size) / _ALL_HAIRS_PIXELS))
 
 
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:
-    """Return the rotation matrix of the head (3, 3)."""
-    turn = table_numbers(parameters, "head")
-    return np.array(angles_matrix((turn["pitch_deg"], turn["yaw_deg"], turn["roll_deg"])))
+    """Return the rotation matrix (3, 3) of the head."""
+    head = table_numbers(parameters, "head")
+    return np.array(angles_matrix((head["pitch_deg"], head["yaw_deg"], head["roll_deg"])))
 
 
 def _bone_angles(
     rotation: NDArray[np.float64], bones: Mapping[str, float]
 ) -> dict[str, tuple[float, float, float]]:
-    """Return the angles of the bones that turn the head together.
+    """Return the angles of the bones that rotate the head together.
 
-    rotation : (3, 3) of the head
-    bones : by name, the share of it that each takes
+    rotation : (3, 3) rotation of the head
+    bones : fraction of it that each bone performs, by name
     """
     vector = Rotation.from_matrix(rotation).as_rotvec()
-    shares = {
-        share: matrix_angles(Rotation.from_rotvec(share * vector).as_matrix()) for share in {*bones.values()}
+    angles = {
+        fraction: matrix_angles(Rotation.from_rotvec(fraction * vector).as_matrix())
+        for fraction in {*bones.values()}
     }
-    return {name: shares[share] for name, share in bones.items()}
+    return {name: angles[fraction] for name, fraction in bones.items()}
 
 
 def _with_gaze(parameters: Parameters, head: Head, pose: Pose, camera_mm: tuple[float, float, float]) -> Pose:
-    """Return the pose with the eyes turned, where the head has eyes that turn."""
+    """Return the pose with rotated eyes, if the head has eyes that can rotate."""
     if head.eyes is None or head.control.skeleton is None:
         return pose
     target = np.array(camera_mm)
     if parameters["gaze.at"] == ANGLES:
         gaze = table_numbers(parameters, "gaze")
         direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
-        target = _head_rotation(parameters) @ direction * _FAR_MM
+        target = _head_rotation(parameters) @ direction * _GAZE_DISTANCE_MM
     return looking_at(head, target, pose)
 
 

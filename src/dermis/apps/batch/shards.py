@@ -1,4 +1,4 @@
-"""Shards: the unit in which a data set is rendered, written and found again."""
+"""Shards: the files or folders of consecutive images in which a data set is rendered."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from dermis.apps.batch.atomic_files import unfinished_files, remove, move_into_place, temporary_path
+from dermis.apps.batch.atomic_files import move_into_place, remove_path, temporary_path, unfinished_files
 from dermis.apps.batch.shard_formats import (
-    MAX_MANIFEST_BYTES,
     MANIFEST_NAME,
+    MAX_MANIFEST_BYTES,
     FolderWriter,
     ShardManifest,
     TarWriter,
     folder_sha256,
-    made_with,
     parse_manifest,
-    tar_sha256,
     read_tar_manifest,
+    software_versions,
+    tar_sha256,
 )
 from dermis.apps.batch.spec import Spec
 from dermis.base.atomic_write import refuse_output
-from dermis.base.errors import DermisError, refuse, shortened
-from dermis.base.reading import opened, read_file, understood
+from dermis.base.errors import DermisError, refuse, shorten
+from dermis.base.reading import open_regular_file, parsing, read_file
 
-EXPECTED = "a shard of a data set"
+SHARD_DESCRIPTION = "a shard of a data set"
 _SHARD_NAME = re.compile(r"shard-(\d{5,9})(\.tar)?")
-_LONGEST_REASON = 200  # letters
+_MAX_REASON_LENGTH = 200  # characters
 
 
 @dataclass(frozen=True, order=True)
 class Shard:
-    """Images from `first` to before `stop`."""
+    """Shard number and its range of images, from `first` up to but excluding `stop`."""
 
     index: int
     first: int
@@ -43,7 +43,7 @@ class Shard:
 
 
 def list_shards(spec: Spec) -> list[Shard]:
-    """Return all shards of a data set, the last one with the remaining images."""
+    """Return all shards of a data set; the last one has the remaining images."""
     starts = range(0, spec.count, spec.shard_size)
     return [Shard(k, first, min(first + spec.shard_size, spec.count)) for k, first in enumerate(starts)]
 
@@ -54,43 +54,44 @@ def shard_path(out: Path, shard: Shard, spec: Spec) -> Path:
 
 
 def shard_index(path: Path) -> int | None:
-    """Return the number of a shard by its name, None for other names."""
+    """Return the number of a shard from its file name; None for other names."""
     found = _SHARD_NAME.fullmatch(path.name)
     return int(found[1]) if found else None
 
 
 def image_key(number: int) -> str:
-    """Return the prefix of the names of an image's files."""
+    """Return the common prefix of the names of an image's files."""
     return f"{number:09d}"
 
 
 class ShardWriter:
-    """Writer of a shard, which gets its name when the context is left without an error.
+    """Context manager that writes a shard; the shard is renamed to its final path on a normal exit.
 
-    adapter : that renders it, for the datasheet
+    adapter : name of the adapter that renders it, for the datasheet
 
-    Raises DermisError when it cannot be written, with nothing left of it.
+    Raises DermisError if it cannot be written; nothing of it is then left on the disk.
     """
 
     def __init__(self, out: Path, shard: Shard, spec: Spec, adapter: str = "") -> None:
         self._target, self._shard, self._spec = shard_path(out, shard, spec), shard, spec
-        self._unfinished, self._adapter = temporary_path(self._target), adapter
-        self._next = shard.first
+        self._temporary, self._adapter = temporary_path(self._target), adapter
+        self._next_number = shard.first
         self._written, self._left_out = 0, dict[int, str]()
 
     def __enter__(self) -> Self:
-        kind = TarWriter if self._spec.format == "webdataset" else FolderWriter
+        """Create the temporary file or folder."""
+        writer = TarWriter if self._spec.format == "webdataset" else FolderWriter
         try:
-            self._files: TarWriter | FolderWriter = kind(self._unfinished)
+            self._files: TarWriter | FolderWriter = writer(self._temporary)
         except OSError as fault:
             refuse_output(self._target, fault)
         return self
 
     def add(self, number: int, entries: Mapping[str, bytes]) -> None:
-        """Write the files of an image by suffix; images come in the order of their numbers."""
-        if not self._next <= number < self._shard.stop:
-            raise ValueError(f"image {number} comes after {self._next - 1}, in {self._shard}")
-        self._next, self._written = number + 1, self._written + 1
+        """Write the files of an image by suffix; images must come in the order of their numbers."""
+        if not self._next_number <= number < self._shard.stop:
+            raise ValueError(f"image {number} was added after {self._next_number - 1}, in {self._shard}")
+        self._next_number, self._written = number + 1, self._written + 1
         try:
             for suffix in sorted(entries):
                 self._files.add(f"{image_key(number)}.{suffix}", entries[suffix])
@@ -98,69 +99,77 @@ class ShardWriter:
             refuse_output(self._target, fault)
 
     def leave_out(self, number: int, reason: str) -> None:
-        """Record an image that could not be made."""
-        self._left_out[number] = shortened(reason, _LONGEST_REASON)
+        """Record an image that could not be rendered."""
+        self._left_out[number] = shorten(reason, _MAX_REASON_LENGTH)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Write the manifest and rename the shard to its final path, or remove it after an error."""
         try:
             if error is None:
-                self._files.finish(self._stamp())
-                move_into_place(self._unfinished, self._target)
+                self._files.finish(self._manifest_bytes())
+                move_into_place(self._temporary, self._target)
         except OSError as fault:
             refuse_output(self._target, fault)
         finally:
-            with suppress(OSError):  # a full disk says so again
+            with suppress(OSError):  # a full disk raises again
                 self._files.close()
-            remove(self._unfinished)
+            remove_path(self._temporary)
 
-    def _stamp(self) -> bytes:
+    def _manifest_bytes(self) -> bytes:
         shard, spec = self._shard, self._spec
         if self._written + len(self._left_out) != shard.stop - shard.first:
-            raise ValueError(f"{self._written} images and {len(self._left_out)} left out are not {shard}")
+            raise ValueError(f"{self._written} images and {len(self._left_out)} left out do not fill {shard}")
         left_out = tuple(sorted(self._left_out.items()))
-        digest, made = self._files.sha256(), made_with(self._adapter)
-        stamp = ShardManifest(spec.digest(), shard.index, shard.first, shard.stop, left_out, digest, made).data()
-        if len(stamp) > MAX_MANIFEST_BYTES:
-            came = f"{len(left_out)} could not be made, such as: {left_out[0][1]}"
-            refuse(self._target, "a shard of images most of which can be made", came, "Correct the spec")
-        return stamp
+        manifest = ShardManifest(
+            spec.digest(),
+            *astuple(shard),
+            left_out=left_out,
+            sha256=self._files.sha256(),
+            made_with=software_versions(self._adapter),
+        )
+        data = manifest.to_bytes()
+        if len(data) > MAX_MANIFEST_BYTES:
+            actual = f"{len(left_out)} failed, for example: {left_out[0][1]}"
+            advice = "Correct the spec"
+            refuse(self._target, "a shard in which most images can be rendered", actual, advice)
+        return data
 
 
 def read_manifest(path: Path) -> ShardManifest:
-    """Return the stamp of a shard; its other bytes are not read.
+    """Return the manifest of a shard without reading its other files.
 
-    Raises DermisError where it is not whole, as far as its end shows.
+    Raises DermisError if the manifest is missing or damaged.
     """
     if path.is_dir():
-        return parse_manifest(read_file(path / MANIFEST_NAME, EXPECTED, MAX_MANIFEST_BYTES), path)
-    with opened(path, EXPECTED) as file, understood(path, EXPECTED):
+        return parse_manifest(read_file(path / MANIFEST_NAME, SHARD_DESCRIPTION, MAX_MANIFEST_BYTES), path)
+    with open_regular_file(path, SHARD_DESCRIPTION) as file, parsing(path, SHARD_DESCRIPTION):
         return parse_manifest(read_tar_manifest(file)[1], path)
 
 
-def is_there(out: Path, shard: Shard, spec: Spec) -> bool:
-    """Return whether a shard exists under its name, which it gets when it is whole.
+def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
+    """Return whether a complete shard exists at its final path.
 
     Raises DermisError for a shard of another data set.
     """
     path = shard_path(out, shard, spec)
     try:
-        stamp = read_manifest(path)
+        manifest = read_manifest(path)
     except DermisError:
         return False
-    if (stamp.spec, stamp.index, stamp.first, stamp.stop) != (spec.digest(), *astuple(shard)):
-        remedy = "Choose another folder, or give the spec that it was begun with"
-        refuse(path, "a shard of this data set", "it belongs to that of another spec", remedy)
+    if (manifest.spec, manifest.index, manifest.first, manifest.stop) != (spec.digest(), *astuple(shard)):
+        advice = "Choose another folder, or use the spec that the folder was created with"
+        refuse(path, "a shard of this data set", "it belongs to another spec", advice)
     return True
 
 
-def is_whole(out: Path, shard: Shard, spec: Spec) -> bool:
-    """Return whether a shard exists with every byte as it was written: all of it is read.
+def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
+    """Return whether a shard exists and its content matches its SHA-256; all of it is read.
 
     Raises DermisError for a shard of another data set.
     """
-    if not is_there(out, shard, spec):
+    if not shard_exists(out, shard, spec):
         return False
     path = shard_path(out, shard, spec)
     with suppress(DermisError):
@@ -169,20 +178,20 @@ def is_whole(out: Path, shard: Shard, spec: Spec) -> bool:
 
 
 def remove_unfinished(out: Path, shards: Collection[Shard] | None = None) -> None:
-    """Remove unfinished files of killed runs.
+    """Remove temporary files of interrupted runs.
 
-    shards : that no other run works on; all where None
+    shards : shards that no other run is writing; all if None
     """
-    mine = None if shards is None else {shard.index for shard in shards}
+    own = None if shards is None else {shard.index for shard in shards}
     for path, name in unfinished_files(out).items():
         index = shard_index(Path(name))
-        if mine is None or index is None or index in mine:
-            remove(path)
+        if own is None or index is None or index in own:
+            remove_path(path)
 
 
 def _sha256(path: Path) -> str:
-    """Return the hash of all files of a shard before its stamp."""
+    """Return the SHA-256 of all files of a shard before its manifest."""
     if path.is_dir():
         return folder_sha256(path, sorted(one.name for one in path.iterdir() if one.name != MANIFEST_NAME))
-    with opened(path, EXPECTED) as file, understood(path, EXPECTED):
+    with open_regular_file(path, SHARD_DESCRIPTION) as file, parsing(path, SHARD_DESCRIPTION):
         return tar_sha256(file, read_tar_manifest(file)[0])

@@ -1,4 +1,4 @@
-"""Specification of a data set: distributions of people, faces, light and cameras, and one seed."""
+"""Spec of a data set: distributions of people, faces, light and cameras, with one seed."""
 
 from __future__ import annotations
 
@@ -12,131 +12,136 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, Field, PrivateAttr
 
 from dermis.apps.batch import spec_tables as tables
-from dermis.apps.batch.distributions import Distribution, Files
+from dermis.apps.batch.distributions import Distribution, FileChoice
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
 from dermis.apps.batch.spec_checks import check_landmarks, check_spec
-from dermis.base.errors import about, refuse, shown_value
-from dermis.base.quantities import whole_number
-from dermis.base.reading import is_file, named_path, read_file, read_toml
-from dermis.human.expressions import EXPRESSIONS, targets_of
+from dermis.base.errors import error_context, format_value, refuse
+from dermis.base.quantities import checked_integer
+from dermis.base.reading import checked_path, is_file, read_file, read_toml
+from dermis.human.expressions import EXPRESSIONS, expand_targets
 from dermis.human.landmarks.sets import SETS
-from dermis.scene.field_errors import Because, ImpossibleError
-from dermis.scene.outputs import checked_outputs
-from dermis.scene.plain import Plain
+from dermis.scene.field_errors import BoundsReason, InvalidFieldsError
+from dermis.scene.frozen_model import FrozenModel
+from dermis.scene.outputs import check_outputs
 from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
 MAX_IMAGES = 10**9
 RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
-"""Settings that a data set has where its spec says nothing."""
+"""Render settings of a spec without [render]."""
 _BACKGROUND = "[background]"
-SETTINGS_OUTSIDE_RENDER = {"size": "size, above all tables", "background": _BACKGROUND, "background_blur": _BACKGROUND}
-"""Settings that [render] does not hold, and where a spec has them."""
+SETTINGS_OUTSIDE_RENDER = {
+    "size": "size, above all tables",
+    "background": _BACKGROUND,
+    "background_blur": _BACKGROUND,
+}
+"""Settings that are not keys of [render], and where a spec states them instead."""
 _Weight = Annotated[float, Field(ge=0, le=1)]
 _HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
-_MOST_FILES = 100_000
-_MOST_BYTES = 4 << 30
-_FILES = "person.head", "environment.name", "skin.profile"
-"""Parameters that may name files."""
-P = TypeVar("P", bound=Plain)
+_MAX_FILES = 100_000
+_MAX_BYTES = 4 << 30
+_FILE_PARAMETERS = "person.head", "environment.name", "skin.profile"
+"""Parameters whose values may be files."""
+P = TypeVar("P", bound=FrozenModel)
 
 
-class Spec(Plain):
+class Spec(FrozenModel):
     """Specification of a data set."""
 
-    count: Annotated[int, Field(ge=1, le=MAX_IMAGES), Because("a billion images")] = 1000
-    """How many images."""
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1), Because("32 bits")] = 0
-    """By which all is drawn."""
-    images_per_person: Annotated[int, Field(ge=1, le=10**6), Because("a million of each")] = 1
-    """Images one after the other that show one person."""
+    count: Annotated[int, Field(ge=1, le=MAX_IMAGES), BoundsReason("a billion images")] = 1000
+    """Number of images."""
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1), BoundsReason("32 bits")] = 0
+    """Seed of all random numbers."""
+    images_per_person: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million of each")] = 1
+    """Number of consecutive images that show the same person."""
     outputs: tuple[str, ...] = ()
-    """What is written of each image besides its colour, as of `dermis render --outputs`."""
+    """Outputs written for each image beside the picture, as in `dermis render --outputs`."""
     landmarks: tuple[str, ...] = ("ibug-68",)
-    """Sets of landmarks, or tables of name,vertex for meshes of your own (.csv, in the spec's folder)."""
-    shard_size: Annotated[int, Field(ge=1, le=10**6), Because("a million in a file")] = 1000
-    """Images in a shard."""
+    """Landmark sets, or tables of name,vertex for your own meshes (.csv, in the spec's folder)."""
+    shard_size: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million in a file")] = 1000
+    """Images per shard."""
     format: Literal["webdataset", "folder"] = "webdataset"
-    """Shards as tar files, or as folders."""
+    """Shards as tar files (webdataset) or as folders."""
     encoding: Encoding = "png"
-    """Files of the outputs: png (16 bits where they suffice), exr or npy (all bits)."""
+    """File format of the outputs: png (16 bits, where sufficient), exr or npy (all bits)."""
     render: Settings = Field(default_factory=lambda: Settings(size=(512, 512), **RENDER_DEFAULTS))
-    """How pictures are computed; `size` and the background stand elsewhere."""
+    """Render settings, without `size` and the background, which have their own keys."""
     person: tables.PersonTable = tables.PersonTable()
-    """Who is seen."""
+    """People."""
     expression: tables.ExpressionTable = tables.ExpressionTable()
-    """What the face does."""
+    """Facial expression."""
     expressions: dict[str, dict[str, _Weight]] = Field(default_factory=dict)
-    """Expressions of the spec's own: weights of targets, or of pairs without Left and Right."""
+    """Expressions of this spec: weights of morph targets; a name without Left or Right sets both sides."""
     pose: dict[str, Annotated[Distribution, tables.DistributionField()]] = Field(default_factory=dict)
-    """Weights of morph targets, or of pairs, in place of those that the expression gives."""
-    head: tables.TurnTable = tables.TurnTable()
-    """How the head is turned."""
+    """Weights of morph targets, or of left and right pairs, that replace those of the expression."""
+    head: tables.HeadRotationTable = tables.HeadRotationTable()
+    """Rotation of the head."""
     gaze: tables.GazeTable = tables.GazeTable()
-    """Where the eyes look."""
+    """Gaze direction."""
     camera: tables.CameraTable = tables.CameraTable()
-    """From where the face is seen."""
+    """Camera position."""
     skin: dict[str, Annotated[Distribution, tables.DistributionField()]] = Field(default_factory=dict)
-    """Dials of the skin, as of scenes: roughness, oiliness, ..."""
+    """Skin settings, as in scenes: roughness, oiliness, ..."""
     light: tables.LightTable = tables.LightTable()
     """Lamps."""
     environment: tables.EnvironmentTable = tables.EnvironmentTable()
-    """Light from all around."""
+    """Environment light."""
     background: tables.BackgroundTable = tables.BackgroundTable()
-    """What is behind the head."""
-    correlated: tuple[tables.Correlated, ...] = ()
-    """Parameters that go together."""
+    """Background."""
+    correlated: tuple[tables.CorrelationGroup, ...] = ()
+    """Correlated parameters."""
     files: dict[str, str] = Field(default_factory=dict)
-    """SHA-256 of each file that the spec names; found when it is read, and checked where it is stated."""
+    """SHA-256 of each file that the spec names; computed on reading, and compared if given."""
     folder: Path = Field(default=Path(), exclude=True)
-    """Where those files lie; no part of a spec's text."""
+    """Folder of the files that the spec names; not part of its TOML."""
 
     _sampler: Sampler = PrivateAttr()
 
     def model_post_init(self, context: object) -> None:
-        sampled = _distributions("", self)
+        """Check the values across tables and prepare the sampler."""
+        distributions = _distributions("", self)
         expressions = {**EXPRESSIONS, **self.expressions}
-        with about("outputs"):
-            checked_outputs(self.outputs)
+        with error_context("outputs"):
+            check_outputs(self.outputs)
         check_landmarks(self.landmarks, self.folder)
-        check_spec(sampled, expressions, self.correlated, self.folder)
-        rows = {name: row for group in self.correlated for name, row in group.rows().items()}
-        sampler = Sampler(self.seed, self.images_per_person, sampled, rows, expressions)
+        check_spec(distributions, expressions, self.correlated, self.folder)
+        rows = {name: row for group in self.correlated for name, row in group.cholesky_rows().items()}
+        sampler = Sampler(self.seed, self.images_per_person, distributions, rows, expressions)
         BaseModel.__setattr__(self, "_sampler", sampler)
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the pictures [pixel]."""
+        """Return width and height of the pictures [pixel]."""
         return self.render.size
 
     @property
     def distributions(self) -> Mapping[str, Distribution]:
-        """Distributions by name of their parameter."""
+        """Return the distributions by the dotted names of their parameters."""
         return self._sampler.distributions
 
     @property
     def landmark_tables(self) -> Mapping[str, str]:
-        """Sets of landmarks by name in the spec: the same name, or the path of a table."""
+        """Return the landmark sets by name: the name of a set of the package, or the path of a table."""
         return {name: name if name in SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
-    def own_targets(self) -> frozenset[str]:
-        """Morph targets that [pose] names, alone or as one of a pair."""
-        return frozenset(targets_of(self.pose))
+    def pose_targets(self) -> frozenset[str]:
+        """Return the morph targets that [pose] names, singly or as a left and right pair."""
+        return frozenset(expand_targets(self.pose))
 
     def parameters(self, k: int) -> Parameters:
-        """Return the sampled parameters of image k by name: numbers of six digits, and texts.
+        """Return the sampled parameters of image k by name: texts, and numbers with six significant digits.
 
         They are equal on every machine and in any order, and changing or adding a distribution changes no
-        other parameter. An image lacks those that it does not use, such as of lamps that are not lit.
+        other parameter. Parameters that an image does not use, such as those of unused lamps, are omitted.
 
-        Raises DermisError for an image that the data set does not have.
+        Raises DermisError if k is not the number of an image.
         """
-        return self._sampler.parameters(whole_number("image", k, 0, self.count - 1))
+        return self._sampler.parameters(checked_integer("image", k, 0, self.count - 1))
 
-    def text(self) -> str:
-        """Return the canonical form: TOML of every value, which reads as the same spec."""
+    def to_toml(self) -> str:
+        """Return the canonical TOML with all values, which `parse_spec` reads as the same spec."""
         values = plain_values(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
         values["render"] = self.render.model_dump(exclude=set(SETTINGS_OUTSIDE_RENDER), exclude_none=True)
@@ -144,151 +149,161 @@ class Spec(Plain):
         return "\n".join([_HEADER, *_toml_lines("", values)])
 
     def digest(self) -> str:
-        """Return the SHA-256 of the text, which identifies a data set."""
-        return hashlib.sha256(self.text().encode()).hexdigest()
+        """Return the SHA-256 of the canonical TOML, which identifies the data set."""
+        return hashlib.sha256(self.to_toml().encode()).hexdigest()
 
 
 def _distributions(name: str, value: object) -> dict[str, Distribution]:
-    """Return the distributions in a table and below, by dotted names."""
+    """Return the distributions in a table and its subtables by dotted names."""
     if isinstance(value, Distribution):
         return {name: value}
-    parts = plain_values(value) if isinstance(value, Plain) else value
+    parts = plain_values(value) if isinstance(value, FrozenModel) else value
     if not isinstance(parts, Mapping):
         return {}
-    start = f"{name}." if name else ""
-    return {key: one for part in parts for key, one in _distributions(f"{start}{part}", parts[part]).items()}
+    found: dict[str, Distribution] = {}
+    for key, part in parts.items():
+        found |= _distributions(f"{name}.{key}" if name else key, part)
+    return found
 
 
 def load_spec(path: str | Path, **values: object) -> Spec:
-    """Return the spec of a TOML file; files that it names are relative to its folder.
+    """Return the spec of a TOML file; paths in it are relative to its folder.
 
-    values : `count`, `seed` or `size` in place of the file's
+    values : `count`, `seed`, `size` or `format` that replace those of the file
 
-    Raises DermisError, naming table and key, for what cannot be rendered and for missing files.
+    Raises DermisError with table and key for values that cannot be rendered, and for missing files.
     """
-    path = named_path(path, "a spec of a data set in TOML")
+    path = checked_path(path, "a spec of a data set in TOML")
     data = read_toml(path, "a spec of a data set in TOML")
-    with about(path):
+    with error_context(path):
         return parse_spec({**data, **values}, path.parent)
 
 
 def parse_spec(data: Mapping[str, object], folder: Path = Path()) -> Spec:
     """Return the spec of parsed TOML.
 
-    folder : of the files that it names
+    folder : folder of the files that it names
 
     Raises DermisError as `load_spec` does.
     """
     if "folder" in data:
-        refuse("folder", "no such key", "it came", "Files lie relative to the spec's own folder")
-    given = {
-        name: table if name == "files" else _with_files(table, folder, name) for name, table in data.items()
+        refuse("folder", "no such key", "it is given", "Paths are relative to the folder of the spec")
+    fields = {
+        name: table if name == "files" else _expand_patterns(table, folder, name)
+        for name, table in data.items()
     }
-    given["render"] = _render(given.pop("size", (512, 512)), given.get("render", {}))
-    if isinstance(groups := given.get("correlated", ()), list | tuple):
-        given["correlated"] = tuple(_model(tables.Correlated, "correlated", group) for group in groups)
-    spec = _model(Spec, "", given | {"folder": folder})
-    support = [end for name in _FILES if name in spec.distributions for end in spec.distributions[name].support]
-    tables_named = (name for name in spec.landmarks if name not in SETS)
-    found = _hashes([*map(str, support), *tables_named], folder)
+    fields["render"] = _parse_render(fields.pop("size", (512, 512)), fields.get("render", {}))
+    if isinstance(groups := fields.get("correlated", ()), list | tuple):
+        fields["correlated"] = tuple(
+            _build_model(tables.CorrelationGroup, "correlated", group) for group in groups
+        )
+    spec = _build_model(Spec, "", fields | {"folder": folder})
+    names = [name for name in spec.landmarks if name not in SETS]
+    for parameter in spec.distributions.keys() & set(_FILE_PARAMETERS):
+        names += map(str, spec.distributions[parameter].support)
+    hashes = _file_hashes(names, folder)
     if spec.files:
-        _check_hashes(spec.files, found)
-    return spec.replace(files=found) if found else spec
+        _check_hashes(spec.files, hashes)
+    return spec.replace(files=hashes) if hashes else spec
 
 
 def example_toml() -> str:
-    """A spec with comments that can be drawn as it is."""
+    """Return a commented example spec that can be rendered unchanged."""
     return resources.files(__package__).joinpath("example.toml").read_text("utf-8")
 
 
-def _render(size: object, table: object) -> Settings:
+def _parse_render(size: object, table: object) -> Settings:
     if not isinstance(table, Mapping):
-        return _model(Settings, "render", table)
+        return _build_model(Settings, "render", table)
     for key in SETTINGS_OUTSIDE_RENDER.keys() & table.keys():
-        refuse(f"render: {key}", "it elsewhere in a spec", "it came here", f"Write it as {SETTINGS_OUTSIDE_RENDER[key]}")
-    return _model(Settings, "render", {**RENDER_DEFAULTS, **table, "size": size})
+        advice = f"Write it as {SETTINGS_OUTSIDE_RENDER[key]}"
+        refuse(f"render: {key}", "no such key in [render]", "it is given here", advice)
+    return _build_model(Settings, "render", {**RENDER_DEFAULTS, **table, "size": size})
 
 
-def _model(kind: type[P], where: str, table: object) -> P:
-    """Return a model of a table and of those below it, which are named in errors."""
+def _build_model(kind: type[P], title: str, table: object) -> P:
+    """Return the model of a table and of its subtables; errors name the table."""
     if isinstance(table, kind):
         return table
     if not isinstance(table, Mapping):
         expected = f"a table with {', '.join(kind.model_fields)}"
-        refuse(where, expected, f"{shown_value(table)} came", "Correct it")
+        refuse(title, expected, f"got {format_value(table)}", "Correct it")
     values = dict(table)
     for name, info in kind.model_fields.items():
-        if name in values and isinstance(info.annotation, type) and issubclass(info.annotation, Plain):
-            values[name] = _model(info.annotation, f"{where}.{name}" if where else name, values[name])
+        if name in values and isinstance(info.annotation, type) and issubclass(info.annotation, FrozenModel):
+            values[name] = _build_model(info.annotation, f"{title}.{name}" if title else name, values[name])
     try:
         return kind(**values)
-    except ImpossibleError as error:
-        raise ImpossibleError(where or "spec", error.findings) from None
+    except InvalidFieldsError as error:
+        raise InvalidFieldsError(title or "spec", error.messages) from None
 
 
-def plain_values(table: Plain) -> dict[str, object]:
-    """Return the fields that have a value, by name."""
+def plain_values(table: FrozenModel) -> dict[str, object]:
+    """Return the fields that are not None, by name."""
     values = {name: getattr(table, name) for name in type(table).model_fields}
     return {name: value for name, value in values.items() if value is not None}
 
 
 def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
-    """Return the TOML of a table and of those below it."""
+    """Return the TOML of a table and its subtables."""
     own, below = dict[str, object](), list[str]()
     for name, value in values.items():
         path = f"{title}.{key_text(name)}" if title else key_text(name)
-        if isinstance(value, Plain | Mapping):
-            below += _toml_lines(path, plain_values(value) if isinstance(value, Plain) else value)
-        elif isinstance(value, tuple) and value and isinstance(value[0], Plain):
+        if isinstance(value, FrozenModel | Mapping):
+            below += _toml_lines(path, plain_values(value) if isinstance(value, FrozenModel) else value)
+        elif isinstance(value, tuple) and value and isinstance(value[0], FrozenModel):
             below += [table_text(f"[[{path}]]", plain_values(one)) for one in value]
         else:
             own[name] = value.spec_value() if isinstance(value, Distribution) else value
     return [table_text(f"[{title}]" if title else "", own), *below] if own or not below else below
 
 
-def _with_files(value: object, folder: Path, key: str) -> object:
+def _expand_patterns(value: object, folder: Path, key: str) -> object:
     """Return a value of a spec in which each {files = PATTERN} is replaced by its sorted files.
 
-    Raises DermisError for patterns that no file matches.
+    Raises DermisError for a pattern that matches no file.
     """
     if not isinstance(value, Mapping):
         return value
     if value.keys() == {"files"} and isinstance(value["files"], str):
-        return _files(value["files"], folder, key)
-    return {name: _with_files(one, folder, f"{key}.{name}") for name, one in value.items()}
+        return _match_files(value["files"], folder, key)
+    return {name: _expand_patterns(one, folder, f"{key}.{name}") for name, one in value.items()}
 
 
-def _files(pattern: str, folder: Path, key: str) -> Files:
+def _match_files(pattern: str, folder: Path, key: str) -> FileChoice:
     names = []
     try:
         for path in folder.glob(pattern):
             if is_file(path):
                 names.append(Path(os.path.relpath(path, folder)).as_posix())
-            if len(names) > _MOST_FILES:
+            if len(names) > _MAX_FILES:
                 break
     except (ValueError, NotImplementedError, OSError, RecursionError) as fault:
-        came = f"{pattern!r} is none ({fault or type(fault).__name__})"
-        refuse(key, "a pattern of files below the spec's folder, such as heads/*.json", came, "Correct it")
-    if not 0 < len(names) <= _MOST_FILES:
-        came = f"more than {_MOST_FILES:,} match" if names else "none matches"
-        refuse(key, f"files that match {pattern!r} in the spec's folder", came, "Correct the pattern")
-    return Files(pattern, tuple(sorted(names)))
+        actual = f"got {pattern!r} ({fault or type(fault).__name__})"
+        refuse(key, "a pattern of files below the spec's folder, such as heads/*.json", actual, "Correct it")
+    if not 0 < len(names) <= _MAX_FILES:
+        actual = f"more than {_MAX_FILES:,} match" if names else "none matches"
+        refuse(key, f"files that match {pattern!r} in the spec's folder", actual, "Correct the pattern")
+    return FileChoice(pattern, tuple(sorted(names)))
 
 
-def _hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
+def _file_hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
     """Return the SHA-256 of those names that are files, sorted by name."""
     found = {}
     for name in sorted(set(names)):
         if is_file(folder / name):
-            data = read_file(folder / name, "a file that the spec names", _MOST_BYTES)
+            data = read_file(folder / name, "a file that the spec names", _MAX_BYTES)
             found[name] = hashlib.sha256(data).hexdigest()
     return found
 
 
-def _check_hashes(stated: Mapping[str, str], found: Mapping[str, str]) -> None:
-    """Refuse files that differ from those that a spec was made with."""
-    for name in sorted(stated.keys() | found.keys()):
-        if stated.get(name) != found.get(name):
-            expected = f"the file of hash {stated[name][:16]}..." if name in stated else "no such file"
-            came = f"it has {found[name][:16]}..." if name in found else "there is none"
-            refuse(f"files: {name}", expected, came, "Put it back, or take [files] out for another data set")
+def _check_hashes(expected: Mapping[str, str], actual: Mapping[str, str]) -> None:
+    """Refuse files whose content differs from that for which the spec was written."""
+    for name in sorted(expected.keys() | actual.keys()):
+        if expected.get(name) != actual.get(name):
+            refuse(
+                f"files: {name}",
+                f"a file with SHA-256 {expected[name][:16]}..." if name in expected else "no such file",
+                f"it has {actual[name][:16]}..." if name in actual else "there is none",
+                "Restore the file, or remove [files] to start another data set",
+            )

@@ -1,4 +1,4 @@
-"""Tables of a spec: their fields, the bounds of these and correlations between them."""
+"""Tables of a spec: their fields with bounds, and correlations between parameters."""
 
 from __future__ import annotations
 
@@ -14,110 +14,114 @@ from pydantic_core.core_schema import (
 )
 
 from dermis.apps.batch.distributions import Constant, Distribution, Uniform, parse_distribution, require
-from dermis.human.published import OLD, YOUNG
+from dermis.human.makehuman import OLD, YOUNG
+from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.lights import light_presets
-from dermis.scene.plain import Plain
 
 RIG = "rig"
 MIXTURE = "mixture"
 NONE = "none"
 CAMERA, ANGLES = "camera", "angles"
 BACKGROUNDS = "none", "gradient", "environment", "colour"
-_REACH = "; normal reaches to 6 sd either way, truncated to its ends"
+_SUPPORT_NOTE = "; normal extends 6 sd to both sides, truncated to its limits"
 
 
 class DistributionField:
-    """For pydantic: `Annotated[Distribution, Anything()]` is read from what a spec states."""
+    """Annotation by which pydantic parses a field as a distribution."""
 
     def check(self, value: object) -> Distribution | None:
-        """Return the distribution that a value describes; None for a field that is left out.
+        """Return the distribution that a value describes; None for an omitted field.
 
-        Raises ValueError, worded as what was expected, for other values and for distributions out of bounds.
+        Raises ValueError with a text of what was expected for other values and for distributions out of
+        bounds.
         """
         if value is None:
             return None
-        found = parse_distribution(value)
-        self.check_support(found)
-        return found
+        distribution = parse_distribution(value)
+        self.check_support(distribution)
+        return distribution
 
-    def check_support(self, found: Distribution) -> None:
-        """Raise ValueError for values that the field cannot have."""
+    def check_support(self, distribution: Distribution) -> None:
+        """Raise ValueError for values that the field does not allow."""
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        serialised = plain_serializer_function_ser_schema(lambda one: one and one.spec_value())
+        """Return the schema that parses and serialises a distribution."""
+        serialised = plain_serializer_function_ser_schema(lambda value: value and value.spec_value())
         return no_info_plain_validator_function(self.check, serialization=serialised)
 
 
-class Within(DistributionField):
-    """Numbers between two bounds.
+class NumberField(DistributionField):
+    """Field of numbers between two bounds.
 
-    why : reason of the bounds
+    reason : reason of the bounds, shown in messages
     """
 
-    def __init__(self, low: float, high: float, why: str = "") -> None:
-        self.ge, self.le, self.why = low, high, why
+    def __init__(self, low: float, high: float, reason: str = "") -> None:
+        self.ge, self.le, self.reason = low, high, reason
 
-    def check_support(self, found: Distribution) -> None:
-        if any(isinstance(end, str) or not self.ge <= end <= self.le for end in found.support):
-            why = f" ({self.why})" if self.why else ""
-            reach = "" if isinstance(found, Constant) else _REACH
-            raise ValueError(f"numbers from {self.ge:.10g} to {self.le:.10g}{why}{reach}")
+    def check_support(self, distribution: Distribution) -> None:
+        """Raise ValueError for texts and for numbers out of bounds."""
+        if any(isinstance(bound, str) or not self.ge <= bound <= self.le for bound in distribution.support):
+            reason = f" ({self.reason})" if self.reason else ""
+            note = "" if isinstance(distribution, Constant) else _SUPPORT_NOTE
+            raise ValueError(f"numbers from {self.ge:.10g} to {self.le:.10g}{reason}{note}")
 
 
-class OneOf(DistributionField):
-    """Names out of a list where there is one, else any name, of a file too."""
+class NameField(DistributionField):
+    """Field of names from a list; without a list, any name or file."""
 
     def __init__(self, known: Callable[[], Iterable[str]] | None = None) -> None:
         self.known = known
 
-    def check_support(self, found: Distribution) -> None:
+    def check_support(self, distribution: Distribution) -> None:
+        """Raise ValueError for numbers and for unknown names."""
         names = list(self.known()) if self.known else []
-        for end in found.support:
-            if not isinstance(end, str) or (names and end not in names):
+        for value in distribution.support:
+            if not isinstance(value, str) or (names and value not in names):
                 raise ValueError(f"one of {', '.join(names)}" if names else "a name, or a choice of names")
-        if names and not found.support:
+        if names and not distribution.support:
             raise ValueError(f"one of {', '.join(names)}, no files")
 
 
-_MOST_NAMES = 50
+_MAX_NAMES = 50
 _Coefficient = Annotated[float, Field(ge=-1, le=1)]
 
 
-class Correlated(Plain):
-    """Correlated parameters: a Gaussian copula, which leaves the distribution of each as it is.
+class CorrelationGroup(FrozenModel):
+    """Correlated parameters: a Gaussian copula, which preserves the distribution of each parameter.
 
-    A greater normal number gives a greater value, or a later one of a choice.
+    A larger normal number gives a larger value, or a later value of a choice.
     """
 
     of: tuple[str, ...]
-    """Names of parameters, such as ["camera.yaw_deg", "head.yaw_deg"]; those of a person first."""
+    """Names of parameters, such as ["camera.yaw_deg", "head.yaw_deg"]; those of [person] first."""
     correlation: _Coefficient | tuple[tuple[_Coefficient, ...], ...]
-    """Of all pairs alike, or the matrix: rows of as many numbers as there are names."""
+    """Correlation of all pairs, or a symmetric matrix with one row per name."""
 
     @model_validator(mode="after")
-    def _possible(self) -> Correlated:
+    def _check_matrix(self) -> CorrelationGroup:
         count = len(self.of)
-        require(2 <= len(set(self.of)) == count <= _MOST_NAMES, f"2 to {_MOST_NAMES} names, each once")
+        require(2 <= len(set(self.of)) == count <= _MAX_NAMES, f"2 to {_MAX_NAMES} names, each once")
         if isinstance(self.correlation, tuple):
             square = [len(row) for row in self.correlation] == [count] * count
-            require(square, f"a correlation of {count} rows of {count} numbers")
+            require(square, f"a correlation matrix of {count} rows of {count} numbers")
         matrix = self.matrix
         symmetric = np.array_equal(matrix, matrix.T) and (np.diag(matrix) == 1).all()
-        require(bool(symmetric), "a correlation that is symmetric, with 1 on its diagonal")
+        require(bool(symmetric), "a correlation matrix that is symmetric, with 1 on its diagonal")
         definite = np.linalg.eigvalsh(matrix)[0] >= 1e-6
-        require(definite, "a correlation that is positive definite: these cannot all be at once")
+        require(definite, "a correlation matrix that is positive definite: these contradict each other")
         return self
 
     @property
     def matrix(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-        """Correlation matrix (n, n)."""
+        """Return the correlation matrix (n, n)."""
         if isinstance(self.correlation, tuple):
             return np.array(self.correlation, np.float64)
         count = len(self.of)
         return np.full((count, count), self.correlation) + (1.0 - self.correlation) * np.eye(count)
 
-    def rows(self) -> dict[str, dict[str, float]]:
-        """Return rows of the Cholesky factor: for each name, weights of independent normal numbers."""
+    def cholesky_rows(self) -> dict[str, dict[str, float]]:
+        """Return the rows of the Cholesky factor: for each name, weights of independent normal numbers."""
         lower = np.linalg.cholesky(self.matrix)
         return {
             name: {other: float(lower[k, j]) for j, other in enumerate(self.of[: k + 1])}
@@ -128,169 +132,174 @@ class Correlated(Plain):
 T = TypeVar("T")
 
 
-def table_of(values: Mapping[str, T], table: str) -> dict[str, T]:
-    """Return the values whose dotted names begin with a table's, by the rest of their names."""
+def table_values(values: Mapping[str, T], table: str) -> dict[str, T]:
+    """Return the values of a table from values by dotted name, by their names within the table."""
     start = f"{table}."
     return {name.removeprefix(start): one for name, one in values.items() if name.startswith(start)}
 
 
-_TURN = Within(-180, 180, "degrees")
-_LEAN = Within(-85, 85, "degrees: straight above there is no side")
-_SHARE = Within(0, 1)
-_AGE = Within(YOUNG, OLD, "years: the ages of the published people")
-_TREND = Within(-1, 1, "0 is the average")
-_MELANIN = Within(0, 10, "0.3 is blond, 8 black")
-_AWAY = Within(150, 20_000, "mm: before the nose, and not across a street")
-_STOPS = Within(0, 100, "light is not negative")
+_ANY_ANGLE = NumberField(-180, 180, "degrees")
+_ELEVATION = NumberField(-85, 85, "degrees: straight above, the yaw is undefined")
+_FRACTION = NumberField(0, 1)
+_AGE = NumberField(YOUNG, OLD, "years: the ages that the human model covers")
+_SIGNED = NumberField(-1, 1, "0 is the average")
+_MELANIN = NumberField(0, 10, "0.3 is blond, 8 black")
+_DISTANCE = NumberField(150, 20_000, "mm: from close-up to telephoto")
+_STRENGTH = NumberField(0, 100, "light cannot be negative")
 _Dials = dict[str, Annotated[Distribution, DistributionField()]]
 
 
-class PersonTable(Plain):
-    """Who is seen: people drawn by a seed, or heads by name. What is left out is as the seed draws it."""
+class PersonTable(FrozenModel):
+    """People: sampled by a seed, or heads by name; the seed determines all omitted keys."""
 
-    head: Annotated[Distribution | None, OneOf()] = None
-    """Heads instead of drawn people: names that `dermis render` takes, files of people (.json), of meshes
-    (.glb, .obj, .ply) or of scenes (.toml), whose head and skin are taken."""
+    head: Annotated[Distribution | None, NameField()] = None
+    """Heads in place of sampled people: names as in `dermis render`, or files of people (.json), meshes
+    (.glb, .obj, .ply) or scenes (.toml), of which head and skin are used."""
     age: Annotated[Distribution | None, _AGE] = None
-    """Age; skin and hair follow it [years]."""
-    sex: Annotated[Distribution | None, _SHARE] = None
-    """From 0, female, to 1, male."""
-    african: Annotated[Distribution | None, _SHARE] = None
-    """Share of the ancestry; the ratios of the three count, those left out are 0."""
-    asian: Annotated[Distribution | None, _SHARE] = None
-    """Share of the ancestry."""
-    caucasian: Annotated[Distribution | None, _SHARE] = None
-    """Share of the ancestry."""
-    weight: Annotated[Distribution | None, _TREND] = None
-    """From -1, least, to 1, most."""
-    muscle: Annotated[Distribution | None, _TREND] = None
-    """From -1, least, to 1, most."""
+    """Age, which also determines skin and hair [years]."""
+    sex: Annotated[Distribution | None, _FRACTION] = None
+    """Sex, from 0 (female) to 1 (male)."""
+    african: Annotated[Distribution | None, _FRACTION] = None
+    """Fraction of African ancestry; the three ancestries are normalised, and omitted ones are 0."""
+    asian: Annotated[Distribution | None, _FRACTION] = None
+    """Fraction of Asian ancestry."""
+    caucasian: Annotated[Distribution | None, _FRACTION] = None
+    """Fraction of Caucasian ancestry."""
+    weight: Annotated[Distribution | None, _SIGNED] = None
+    """Body weight, from -1 (lowest) to 1 (highest)."""
+    muscle: Annotated[Distribution | None, _SIGNED] = None
+    """Muscle mass, from -1 (lowest) to 1 (highest)."""
     hair_eumelanin: Annotated[Distribution | None, _MELANIN] = None
-    """Of the hair as it grew: 0.3 is blond, 1.3 brown, 8 black."""
+    """Eumelanin of the hair before greying: 0.3 is blond, 1.3 brown, 8 black."""
     hair_pheomelanin: Annotated[Distribution | None, _MELANIN] = None
-    """Of the hair as it grew: 2 with little of the other is red."""
+    """Pheomelanin of the hair before greying: 2 with little eumelanin is red."""
     skin: _Dials = Field(default_factory=dict)
-    """Numbers of `SkinLook`: melanin, blood, freckles, spots, oil ..."""
+    """Fields of `SkinLook`: melanin, blood, freckles, spots, oil ..."""
     eyes: _Dials = Field(default_factory=dict)
-    """Numbers of `EyeLook`: eumelanin, pupil_mm, redness."""
+    """Fields of `EyeLook`: eumelanin, pupil_mm, redness."""
     hair: _Dials = Field(default_factory=dict)
-    """Of `HairLook`: style, length_mm, density, curl, grey, beard_mm ..."""
+    """Fields of `HairLook`: style, length_mm, density, curl, grey, beard_mm ..."""
     targets: _Dials = Field(default_factory=dict)
-    """Weights of published targets by name, see `dermis head --list-targets`."""
+    """Weights of MakeHuman's targets by name, see `dermis head --list-targets`."""
 
 
-class ExpressionTable(Plain):
-    """What the face does: a named expression, or muscles at random."""
+class ExpressionTable(FrozenModel):
+    """Facial expression: a named one, or random movements."""
 
-    name: Annotated[Distribution, OneOf()] = Constant("neutral")
-    """Of the package's, of the spec's own under [expressions.NAME], or "mixture": in each part of the face
-    one movement or none, so that none works against another."""
-    intensity: Annotated[Distribution, Within(0, 1.5, "beyond it faces come apart")] = Constant(1.0)
+    name: Annotated[Distribution, NameField()] = Constant("neutral")
+    """Name of an expression of the package or of [expressions.NAME], or "mixture": at most one random
+    movement in each part of the face, so that movements do not oppose each other."""
+    intensity: Annotated[Distribution, NumberField(0, 1.5, "larger weights distort faces")] = Constant(1.0)
     """Factor of all weights."""
-    asymmetry: Annotated[Distribution, Within(-1, 1, "at 1 the right side rests")] = Constant(0.0)
-    """How much more the left side moves, and how much less the right one."""
-    variation: Annotated[Distribution, _SHARE] = Constant(0.0)
-    """How much each movement differs from what the expression says: standard deviation of the logarithm."""
+    asymmetry: Annotated[Distribution, NumberField(-1, 1, "1 stills the right side")] = Constant(
+        0.0
+    )
+    """Relative increase of the left side's weights and decrease of the right side's [-]."""
+    variation: Annotated[Distribution, _FRACTION] = Constant(0.0)
+    """Random variation of each movement: standard deviation of the logarithm of its weight [-]."""
 
 
-class TurnTable(Plain):
-    """How the head is turned by the neck."""
+class HeadRotationTable(FrozenModel):
+    """Rotation of the head by the neck."""
 
-    yaw_deg: Annotated[Distribution, Within(-60, 60, "degrees that a neck turns")] = Constant(0.0)
-    """Turn to the head's left [degrees]."""
-    pitch_deg: Annotated[Distribution, Within(-40, 40, "degrees that a neck turns")] = Constant(0.0)
-    """Nod downwards [degrees]."""
-    roll_deg: Annotated[Distribution, Within(-35, 35, "degrees that a neck turns")] = Constant(0.0)
-    """Tilt to the head's right shoulder [degrees]."""
-
-
-class GazeTable(Plain):
-    """Where the eyes look."""
-
-    at: Annotated[Distribution, OneOf(lambda: (CAMERA, ANGLES))] = Constant(CAMERA)
-    """The camera, or by the two angles."""
-    yaw_deg: Annotated[Distribution, Within(-36, 36, "degrees that eyes turn")] = Constant(0.0)
-    """To the head's left, from where the face points [degrees]."""
-    pitch_deg: Annotated[Distribution, Within(-30, 30, "degrees that eyes turn")] = Constant(0.0)
-    """Downwards [degrees]."""
+    yaw_deg: Annotated[Distribution, NumberField(-60, 60, "degrees: range of the neck")] = Constant(0.0)
+    """Rotation to the head's left [degrees]."""
+    pitch_deg: Annotated[Distribution, NumberField(-40, 40, "degrees: range of the neck")] = Constant(0.0)
+    """Rotation downwards [degrees]."""
+    roll_deg: Annotated[Distribution, NumberField(-35, 35, "degrees: range of the neck")] = Constant(0.0)
+    """Rotation towards the head's right shoulder [degrees]."""
 
 
-class CameraTable(Plain):
-    """From where the face is seen. Whatever is drawn, the whole face is in the picture."""
+class GazeTable(FrozenModel):
+    """Gaze direction of the eyes."""
 
-    distance_mm: Annotated[Distribution, _AWAY] = Constant(1100.0)
-    """From the middle of the face [mm]."""
-    yaw_deg: Annotated[Distribution, _TURN] = Constant(0.0)
-    """Around the head, to its left [degrees]."""
-    pitch_deg: Annotated[Distribution, _LEAN] = Constant(0.0)
-    """Above it [degrees]."""
-    roll_deg: Annotated[Distribution, _TURN] = Constant(0.0)
-    """Turn of the camera about its axis, clockwise as it looks [degrees]."""
-    frame_mm: Annotated[Distribution, Within(50, 10_000, "mm: from a nose to a crowd")] = Constant(340.0)
-    """Height of what the picture shows at the head [mm]."""
-    focal_mm: Annotated[Distribution | None, Within(8, 1200, "mm: lenses for a sensor 24 mm high")] = None
-    """Focal length of a lens before a sensor 24 mm high, instead of frame_mm [mm]."""
-    offset_x: Annotated[Distribution, _TREND] = Constant(0.0)
-    """How far the face is right of the picture's middle, of half its width [-]."""
-    offset_y: Annotated[Distribution, _TREND] = Constant(0.0)
-    """How far the face is above the picture's middle, of half its height [-]."""
+    at: Annotated[Distribution, NameField(lambda: (CAMERA, ANGLES))] = Constant(CAMERA)
+    """Gaze target: the camera, or the direction given by the two angles."""
+    yaw_deg: Annotated[Distribution, NumberField(-36, 36, "degrees: range of the eyes")] = Constant(0.0)
+    """Angle to the head's left, relative to the direction of the face [degrees]."""
+    pitch_deg: Annotated[Distribution, NumberField(-30, 30, "degrees: range of the eyes")] = Constant(0.0)
+    """Angle downwards [degrees]."""
 
 
-class LampTable(Plain):
-    """A lamp of the rig: an even square that faces the head."""
+class CameraTable(FrozenModel):
+    """Camera position; the complete face is always in the picture."""
 
-    yaw_deg: Annotated[Distribution, _TURN] = Constant(0.0)
-    """Around the head, to its left, from where it faces [degrees]."""
-    pitch_deg: Annotated[Distribution, _LEAN] = Constant(0.0)
-    """Above it [degrees]."""
-    distance_mm: Annotated[Distribution, Within(400, 20_000, "mm: not in the face")] = Constant(1300.0)
-    """From the middle of the head [mm]."""
-    size_mm: Annotated[Distribution, Within(10, 3000, "mm: from a flashlight to a wall")] = Constant(500.0)
-    """Length of its sides [mm]."""
-    strength: Annotated[Distribution, _STOPS] = Constant(1.0)
-    """Irradiance over pi where the head is."""
-    kelvin: Annotated[Distribution, Within(1700, 20_000, "K: from a candle to a blue sky")] = Constant(6500.0)
-    """Colour temperature, white at 6500 [K]."""
+    distance_mm: Annotated[Distribution, _DISTANCE] = Constant(1100.0)
+    """Distance to the centre of the face [mm]."""
+    yaw_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
+    """Angle around the head, to its left [degrees]."""
+    pitch_deg: Annotated[Distribution, _ELEVATION] = Constant(0.0)
+    """Angle above the head [degrees]."""
+    roll_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
+    """Rotation of the camera about its axis, clockwise as seen from behind it [degrees]."""
+    frame_mm: Annotated[Distribution, NumberField(50, 10_000, "mm: from a nose to a crowd")] = Constant(340.0)
+    """Visible height at the head [mm]."""
+    focal_mm: Annotated[Distribution | None, NumberField(8, 1200, "mm")] = None
+    """Focal length for a sensor 24 mm high, in place of frame_mm [mm]."""
+    offset_x: Annotated[Distribution, _SIGNED] = Constant(0.0)
+    """Offset of the face to the right of the picture's centre, relative to half its width [-]."""
+    offset_y: Annotated[Distribution, _SIGNED] = Constant(0.0)
+    """Offset of the face above the picture's centre, relative to half its height [-]."""
 
 
-class LightTable(Plain):
-    """Lamps: a rig of the package, or one of three lamps at random."""
+class LampTable(FrozenModel):
+    """Lamp of the rig: a uniform square light that faces the head."""
 
-    kind: Annotated[Distribution, OneOf(lambda: [RIG, *light_presets()])] = Constant("studio")
-    """Of the package's rigs, or "rig": key, fill and rim as their tables say."""
-    turn_deg: Annotated[Distribution, _TURN] = Constant(0.0)
-    """Turn of all lamps about the upward axis, to the head's left [degrees]."""
-    strength: Annotated[Distribution, _STOPS] = Constant(1.0)
-    """Factor of all lamps: what they have beside the environment."""
+    yaw_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
+    """Angle around the head, from its front to its left [degrees]."""
+    pitch_deg: Annotated[Distribution, _ELEVATION] = Constant(0.0)
+    """Angle above the head [degrees]."""
+    distance_mm: Annotated[Distribution, NumberField(400, 20_000, "mm: outside the face")] = Constant(1300.0)
+    """Distance to the centre of the head [mm]."""
+    size_mm: Annotated[Distribution, NumberField(10, 3000, "mm: from a torch to a wall")] = Constant(500.0)
+    """Side length [mm]."""
+    strength: Annotated[Distribution, _STRENGTH] = Constant(1.0)
+    """Irradiance at the head, divided by pi."""
+    kelvin: Annotated[Distribution, NumberField(1700, 20_000, "K: from candle to blue sky")] = Constant(
+        6500.0
+    )
+    """Colour temperature; 6500 is white [K]."""
+
+
+class LightTable(FrozenModel):
+    """Lamps: a rig of the package, or key, fill and rim lamps."""
+
+    kind: Annotated[Distribution, NameField(lambda: [RIG, *light_presets()])] = Constant("studio")
+    """Rig of the package, or "rig" for the key, fill and rim lamps of the tables below."""
+    turn_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
+    """Rotation of all lamps about the upward axis, to the head's left [degrees]."""
+    strength: Annotated[Distribution, _STRENGTH] = Constant(1.0)
+    """Factor of all lamps' irradiance."""
     key: LampTable = LampTable(yaw_deg=Uniform(-70, 70), pitch_deg=Uniform(-5, 60))
-    """The lamp that draws the face."""
+    """Key lamp, the main light."""
     fill: LampTable = LampTable(yaw_deg=Uniform(-60, 60), size_mm=Constant(900), strength=Constant(0.2))
-    """The lamp that lights its shadows."""
+    """Fill lamp, which lights the shadows."""
     rim: LampTable = LampTable(yaw_deg=Uniform(120, 180), pitch_deg=Constant(25), strength=Constant(0.4))
-    """The lamp behind the head."""
+    """Rim lamp, behind the head."""
 
 
-class EnvironmentTable(Plain):
-    """Light from all around."""
+class EnvironmentTable(FrozenModel):
+    """Environment light."""
 
-    name: Annotated[Distribution, OneOf()] = Constant(NONE)
-    """"none", "uniform", a sample (royal_esplanade, lebombo; fetched once) or files (.hdr, .exr)."""
-    turn_deg: Annotated[Distribution, _TURN] = Uniform(-180, 180)
-    """Turn about the upward axis, counter-clockwise as seen from above [degrees]."""
-    strength: Annotated[Distribution, _STOPS] = Constant(1.0)
+    name: Annotated[Distribution, NameField()] = Constant(NONE)
+    """Environment: "none", "uniform", a sample (royal_esplanade, lebombo; downloaded once), or files (.hdr,
+    .exr)."""
+    turn_deg: Annotated[Distribution, _ANY_ANGLE] = Uniform(-180, 180)
+    """Rotation about the upward axis, counter-clockwise as seen from above [degrees]."""
+    strength: Annotated[Distribution, _STRENGTH] = Constant(1.0)
     """Factor of its radiance."""
 
 
-class BackgroundTable(Plain):
-    """What is behind the head, which sheds no light."""
+class BackgroundTable(FrozenModel):
+    """Background of the picture, which emits no light."""
 
-    kind: Annotated[Distribution, OneOf(lambda: BACKGROUNDS)] = Constant("gradient")
-    """"none" for alpha, "gradient", "colour", or the "environment", where there is one, else the gradient."""
-    red: Annotated[Distribution, _SHARE] = Uniform(0, 0.6)
-    """Of the colour, linear Rec. 709."""
-    green: Annotated[Distribution, _SHARE] = Uniform(0, 0.6)
-    """Of the colour, linear Rec. 709."""
-    blue: Annotated[Distribution, _SHARE] = Uniform(0, 0.6)
-    """Of the colour, linear Rec. 709."""
-    blur: Annotated[Distribution, _SHARE] = Constant(0.0)
-    """Roughness of the mirror in which the environment behind the head is seen."""
+    kind: Annotated[Distribution, NameField(lambda: BACKGROUNDS)] = Constant("gradient")
+    """"none" for alpha, "gradient", "colour", or "environment", which is a gradient in images without one."""
+    red: Annotated[Distribution, _FRACTION] = Uniform(0, 0.6)
+    """Red of the colour, linear Rec. 709."""
+    green: Annotated[Distribution, _FRACTION] = Uniform(0, 0.6)
+    """Green of the colour, linear Rec. 709."""
+    blue: Annotated[Distribution, _FRACTION] = Uniform(0, 0.6)
+    """Blue of the colour, linear Rec. 709."""
+    blur: Annotated[Distribution, _FRACTION] = Constant(0.0)
+    """Roughness with which the environment behind the head is blurred."""

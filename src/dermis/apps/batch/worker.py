@@ -1,4 +1,4 @@
-"""Worker that renders shards: a renderer, the maker of its scenes and encoder processes."""
+"""Worker that renders shards with a renderer, a scene builder and encoder processes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneBuilder
-from dermis.apps.batch.shards import Shard, ShardWriter, is_whole
+from dermis.apps.batch.shards import Shard, ShardWriter, is_intact
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import DermisError, DermisWarning
 from dermis.frame.observation import Observation
@@ -28,11 +28,11 @@ from dermis.gpu.failures import DeviceError
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-_CACHE_FRAMES = 16  # images between two with an environment, whose occlusion is kept
+_CACHE_FRAMES = 16  # occlusion stays cached for this many images without an environment
 
 
 class Failure(NamedTuple):
-    """Image that was left out, and the reason."""
+    """Image that was left out, with the reason."""
 
     number: int
     reason: str
@@ -40,11 +40,11 @@ class Failure(NamedTuple):
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What a run asks of all its workers.
+    """Options of a run, shared by all of its workers.
 
     out : folder of the data set
-    encoders : encoder processes of each worker; 0 encodes in the worker
-    keep_going : leave out images that cannot be made, and record them
+    encoders : encoder processes per worker; with 0, the worker encodes
+    keep_going : leave out images that cannot be rendered, and record them
     """
 
     spec: Spec
@@ -55,10 +55,10 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class WorkerSlot:
-    """Place of one worker on an adapter.
+    """Adapter and thread count of one worker.
 
-    adapter : as of `Renderer`
-    threads : of a software adapter; 0 is its own default
+    adapter : as for `Renderer`
+    threads : threads of a software adapter; 0 keeps its default
     """
 
     adapter: str
@@ -67,14 +67,14 @@ class WorkerSlot:
 
 @dataclass(frozen=True)
 class WorkerEvent:
-    """Progress event sent by a worker: one field at a time.
+    """Progress event sent by a worker; one of its fields is set.
 
-    images : number rendered since the last event
-    shard : that was completed
-    failed : images that were left out of it
+    images : number of images rendered since the last event
+    shard : shard that was completed
+    failed : images that were left out of that shard
     note : warning for the user
-    retry : why the worker ends and another one has to render its shard
-    refusal : why the run ends
+    retry : reason for which the worker exits and another one must render its shard
+    refusal : reason for which the run ends
     """
 
     images: int = 0
@@ -86,143 +86,150 @@ class WorkerEvent:
 
 
 class _PlannedImage(NamedTuple):
-    """Image to be rendered; motion is relative to the scene `before`."""
+    """Image to render; its motion is computed relative to the scene `previous`."""
 
     number: int
     parameters: Parameters
     scene: Scene
     settings: Settings
-    before: Scene | None
+    previous: Scene | None
 
 
 class Worker:
-    """Renders shards one after another on one device; an image depends on its number alone.
+    """Renderer of shards on one device; the result of an image depends on its number only.
 
-    adapter : as of `Renderer`
+    adapter : as for `Renderer`
     """
 
-    def __init__(self, adapter: str, work: RunOptions) -> None:
-        self._work = work
+    def __init__(self, adapter: str, options: RunOptions) -> None:
+        self._options = options
         self._renderer = Renderer(adapter, rounds=_CACHE_FRAMES)
-        self._maker = SceneBuilder(work.spec)
-        self._encoders = EncoderPool(work.encoders, partial(_encode, work.spec))
-        gc.freeze()  # scanning the objects that exist now took a tenth of an image's time
+        self._builder = SceneBuilder(options.spec)
+        self._encoders = EncoderPool(options.encoders, partial(_encode, options.spec))
+        gc.freeze()  # excludes the objects created so far from collections, which would scan them each time
 
-    def render_shard(self, shard: Shard, rendered: Callable[[], None] = lambda: None) -> tuple[Failure, ...]:
-        """Write a shard unless it is whole, and return the images left out: always () without keep_going.
+    def render_shard(self, shard: Shard, on_image: Callable[[], None] = lambda: None) -> tuple[Failure, ...]:
+        """Write a shard unless it is intact, and return the images that were left out.
 
-        rendered : called after each image
+        No image is left out without `keep_going`.
 
-        Raises DermisError for faults of the spec or the disk, DeviceError for a device that was lost twice,
-        LostProcessError where an encoder process ended.
+        on_image : function called after each image
+
+        Raises DermisError for errors of the spec or the disk, DeviceError if the device was lost twice, and
+        LostProcessError if an encoder process died.
         """
-        work = self._work
-        if is_whole(work.out, shard, work.spec):
+        options = self._options
+        if is_intact(options.out, shard, options.spec):
             return ()
         failed: list[Failure] = []
         adapter = self._renderer.device.adapter.name
-        with ShardWriter(work.out, shard, work.spec, adapter) as writer:
-            for number, files in self._encoders.encoded(self._jobs(shard, failed)):
+        with ShardWriter(options.out, shard, options.spec, adapter) as writer:
+            for number, files in self._encoders.encode_all(self._jobs(shard, failed)):
                 writer.add(number, files)
-                rendered()
+                on_image()
             for failure in sorted(failed):
                 writer.leave_out(*failure)
         return tuple(sorted(failed))
 
     def __enter__(self) -> Self:
+        """Return the worker itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Kill the encoder processes."""
         self._encoders.close()
 
     def _jobs(self, shard: Shard, failed: list[Failure]) -> Iterator[tuple[int, Observation, Parameters]]:
         """Yield number, observation and parameters of each image that can be rendered, in order."""
         groups = deque([deque(range(shard.first, shard.stop))])
         while groups:
-            numbers, sent = groups.popleft(), deque[_PlannedImage]()
+            numbers, in_flight = groups.popleft(), deque[_PlannedImage]()
             try:
-                for observation in self._observed(self._plans(numbers, sent, failed)):
-                    done = sent.popleft()
+                for observation in self._observations(self._plans(numbers, in_flight, failed)):
+                    done = in_flight.popleft()
                     yield done.number, observation, done.parameters
             except DeviceError:
                 raise
             except DermisError as fault:
-                if not self._work.keep_going:
+                if not self._options.keep_going:
                     raise
-                if len(sent) == 1:
-                    failed.append(Failure(sent[0].number, str(fault)))
-                    alone = []
-                else:  # any of those in flight: render them again one by one
-                    alone = [deque([plan.number]) for plan in sent]
-                groups.extendleft(reversed([*alone, numbers]))
+                if len(in_flight) == 1:
+                    failed.append(Failure(in_flight[0].number, str(fault)))
+                    single = []
+                else:  # it is unknown which one failed: render them again one by one
+                    single = [deque([plan.number]) for plan in in_flight]
+                groups.extendleft(reversed([*single, numbers]))
 
-    def _plans(self, numbers: deque[int], sent: deque[_PlannedImage], failed: list[Failure]) -> Iterator[_PlannedImage]:
-        """Take numbers, and append what is sent to be rendered."""
+    def _plans(
+        self, numbers: deque[int], in_flight: deque[_PlannedImage], failed: list[Failure]
+    ) -> Iterator[_PlannedImage]:
+        """Yield the next image to render for each number, and append it to `in_flight`."""
         while numbers:
             number = numbers.popleft()
-            parameters = self._work.spec.parameters(number)
+            parameters = self._options.spec.parameters(number)
             try:
-                plan = _PlannedImage(number, parameters, *self._maker.scene(parameters), self._before(number))
+                scene, settings = self._builder.build(parameters)
+                plan = _PlannedImage(number, parameters, scene, settings, self._previous_scene(number))
             except DermisError as fault:
-                if not self._work.keep_going:
+                if not self._options.keep_going:
                     raise DermisError(f"image {number}: {fault}") from fault
                 failed.append(Failure(number, str(fault)))
                 continue
-            sent.append(plan)
+            in_flight.append(plan)
             yield plan
 
-    def _observed(self, plans: Iterable[_PlannedImage]) -> Iterator[Observation]:
-        """Yield the observation of each plan, frames in flight; those without a background have alpha."""
-        spec = self._work.spec
+    def _observations(self, plans: Iterable[_PlannedImage]) -> Iterator[Observation]:
+        """Yield the observation of each planned image, with an alpha channel if it has no background."""
+        spec = self._options.spec
         for alpha, group in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
             each = itertools.tee(group, 3)
             yield from self._renderer.observe(
                 (plan.scene for plan in each[0]),
                 (plan.settings for plan in each[1]),
                 alpha=alpha,
-                previous=(plan.before for plan in each[2]),  # and never what was rendered before by chance
+                previous=(plan.previous for plan in each[2]),  # not the frame that happened to come before
                 outputs=spec.outputs,
                 landmarks=spec.landmark_tables.values(),
             )
 
-    def _before(self, number: int) -> Scene | None:
-        """Return the scene that an image's motion is relative to: the image before, of the same person."""
-        spec = self._work.spec
+    def _previous_scene(self, number: int) -> Scene | None:
+        """Return the scene of the preceding image of the same person, the reference of motion vectors."""
+        spec = self._options.spec
         if "motion" not in spec.outputs or number % spec.images_per_person == 0:
             return None
         try:
-            return self._maker.scene(spec.parameters(number - 1))[0]
-        except DermisError:  # it is left out of the data set
+            return self._builder.build(spec.parameters(number - 1))[0]
+        except DermisError:  # that image is left out of the data set
             return None
 
 
-def serve(pipe: Connection, slot: WorkerSlot, work: RunOptions) -> None:
-    """Render the shards that come through a pipe and send events, in a worker process."""
+def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
+    """Render the shards received from a pipe and send events back, in a worker process."""
     if slot.threads:
-        os.environ["LP_NUM_THREADS"] = str(slot.threads)  # before its driver is loaded
+        os.environ["LP_NUM_THREADS"] = str(slot.threads)  # read when the driver is loaded
     with warnings.catch_warnings():
         _forward_notes(lambda text: pipe.send(WorkerEvent(note=text)))
         try:
-            with Worker(slot.adapter, work) as worker:
+            with Worker(slot.adapter, options) as worker:
                 while True:
                     shard = pipe.recv()
                     failed = worker.render_shard(shard, lambda: pipe.send(WorkerEvent(images=1)))
                     pipe.send(WorkerEvent(shard=shard, failed=failed))
         except (DeviceError, LostProcessError) as fault:
-            pipe.send(WorkerEvent(retry=str(fault).removesuffix(".")))  # the message continues after it
+            pipe.send(WorkerEvent(retry=str(fault).removesuffix(".")))  # text follows in the message
         except DermisError as fault:
             pipe.send(WorkerEvent(refusal=str(fault)))
 
 
 def _forward_notes(forward: Callable[[str], None]) -> None:
-    """Send the package's warnings elsewhere; others are shown as usual."""
-    usual = warnings.showwarning
+    """Pass the package's warnings to a function; other warnings are shown as usual."""
+    default = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
         if issubclass(category, DermisWarning):
             forward(str(message))
         else:
-            usual(message, category, *more, **named)
+            default(message, category, *more, **named)
 
     warnings.simplefilter("default", DermisWarning)
     warnings.showwarning = show

@@ -1,4 +1,4 @@
-"""Worker processes on this machine: a slot for each, a shard at a time, replaced when they die."""
+"""Worker processes on this machine: each renders one shard at a time and is replaced if it dies."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import connection
 
-from dermis.apps.batch.child_processes import ChildProcess, start
+from dermis.apps.batch.child_processes import ChildProcess, start_process
 from dermis.apps.batch.shards import Shard
-from dermis.apps.batch.worker import RunOptions, WorkerEvent, WorkerSlot, serve
+from dermis.apps.batch.worker import RunOptions, WorkerEvent, WorkerSlot, run_worker
 from dermis.base.errors import DermisError
 from dermis.gpu.adapters import Adapter, similar_adapters
 
 MAX_ATTEMPTS = 3
-"""Attempts at a shard before it is given up."""
-_MAX_ENCODERS = 8  # of a worker: more wait for what it renders
+"""Attempts to render a shard before the run fails."""
+_MAX_ENCODERS = 8  # per worker: more would wait for the renderer
 
 
 @dataclass(frozen=True)
 class SlotRequest:
-    """Requested workers; None where the machine decides.
+    """Requested number and adapters of the workers; None selects a default for this machine.
 
-    adapter : "auto", "cpu", part of a name: all that are alike are used; or one by its number, as "#1"
-    numbers : of adapters, in place of `adapter`
-    workers : in all
-    workers_per_gpu : of each adapter, where `workers` is None
-    encoders : of each worker
+    adapter : "auto", "cpu", part of a name (all adapters of the same kind are used), or a number as in "#1"
+    numbers : numbers of the adapters, in place of `adapter`
+    workers : total number of workers
+    workers_per_gpu : workers on each adapter, if `workers` is None
+    encoders : encoder processes per worker
     """
 
     adapter: str = "auto"
@@ -38,24 +38,24 @@ class SlotRequest:
     encoders: int | None = None
 
     def adapters(self) -> list[Adapter]:
-        """Return the adapters to use.
+        """Return the requested adapters.
 
-        Raises DermisError when one of them is not there.
+        Raises DermisError if one of them does not exist.
         """
         if not self.numbers:
             return similar_adapters(self.adapter)
         return [similar_adapters(f"#{number}")[0] for number in self.numbers]
 
     def slots(self) -> tuple[list[WorkerSlot], int]:
-        """Return a slot for each worker, in turn on each adapter, and the number of encoders of each.
+        """Return one slot per worker, alternating between the adapters, and the encoder processes per worker.
 
-        A software adapter shares the cores with Python and the encoders: there is a worker for each two
-        cores, with as many threads, and it encodes by itself.
+        A software adapter shares the processor cores with Python and the encoders: by default it has one
+        worker per two cores, with as many threads, and the worker encodes its images itself.
         """
         adapters, cores = self.adapters(), available_cores()
         software = adapters[0].kind == "CPU"
-        usual = max(1, cores // 2) if software else len(adapters) * self.workers_per_gpu
-        workers = self.workers or usual
+        default = max(1, cores // 2) if software else len(adapters) * self.workers_per_gpu
+        workers = self.workers or default
         threads = max(1, cores // workers) if software else 0
         encoders = 0 if software else min(_MAX_ENCODERS, max(1, cores // workers - 1))
         slots = [WorkerSlot(f"#{adapters[k % len(adapters)].number}", threads) for k in range(workers)]
@@ -63,7 +63,7 @@ class SlotRequest:
 
 
 def available_cores() -> int:
-    """Return the number of cores that this process may use."""
+    """Return the number of processor cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -71,84 +71,86 @@ def available_cores() -> int:
 
 @dataclass(frozen=True)
 class ProcessPool:
-    """Crew of worker processes, one for each slot."""
+    """Pool of worker processes on this machine, one per slot."""
 
     slots: Sequence[WorkerSlot]
 
-    def render(self, work: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    def render(self, options: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Render the shards and yield events as they happen.
 
-        Raises DermisError for what no worker can mend, with all of them ended.
+        Raises DermisError for errors that another attempt cannot solve, after all workers have been stopped.
         """
-        pool = _Pool(work, shards)
+        pool = _PoolState(options, shards)
         try:
             for slot in self.slots:
-                pool.employ(slot)
+                pool.start_worker(slot)
             while pool.workers:
                 by_pipe = {worker.child.pipe: worker for worker in pool.workers}
                 for pipe in connection.wait(list(by_pipe)):
                     yield pool.receive(by_pipe[pipe])  # type: ignore[index]
         finally:
             for worker in pool.workers:
-                worker.child.end()
+                worker.child.kill()
 
 
 @dataclass
-class _Process:
-    """Worker process in its slot, and the shard that it renders."""
+class _WorkerProcess:
+    """Worker process with its slot and the shard that it renders."""
 
     slot: WorkerSlot
     child: ChildProcess
     shard: Shard
 
 
-class _Pool:
-    """State of a run: the worker processes, and the shards that wait for one."""
+class _PoolState:
+    """State of a run: its worker processes and the queue of shards."""
 
-    def __init__(self, work: RunOptions, shards: Sequence[Shard]) -> None:
-        self._work, self._waiting, self._begun = work, deque(shards), Counter[int]()
-        self.workers: list[_Process] = []
+    def __init__(self, options: RunOptions, shards: Sequence[Shard]) -> None:
+        self._options, self._queue, self._attempts = options, deque(shards), Counter[int]()
+        self.workers: list[_WorkerProcess] = []
 
-    def employ(self, slot: WorkerSlot) -> None:
-        """Start a worker, if there is a shard for it."""
-        if self._waiting:
-            worker = _Process(slot, start(serve, slot, self._work), self._waiting.popleft())
+    def start_worker(self, slot: WorkerSlot) -> None:
+        """Start a worker if a shard is left in the queue."""
+        if self._queue:
+            worker = _WorkerProcess(
+                slot, start_process(run_worker, slot, self._options), self._queue.popleft()
+            )
             self.workers.append(worker)
-            self._give(worker)
+            self._send_shard(worker)
 
-    def receive(self, worker: _Process) -> WorkerEvent:
-        """Return the next event of a worker, and give it the next shard or replace it.
+    def receive(self, worker: _WorkerProcess) -> WorkerEvent:
+        """Return the next event of a worker; send the worker its next shard, replace it or stop it.
 
-        Raises DermisError for a refusal, and for a shard that too many workers failed at.
+        Raises DermisError for a refusal, and for a shard that failed `MAX_ATTEMPTS` times.
         """
         try:
             event: WorkerEvent = worker.child.pipe.recv()
         except (EOFError, OSError):
-            event = WorkerEvent(retry=f"a worker: {worker.child.fate()}")
+            event = WorkerEvent(retry=f"a worker: {worker.child.exit_reason()}")
         if event.refusal:
             raise DermisError(event.refusal)
         if event.retry:
-            self._dismiss(worker)
-            if self._begun[worker.shard.index] >= MAX_ATTEMPTS:
-                expected = f"shard {worker.shard.index}: expected a worker to draw it"
+            self._stop_worker(worker)
+            if self._attempts[worker.shard.index] >= MAX_ATTEMPTS:
                 raise DermisError(
-                    f"{expected}, but {MAX_ATTEMPTS} failed, the last one so: {event.retry}. "
-                    "What is whole is kept; give the command again to go on."
+                    f"shard {worker.shard.index}: expected a worker to render it, but {MAX_ATTEMPTS} failed; "
+                    f"the last one reported: {event.retry}. "
+                    "Complete shards are kept; run the command again to continue."
                 )
-            self._waiting.appendleft(worker.shard)
-            self.employ(worker.slot)
-        elif event.shard is not None and self._waiting:
-            worker.shard = self._waiting.popleft()
-            self._give(worker)
+            self._queue.appendleft(worker.shard)
+            self.start_worker(worker.slot)
+        elif event.shard is not None and self._queue:
+            worker.shard = self._queue.popleft()
+            self._send_shard(worker)
         elif event.shard is not None:
-            self._dismiss(worker)
+            self._stop_worker(worker)
         return event
 
-    def _give(self, worker: _Process) -> None:
-        self._begun[worker.shard.index] += 1
-        with suppress(OSError):  # it died, which its end of the pipe reports next
+    def _send_shard(self, worker: _WorkerProcess) -> None:
+        self._attempts[worker.shard.index] += 1
+        with suppress(OSError):  # the process died, which the next read of the pipe reports
             worker.child.pipe.send(worker.shard)
 
-    def _dismiss(self, worker: _Process) -> None:
+    def _stop_worker(self, worker: _WorkerProcess) -> None:
         self.workers.remove(worker)
-        worker.child.end()
+        worker.child.kill()
