@@ -29,7 +29,7 @@ class Points(NamedTuple):
 
 def shown(atlas: Atlas, mesh: Mesh, own: bool = False) -> Floats:
     """(n, n, 3) position that each texel shows, NaN where none; with `own` only where light is computed."""
-    there = atlas.own if own else atlas.coverage
+    there = atlas.lit if own else atlas.coverage
     return np.where(there[..., None], atlas.interpolate(mesh, mesh.positions), np.nan)
 
 
@@ -52,7 +52,7 @@ def read(values: Floats, at: Floats) -> Floats:
 
 def lit_at(values: Floats, atlas: Atlas, points: Points) -> Floats:
     """(k, c) of values (n, n, c) where the atlas has these points."""
-    return read(values, points.on(atlas.place) * atlas.size - 0.5)
+    return read(values, points.on(atlas.corner_uv) * atlas.size - 0.5)
 
 
 def random_points(mesh: Mesh, count: int, seed: int = 0) -> Points:

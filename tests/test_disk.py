@@ -20,7 +20,7 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import cached_atlas
 from dermis.base import disk
 from dermis.base.disk import cached_array
-from dermis.formats.load import Rigged, cached_rigged
+from dermis.formats.load import RiggedMesh, cached_rigged
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import plane, uv_sphere
 
@@ -37,9 +37,9 @@ def built(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     sizes: list[int] = []
     build = cached.build_atlas
 
-    def counted(mesh: Mesh, size: int, layout: str, reach_mm: float) -> Atlas:
+    def counted(mesh: Mesh, size: int, layout: str, gutter_mm: float) -> Atlas:
         sizes.append(size)
-        return build(mesh, size, layout, reach_mm)
+        return build(mesh, size, layout, gutter_mm)
 
     monkeypatch.setattr(cached, "build_atlas", counted)
     return sizes
@@ -145,14 +145,14 @@ def test_a_file_under_another_name_is_made_again(folder: Path, built: list[int])
     assert built == [64, 64, 64]
     (folder.parent / "links").mkdir()
     path.rename(folder.parent / "links" / path.name)
-    assert disk.find("links", path.stem, ["triangle"]) is None
+    assert disk.load_arrays("links", path.stem, ["triangle"]) is None
 
 
 def test_a_large_file_is_checked_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     large = {"a": np.arange(3_000_000, dtype=np.uint32), "b": np.ones((1000, 777)).T}
-    disk.store("large", "one", large)
-    found = disk.find("large", "one", ["a", "b"])
+    disk.save_arrays("large", "one", large)
+    found = disk.load_arrays("large", "one", ["a", "b"])
     assert found is not None and all(np.array_equal(found[name], large[name]) for name in large)
     assert found["b"].flags.fnc  # sums over it round as they did
     path = only(tmp_path / "large")
@@ -160,10 +160,10 @@ def test_a_large_file_is_checked_block_by_block(tmp_path: Path, monkeypatch: pyt
     for place in (len(whole) // 3, len(whole) // 2, len(whole) - 1):
         whole[place] ^= 1
         path.write_bytes(whole)
-        assert disk.find("large", "one", ["a", "b"]) is None
+        assert disk.load_arrays("large", "one", ["a", "b"]) is None
         whole[place] ^= 1
     path.write_bytes(whole)
-    assert disk.find("large", "one", ["a", "b"]) is not None
+    assert disk.load_arrays("large", "one", ["a", "b"]) is not None
 
 
 @pytest.mark.parametrize("blocked", ["a file", "a folder in the file's place", "nothing may be written"])
@@ -311,9 +311,9 @@ def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     mesh, made = uv_sphere(20.0), []
 
-    def load() -> Rigged:
+    def load() -> RiggedMesh:
         made.append(1)
-        return Rigged(mesh, None)
+        return RiggedMesh(mesh, None)
 
     first, second = (cached_rigged(b"file", "up y", load).mesh for _ in range(2))
     for one in (first, second):
@@ -332,14 +332,14 @@ def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_a_flipped_bit_anywhere_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And the file goes, so that the next start need not read it."""
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
-    disk.store("few", "one", {"a": np.arange(3, dtype=np.uint8)})
+    disk.save_arrays("few", "one", {"a": np.arange(3, dtype=np.uint8)})
     path = only(tmp_path / "few")
     whole = path.read_bytes()
     for place in range(len(whole)):
         spoilt = bytearray(whole)
         spoilt[place] ^= 1 << 5 * place % 8
         path.write_bytes(spoilt)
-        assert disk.find("few", "one", ["a"]) is None and not path.exists()
+        assert disk.load_arrays("few", "one", ["a"]) is None and not path.exists()
         path.touch(0o600)
 
 
@@ -347,7 +347,7 @@ def test_a_head_takes_no_memory_before_its_file_is_long_enough(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
-    disk.store("few", "one", {"a": np.arange(3, dtype=np.uint8)})
+    disk.save_arrays("few", "one", {"a": np.arange(3, dtype=np.uint8)})
     path = only(tmp_path / "few")
     whole = path.read_bytes()
     monkeypatch.setattr(np, "empty", lambda *_: pytest.fail("made room"))
@@ -360,7 +360,7 @@ def test_a_head_takes_no_memory_before_its_file_is_long_enough(
     ):
         wrong = ["a", kind, shape, "C"]
         path.write_bytes(forged(whole, lambda told, wrong=wrong: told["arrays"].__setitem__(0, wrong)))
-        assert disk.find("few", "one", ["a"]) is None
+        assert disk.load_arrays("few", "one", ["a"]) is None
 
 
 def test_two_processes_at_once_leave_whole_files(tmp_path: Path) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import GUTTER, Atlas
+from dermis.atlas.atlas import GUTTER_TEXELS, Atlas
 from dermis.atlas.build import build_atlas
-from dermis.atlas.raster import charts
+from dermis.atlas.raster import find_charts
 from dermis.base.errors import DermisError
 from dermis.formats.samples import SAMPLES
 from dermis.mesh.mesh import Mesh, build_mesh
@@ -32,7 +32,7 @@ def patches(*squares: Square) -> Mesh:
 
 
 def chart_map(atlas: Atlas, mesh: Mesh) -> NDArray[np.int32]:
-    return np.where(atlas.coverage, charts(mesh)[np.maximum(atlas.triangle, 0)], -1)
+    return np.where(atlas.coverage, find_charts(mesh)[np.maximum(atlas.triangle, 0)], -1)
 
 
 def centres(size: int) -> NDArray[np.float64]:
@@ -79,7 +79,7 @@ def test_every_centre_on_the_surface_is_covered() -> None:
     """Counted without triangles: the plane's uv is the square 0..0.61."""
     atlas = build_atlas(plane(50.0, 2, uv_scale=0.61), 100)
     inside = np.arange(100) + 0.5 < 61
-    grown = np.arange(100) + 0.5 < 61 + GUTTER
+    grown = np.arange(100) + 0.5 < 61 + GUTTER_TEXELS
     assert np.array_equal(own_texels(atlas, plane(50.0, 2, uv_scale=0.61)), inside[:, None] & inside[None])
     assert np.array_equal(atlas.coverage, grown[:, None] & grown[None])
 
@@ -121,10 +121,10 @@ def test_gutter_repeats_the_edge() -> None:
     mesh = MESHES["two patches"]()
     atlas = build_atlas(mesh, 128)
     gutter = atlas.coverage & ~own_texels(atlas, mesh)
-    assert gutter.sum() > 4 * GUTTER * 40
+    assert gutter.sum() > 4 * GUTTER_TEXELS * 40
     seen = atlas.interpolate(mesh, mesh.uv)
     away = np.abs(seen - centres(128)).max(axis=-1)[gutter] * 128
-    assert away.max() <= GUTTER + 0.5 and away.min() > 0
+    assert away.max() <= GUTTER_TEXELS + 0.5 and away.min() > 0
     for chart, (left, top, side) in enumerate([(0.05, 0.1, 0.3), (0.5, 0.4, 0.45)]):
         texels = seen[gutter & (chart_map(atlas, mesh) == chart)]
         off_edge = np.minimum(texels - [left, top], [left + side, top + side] - texels).min(axis=-1)
@@ -156,11 +156,11 @@ def test_reach_by_brute_force() -> None:
                 0 <= y + n * dy < 96 and 0 <= x + n * dx < 96 and owner[y + n * dy, x + n * dx] == owner[y, x]
             ):
                 n += 1
-            assert atlas.reach[y, x, k] == n - 1
+            assert atlas.edge_distance[y, x, k] == n - 1
 
 
 def test_reach_goes_all_the_way() -> None:
-    reach = build_atlas(plane(100.0), 300).reach
+    reach = build_atlas(plane(100.0), 300).edge_distance
     assert reach[10, 299].tolist() == [299, 0, 10, 289]
 
 
@@ -213,7 +213,7 @@ def test_the_scan() -> None:
     atlas = build_atlas(mesh, 256)
     assert 0.5 < atlas.coverage.mean() < 1.0
     # two shells of 264 triangles, and the few triangles of other islands that have no uv area
-    collapsed = np.bincount(charts(mesh)[~atlas.mapped], minlength=11)
+    collapsed = np.bincount(find_charts(mesh)[~atlas.mapped], minlength=11)
     assert sorted(collapsed)[-2:] == [264, 264]
     assert (~atlas.mapped).sum() < 2 * 264 + 20
     assert np.isfinite(atlas.stretch).all() and (atlas.stretch[atlas.coverage] > 0).all()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dermis.atlas.interreflection import SAMPLES, SIDE, Links, find_links
+from dermis.atlas.interreflection import SAMPLES, SIDE, FormFactors, compute_form_factors
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 
@@ -36,9 +36,9 @@ def room() -> Mesh:
     return build_mesh(*made, np.zeros(12, int), (SKIN,))
 
 
-def found(mesh: Mesh) -> Links:
+def found(mesh: Mesh) -> FormFactors:
     place = mesh.uv[mesh.triangles].astype(np.float32)
-    return find_links(mesh, place, np.ones(len(mesh.triangles), bool))
+    return compute_form_factors(mesh, place, np.ones(len(mesh.triangles), bool))
 
 
 def face_of(x: np.ndarray, y: np.ndarray, side: int) -> np.ndarray:
@@ -46,15 +46,15 @@ def face_of(x: np.ndarray, y: np.ndarray, side: int) -> np.ndarray:
 
 
 def test_the_faces_of_a_room() -> None:
-    links = found(room())
+    form_factors = found(room())
     given = np.zeros((6, 6))
     y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
     face = face_of(x, y, SIDE)
     held = face < 6
     patch = face[(y % 2 == 0) & (x % 2 == 0) & held]  # in the order of patches
-    assert len(patch) == links.patches
-    row = np.repeat(np.arange(SIDE * SIDE), np.diff(links.first.astype(np.int64)))
-    np.add.at(given, (face[row], patch[links.patch]), links.share)
+    assert len(patch) == form_factors.patch_count
+    row = np.repeat(np.arange(SIDE * SIDE), np.diff(form_factors.cell_first.astype(np.int64)))
+    np.add.at(given, (face[row], patch[form_factors.cell_target]), form_factors.cell_factor)
     given /= np.bincount(face[held])[:, None]
     opposite = np.array([1, 0, 3, 2, 5, 4])
     expected = np.full((6, 6), BESIDE)
@@ -65,10 +65,10 @@ def test_the_faces_of_a_room() -> None:
 
 def test_places_lie_on_their_patch() -> None:
     mesh = room()
-    links = found(mesh)
-    w = np.stack([links.weights & 0xFFFF, links.weights >> 16], axis=1) / 65535.0
+    form_factors = found(mesh)
+    w = np.stack([form_factors.sample_weights & 0xFFFF, form_factors.sample_weights >> 16], axis=1) / 65535.0
     w = np.column_stack([1.0 - w.sum(axis=1), w])
-    uv = np.einsum("nk,nkc->nc", w, mesh.uv[mesh.triangles[links.triangle]])
+    uv = np.einsum("nk,nkc->nc", w, mesh.uv[mesh.triangles[form_factors.sample_triangle]])
     patch = np.floor(SIDE // 2 * uv.reshape(-1, SAMPLES, 2) - 1e-4 * (uv.reshape(-1, SAMPLES, 2) == 1.0))
     apart = np.abs(patch - np.median(patch, axis=1, keepdims=True))
     assert (apart.max(axis=(1, 2)) < 1.0).mean() > 0.99  # weights are rounded at a patch's edge
@@ -77,13 +77,15 @@ def test_places_lie_on_their_patch() -> None:
 @pytest.mark.parametrize("outside", [True, False])
 def test_a_ball_sees_all_of_itself_from_within_and_nothing_from_without(outside: bool) -> None:
     ball = uv_sphere(10.0, 24, 12)
-    links = found(ball if outside else inside_out(ball))
+    form_factors = found(ball if outside else inside_out(ball))
     if outside:
-        assert not len(links.share)
+        assert not len(form_factors.cell_factor)
     else:
         seen = np.bincount(
-            np.repeat(np.arange(links.patches), np.diff(links.bounce_first.astype(np.int64))),
-            links.bounce_share,
-            links.patches,
+            np.repeat(
+                np.arange(form_factors.patch_count), np.diff(form_factors.patch_first.astype(np.int64))
+            ),
+            form_factors.patch_factor,
+            form_factors.patch_count,
         )
         assert np.abs(seen - 1.0).mean() < 1e-3 and np.abs(seen - 1.0).max() < 0.05  # lines through edges

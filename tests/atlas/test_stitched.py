@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.atlas.raster import charts
+from dermis.atlas.raster import find_charts
 from dermis.mesh.geometry import triangle_areas, uv_cross
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import plane
@@ -54,14 +54,14 @@ def texel_mm(atlas: Atlas) -> Floats:
 
 
 def test_many_charts_are_many() -> None:
-    assert charts(case("many charts")[0]).max() >= 300
+    assert find_charts(case("many charts")[0]).max() >= 300
 
 
 @pytest.mark.parametrize("name", MESHES)
 def test_all_triangles_have_texels(name: str) -> None:
     mesh, atlas = case(name)
     assert atlas.mapped.all()
-    assert atlas.unscattered(mesh) == 0
+    assert atlas.unscattered_fraction(mesh) == 0
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -72,7 +72,7 @@ def test_light_is_found_at_every_place(name: str) -> None:
     found = lit_at(shown(atlas, mesh, own=True), atlas, points)
     off = np.linalg.norm(found - points.on(mesh.positions[mesh.triangles]), axis=1)
     assert np.isfinite(off).all()
-    at = np.clip(np.rint(points.on(atlas.place) * atlas.size - 0.5).astype(int), 0, atlas.size - 1)
+    at = np.clip(np.rint(points.on(atlas.corner_uv) * atlas.size - 0.5).astype(int), 0, atlas.size - 1)
     assert np.percentile(off / texel_mm(atlas)[at[:, 1], at[:, 0]], 99.5) < READ
 
 
@@ -80,11 +80,11 @@ def test_light_is_found_at_every_place(name: str) -> None:
 def test_texels_in_pieces_stand_for_their_own_place(name: str) -> None:
     atlas = case(name)[1]
     n = atlas.size
-    corner = atlas.place[np.maximum(atlas.triangle, 0)].astype(np.float64) * n - 0.5
+    corner = atlas.corner_uv[np.maximum(atlas.triangle, 0)].astype(np.float64) * n - 0.5
     x, y = np.meshgrid(np.arange(n), np.arange(n))
     centre = np.stack((x, y), axis=-1)
     sides = [_cross(corner[..., k, :], corner[..., (k + 1) % 3, :], centre) for k in range(3)]
-    inside = ((np.min(sides, axis=0) > 1e-5) | (np.max(sides, axis=0) < -1e-5)) & atlas.own
+    inside = ((np.min(sides, axis=0) > 1e-5) | (np.max(sides, axis=0) < -1e-5)) & atlas.lit
     shown_at = np.einsum("yxk,yxkc->yxc", atlas.weights(), corner)
     assert inside.sum() > 0.1 * n * n
     assert np.abs(shown_at - centre)[inside].max() < 0.01
@@ -114,8 +114,8 @@ def test_steps_into_the_gutter_are_as_long_as_the_metric_says(name: str) -> None
     points = shown(atlas, mesh)
     steps = []
     for axis, after, before in ((0, np.s_[:, 1:], np.s_[:, :-1]), (1, np.s_[1:], np.s_[:-1])):
-        joined = atlas.reach[after][..., 2 * axis] > 0
-        edge = joined & (atlas.own[after] != atlas.own[before])
+        joined = atlas.edge_distance[after][..., 2 * axis] > 0
+        edge = joined & (atlas.lit[after] != atlas.lit[before])
         per_mm = atlas.stretch[..., axis].astype(np.float64)[after]
         steps.append((np.linalg.norm(points[after] - points[before], axis=-1) * per_mm)[edge])
     ratio = np.concatenate(steps)
@@ -129,8 +129,8 @@ def test_steps_into_the_gutter_are_as_long_as_the_metric_says(name: str) -> None
 def test_runs_cross_no_gap(name: str) -> None:
     """A tap never shows a point farther away than the way to it is long, as a jump to elsewhere would be."""
     mesh, atlas = case(name)
-    points, reach = shown(atlas, mesh), atlas.reach.astype(int)
-    y, x = np.nonzero(atlas.own)
+    points, reach = shown(atlas, mesh), atlas.edge_distance.astype(int)
+    y, x = np.nonzero(atlas.lit)
     for n in (1, 3, 6, 10, 14):
         for k, (dy, dx) in enumerate(((0, -n), (0, n), (-n, 0), (n, 0))):
             held = reach[y, x, k] >= n
@@ -142,7 +142,7 @@ def test_runs_cross_no_gap(name: str) -> None:
 
 @pytest.mark.parametrize("name", MESHES)
 def test_runs_are_told_alike_from_both_ends(name: str) -> None:
-    reach = case(name)[1].reach.astype(int)
+    reach = case(name)[1].edge_distance.astype(int)
     right, left = reach[:, :-1, 1], reach[:, 1:, 0]
     assert np.array_equal(right > 0, left > 0)
     assert (np.diff(reach[..., 0], axis=1)[left > 0] == 1).all()
@@ -154,24 +154,24 @@ def test_runs_are_told_alike_from_both_ends(name: str) -> None:
 
 def test_gutters_are_as_wide_as_asked() -> None:
     mesh = cut_cylinder(30.0, 80.0, 9)
-    for reach_mm in (3.0, 8.0):
-        atlas = build_atlas(mesh, 256, "stitched", reach_mm)
-        area_mm2 = (1.0 / atlas.stretch[~atlas.own & atlas.coverage].astype(np.float64).prod(axis=-1)).sum()
+    for gutter_mm in (3.0, 8.0):
+        atlas = build_atlas(mesh, 256, "stitched", gutter_mm)
+        area_mm2 = (1.0 / atlas.stretch[~atlas.lit & atlas.coverage].astype(np.float64).prod(axis=-1)).sum()
         seams = 2 * 3 * 80.0  # both sides of three; the first texel or two of each belong to the rim
-        rim_mm = 1.0 / atlas.stretch[atlas.own].astype(np.float64).max(axis=-1).mean()
-        assert area_mm2 == pytest.approx(seams * (reach_mm - rim_mm), rel=0.08)
+        rim_mm = 1.0 / atlas.stretch[atlas.lit].astype(np.float64).max(axis=-1).mean()
+        assert area_mm2 == pytest.approx(seams * (gutter_mm - rim_mm), rel=0.08)
 
 
 def test_no_gutter_where_the_surface_ends() -> None:
     atlas = build_atlas(plane(40.0, 4), 128, "stitched")
     assert len(atlas.gutter) == 0
     assert atlas.mapped.all()
-    assert atlas.reach.astype(int).sum(axis=-1)[64, 64] == 2 * (np.count_nonzero(atlas.own[64]) - 1)
+    assert atlas.edge_distance.astype(int).sum(axis=-1)[64, 64] == 2 * (np.count_nonzero(atlas.lit[64]) - 1)
 
 
 def test_light_does_not_cross_to_what_is_no_skin() -> None:
     mesh = cut_cylinder(30.0, 80.0, 9)
-    cloth = charts(mesh) == 1
+    cloth = find_charts(mesh) == 1
     kinds = (Material("skin"), Material("cloth", "opaque"))
     clothed = build_mesh(mesh.positions, mesh.uv, mesh.triangles, cloth, kinds, mesh.normals)
     atlas = build_atlas(clothed, 200, "stitched")
@@ -184,7 +184,7 @@ def test_triangles_may_face_either_way_round() -> None:
     """Adjacency is by place; a chart whose triangles are listed the other way round changes nothing."""
     mesh, atlas = case("cylinder")
     triangles = mesh.triangles.copy()
-    part = charts(mesh) == 0
+    part = find_charts(mesh) == 0
     triangles[part] = triangles[part][:, ::-1]
     flipped = build_mesh(mesh.positions, mesh.uv, triangles, mesh.material, mesh.materials, mesh.normals)
     other = build_atlas(flipped, atlas.size, "stitched")
@@ -200,16 +200,16 @@ def test_folded_halves_both_get_texels() -> None:
     """On the mesh's own uv one of them has none."""
     mesh, atlas = case("fold")
     assert not build_atlas(mesh, atlas.size).mapped.all()
-    both = uv_cross(atlas.place)
+    both = uv_cross(atlas.corner_uv)
     assert (both > 0).sum() == (both < 0).sum()
 
 
 def test_densities_that_differ_little_are_left_and_others_come_closer() -> None:
     lays = [*SPHERE_LAYS[:4], SPHERE_LAYS[4]._replace(scale=0.02), SPHERE_LAYS[5]._replace(scale=0.30)]
     mesh = cut_sphere(30.0, 8, lays)
-    placed = np.abs(uv_cross(build_atlas(mesh, 256, "stitched").place))
+    placed = np.abs(uv_cross(build_atlas(mesh, 256, "stitched").corner_uv))
     area = triangle_areas(mesh.positions[mesh.triangles])
-    chart = charts(mesh)
+    chart = find_charts(mesh)
     assert np.bincount(chart).tolist() == [128] * 6
     size = np.sqrt(np.bincount(chart, placed) / np.bincount(chart, area))
     given = np.array([lay.scale for lay in lays])
@@ -223,9 +223,9 @@ def test_a_collapsed_chart_is_left_out() -> None:
     lays = [*CYLINDER_LAYS[:2], Lay((0.9, 0.9), 1e-5)]
     mesh = cut_cylinder(30.0, 80.0, 6, lays)
     atlas = build_atlas(mesh, 128, "stitched")
-    assert np.bincount(charts(mesh), atlas.mapped).tolist() == [72, 72, 0]
+    assert np.bincount(find_charts(mesh), atlas.mapped).tolist() == [72, 72, 0]
     # and no gutter shows it
-    assert atlas.mapped[atlas.triangle[~atlas.own & atlas.coverage]].all()
+    assert atlas.mapped[atlas.triangle[~atlas.lit & atlas.coverage]].all()
 
 
 def test_too_many_charts_for_so_few_texels_stay_where_they_are() -> None:
@@ -234,7 +234,7 @@ def test_too_many_charts_for_so_few_texels_stay_where_they_are() -> None:
     stitched, plain = build_atlas(mesh, 64, "stitched"), build_atlas(mesh, 64)
     assert len(stitched.gutter) == 0
     assert np.array_equal(stitched.triangle, plain.triangle)
-    assert np.array_equal(stitched.place, plain.place)
+    assert np.array_equal(stitched.corner_uv, plain.corner_uv)
 
 
 def test_a_mesh_without_skin_has_an_empty_atlas() -> None:

@@ -29,14 +29,14 @@ def blurred(atlas: Atlas, light: Floats) -> list[Floats]:
     for variance in VARIANCES:
         source = made[-1].copy()
         source[y, x] = read(source, atlas.source.astype(np.float64))
-        along_u = twins.spread(source, metric, atlas.reach, variance - before, before, 0)
-        made.append(twins.spread(along_u, metric, atlas.reach, variance - before, before, 1))
+        along_u = twins.spread(source, metric, atlas.edge_distance, variance - before, before, 0)
+        made.append(twins.spread(along_u, metric, atlas.edge_distance, variance - before, before, 1))
         before = variance
     return [level[..., :1] for level in made[1:]]
 
 
 def lit(atlas: Atlas, mesh: Mesh, light: Callable[[Floats], Floats]) -> Floats:
-    return np.where(atlas.own, light(np.nan_to_num(shown(atlas, mesh))), 0.0)
+    return np.where(atlas.lit, light(np.nan_to_num(shown(atlas, mesh))), 0.0)
 
 
 def stripes(points: Floats) -> Floats:

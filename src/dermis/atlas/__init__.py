@@ -1,1 +1,1 @@
-"""The uv layout as a surface: texels, charts, stitched seams, form factors and translucent pairs."""
+"""Atlases: uv layouts as surfaces, with stitched seams, form factors and cells for translucency."""

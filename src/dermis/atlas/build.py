@@ -1,4 +1,4 @@
-"""Atlases of a mesh in one of its layouts, built or read from the cache."""
+"""Construction of the atlas of a mesh in one of its uv layouts, with a cache on disk."""
 
 from __future__ import annotations
 
@@ -8,77 +8,69 @@ from dataclasses import fields
 
 import numpy as np
 
-from dermis.atlas.atlas import GUTTER, REACH_MM, Atlas
-from dermis.atlas.raster import build_own_layout
-from dermis.base.disk import Array, Arrays, stored
+from dermis.atlas.atlas import GUTTER_MM, GUTTER_TEXELS, Atlas
+from dermis.atlas.raster import build_mesh_layout
+from dermis.base.disk import Array, Arrays, load_or_make
 from dermis.base.errors import refuse
-from dermis.base.progress import preparing
+from dermis.base.progress import logged_step
 from dermis.mesh.mesh import Mesh
 
 LAYOUTS = ("mesh", "stitched", "unwrapped")
-SMALLEST = 64
-_FORM = 6  # increment when `build_atlas` gives other results for the same mesh
+MIN_SIZE = 64
+_CACHE_VERSION = 7  # increment when `build_atlas` gives other results for the same mesh
 
 
-def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:
-    """The atlas of `size` x `size` texels.
+def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
+    """Build the atlas of a mesh.
 
-    layout : "mesh" is the mesh's own uv; "stitched" has its charts moved apart, with gutters that continue
-        the surface beyond their edges, or the mesh's own uv where there are too many charts for that;
-        "unwrapped" has charts whose seams are elsewhere
-    reach_mm : width of the gutters [mm]
+    size : texels along each side
+    layout : "mesh" is the mesh's own uv; "stitched" moves its charts apart and adds gutters that continue the
+        surface across their seams, unless there are too many charts for that; "unwrapped" has other seams
+    gutter_mm : width of the gutters [mm]
 
-    Raises DermisError when the size is under 64.
+    Raises DermisError for a size under 64.
     """
-    if size < SMALLEST:
-        expected = f"a size of {SMALLEST} texels or more"
+    if size < MIN_SIZE:
+        expected = f"a size of {MIN_SIZE} texels or more"
         refuse("atlas", expected, f"it is {size}", "Choose --atlas 1024 or 2048")
     if layout not in LAYOUTS:
-        refuse("layout", f"one of {', '.join(LAYOUTS)}", f"{layout} came", "Choose one of these")
+        refuse("layout", f"one of {', '.join(LAYOUTS)}", f"got {layout}", "Choose one of these")
     if layout == "stitched":
         from dermis.atlas.stitched.build import build_stitched
 
-        return build_stitched(mesh, size, reach_mm) or build_own_layout(mesh, size)
+        return build_stitched(mesh, size, gutter_mm) or build_mesh_layout(mesh, size)
     if layout == "unwrapped":
-        from dermis.atlas.unwrap.unwrap import with_other_seams
+        from dermis.atlas.unwrap.unwrap import unwrap_mesh
 
-        return build_own_layout(with_other_seams(mesh), size)
-    return build_own_layout(mesh, size)
+        return build_mesh_layout(unwrap_mesh(mesh), size)
+    return build_mesh_layout(mesh, size)
 
 
-def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:
-    """`build_atlas`, read back from disk when it was made before; the disk may fail without harm."""
+def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
+    """Return `build_atlas` with these arguments, cached on disk; works without a disk too."""
     names = [field.name for field in fields(Atlas)]
 
-    @preparing("laying the skin out on the atlas")
+    @logged_step("mapping the skin to the atlas")
     def make() -> Arrays:
-        atlas = build_atlas(mesh, size, layout, reach_mm)
+        atlas = build_atlas(mesh, size, layout, gutter_mm)
         return {name: getattr(atlas, name) for name in names}
 
-    return Atlas(**stored("atlas", _key(mesh, size, layout, reach_mm), names, make))
+    return Atlas(**load_or_make("atlas", _key(mesh, size, layout, gutter_mm), names, make))
 
 
-def cached_occlusion(mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:
-    """What `bake` returns for a mesh and its atlas, kept on disk in the same way.
+def cached_occlusion(mesh: Mesh, atlas: Atlas, key: str, bake: Callable[[], Array]) -> Array:
+    """Return `bake()` for a mesh and its atlas, cached on disk.
 
-    form : everything else that the result depends on
+    key : text that identifies everything else that the result depends on
     """
-    return _baked("occlusion", mesh, atlas, form, bake)
-
-
-def _baked(folder: str, mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:
-    return stored(folder, _baked_key(mesh, atlas, form), ["open"], lambda: {"open": bake()})["open"]
-
-
-def _baked_key(mesh: Mesh, atlas: Atlas, form: str) -> str:
-    digest = hashlib.sha256(f"{_key(mesh, atlas.size)} {form}".encode())
-    for array in (mesh.positions, mesh.normals, atlas.place, np.packbits(atlas.own)):
+    digest = hashlib.sha256(f"{_key(mesh, atlas.size)} {key}".encode())
+    for array in (mesh.positions, mesh.normals, atlas.corner_uv, np.packbits(atlas.lit)):
         digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()[:40]
+    return load_or_make("occlusion", digest.hexdigest()[:40], ["open"], lambda: {"open": bake()})["open"]
 
 
-def _key(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> str:
-    digest = hashlib.sha256(f"{_FORM} {GUTTER} {size} {layout} {reach_mm}".encode())
+def _key(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> str:
+    digest = hashlib.sha256(f"{_CACHE_VERSION} {GUTTER_TEXELS} {size} {layout} {gutter_mm}".encode())
     digest.update(repr([material.kind for material in mesh.materials]).encode())
     for array in (mesh.material, mesh.positions, mesh.uv, mesh.triangles, mesh.dpdu, mesh.dpdv, mesh.point):
         digest.update(np.ascontiguousarray(array).tobytes())

@@ -1,4 +1,4 @@
-"""Which patches of a surface see each other through the air: form factors, by lines all through its space."""
+"""Form factors between patches of a surface that face each other through the air."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.disk import stored
-from dermis.base.progress import preparing
+from dermis.atlas.raster import expand_runs
+from dermis.base.disk import load_or_make
+from dermis.base.progress import logged_step
 from dermis.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -17,110 +18,117 @@ Index = NDArray[np.int64]
 Words = NDArray[np.uint32]
 
 SIDE = 128
-"""Cells along the side of the uv square that take light; 2 x 2 of them are a patch that gives it."""
+"""Cells along each side of the uv square, which receive light; 2 x 2 cells are a patch, which emits it."""
 SAMPLES = 8
-"""Places at which a patch is lit."""
-BUNDLES, LINES = 128, (96, 256)  # directions of parallel lines; least and most lines along a bundle's side
-_FEW = 12, 64  # the same, to learn whether a surface sees anything of itself
-_FORM = 3  # raise when `find_links` gives other results
-_LEAST = 1e-3  # share of the hemisphere below which links are left out, and the others made up for them
+"""Sample points of a patch at which its light is computed."""
+BUNDLES, LINES = 128, (96, 256)  # directions of parallel lines; bounds of the lines along a bundle's side
+_FEW_BUNDLES, _FEW_LINES = 12, 64  # to find out whether any part of the surface faces another
+_CACHE_VERSION = 4  # increment when `compute_form_factors` gives other results
+_MIN_FORM_FACTOR = 1e-3  # smaller ones are dropped, and the others of their cell scaled up
 _SEED = 20
-_ROW = 4096  # of lines: more than a bundle has along its side
+_LINES_PER_ROW = 4096  # for line indices: more than a bundle has along its side
 
 
 @dataclass(frozen=True, eq=False)
-class Links:
-    """What cells of the uv square see of the surface's own patches.
+class FormFactors:
+    """Form factors between cells of the uv square, or patches, and the patches that they face.
 
-    first, patch, share : (SIDE^2 + 1,), (k,) and (k,) float32 where the links of each cell begin, the patch
-        that each leads to, and its form factor [0..1]
-    own : (SIDE^2,) the patch that each belongs to, or the nearest one
-    held : (SIDE^2,) float32 how well a cell is known: lines that left it, over the usual number, at most 1
-    bounce_first, bounce_patch, bounce_share : the same links of patches
-    triangle, weights : (p * SAMPLES,) uint32 places of the patches: triangle, its packed weights
+    Both are sparse matrices by rows: the entries of row k start at `first[k]` and end at `first[k + 1]`.
+
+    cell_first, cell_target, cell_factor : (SIDE^2 + 1,), (k,) and (k,) float32 rows of the cells: patches
+        that each cell faces, and their form factors [0..1]
+    nearest_patch : (SIDE^2,) patch that each cell belongs to, or the nearest one
+    confidence : (SIDE^2,) float32 number of lines that left a cell, over the median, at most 1
+    patch_first, patch_target, patch_factor : the same rows for patches
+    sample_triangle, sample_weights : (p * SAMPLES,) uint32 sample points of the patches: triangle, and packed
+        weights of its second and third corner
     """
 
-    first: Words
-    patch: Words
-    share: NDArray[np.float32]
-    own: Words
-    held: NDArray[np.float32]
-    bounce_first: Words
-    bounce_patch: Words
-    bounce_share: NDArray[np.float32]
-    triangle: Words
-    weights: Words
+    cell_first: Words
+    cell_target: Words
+    cell_factor: NDArray[np.float32]
+    nearest_patch: Words
+    confidence: NDArray[np.float32]
+    patch_first: Words
+    patch_target: Words
+    patch_factor: NDArray[np.float32]
+    sample_triangle: Words
+    sample_weights: Words
 
     @property
-    def patches(self) -> int:
-        """How many give light."""
-        return len(self.bounce_first) - 1
+    def patch_count(self) -> int:
+        """Return the number of patches."""
+        return len(self.patch_first) - 1
 
 
-def cached_links(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]) -> Links:
-    """`find_links`, read back from disk when they were found before."""
-    digest = hashlib.sha256(f"{_FORM} {SIDE} {SAMPLES} {BUNDLES} {LINES} {_LEAST}".encode())
-    for array in (mesh.positions, mesh.triangles, place, np.packbits(mapped)):
+def cached_form_factors(mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_]) -> FormFactors:
+    """Return `compute_form_factors` with these arguments, cached on disk."""
+    digest = hashlib.sha256(
+        f"{_CACHE_VERSION} {SIDE} {SAMPLES} {BUNDLES} {LINES} {_MIN_FORM_FACTOR}".encode()
+    )
+    for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped)):
         digest.update(np.ascontiguousarray(array).tobytes())
-    names = [field.name for field in fields(Links)]
+    names = [field.name for field in fields(FormFactors)]
 
-    @preparing("finding which parts of the skin see each other")
+    @logged_step("computing form factors of the skin")
     def make() -> dict[str, NDArray[np.generic]]:
-        found = find_links(mesh, place, mapped)
-        return {name: getattr(found, name) for name in names}
+        form_factors = compute_form_factors(mesh, corner_uv, mapped)
+        return {name: getattr(form_factors, name) for name in names}
 
-    return Links(**stored("interreflection", digest.hexdigest()[:40], names, make))
+    return FormFactors(**load_or_make("interreflection", digest.hexdigest()[:40], names, make))
 
 
-def find_links(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]) -> Links:
-    """Form factors between cells and patches, by bundles of parallel lines [Sbert1993].
+def compute_form_factors(
+    mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_]
+) -> FormFactors:
+    """Compute form factors between cells and patches with bundles of parallel lines [Sbert1993].
 
-    place : (f, 3, 2) uv of the triangles' corners in the atlas
-    mapped : (f,) triangles that have texels; the others are in the way of light and give none
+    Lines are distributed uniformly over all directions and positions: of those that leave one patch, the
+    fraction that meets another one next is its form factor.
 
-    Lines lie evenly in all directions and places: the share of those leaving one patch that meet another next
-    is its form factor.
+    corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
+    mapped : (f,) triangles that have texels; the others block light and emit none
     """
-    seen, left = _seen(mesh, place, mapped, *_FEW)
-    if len(seen):
+    facing, left = _trace_lines(mesh, corner_uv, mapped, _FEW_BUNDLES, _FEW_LINES)
+    if len(facing):
         lines = int(np.clip(np.sqrt(len(mesh.triangles)), *LINES))
-        seen, left = _seen(mesh, place, mapped, BUNDLES, lines)
-    return _links(seen, left, mesh, place, mapped)
+        facing, left = _trace_lines(mesh, corner_uv, mapped, BUNDLES, lines)
+    return _form_factors(facing, left, mesh, corner_uv, mapped)
 
 
-def _seen(
-    mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_], bundles: int, lines: int
+def _trace_lines(
+    mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_], bundles: int, lines: int
 ) -> tuple[Index, Floats]:
-    """(m, 2) cells at both ends of lines through the air, and (SIDE^2,) how many lines left each cell."""
+    """Return pairs of cells (m, 2) that lines connect, and the number of lines that left each cell."""
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     corners -= 0.5 * (low + high)
     per_mm = 0.5 * lines / (float(np.linalg.norm(corners, axis=2).max()) or 1.0)
-    rng, left, seen = np.random.default_rng(_SEED), np.zeros(SIDE * SIDE), [np.zeros((0, 2), np.int64)]
-    for way in _half_sphere(bundles):
-        axes = per_mm * _axes(way, rng.uniform(0.0, 2.0 * np.pi))
+    rng, left, facing = np.random.default_rng(_SEED), np.zeros(SIDE * SIDE), [np.zeros((0, 2), np.int64)]
+    for direction in _hemisphere_directions(bundles):
+        axes = per_mm * _axes(direction, rng.uniform(0.0, 2.0 * np.pi))
         points = corners @ axes.T + np.append(lines + rng.uniform(-0.5, 0.5, 2), 0.0)
-        line, depth, outward, triangle, weights = crossings(points)
-        cell = np.where(mapped[triangle], _cells(place[triangle], weights), -1)
+        line, depth, outward, triangle, weights = intersect_lines(points)
+        cell = np.where(mapped[triangle], _cell_index(corner_uv[triangle], weights), -1)
         left += np.bincount(cell[cell >= 0], minlength=SIDE * SIDE)
-        seen.append(_through_air(line, depth, outward, cell))
-    return np.concatenate(seen), left
+        facing.append(_facing_cells(line, depth, outward, cell))
+    return np.concatenate(facing), left
 
 
-def crossings(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, Floats]:
-    """Where the lines x, y = whole numbers meet triangles.
+def intersect_lines(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, Floats]:
+    """Intersect the lines parallel to z through all integers x, y with triangles.
 
-    Returns line, z, whether the surface looks towards +z there, triangle, (n, 3) its weights; of (f, 3, 3).
+    Returns line index, z, whether the surface faces +z, triangle, and (n, 3) weights of its corners.
+
+    points : (f, 3, 3) corners of the triangles
     """
     low, high = np.ceil(points[..., :2].min(axis=1)), np.floor(points[..., :2].max(axis=1))
     wide, tall = (np.maximum(high - low + 1, 0).astype(np.int64)).T
     count = wide * tall
-    some = np.flatnonzero(count)
-    triangle = np.repeat(some, count[some])
-    number = np.arange(len(triangle)) - np.repeat(np.cumsum(count[some]) - count[some], count[some])
+    triangle, number = expand_runs(np.zeros_like(count), count)
     x, y = low[triangle].T + np.stack([number % wide[triangle], number // wide[triangle]])
     a, b, c = points[triangle].transpose(1, 0, 2)
-    across = np.stack(
+    signed_areas = np.stack(
         [
             (b[:, 0] - x) * (c[:, 1] - y) - (b[:, 1] - y) * (c[:, 0] - x),
             (c[:, 0] - x) * (a[:, 1] - y) - (c[:, 1] - y) * (a[:, 0] - x),
@@ -128,74 +136,79 @@ def crossings(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, 
         ],
         axis=1,
     )
-    area = across.sum(axis=1)
-    inside = (across * np.sign(area)[:, None] >= 0.0).all(axis=1) & (area != 0.0)
-    weights = across[inside] / area[inside, None]
+    area = signed_areas.sum(axis=1)
+    inside = (signed_areas * np.sign(area)[:, None] >= 0.0).all(axis=1) & (area != 0.0)
+    weights = signed_areas[inside] / area[inside, None]
     depth = (weights * points[triangle[inside], :, 2]).sum(axis=1)
-    line = (y[inside] * _ROW + x[inside]).astype(np.int64)
+    line = (y[inside] * _LINES_PER_ROW + x[inside]).astype(np.int64)
     return line, depth, area[inside] > 0.0, triangle[inside], weights
 
 
-def _through_air(line: Index, depth: Floats, outward: NDArray[np.bool_], cell: Index) -> Index:
-    """(m, 2) cells that lines leave, and the cell that each meets next, -1 for one without texels.
+def _facing_cells(line: Index, depth: Floats, outward: NDArray[np.bool_], cell: Index) -> Index:
+    """Return pairs of cells (m, 2): the one that a line leaves, and the one that it meets next.
 
-    Both ways along each line, without those that meet nothing more.
+    Each line is followed in both directions; lines that meet nothing more are left out. The second cell is -1
+    where the surface has no texels.
     """
     order = np.lexsort((depth, line))
     line, outward, cell = line[order], outward[order], cell[order]
-    # Light leaves a body where it looks outward, and meets one that looks back.
-    air = (line[1:] == line[:-1]) & outward[:-1] & ~outward[1:]
-    pair = np.stack([cell[:-1][air], cell[1:][air]], axis=1)
+    # Light leaves a body where it faces along the line, and meets one that faces against it.
+    through_air = (line[1:] == line[:-1]) & outward[:-1] & ~outward[1:]
+    pair = np.stack([cell[:-1][through_air], cell[1:][through_air]], axis=1)
     return np.concatenate([pair, pair[:, ::-1]])
 
 
-def _cells(place: NDArray[np.float32], weights: Floats) -> Index:
-    uv = np.einsum("nk,nkc->nc", weights, place)
+def _cell_index(corner_uv: NDArray[np.float32], weights: Floats) -> Index:
+    uv = np.einsum("nk,nkc->nc", weights, corner_uv)
     x, y = np.clip((SIDE * uv).astype(np.int64), 0, SIDE - 1).T
     return np.asarray(y * SIDE + x)
 
 
-def _half_sphere(count: int) -> Floats:
-    """(count, 3) unit vectors evenly over half of the sphere."""
+def _hemisphere_directions(count: int) -> Floats:
+    """Return (count, 3) unit vectors that are evenly distributed over a hemisphere."""
     index = np.arange(count) + 0.5
     z, phi = index / count, np.pi * (1.0 + np.sqrt(5.0)) * index
     r = np.sqrt(1.0 - z**2)
     return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
 
 
-def _axes(way: Floats, turn: float) -> Floats:
-    """(3, 3) rows right, up and along a direction, turned about it."""
-    side = np.cross(way, np.eye(3)[np.abs(way).argmin()])
-    side /= np.linalg.norm(side)
-    up = np.cross(way, side)
-    c, s = np.cos(turn), np.sin(turn)
-    return np.stack([c * side + s * up, c * up - s * side, way])
+def _axes(direction: Floats, angle: float) -> Floats:
+    """Return the (3, 3) axes right, up and along a direction, rotated about it by an angle [rad]."""
+    right = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+    right /= np.linalg.norm(right)
+    up = np.cross(direction, right)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * right + s * up, c * up - s * right, direction])
 
 
-def _links(
-    met: Index, left: Floats, mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]
-) -> Links:
-    """The form factors of lines that were counted."""
-    patch_of, triangle, weights = _patches(mesh, place, mapped)
+def _form_factors(
+    facing: Index, left: Floats, mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_]
+) -> FormFactors:
+    """Return the form factors from the cells at the ends of lines.
+
+    facing : (m, 2) from `_trace_lines`
+    left : (SIDE^2,) number of lines that left each cell
+    """
+    patch_of, triangle, weights = _patches(mesh, corner_uv, mapped)
     count = len(triangle) // SAMPLES
-    there = (met >= 0).all(axis=1)
-    cell, patch = met[there, 0], patch_of[met[there, 1]]
-    giver, known = patch_of[cell], patch >= 0
-    gone = np.bincount(patch_of[patch_of >= 0], left[patch_of >= 0], count).astype(np.float64)
+    has_texels = (facing >= 0).all(axis=1)
+    cell, target = facing[has_texels, 0], patch_of[facing[has_texels, 1]]
+    patch, known = patch_of[cell], target >= 0
+    left_patch = np.bincount(patch_of[patch_of >= 0], left[patch_of >= 0], count).astype(np.float64)
     usual = np.median(left[left > 0]) if (left > 0).any() else 1.0
-    known_giver = known & (giver >= 0)
-    return Links(
-        *_rows(cell[known], patch[known], left, count),
-        _nearest(patch_of),
+    known_patch = known & (patch >= 0)
+    return FormFactors(
+        *_sparse_rows(cell[known], target[known], left, count),
+        _nearest_patch(patch_of),
         np.minimum(left / usual, 1.0).astype(np.float32),
-        *_rows(giver[known_giver], patch[known_giver], gone, count),
+        *_sparse_rows(patch[known_patch], target[known_patch], left_patch, count),
         triangle,
         weights,
     )
 
 
-def _nearest(patch_of: Index) -> Words:
-    """(SIDE^2,) the patch of each cell, for those of none that of the nearest cell in uv."""
+def _nearest_patch(patch_of: Index) -> Words:
+    """Return the patch of each cell (SIDE^2,); for cells without one, the patch of the nearest cell in uv."""
     from scipy.ndimage import distance_transform_edt
 
     known = patch_of.reshape(SIDE, SIDE)
@@ -205,27 +218,35 @@ def _nearest(patch_of: Index) -> Words:
     return np.asarray(known[tuple(nearest)].ravel(), np.uint32)
 
 
-def _rows(giver: Index, patch: Index, left: Floats, patches: int) -> tuple[Words, Words, NDArray[np.float32]]:
-    """Where each row begins, the patches that it leads to, and their shares."""
-    pair, lines = np.unique(giver * max(patches, 1) + patch, return_counts=True)
-    row, column = pair // max(patches, 1), pair % max(patches, 1)
-    share = lines / left[row]
-    kept = share >= _LEAST
-    whole, rest = (np.bincount(row[some], share[some], len(left)) for some in (slice(None), kept))
-    share = share[kept] * (whole / np.maximum(rest, 1e-12))[row[kept]]
-    first = np.concatenate([[0], np.cumsum(np.bincount(row[kept], minlength=len(left)))])
-    return first.astype(np.uint32), column[kept].astype(np.uint32), share.astype(np.float32)
+def _sparse_rows(
+    row: Index, target: Index, left: Floats, patches: int
+) -> tuple[Words, Words, NDArray[np.float32]]:
+    """Return the rows of a sparse matrix of form factors: start of each row, columns, and factors.
+
+    row, target : (m,) cell or patch that each line left, and the patch that it met
+    left : number of lines that left each cell or patch
+    """
+    entry, lines = np.unique(row * max(patches, 1) + target, return_counts=True)
+    row, column = entry // max(patches, 1), entry % max(patches, 1)
+    factor = lines / left[row]
+    large = factor >= _MIN_FORM_FACTOR
+    total, total_large = (np.bincount(row[some], factor[some], len(left)) for some in (slice(None), large))
+    factor = factor[large] * (total / np.maximum(total_large, 1e-12))[row[large]]
+    first = np.concatenate([[0], np.cumsum(np.bincount(row[large], minlength=len(left)))])
+    return first.astype(np.uint32), column[large].astype(np.uint32), factor.astype(np.float32)
 
 
-def _patches(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]) -> tuple[Index, Words, Words]:
-    """(SIDE^2,) the patch of each cell, -1 for none, and places by chance over all patches."""
-    triangle, weights, rank = _places(mesh, mapped)
-    half, cell = SIDE // 2, _cells(place[triangle], weights)
+def _patches(
+    mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_]
+) -> tuple[Index, Words, Words]:
+    """Return the patch of each cell (SIDE^2,), -1 for none, and random sample points of all patches."""
+    triangle, weights, rank = _sample_points(mesh, mapped)
+    half, cell = SIDE // 2, _cell_index(corner_uv[triangle], weights)
     patch = (cell // SIDE // 2) * half + cell % SIDE // 2
     order = np.lexsort((rank, patch))
-    own, first, size = np.unique(patch[order], return_index=True, return_counts=True)
+    occupied, first, size = np.unique(patch[order], return_index=True, return_counts=True)
     number = np.full(half * half, -1, np.int64)
-    number[own] = np.arange(len(own))
+    number[occupied] = np.arange(len(occupied))
     chosen = order[(first[:, None] + np.arange(SAMPLES) % np.maximum(size, 1)[:, None]).ravel()]
     packed = np.rint(65535 * weights[chosen]).astype(np.uint32)
     y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
@@ -234,10 +255,10 @@ def _patches(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]) 
     return patch_of, triangle[chosen].astype(np.uint32), words.astype(np.uint32)
 
 
-def _places(mesh: Mesh, mapped: NDArray[np.bool_]) -> tuple[Index, Floats, Floats]:
-    """Places by chance: at least one of each triangle with texels; its weights, and a rank.
+def _sample_points(mesh: Mesh, mapped: NDArray[np.bool_]) -> tuple[Index, Floats, Floats]:
+    """Return random points, at least one on each triangle with texels: triangle, weights and rank.
 
-    The first by rank lie evenly over the surface.
+    The points with the lowest ranks are uniformly distributed over the surface.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     area = np.where(mapped, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)

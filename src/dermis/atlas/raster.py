@@ -1,178 +1,185 @@
-"""Rasterised uv layouts: charts that texture space can hold, and the triangles of texels."""
+"""Rasterisation of uv layouts: charts, texels of triangles, and the atlas of a mesh's own layout."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import GUTTER, MOST_SHEAR, Atlas
+from dermis.atlas.atlas import GUTTER_TEXELS, MAX_SHEAR, Atlas
 from dermis.base.arrays import Doubles, Ints
 from dermis.mesh.geometry import MIN_UV_CROSS, components, edges, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
-_EDGE = 1e-6  # texels this near outside an edge count as on it
-_LEAST_TEXELS = 4.0  # a chart with less uv area than this holds nothing that could be blurred
+_EDGE_TOLERANCE = 1e-6  # texel centres this far outside an edge still count as covered [texel]
+_MIN_CHART_TEXELS = 4.0  # area of a chart; smaller ones are too small to be blurred
 
 
-def charts(mesh: Mesh) -> Ints:
-    """Chart of each triangle (f,), counted from 0: triangles that share an edge in space and in uv."""
-    # by place and uv, not by corner vertex: a vertex split for its normal only does not cut a chart
+def find_charts(mesh: Mesh) -> Ints:
+    """Return the chart of each triangle (f,), numbered from 0; a chart is connected in space and in uv."""
+    # vertices are compared by position and uv, as one that is split only for its normal is no seam
     corner = weld(np.hstack((mesh.positions, mesh.uv)))
-    _, of_side, _ = edges(corner[mesh.triangles])
+    _, edge_of_side, _ = edges(corner[mesh.triangles])
     faces = np.tile(np.arange(len(mesh.triangles)), 3)
-    order = np.argsort(of_side, kind="stable")
-    shared = of_side[order][1:] == of_side[order][:-1]
+    order = np.argsort(edge_of_side, kind="stable")
+    shared = edge_of_side[order][1:] == edge_of_side[order][:-1]
     a, b = faces[order][:-1][shared], faces[order][1:][shared]
     return components(len(mesh.triangles), a, b).astype(np.int32)
 
 
 def triangle_uv_area(mesh: Mesh) -> Doubles:
-    """Unsigned uv area of each triangle (f,), 1 being the whole map."""
+    """Return the unsigned uv area of each triangle (f,), as a fraction of the map."""
     return np.asarray(np.abs(uv_cross(mesh.uv[mesh.triangles])) / 2)
 
 
 def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
-    """Unsigned uv area of each chart (c,), 1 being the whole map.
+    """Return the unsigned uv area of each chart (c,), as a fraction of the map.
 
-    chart : (f,) from `charts`
+    chart : (f,) from `find_charts`
     """
     return np.asarray(np.bincount(chart, weights=triangle_uv_area(mesh)), dtype=np.float64)
 
 
-def usable(mesh: Mesh, atlas: int, min_texels: float = 4.0) -> NDArray[np.bool_]:
-    """Whether each triangle (f,) can be processed in texture space.
+def usable_triangles(mesh: Mesh, size: int, min_texels: float = _MIN_CHART_TEXELS) -> NDArray[np.bool_]:
+    """Return the mask (f,) of triangles that can be processed in texture space.
 
-    False for triangles without uv area and for all triangles of a chart that is collapsed.
+    Triangles without uv area and all triangles of a collapsed chart cannot.
 
-    atlas : width and height of the square map [texels]
-    min_texels : a chart whose whole uv area is below this is collapsed [texels]
+    size : width and height of the map [texel]
+    min_texels : a chart with less uv area than this is collapsed [texel]
     """
-    chart = charts(mesh)
-    roomy = chart_uv_area(mesh, chart) * atlas**2 >= min_texels
-    return np.asarray(roomy[chart] & (2 * triangle_uv_area(mesh) > MIN_UV_CROSS))
+    chart = find_charts(mesh)
+    large_enough = chart_uv_area(mesh, chart) * size**2 >= min_texels
+    return np.asarray(large_enough[chart] & (2 * triangle_uv_area(mesh) > MIN_UV_CROSS))
 
 
 def texel_corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> Floats:
-    """(t, 3, 2) uv corners in texels, whole numbers at texel centres."""
+    """Return the uv of some triangles' corners (t, 3, 2) in texels, integers at texel centres."""
     return np.asarray(mesh.uv[mesh.triangles[triangle]].astype(np.float64) * size - 0.5)
 
 
 def rasterise(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> tuple[Index, Index]:
-    """Texels whose centre lies in a triangle, as (flat texel index, triangle), by spans of rows."""
-    texel, which = texels_in(texel_corners(mesh, size, triangle), (size, size))
+    """Return the texels whose centres some triangles cover, as flat indices, and the triangle of each."""
+    texel, which = covered_texels(texel_corners(mesh, size, triangle), (size, size))
     return texel, triangle[which].astype(np.int64)
 
 
-def texels_in(p: Floats, shape: tuple[int, int], margin: float = -_EDGE) -> tuple[Index, Index]:
-    """Texels of a grid (h, w) whose centre lies in a triangle: flat index, and which triangle (t,).
+def covered_texels(
+    p: Floats, shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE
+) -> tuple[Index, Index]:
+    """Return the texels of a grid whose centres triangles cover, as flat indices, and their row in `p`.
 
-    p : (t, 3, 2) corners [texel], whole numbers at texel centres
-    margin : how far inside its edges along rows and columns they have to be [texel]
+    p : (t, 3, 2) corners [texel], integers at texel centres
+    shape : height and width of the grid
+    margin : distance that a centre must be inside the edges, along rows and columns [texel]
     """
     height, width = shape
-    low, high = (least(least(p[:, 0, 1], p[:, 1, 1]), p[:, 2, 1]) for least in (np.minimum, np.maximum))
-    top, bottom = _inside(low, high, height, margin)
-    which, y = expand(top, np.maximum(bottom - top + 1, 0))
-    left, right = _inside(*_span(p, which, y), width, margin)
-    span, x = expand(left, np.maximum(right - left + 1, 0))
+    low, high = p[..., 1].min(axis=1), p[..., 1].max(axis=1)
+    top, bottom = _integers_between(low, high, height, margin)
+    which, y = expand_runs(top, np.maximum(bottom - top + 1, 0))
+    left, right = _integers_between(*_row_interval(p, which, y), width, margin)
+    span, x = expand_runs(left, np.maximum(right - left + 1, 0))
     return y[span] * width + x, which[span]
 
 
-def _inside(low: Floats, high: Floats, size: int, margin: float) -> tuple[Index, Index]:
-    """First and last whole number between two bounds, within 0 .. size - 1."""
+def _integers_between(low: Floats, high: Floats, size: int, margin: float) -> tuple[Index, Index]:
+    """Return the first and last integer between two bounds, within 0 .. size - 1."""
     first = np.clip(np.ceil(low + margin), 0, size).astype(np.int64)
     return first, np.clip(np.floor(high - margin), -1, size - 1).astype(np.int64)
 
 
-def expand(first: Index, count: Index) -> tuple[Index, Index]:
-    """Each run first, first + 1, ... of `count` numbers, with the index of the run it belongs to."""
+def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
+    """Expand runs of consecutive integers: return the run that each integer belongs to, and the integers.
+
+    first, count : first integer of each run and its length
+    """
     which = np.repeat(np.arange(len(count)), count)
     start = np.repeat(np.cumsum(count) - count, count)
     return which, np.arange(len(which)) - start + first[which]
 
 
-def _span(p: Floats, which: Index, y: Index) -> tuple[Floats, Floats]:
-    """Where each row y enters and leaves its triangle."""
+def _row_interval(p: Floats, which: Index, y: Index) -> tuple[Floats, Floats]:
+    """Return the x interval in which each row y intersects its triangle."""
     lowest = np.full(len(y), -np.inf)
     highest = np.full(len(y), np.inf)
-    sign = np.where(cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) >= 0, 1.0, -1.0)[:, None]
+    sign = np.where(cross_2d(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) >= 0, 1.0, -1.0)[:, None]
     edge = np.roll(p, -1, axis=1) - p
     # inside: cross(edge, q - a) * sign >= 0, linear in q.x with slope -edge.y * sign
     slopes, across = -edge[..., 1] * sign, edge[..., 0] * sign
-    levels = edge[..., 1] * p[..., 0] * sign - across * p[..., 1]
+    offsets = edge[..., 1] * p[..., 0] * sign - across * p[..., 1]
     for k in range(3):
-        slope, level = slopes[which, k], levels[which, k] + across[which, k] * y
-        crossing = -level / np.where(slope == 0, 1.0, slope)
+        slope, offset = slopes[which, k], offsets[which, k] + across[which, k] * y
+        crossing = -offset / np.where(slope == 0, 1.0, slope)
         np.maximum(lowest, crossing, out=lowest, where=slope > 0)
         np.minimum(highest, crossing, out=highest, where=slope < 0)
-        highest[(slope == 0) & (level < 0)] = -np.inf
+        highest[(slope == 0) & (offset < 0)] = -np.inf
     return np.where(np.isfinite(lowest), lowest, 1.0), np.where(np.isfinite(highest), highest, 0.0)
 
 
-def cross(a: Floats, b: Floats) -> Floats:
-    """z of the cross product of (..., 2) vectors."""
+def cross_2d(a: Floats, b: Floats) -> Floats:
+    """Return the z component of the cross product of (..., 2) vectors."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def build_own_layout(mesh: Mesh, size: int) -> Atlas:
-    """The atlas whose texels are those of the mesh's own maps."""
-    chart = charts(mesh)
+def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
+    """Build the atlas whose texels are those of the mesh's own maps."""
+    chart = find_charts(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])
-    fit = usable(mesh, size, _LEAST_TEXELS) & skin[mesh.material]
-    texel, triangle = rasterise(mesh, size, np.flatnonzero(fit))
-    mapped = fit & ~_overlapped(chart, texel, triangle, size)
-    owner, lost = _owners(mesh, mapped, texel, triangle, size)
-    mapped &= ~lost
-    for _ in range(GUTTER):
+    usable = usable_triangles(mesh, size) & skin[mesh.material]
+    texel, triangle = rasterise(mesh, size, np.flatnonzero(usable))
+    mapped = usable & ~_overlapped_charts(chart, texel, triangle, size)
+    owner, hidden = _assign_texels(mesh, mapped, texel, triangle, size)
+    mapped &= ~hidden
+    for _ in range(GUTTER_TEXELS):
         owner = _dilate(owner)
-    mapped &= _readable(mesh, size, owner)
+    mapped &= _interpolable(mesh, size, owner)
     barycentric = _barycentric(mesh, size, owner)
     chart_map = np.where(owner >= 0, chart[np.maximum(owner, 0)], -1)
-    stretch, shear = _metric(mesh, size, owner, barycentric)
-    place = mesh.uv[mesh.triangles]
+    stretch, shear = _texel_metric(mesh, size, owner, barycentric)
+    corner_uv = mesh.uv[mesh.triangles]
     none = np.zeros((0, 2), np.uint16)
     return Atlas(
         triangle=owner,
         barycentric=barycentric,
         stretch=stretch,
         shear=shear,
-        reach=_reach(chart_map),
-        place=place,
+        edge_distance=_edge_distance(chart_map),
+        corner_uv=corner_uv,
         gutter=none,
         source=none.astype(np.float32),
-        beyond=none,
-        root=np.zeros(0, np.int32),
-        root_weight=none,
-        per_uv=np.full(len(place), size, np.float32),
+        outside=none,
+        border_triangle=np.zeros(0, np.int32),
+        border_weights=none,
+        texels_per_uv=np.full(len(corner_uv), size, np.float32),
         mapped=mapped,
     )
 
 
-def _overlapped(
+def _overlapped_charts(
     chart: NDArray[np.integer], texel: NDArray[np.int64], triangle: NDArray[np.int64], size: int
 ) -> NDArray[np.bool_]:
-    """Triangles of charts most of whose texels a larger chart covers too."""
+    """Return the mask (f,) of triangles in charts that are mostly covered by a larger chart."""
     count = int(chart.max()) + 1
     area = np.bincount(chart[triangle], minlength=count)
     order = np.argsort(area[chart[triangle]], kind="stable")  # the largest chart writes last and wins
     winner = np.full(size * size, -1, dtype=np.int64)
     winner[texel[order]] = chart[triangle[order]]
     own = np.bincount(chart[triangle][winner[texel] == chart[triangle]], minlength=count)
-    lost: NDArray[np.bool_] = own < 0.5 * np.maximum(area, 1)
-    return np.asarray(lost[chart])
+    hidden: NDArray[np.bool_] = own < 0.5 * np.maximum(area, 1)
+    return np.asarray(hidden[chart])
 
 
-def _owners(
+def _assign_texels(
     mesh: Mesh, mapped: NDArray[np.bool_], texel: NDArray[np.int64], triangle: NDArray[np.int64], size: int
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """The triangle of each texel, and the triangles that lose most of theirs to others of their own chart.
+    """Return the triangle of each texel, and the mask of triangles mostly covered by others of their chart.
 
-    Two mirrored halves folded onto each other are one chart: the half that is not mirrored in uv wins.
+    Where two mirrored halves are folded onto each other in one chart, the half that is not mirrored in uv
+    wins.
     """
-    keep = mapped[triangle]
-    texel, triangle = texel[keep], triangle[keep]
+    is_mapped = mapped[triangle]
+    texel, triangle = texel[is_mapped], triangle[is_mapped]
     order = np.argsort(uv_cross(mesh.uv[mesh.triangles])[triangle] < 0, kind="stable")
     owner: NDArray[np.int32] = np.full((size, size), -1, dtype=np.int32)
     owner.ravel()[texel[order]] = triangle[order]
@@ -183,18 +190,18 @@ def _owners(
 
 
 def _dilate(owner: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Empty texels take the owner of one of their eight neighbours, straight ones first."""
-    grown = owner.copy()
+    """Assign to each empty texel the triangle of one of its eight neighbours, direct neighbours first."""
+    dilated = owner.copy()
     padded = np.pad(owner, 1, constant_values=-1)
     n = len(owner)
     for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)):
         neighbour = padded[1 + dy : 1 + dy + n, 1 + dx : 1 + dx + n]
-        np.copyto(grown, neighbour, where=(grown < 0) & (neighbour >= 0))
-    return grown
+        np.copyto(dilated, neighbour, where=(dilated < 0) & (neighbour >= 0))
+    return dilated
 
 
-def _readable(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Triangles at whose corners interpolation finds surface; slivers thinner than a texel may have none."""
+def _interpolable(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Return the mask (f,) of triangles whose corners can be interpolated; slivers may have no texels."""
     low = np.floor(texel_corners(mesh, size, np.arange(len(mesh.triangles)))).astype(np.int64)
     found = np.ones(len(low), dtype=bool)
     for offset in ((0, 0), (1, 0), (0, 1), (1, 1)):
@@ -204,24 +211,24 @@ def _readable(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.boo
 
 
 def _barycentric(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.uint16]:
-    """Weights at each texel's centre; in the gutter those of the nearest place in the triangle."""
+    """Return the weights at each texel centre; in gutters those of the nearest point of the triangle."""
     y, x = np.nonzero(owner >= 0)
     p = texel_corners(mesh, size, owner[y, x])
     q = np.stack([x, y], axis=-1) - p[:, 0]
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    area = cross(e1, e2)
+    area = cross_2d(e1, e2)
     area = np.where(area == 0, 1.0, area)
-    b = np.clip(np.stack([cross(q, e2) / area, cross(e1, q) / area], axis=-1), 0.0, 1.0)
+    b = np.clip(np.stack([cross_2d(q, e2) / area, cross_2d(e1, q) / area], axis=-1), 0.0, 1.0)
     b /= np.maximum(b.sum(axis=-1, keepdims=True), 1.0)
-    whole = np.zeros((size, size, 2), dtype=np.uint16)
-    whole[y, x] = np.floor(b * 65535.0).astype(np.uint16)
-    return whole
+    packed = np.zeros((size, size, 2), dtype=np.uint16)
+    packed[y, x] = np.floor(b * 65535.0).astype(np.uint16)
+    return packed
 
 
-def _metric(
+def _texel_metric(
     mesh: Mesh, size: int, owner: NDArray[np.int32], barycentric: NDArray[np.uint16]
 ) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
-    """Texels per mm along u and v, and the cosine between the two, from the interpolated derivatives."""
+    """Return texels per mm along u and v, and the cosine between u and v, from interpolated derivatives."""
     y, x = np.nonzero(owner >= 0)
     corners = mesh.triangles[owner[y, x]]
     b = barycentric[y, x] / np.float32(65535)
@@ -233,20 +240,20 @@ def _metric(
     stretch = np.zeros((size, size, 2), dtype=np.float16)
     stretch[y, x] = np.clip(size / np.maximum(interpolated[:, :2], 1e-3), 0.0, 6e4)
     shear = np.zeros((size, size), dtype=np.float16)
-    shear[y, x] = np.clip(interpolated[:, 2], -MOST_SHEAR, MOST_SHEAR)
+    shear[y, x] = np.clip(interpolated[:, 2], -MAX_SHEAR, MAX_SHEAR)
     return stretch, shear
 
 
-def _reach(chart: NDArray[np.integer]) -> NDArray[np.uint16]:
-    """Run lengths of equal chart to the left, right, up and down of each texel."""
+def _edge_distance(chart: NDArray[np.integer]) -> NDArray[np.uint16]:
+    """Return the number of texels of the same chart to the left, right, up and down of each texel."""
 
-    def before(rows: NDArray[np.integer]) -> NDArray[np.int64]:
+    def run_before(rows: NDArray[np.integer]) -> NDArray[np.int64]:
         index = np.arange(rows.shape[1])[None, :]
         breaks = np.ones(rows.shape, dtype=bool)
         breaks[:, 1:] = rows[:, 1:] != rows[:, :-1]
         start: NDArray[np.int64] = np.maximum.accumulate(np.where(breaks, index, 0), axis=1)
         return index - start
 
-    right, down = before(chart[:, ::-1])[:, ::-1], before(chart.T[:, ::-1])[:, ::-1].T
-    runs = before(chart), right, before(chart.T).T, down
+    right, down = run_before(chart[:, ::-1])[:, ::-1], run_before(chart.T[:, ::-1])[:, ::-1].T
+    runs = run_before(chart), right, run_before(chart.T).T, down
     return np.stack(runs, axis=-1).astype(np.uint16)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import MOST_SHEAR, Atlas
+from dermis.atlas.atlas import MAX_SHEAR, Atlas
 from dermis.atlas.stitched.cover import Cover, cover, hidden, metric_of, runs_of
 from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
@@ -61,7 +61,7 @@ def _density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
     return np.where(inside, np.sqrt(uv / np.maximum(mm2, 1e-12))[number], mean), mean
 
 
-def build_stitched(mesh: Mesh, size: int, reach_mm: float) -> Atlas | None:
+def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
     """The atlas in which every chart has room of its own, and a gutter that shows what lies across its seams.
 
     None when there are too many charts for the texels.
@@ -70,8 +70,8 @@ def build_stitched(mesh: Mesh, size: int, reach_mm: float) -> Atlas | None:
     """
     surface = survey(mesh)
     piece, scale = find_pieces(surface)
-    piece = cut_overlaps(surface, piece, reach_mm)
-    width = GutterWidth(reach_mm, _WIDEST * size)
+    piece = cut_overlaps(surface, piece, gutter_mm)
+    width = GutterWidth(gutter_mm, _WIDEST * size)
     packing = pack_pieces(surface, piece, scale, size, width)
     if packing is None:
         return None
@@ -94,7 +94,7 @@ def _atlas(surface: FlatSurface, packing: Packing, made: Cover, mapped: NDArray[
     # the rims of pieces show what lies across a seam, but are stretched as their own side of it
     outer = (made.rooted >= 0) & ((made.rooted != made.triangle) | made.gutter)
     row, column = np.nonzero(outer)
-    shear = np.clip(metric[..., 2], -MOST_SHEAR, MOST_SHEAR)
+    shear = np.clip(metric[..., 2], -MAX_SHEAR, MAX_SHEAR)
     return Atlas(
         triangle=made.triangle,
         barycentric=np.floor(made.weights * 65535.0).astype(np.uint16),

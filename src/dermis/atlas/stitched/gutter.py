@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.raster import texels_in
+from dermis.atlas.raster import covered_texels
 from dermis.atlas.stitched.nearest import Nearest, Sides, nearest_sides
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 from dermis.atlas.stitched.walk import Ends, walk
@@ -43,7 +43,7 @@ class Packing(NamedTuple):
 class GutterWidth(NamedTuple):
     """How far gutters reach: on the surface [mm], and at most [texel]."""
 
-    reach_mm: float
+    gutter_mm: float
     widest: float
 
 
@@ -67,8 +67,8 @@ def sides_of(surface: FlatSurface, border: Border, packing: Packing, width: Gutt
     steps = np.stack([surface.along[triangle, k] for k in both], axis=1)
     steps = steps / packing.per_uv[triangle][:, None, None, None]
     # slivers may be stretched a hundredfold: gutters that wide would waste room
-    widest = np.minimum(width.widest, _MOST_STRETCH * width.reach_mm * packing.per_mm[triangle])
-    return Sides(ends, steps, np.where(border.seam, width.reach_mm, 0.0), widest)
+    widest = np.minimum(width.widest, _MOST_STRETCH * width.gutter_mm * packing.per_mm[triangle])
+    return Sides(ends, steps, np.where(border.seam, width.gutter_mm, 0.0), widest)
 
 
 def needed(
@@ -81,7 +81,7 @@ def needed(
 ) -> Flags:
     """(h, w) texels that pieces, rims and gutters may need."""
     found = np.zeros(shape, np.bool_)
-    found.ravel()[texels_in(packing.places[own], shape)[0]] = True
+    found.ravel()[covered_texels(packing.places[own], shape)[0]] = True
     found.ravel()[nearest_sides(sides_of(surface, border, packing, width), found).texel] = True
     return found
 

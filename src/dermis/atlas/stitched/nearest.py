@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.raster import expand
+from dermis.atlas.raster import expand_runs
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -26,7 +26,7 @@ class Sides(NamedTuple):
 
     ends: Doubles
     steps: Doubles
-    reach_mm: Doubles
+    gutter_mm: Doubles
     widest: Doubles
 
 
@@ -76,7 +76,7 @@ def nearest_sides(sides: Sides, inside: Flags) -> Nearest:
     v = off - share * along
     away2 = (metric.x[k] * v[0] + metric.y[k] * v[1]) ** 2 + (metric.down[k] * v[1]) ** 2
     rim = _within_a_texel(off, along)
-    near = np.flatnonzero(rim | (away2 < sides.reach_mm[k] ** 2))
+    near = np.flatnonzero(rim | (away2 < sides.gutter_mm[k] ** 2))
     least = np.full(inside.size, np.inf)
     np.minimum.at(least, texel[near], away2[near])
     first = np.full(inside.size, -1)
@@ -92,7 +92,7 @@ def _metric(sides: Sides) -> _Metric:
     u, v = np.moveaxis(sides.steps.mean(axis=1), 1, 0)
     e, f, g = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
     det = np.maximum(np.maximum(e * g - f * f, 1e-9 * e * g), 1e-30)
-    reach = sides.reach_mm * np.sqrt(np.stack((g, e)) / det)
+    reach = sides.gutter_mm * np.sqrt(np.stack((g, e)) / det)
     half = np.maximum(np.minimum(reach, sides.widest), _TEXEL).T
     x, y = (sides.ends[:, 1] - sides.ends[:, 0]).T
     length = np.maximum(e * x * x + 2 * f * x * y + g * y * y, 1e-30)
@@ -108,8 +108,8 @@ def _around(sides: Sides, metric: _Metric, shape: tuple[int, ...]) -> tuple[Inde
     high = np.floor(sides.ends.max(axis=1) + metric.half)
     left, top = np.maximum(low, 0).astype(np.int64).T
     right, bottom = np.minimum(high, (width - 1, height - 1)).astype(np.int64).T
-    k, y = expand(top, np.maximum(bottom - top + 1, 0))
-    row, x = expand(left[k], np.maximum(right - left + 1, 0)[k])
+    k, y = expand_runs(top, np.maximum(bottom - top + 1, 0))
+    row, x = expand_runs(left[k], np.maximum(right - left + 1, 0)[k])
     return k[row], x, y[row]
 
 

@@ -76,7 +76,7 @@ class _Grid(NamedTuple):
     nearest: Nearest
 
 
-def find_conflicts(surface: FlatSurface, placed: Flags, own: Index, reach_mm: float) -> Conflicts:
+def find_conflicts(surface: FlatSurface, placed: Flags, own: Index, gutter_mm: float) -> Conflicts:
     """Conflicts of the piece that consists of the triangles `own`, on a grid of its own.
 
     placed : (f,) triangles of any piece
@@ -86,7 +86,7 @@ def find_conflicts(surface: FlatSurface, placed: Flags, own: Index, reach_mm: fl
     box_mm2 = float((high - low).prod()) * mm2 / area_uv
     texel_mm = float(max(_FINEST_MM, np.sqrt(mm2 / _MOST_TEXELS), np.sqrt(box_mm2 / _MOST_CELLS)))
     per_uv = float(np.sqrt(mm2 / area_uv) / texel_mm)
-    width = GutterWidth(reach_mm, np.ceil(2 * reach_mm / texel_mm))
+    width = GutterWidth(gutter_mm, np.ceil(2 * gutter_mm / texel_mm))
     margin, every = width.widest + 2, np.ones(len(placed))
     places = np.zeros(surface.uv.shape)
     places[own] = (surface.uv[own] - low) * per_uv + margin
@@ -105,7 +105,7 @@ def _grid(
     surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: NDArray[np.int32]
 ) -> _Grid:
     sides = sides_of(surface, border, packing, width)
-    sides = sides._replace(reach_mm=_NEAR * sides.reach_mm)
+    sides = sides._replace(gutter_mm=_NEAR * sides.gutter_mm)
     nearest, own = nearest_sides(sides, owner >= 0), np.flatnonzero(owner >= 0)
     f, texel = owner.ravel()[own], np.concatenate((own, nearest.texel))
     number, labels = np.full(owner.shape, -1), np.where(owner >= 0, owner, -2)
@@ -148,7 +148,7 @@ def _points(surface: FlatSurface, placed: Flags, grid: _Grid, chosen: Index) -> 
     return points
 
 
-def cut_overlaps(surface: FlatSurface, piece: Index, reach_mm: float) -> Index:
+def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
     """Pieces (f,) cut along lines until gutters hardly overlap.
 
     reach_mm : width of the gutters
@@ -160,8 +160,8 @@ def cut_overlaps(surface: FlatSurface, piece: Index, reach_mm: float) -> Index:
     room_mm2 = _GROWTH * surface.area_mm2[order].sum()
     while waiting:
         own, depth = waiting.pop()
-        parts = _cut(surface, piece >= 0, own, reach_mm) if depth < _DEEPEST else None
-        cost_mm2 = 0.0 if parts is None else 2 * reach_mm * _cut_mm(surface, own, parts)
+        parts = _cut(surface, piece >= 0, own, gutter_mm) if depth < _DEEPEST else None
+        cost_mm2 = 0.0 if parts is None else 2 * gutter_mm * _cut_mm(surface, own, parts)
         if parts is None or cost_mm2 > room_mm2:
             done[own] = count
             count += 1
@@ -180,13 +180,13 @@ def _cut_mm(surface: FlatSurface, own: Index, part: Index) -> float:
     return float(length[(other >= 0) & (other != part[:, None])].sum()) / 2
 
 
-def _cut(surface: FlatSurface, placed: Flags, own: Index, reach_mm: float) -> Index | None:
+def _cut(surface: FlatSurface, placed: Flags, own: Index, gutter_mm: float) -> Index | None:
     """Part of each triangle of one piece, None when it needs no cut."""
-    found = find_conflicts(surface, placed, own, reach_mm)
-    reach = reach_mm / found.texel_mm
+    found = find_conflicts(surface, placed, own, gutter_mm)
+    reach = gutter_mm / found.texel_mm
     part = np.zeros(len(own), np.int64)
     for number, cluster in enumerate(_clusters(found, reach), start=1):
-        if len(cluster) * found.texel_mm < _LEAST * reach_mm:
+        if len(cluster) * found.texel_mm < _LEAST * gutter_mm:
             continue
         overlap = found._replace(one=found.one[cluster], other=found.other[cluster])
         normal, offset, parted = _best_line(overlap, reach)
@@ -196,9 +196,9 @@ def _cut(surface: FlatSurface, placed: Flags, own: Index, reach_mm: float) -> In
         if parted < _WORTH * min(across, around):
             continue
         if across <= around:
-            return _parts(surface, own, half.astype(np.int64), reach_mm)
+            return _parts(surface, own, half.astype(np.int64), gutter_mm)
         part[_strip(surface, own, overlap, half, reach) & (part == 0)] = number
-    return _parts(surface, own, part, reach_mm)
+    return _parts(surface, own, part, gutter_mm)
 
 
 def _clusters(found: Conflicts, reach: float) -> list[Index]:
@@ -251,7 +251,7 @@ def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
     return line
 
 
-def _parts(surface: FlatSurface, own: Index, part: Index, reach_mm: float) -> Index | None:
+def _parts(surface: FlatSurface, own: Index, part: Index, gutter_mm: float) -> Index | None:
     """Connected parts; crumbs along the cut join the largest part beside them. None for a single part."""
     index = np.full(len(surface.uv), -1, np.int64)
     index[own] = np.arange(len(own))
@@ -259,7 +259,7 @@ def _parts(surface: FlatSurface, own: Index, part: Index, reach_mm: float) -> In
     beside = np.where(there >= 0, there, np.arange(len(own))[:, None])
     part = connected(part, beside)
     area = np.bincount(part, surface.area_mm2[own])
-    crumbs = area[part] < _CRUMB * reach_mm**2
+    crumbs = area[part] < _CRUMB * gutter_mm**2
     host = np.take_along_axis(part[beside], area[part[beside]].argmax(axis=1)[:, None], axis=1)[:, 0]
     part = connected(np.where(crumbs, host, part), beside)
     return part if part.max() > 0 else None

@@ -255,5 +255,5 @@ def _half_extent(one: _Piece, scale: float, width: GutterWidth) -> Doubles:
     e, g = ((steps[..., k, :] ** 2).sum(axis=-1) for k in (0, 1))
     f = (steps[..., 0, :] * steps[..., 1, :]).sum(axis=-1)
     det = np.maximum(e * g - f * f, 1e-9 * e * g)
-    half = width.reach_mm * np.sqrt(np.array([(g / det).max(), (e / det).max()]))
+    half = width.gutter_mm * np.sqrt(np.array([(g / det).max(), (e / det).max()]))
     return np.asarray(np.clip(half, 1.0, max(width.widest, 1.0)))

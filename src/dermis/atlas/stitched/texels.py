@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.raster import cross, texels_in
+from dermis.atlas.raster import covered_texels, cross_2d
 from dermis.atlas.stitched.surface import FlatSurface
 
 Doubles = NDArray[np.float64]
@@ -26,14 +26,14 @@ def owners(places: Doubles, triangles: Index, shape: tuple[int, int]) -> NDArray
     triangles : those to be drawn
     """
     owner = np.full(shape, -1, np.int32)
-    texel, which = texels_in(places[triangles], shape)
+    texel, which = covered_texels(places[triangles], shape)
     owner.ravel()[texel] = triangles[which]
     return owner
 
 
 def lost(places: Doubles, triangles: Index, owner: NDArray[np.int32]) -> Flags:
     """Triangles (f,) most of whose texels are owned by others; arguments as for `owners`."""
-    texel, which = texels_in(places[triangles], owner.shape, _WELL)
+    texel, which = covered_texels(places[triangles], owner.shape, _WELL)
     drawn, count = triangles[which], len(places)
     owned = np.bincount(drawn[owner.ravel()[texel] == drawn], minlength=count)
     return np.asarray(owned < 0.5 * np.bincount(drawn, minlength=count))
@@ -50,9 +50,9 @@ def weights_at(places: Doubles, owner: NDArray[np.int32]) -> Singles:
 def weights_in(corners: Doubles, at: NDArray[Any]) -> Doubles:
     """(n, 2) of the second and third corner of triangles (n, 3, 2) at places (n, 2) in them [texel]."""
     e1, e2, off = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], at - corners[:, 0]
-    area = cross(e1, e2)
+    area = cross_2d(e1, e2)
     area = np.where(area == 0, 1.0, area)
-    second, third = np.clip(cross(off, e2) / area, 0.0, 1.0), np.clip(cross(e1, off) / area, 0.0, 1.0)
+    second, third = np.clip(cross_2d(off, e2) / area, 0.0, 1.0), np.clip(cross_2d(e1, off) / area, 0.0, 1.0)
     return np.stack((second, third), axis=1) / np.maximum(second + third, 1.0)[:, None]
 
 

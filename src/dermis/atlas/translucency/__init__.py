@@ -1,1 +1,1 @@
-"""Pairs of places of the surface that exchange light through thin flesh: ears, nostrils, lips, lids."""
+"""Cells of an atlas between which light passes through thin parts: ears, nostrils, lips, lids."""

@@ -58,7 +58,7 @@ def pack(outlines: list[Doubles], padding: float) -> tuple[float, Doubles]:
             else:
                 best, cells, low = scale, found, scale
     if cells is None:
-        refuse("charts", "fewer charts", f"{len(outlines)} came", "Cut the mesh into larger charts")
+        refuse("charts", "fewer charts", f"got {len(outlines)}", "Cut the mesh into larger charts")
     return best / _CELLS, (cells - best * corner) / _CELLS
 
 
