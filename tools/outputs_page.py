@@ -31,8 +31,8 @@ def table() -> str:
 
 def _cells(output: Output) -> list[str]:
     each = f"{output.channels} x {output.kind}" if output.channels else f"{output.kind} for each light"
-    channels = ", ".join(f"`{output.name}.{letter}`" for letter in output.letters or "012")
-    channels += "" if output.letters else ", ..."
+    channels = ", ".join(f"`{output.name}.{letter}`" for letter in output.channel_names or "012")
+    channels += "" if output.channel_names else ", ..."
     cells = [f"`{output.name}`", output.description, output.unit, each.removeprefix("1 x ")]
     return [*cells, channels, _png(output), f"{output.background:g}"]
 
@@ -40,9 +40,9 @@ def _cells(output: Output) -> list[str]:
 def _png(output: Output) -> str:
     if output.kind == "uint8":
         return "8 bit, as it is"
-    if output.levels is None:
+    if output.quantisation is None:
         return "none"
-    step, zero = output.levels
+    step, zero = output.quantisation
     shown = f"{step:g}" if round(step, 3) == step else f"1/{round(1 / step)}"
     return f"(level - {zero}) x {shown}" if zero else f"level x {shown}"
 

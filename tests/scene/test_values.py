@@ -75,7 +75,7 @@ def test_edges_of_the_ranges_are_allowed() -> None:
 
 def test_scene_data_are_frozen_and_copied_with_other_values() -> None:
     skin = Skin(roughness=0.4)
-    with pytest.raises(DermisError, match=r"Skin: .*mix was to be changed\. Write replace\(mix=0\.1\)"):
+    with pytest.raises(DermisError, match=r"Skin: .*got one to mix\. Write replace\(mix=0\.1\)"):
         skin.mix = 0.1  # type: ignore[misc]
     assert skin.replace(mix=0.1) == Skin(roughness=0.4, mix=0.1)
     with pytest.raises(DermisError, match="got 7"):

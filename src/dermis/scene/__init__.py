@@ -1,4 +1,4 @@
-"""What is to be seen, as plain data without a GPU."""
+"""Scene description without a GPU: head, skin, lights, camera, environment and settings."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ __all__ = [  # besides those of dermis.scene.lights
 
 
 def __getattr__(name: str) -> Any:
-    """Names on first use: a command's help needs some of the models, not the heads."""
+    """Import a name on first use, so that the help of a command does not load heads."""
     if new := successor(__name__, name):
         return __getattr__(new)
     home = next((home for home, names in _HOMES.items() if name in names), "lights")

@@ -1,4 +1,4 @@
-"""Pinhole cameras; places are in mm from the head's centre, +X to the head's left, +Z to its front."""
+"""Pinhole cameras. Positions are in mm from the head's centre, +X to the head's left, +Z to its front."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from dermis.scene.field_errors import BoundsReason
 from dermis.scene.frozen_model import Direction, FrozenModel, Vector
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
 
-_DISTANCE_MM = 1100.0  # a portrait lens' distance: closer makes noses large
+_DISTANCE_MM = 1100.0  # of portrait photography; from a shorter distance the nose looks large
 
 
 _Fraction = Annotated[float, Field(ge=-10, le=10), BoundsReason("lenses do not shift farther")]
 
 
 class Window(NamedTuple):
-    """What a picture shows of a plane at distance 1 before the eye.
+    """Image rectangle in the plane at distance 1 in front of the camera.
 
-    Its x, from -1 at the left to 1, and its y, from -1 at the bottom to 1, are (x + shift) half there.
+    With picture coordinates x from -1 (left) to 1 and y from -1 (bottom) to 1, a point of the plane is (x +
+    shift) * half.
     """
 
     half: tuple[float, float]
@@ -33,97 +34,194 @@ class Window(NamedTuple):
 
 
 class Camera(FrozenModel):
-    """Where the picture is taken from."""
+    """Pinhole camera.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> camera = dermis.Camera(position=(0, 0, 1100), frame_mm=340)
+    >>> camera.to_opencv((512, 512)).K[1, 1].round(1)
+    1656.5
+    """
 
     synonyms: ClassVar[Mapping[str, str]] = {
         "eye": "position",
         "location": "position",
         "look_at": "target",
-        "field_of_view": "frame_mm (height of what is shown at the target)",
-        "fov": "frame_mm (height of what is shown at the target)",
+        "field_of_view": "frame_mm (height of the picture at the target)",
+        "fov": "frame_mm (height of the picture at the target)",
     }
 
     position: Vector = Field(kw_only=False)
-    """Place of the eye [mm]."""
+    """Position of the camera [mm]."""
     target: Vector = (0.0, 0.0, 0.0)
-    """The point on the optical axis that is looked at: as a rule the middle of the picture [mm]."""
+    """Point on the optical axis, normally in the middle of the picture [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
-    """The direction that is upwards in the picture."""
-    frame_mm: Annotated[float, Field(ge=0.01, le=1e5), BoundsReason("mm: from a pore's wall to a crowd")] = (
-        340.0
-    )
-    """Height of what the picture shows at the target's distance [mm]."""
+    """Direction that is up in the picture."""
+    frame_mm: Annotated[
+        float, Field(ge=0.01, le=1e5), BoundsReason("mm: from a part of a pore to a crowd")
+    ] = 340.0
+    """Height of the picture in the plane of the target [mm]."""
     principal_point: tuple[_Fraction, _Fraction] = (0.5, 0.5)
-    """Where the optical axis meets the picture, from its upper left corner, in widths and heights of it."""
+    """Point of the picture on the optical axis, as fractions of width and height from the upper left
+    corner."""
     pixel_aspect: Annotated[
-        float, Field(ge=0.1, le=10), BoundsReason("sensors' pixels are nearly square")
+        float, Field(ge=0.1, le=10), BoundsReason("pixels of sensors are nearly square")
     ] = 1.0
-    """Width of a pixel over its height."""
+    """Width of a pixel divided by its height."""
 
     @model_validator(mode="after")
     def _check_view(self) -> Camera:
         view = np.subtract(self.target, self.position)
         if np.linalg.norm(np.cross(view, self.up)) < 1e-6 * np.linalg.norm(self.up):
-            raise ValueError("a position away from the target, and not along up from it")
+            raise ValueError("a position away from the target, and a view that is not parallel to up")
         return self
 
     @classmethod
     def from_opencv(cls, K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> Camera:
-        """The camera of a calibration by OpenCV, for pictures of a size; see `to_opencv`.
+        """Return the camera of an OpenCV calibration.
 
-        Lens distortion is not in these: undistort pictures first.
+        Lens distortion is not part of it: undistort pictures first.
 
-        Raises DermisError for a K with skew, an R that is no rotation, and numbers of another shape.
+        Parameters
+        ----------
+        K : (3, 3) array_like
+            Intrinsic matrix [pixel].
+        R : (3, 3) array_like
+            Rotation from the scene to the camera.
+        t : (3,) array_like
+            Translation [mm].
+        size : (int, int)
+            Width and height of the picture [pixel].
+
+        Returns
+        -------
+        Camera
+            Camera for pictures of this size; see `to_opencv`.
+
+        Raises
+        ------
+        DermisError
+            For a K with skew, an R that is not a rotation, and arrays of another shape.
         """
         return cls(**from_opencv(K, R, t, size))
 
     def to_opencv(self, size: tuple[int, int]) -> OpenCvCamera:
-        """K, R and t as OpenCV has them: X_cam = R X + t, x to the right, y down, z forward.
+        """Return K, R and t of OpenCV: X_cam = R X + t, x to the right, y down, z forward.
 
-        size : width and height of the picture [pixel]
+        X is in mm from the head's centre, like all positions of a scene. Pixel centres have integer
+        coordinates: the upper left pixel is at (0, 0), the corner of the picture at (-0.5, -0.5).
 
-        X and t are in mm, X from the head's centre, as all places of a scene. The middles of pixels have
-        whole coordinates: the upper left one is at (0, 0), the corner of the picture at (-0.5, -0.5).
+        Parameters
+        ----------
+        size : (int, int)
+            Width and height of the picture [pixel].
+
+        Returns
+        -------
+        OpenCvCamera
+            Arrays K (3, 3) [pixel], R (3, 3) and t (3,) [mm].
         """
         lens = self.half_tangent, self.principal_point, self.pixel_aspect
         return OpenCvCamera(intrinsics(lens, size), *extrinsics(self.position, self.target, self.up))
 
     @property
     def half_tangent(self) -> float:
-        """Tangent of half the vertical angle of view, were the axis in the middle."""
+        """Return the tangent of half the vertical angle of view, for a principal point in the middle."""
         return 0.5 * self.frame_mm / math.dist(self.position, self.target)
 
     def window(self, aspect: float) -> Window:
-        """What a picture of this width over height shows."""
+        """Return the image rectangle of a picture.
+
+        aspect : width of the picture over its height
+        """
         u, v = self.principal_point
         half = self.half_tangent
         return Window((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * u, 2.0 * v - 1.0))
 
 
 def portrait(head: Head) -> Camera:
-    """Head and shoulders from the front."""
-    return _camera_at_azimuth(head, 0.0)
+    """Return a camera that shows head and shoulders from the front.
+
+    Parameters
+    ----------
+    head : Head
+        Not used; all presets are functions of the head.
+
+    Returns
+    -------
+    Camera
+        Camera at a distance of 1.1 m.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> from dermis.mesh.maps import Maps
+    >>> from dermis.mesh.primitives import uv_sphere
+    >>> dermis.portrait(dermis.Head("ball", uv_sphere(90.0, 8, 4), Maps())).position
+    (0.0, -25.0, 1100.0)
+    """
+    return _camera_at_azimuth(0.0)
 
 
 def three_quarter(head: Head) -> Camera:
-    """From the head's left front."""
-    return _camera_at_azimuth(head, 40.0)
+    """Return a camera 40 degrees to the left of the face, as seen by the head.
+
+    Parameters
+    ----------
+    head : Head
+        Not used; all presets are functions of the head.
+
+    Returns
+    -------
+    Camera
+        Camera at a distance of 1.1 m.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> from dermis.mesh.maps import Maps
+    >>> from dermis.mesh.primitives import uv_sphere
+    >>> camera = dermis.three_quarter(dermis.Head("ball", uv_sphere(90.0, 8, 4), Maps()))
+    >>> round(camera.position[0])
+    707
+    """
+    return _camera_at_azimuth(40.0)
 
 
 def side(head: Head) -> Camera:
-    """From the head's left side."""
-    return _camera_at_azimuth(head, 90.0)
+    """Return a camera on the left side of the head, for a view in profile.
+
+    Parameters
+    ----------
+    head : Head
+        Not used; all presets are functions of the head.
+
+    Returns
+    -------
+    Camera
+        Camera at a distance of 1.1 m.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> from dermis.mesh.maps import Maps
+    >>> from dermis.mesh.primitives import uv_sphere
+    >>> round(dermis.side(dermis.Head("ball", uv_sphere(90.0, 8, 4), Maps())).position[0])
+    1100
+    """
+    return _camera_at_azimuth(90.0)
 
 
 def cheek(head: Head) -> Camera:
-    """Close to the left cheek, which the studio's key light rakes: pores show."""
+    """Return a close-up of the left cheek at a grazing angle to the studio's key light, which shows pores."""
     focus = head.frontmost(40.0, -35.0)
     view_direction = _azimuth_direction(58.0)
     return Camera(position=_offset_point(focus, view_direction, 300.0), target=focus, frame_mm=48.0)
 
 
 def ear(head: Head) -> Camera:
-    """Close to the left ear."""
+    """Return a close-up of the left ear."""
     p = head.mesh.positions - np.array(head.centre_mm, dtype=np.float32)
     near_ear = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
     x, y, z = (near_ear if len(near_ear) else p)[np.argmax((near_ear if len(near_ear) else p)[:, 0])]
@@ -143,9 +241,9 @@ PRESETS = {
 
 
 def preset(name: str, head: Head) -> Camera:
-    """The camera preset of that name.
+    """Return a camera preset for a head.
 
-    Raises DermisError for a name that is none of `PRESETS`.
+    Raises DermisError for a name that is not in `PRESETS`.
     """
     if name not in PRESETS:
         refuse(
@@ -154,7 +252,7 @@ def preset(name: str, head: Head) -> Camera:
     return PRESETS[name](head)
 
 
-def _camera_at_azimuth(head: Head, degrees: float) -> Camera:
+def _camera_at_azimuth(degrees: float) -> Camera:
     middle = (0.0, -25.0, 0.0)
     return Camera(position=_offset_point(middle, _azimuth_direction(degrees), _DISTANCE_MM), target=middle)
 

@@ -1,4 +1,4 @@
-"""The parts of a scene as callers give them: what is meant clearly is taken, the rest is refused."""
+"""Conversion of the arguments of `Scene` to heads, lights, cameras and other settings."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from dermis.scene.frozen_model import FrozenModel, Vector
 from dermis.scene.lights import Light, PointLight, light_presets, preset_lights
 
 P = TypeVar("P", bound=FrozenModel)
-_NEAR_CENTRE_MM = 5.0  # from the middle of any head, where nothing but a mistake stands
+_NEAR_CENTRE_MM = 5.0  # a position this close to the head's centre is a mistake in the unit
 
 
 def as_head(head: object) -> Head:
-    """A head, by itself or by what `load_head` takes; a `Human` too.
+    """Return a head, loaded by `load_head` from a name or file, or built from a `Human`.
 
-    Raises DermisError for anything else.
+    Raises DermisError for any other object.
     """
     if isinstance(head, Head):
         return head
@@ -38,9 +38,9 @@ def as_head(head: object) -> Head:
 
 
 def as_lights(lights: object) -> Sequence[Light]:
-    """Several lights, one, or a preset's name.
+    """Return lights as a sequence, from several lights, one light or the name of a preset.
 
-    Raises DermisError for anything else.
+    Raises DermisError for any other object.
     """
     advice = "Write lights=[dermis.PointLight(position=(0, 300, 900))], or dermis.load_lights(FILE)"
     if isinstance(lights, Light):
@@ -60,9 +60,9 @@ def as_lights(lights: object) -> Sequence[Light]:
 
 
 def as_camera(camera: object, head: Head) -> Camera:
-    """A camera, a preset's name, or a function such as `portrait`.
+    """Return a camera, from a camera, the name of a preset or a function of the head such as `portrait`.
 
-    Raises DermisError for anything else.
+    Raises DermisError for any other object.
     """
     if isinstance(camera, str):
         return preset(camera, head)
@@ -76,9 +76,9 @@ def as_camera(camera: object, head: Head) -> Camera:
 
 
 def as_environment(environment: object) -> Environment | None:
-    """An environment, or its name.
+    """Return an environment, from an environment or the name of a panorama; None stays None.
 
-    Raises DermisError for anything else.
+    Raises DermisError for any other object.
     """
     if environment is None or isinstance(environment, Environment):
         return environment
@@ -89,9 +89,9 @@ def as_environment(environment: object) -> Environment | None:
 
 
 def as_model(kind: type[P], values: object, part: str, example: str) -> P:
-    """Plain data of a kind, or their values by name.
+    """Return settings of a class, from an instance or from a mapping of values by name.
 
-    Raises DermisError for anything else.
+    Raises DermisError for any other object.
     """
     if isinstance(values, kind):
         return values
@@ -112,6 +112,6 @@ def _warn_near_centre(what: str, position: Vector) -> None:
     distance = float(np.linalg.norm(position))
     if 0.0 < distance < _NEAR_CENTRE_MM:
         notify(
-            f"{what}: expected a place around the head in mm, but this one is {distance:g} mm from its middle. "
+            f"{what}: expected a position outside the head in mm, but it is {distance:g} mm from the centre. "
             "Write 1100 for 1.1 m."
         )

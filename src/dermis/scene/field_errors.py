@@ -1,4 +1,4 @@
-"""What is said of values that a model cannot have: what was expected, why, and what came."""
+"""Error messages for field values that a model rejects."""
 
 from __future__ import annotations
 
@@ -30,41 +30,42 @@ _MAX_TABLE_LENGTH = 160
 
 
 class Keywords:
-    """For a field of numbers: `Annotated[float, Words("auto")]` may also be one of some words."""
+    """Words that a numeric field accepts besides numbers, as in `Annotated[float, Keywords("auto")]`."""
 
     def __init__(self, *words: str) -> None:
         self.words = words
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Return a schema that accepts the words and whatever the annotated type accepts."""
         from pydantic_core import core_schema
 
         def check(value: Any, numbers: Any) -> Any:
             return value if isinstance(value, str) and value in self.words else numbers(value)
 
-        as_it_is = core_schema.plain_serializer_function_ser_schema(lambda value: value)
-        return core_schema.no_info_wrap_validator_function(check, handler(source), serialization=as_it_is)
+        unchanged = core_schema.plain_serializer_function_ser_schema(lambda value: value)
+        return core_schema.no_info_wrap_validator_function(check, handler(source), serialization=unchanged)
 
 
 class BoundsReason(str):
-    """For a field of numbers: why its bounds are where they are."""
+    """Reason for the bounds of a numeric field, shown in error messages."""
 
     __slots__ = ()
 
 
 class InvalidFieldsError(DermisError):
-    """Values that cannot be.
+    """Error for values that a model does not accept.
 
-    findings : by field: what was expected and what came
+    messages : by field, what was expected and what was received
     """
 
     def __init__(self, owner: str, messages: dict[str, str]) -> None:
-        said = "; ".join(f"{field}: {finding}" if field else finding for field, finding in messages.items())
-        super().__init__(f"{owner}: {said}. Correct it.")
+        texts = [f"{field}: {message}" if field else message for field, message in messages.items()]
+        super().__init__(f"{owner}: {'; '.join(texts)}. Correct it.")
         self.messages = messages
 
 
 class _NotANumber:
-    """What stands where a number is wanted: no field of numbers takes it."""
+    """Value in place of a number, wrapped so that every numeric field rejects it."""
 
     def __init__(self, value: object) -> None:
         self.value = value
@@ -75,7 +76,7 @@ class _NotANumber:
 
 @cache
 def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
-    """Fields that hold numbers and nothing else, each with whether text can stand for them."""
+    """Return the fields that hold only numbers, each with whether it also accepts text."""
     found = {}
     for name, info in model.model_fields.items():
         kinds = set(_leaf_types(info.annotation))
@@ -85,9 +86,9 @@ def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
 
 
 def python_numbers(value: Any, text: bool = False) -> Any:
-    """NumPy's numbers and arrays as Python's; what only looks like a number is made to be refused.
+    """Convert NumPy numbers and arrays to Python numbers, and mark other values so that they are rejected.
 
-    text : whether a text can stand for the value
+    text : whether text is a valid value
     """
     import numpy as np  # loading it takes longer than all of --help
 
@@ -103,25 +104,25 @@ def python_numbers(value: Any, text: bool = False) -> Any:
 
 
 def field_keywords(model: type[BaseModel], field: str) -> tuple[str, ...]:
-    """The words that a field of numbers may be instead."""
+    """Return the words that a numeric field accepts besides numbers."""
     found = [one.words for one in model.model_fields[field].metadata if isinstance(one, Keywords)]
     return found[0] if found else ()
 
 
 def field_bounds(info: FieldInfo) -> tuple[float | None, float | None]:
-    """The least and the greatest that a field's number may be; None where there is none."""
+    """Return the lower and the upper bound of a numeric field; None for a bound that it does not have."""
     low = [getattr(one, name) for one in info.metadata for name in ("ge", "gt") if hasattr(one, name)]
     high = [getattr(one, name) for one in info.metadata for name in ("le", "lt") if hasattr(one, name)]
     return next(iter(low), None), next(iter(high), None)
 
 
 def messages_by_field(errors: list[ErrorDetails], model: type[BaseModel]) -> dict[str, str]:
-    """Findings of an `InvalidFieldsError` by field, from pydantic's."""
+    """Convert the errors of pydantic to the messages of an `InvalidFieldsError`."""
     return {".".join(str(part) for part in one["loc"]): _message(one, model) for one in errors}
 
 
 def _message(one: ErrorDetails, model: type[BaseModel]) -> str:
-    """One of pydantic's findings as what was expected and what came."""
+    """Return one error of pydantic as "expected ..., but got ..."."""
     if one["type"] == "extra_forbidden":
         return _unknown_field(str(one["loc"][-1]), model)
     if one["type"] == "missing":
@@ -140,7 +141,10 @@ def _message(one: ErrorDetails, model: type[BaseModel]) -> str:
 
 
 def _number_range(place: tuple[int | str, ...], model: type[BaseModel]) -> str:
-    """The range of the number at a place, with its reason; nothing where it has none."""
+    """Return the range of a number in a field, with the reason; empty without bounds.
+
+    location : path of the number, from the name of the field
+    """
     info = model.model_fields.get(str(place[0])) if place else None
     if info is None:
         return ""
@@ -154,7 +158,7 @@ def _number_range(place: tuple[int | str, ...], model: type[BaseModel]) -> str:
 
 
 def _leaf_types(kind: Any) -> Iterator[Any]:
-    """All types that an annotation is made of."""
+    """Yield the element types of an annotation."""
     parts = get_args(kind)
     if get_origin(kind) is dict:
         yield from _leaf_types(parts[1])
@@ -168,14 +172,14 @@ def _leaf_types(kind: Any) -> Iterator[Any]:
 
 
 def _list_length(one: ErrorDetails, model: type[BaseModel]) -> str:
-    """How many numbers a list has that a field wants, where it says so."""
+    """Return " of N numbers" for a field that is a tuple of fixed length, else an empty text."""
     info = model.model_fields.get(str(one["loc"][0])) if len(one["loc"]) == 1 else None
     count = len([part for part in get_args(info.annotation) if part is not Ellipsis]) if info else 0
     return f" of {count} numbers" if count > 1 else ""
 
 
 def _unknown_field(name: str, model: type[Any]) -> str:
-    """What to say of a name that is no field: the nearest, or whose field it is."""
+    """Return the message for an unknown field: the most similar name, or the model that has such a field."""
     known, finding = list(model.model_fields), "but this name is unknown"
     plain = name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
     near = (

@@ -1,4 +1,4 @@
-"""Lights, cameras and whole scenes as TOML files."""
+"""Loading of lights, cameras and whole scenes from TOML files."""
 
 from __future__ import annotations
 
@@ -32,12 +32,34 @@ P = TypeVar("P", bound=FrozenModel)
 _TABLES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
 _Weight = Annotated[
-    float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT), BoundsReason("faces come apart long before")
+    float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT), BoundsReason("faces break apart long before")
 ]
 
 
 def load_lights(name: str | Path) -> tuple[Light, ...]:
-    """The lights of a preset ("studio", "window", ...) or of a TOML file with [[lights]] tables."""
+    """Load the lights of a preset or of a TOML file with [[lights]] tables.
+
+    Parameters
+    ----------
+    name : str or path
+        Name of a preset ("studio", "window", ...) or a file.
+
+    Returns
+    -------
+    tuple of lights
+        The lights; empty for the preset "none".
+
+    Raises
+    ------
+    DermisError
+        For unknown names and invalid files.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> [light.kind for light in dermis.load_lights("window")]
+    ['rectangle', 'rectangle']
+    """
     known = light_presets()
     if str(name) in known:
         return preset_lights(str(name))
@@ -45,7 +67,7 @@ def load_lights(name: str | Path) -> tuple[Light, ...]:
 
 
 def load_camera(name: str | Path, head: Head) -> Camera:
-    """A camera preset for the head, or the [camera] table of a TOML file."""
+    """Return a camera preset for the head, or the camera in the [camera] table of a TOML file."""
     if str(name) in PRESETS:
         return preset(str(name), head)
     table = _read(name, f"a preset ({', '.join(PRESETS)}) or a TOML file").get("camera")
@@ -59,20 +81,51 @@ def load_scene(
     camera: str | None = None,
     size: tuple[int, int] | None = None,
 ) -> tuple[Scene, Settings]:
-    """Scene and settings of a TOML file; what it leaves out keeps its default.
+    r"""Load a scene and its settings from a TOML file.
 
-    Tables: [head] (file or sample under `name`, the options of `load_head`, and `regions`, a table as for
+    Tables: [head] (`name` of a file or a sample, options of `load_head`, and `regions`, a table for
     `with_regions`), [pose] (`weights` and `bones` by name), [skin] or skin = "deck-2007", [[lights]] or
-    lights = "preset", [environment], [camera] or camera = "preset", [render]. File names are relative to the
-    scene's folder. With an environment there are no other lights unless the file names some.
+    lights = "preset", [environment], [camera] or camera = "preset", [render]. Missing keys have their
+    defaults. File names are relative to the folder of the file. A scene with an environment has other lights
+    only if the file names them.
 
-    known : the head of the file's [head], when the caller has it already
-    camera, size : of the picture that the head is subdivided for, in place of the file's own
+    Parameters
+    ----------
+    path : str or path
+        The TOML file.
+    known : Head, optional
+        Head of the file's [head] table, if it is loaded already.
+    camera : str, optional
+        Camera that decides the levels of subdivision, instead of the file's.
+    size : (int, int), optional
+        Picture size that decides the levels of subdivision, instead of the file's [pixel].
+
+    Returns
+    -------
+    scene : Scene
+    settings : Settings
+
+    Raises
+    ------
+    DermisError
+        For files that cannot be read, unknown keys and invalid values.
+
+    Examples
+    --------
+    >>> import dermis, pathlib, tempfile
+    >>> from dermis.mesh.maps import Maps
+    >>> from dermis.mesh.primitives import uv_sphere
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "scene.toml"
+    >>> _ = path.write_text('lights = "window"\n[head]\nname = "human"\n[render]\nsize = 64\n')
+    >>> head = dermis.Head("ball", uv_sphere(90.0, 8, 4), Maps())
+    >>> scene, settings = dermis.load_scene(path, head)
+    >>> len(scene.lights), settings.size
+    (2, (64, 64))
     """
     path = checked_path(path, "a scene in TOML")
     table = _read(path, "a scene in TOML")
     for part in table.keys() - _TABLES:
-        refuse(path, f"only the parts {', '.join(sorted(_TABLES))}", f"got {part!r}", "Correct its name")
+        refuse(path, f"only the tables {', '.join(sorted(_TABLES))}", f"got {part!r}", "Correct its name")
     skin = _skin(path, table.get("skin", {}))
     settings = _build(Settings, path, "render", table.get("render", {}))
     head_entry = _build(HeadTable, path, "head", table.get("head"))
@@ -100,12 +153,12 @@ def load_scene(
 
 
 def head_table(path: Path) -> dict[str, Any]:
-    """The [head] of a scene's file with names that hold from any folder."""
+    """Return the [head] table of a scene file with absolute file names."""
     return with_absolute_paths(_read(path, "a scene in TOML").get("head", {}), path.parent)
 
 
 def with_absolute_paths(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A [head] whose files, in a folder, have names that hold from any other."""
+    """Return a [head] table whose files in a folder have absolute names."""
     named = {role: folder / table[role] for role in ("name", "regions", *_MAP_ROLES) if role in table}
     return {**table} | {role: str(file.resolve()) for role, file in named.items() if is_file(file)}
 
@@ -113,10 +166,10 @@ def with_absolute_paths(table: Mapping[str, Any], folder: Path) -> dict[str, Any
 def head_and_skin(
     table: HeadTable, skin: Skin, folder: Path, picture: SmoothIn | None = None
 ) -> tuple[Head, Skin]:
-    """The head of a [head] table, and the skin with the mean strength that a table of regions gives it.
+    """Return the head of a [head] table, and the skin with the mean strength of its region table.
 
-    folder : where the files lie that the table names
-    picture : that the head is subdivided for, where the table does not say how often
+    folder : folder of the files that the table names
+    picture : picture that decides the levels of subdivision if the table does not
 
     Raises DermisError for files that cannot be used.
     """
@@ -135,7 +188,7 @@ def head_and_skin(
 
 
 def _skin(path: Path, entry: Any) -> Skin:
-    """The [skin] table's skin, or the one of a preset's name."""
+    """Return the skin of a [skin] table or of a preset's name."""
     if not isinstance(entry, str):
         return _build(Skin, path, "skin", entry)
     if entry not in SKINS:
@@ -144,7 +197,7 @@ def _skin(path: Path, entry: Any) -> Skin:
 
 
 def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
-    """The skin with names of files that hold from anywhere."""
+    """Return the skin with file names relative to a folder resolved."""
     others = tuple(_resolve(folder, name) for name in skin.other_profiles)
     mixture_map = skin.profile_map and _resolve(folder, skin.profile_map)
     names = {"profile": _resolve(folder, skin.profile), "other_profiles": others, "profile_map": mixture_map}
@@ -166,20 +219,20 @@ def _camera(path: Path, entry: Any, head: Head) -> Camera:
 def _pose(path: Path, table: Any, head: Head) -> Pose:
     entry = _build(PoseTable, path, "pose", table)
     pose = Pose(entry.weights, entry.bones)
-    pose.motion(head.control, f"{path}: pose")  # so that an error names the file
+    pose.motion(head.control, f"{path}: pose")  # for an error that names the file
     return pose
 
 
 def _environment(path: Path, table: Any) -> Environment:
     if isinstance(table, dict) and "visible" in table:
         advice = 'Write background = "environment" into [render]'
-        refuse(f"{path}: environment: visible", "what is behind the head elsewhere", "it is given", advice)
+        refuse(f"{path}: environment: visible", "no such key any more", "it is given", advice)
     environment = _build(Environment, path, "environment", table)
     return environment.model_copy(update={"name": _resolve(path.parent, environment.name)})
 
 
 def _resolve(folder: Path, name: str) -> str:
-    """The file of that name in a scene's folder if there is one, else the name, of a preset mostly."""
+    """Return the path of a file in a folder if it exists, else the name, such as that of a preset."""
     file = folder / name
     return str(file) if is_file(file) else name
 
@@ -199,7 +252,7 @@ def _light(culprit: object, label: str, table: Any) -> Light:
 
 
 def _build(kind: type[P], culprit: object, part: str, table: Any) -> P:
-    """`kind` from a table of a file; the file and the part are named when it cannot be."""
+    """Return a model built from a table; errors name the file and the table."""
     if not isinstance(table, dict):
         actual = "there is none" if table is None else f"got {table!r}"
         refuse(f"{culprit}: {part}", f"a table with {', '.join(kind.model_fields)}", actual, "Add one")
@@ -214,9 +267,9 @@ def _read(name: str | Path, expected: str) -> dict[str, Any]:
 
 
 class PoseTable(FrozenModel):
-    """The [pose] of a scene: what `Pose` takes, without places of points, for which a text is too long."""
+    """The [pose] table of a scene file: weights and bones of a `Pose`, without positions of points."""
 
     weights: dict[str, _Weight] = Field(default_factory=dict)
-    """Weights of morph targets by name, mostly 0 to 1."""
+    """Weights of morph targets by name, normally 0 to 1."""
     bones: dict[str, Any] = Field(default_factory=dict)
-    """By name of the bone: three angles about the head's x, y and z [degrees], or a (4, 4) matrix."""
+    """Rotations by name of the bone: angles about the head's x, y and z [degrees], or a (4, 4) matrix."""

@@ -1,4 +1,4 @@
-"""The base of all scene data: frozen, checked, and with errors in the package's own words."""
+"""Base class of scene data: immutable pydantic models with validated fields."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ else:
     ModelMetaclass = type(BaseModel)
 
 MAX_COORDINATE_MM = 1e6
-_DISPLAYED_BOUND = 1e5  # bounds beyond it only keep numbers finite
+_DISPLAYED_BOUND = 1e5  # larger bounds only keep numbers finite
 _MEMBER_TYPES = FunctionType, classmethod, property
-_DOCSTRING_WIDTH = 92  # of a line of a docstring
+_DOCSTRING_WIDTH = 92
 
 
 def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -74,8 +74,8 @@ Colour = tuple[Intensity, Intensity, Intensity]
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(Field, PrivateAttr))
 class _Documented(ModelMetaclass):
-    # The class of all models: their signature and their docstring list the fields, and `dir` leaves out what
-    # pydantic adds. Type checkers read the fields themselves.
+    # Metaclass of all models: signature and docstring list the fields, and `dir` omits the names of pydantic.
+    # Type checkers read the fields themselves.
     if not TYPE_CHECKING:
 
         @property
@@ -84,7 +84,7 @@ class _Documented(ModelMetaclass):
 
         @__signature__.setter
         def __signature__(self, signature: Any) -> None:
-            """Drop pydantic's own, which shows `__init__`'s parameters."""
+            """Ignore the signature of pydantic, which shows the parameters of `__init__`."""
 
         @property
         def __doc__(self) -> str:
@@ -99,17 +99,18 @@ class _Documented(ModelMetaclass):
 
 
 class FrozenModel(BaseModel, metaclass=_Documented):
-    """Immutable settings: unknown names and impossible values are refused.
+    """Base class of immutable settings with validated fields.
 
-    The docstring under a field is its help, in Python, the command line, the viewer and the documentation.
+    The docstring below a field is its help text in Python, on the command line, in the viewer and in the
+    documentation.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, defer_build=True)
     synonyms: ClassVar[Mapping[str, str]] = {}
-    """Fields by the names that other programs have for them."""
+    """Names that other programs use, and the fields that they correspond to."""
 
     def __init__(self, *value: Any, **data: Any) -> None:
-        """Values by name; one without a name is that of the one field that has no default."""
+        """Set fields by name; if exactly one field is required, it may be positional."""
         model = type(self)
         if value:
             data[_positional_field(model, value)] = value[0]
@@ -122,20 +123,24 @@ class FrozenModel(BaseModel, metaclass=_Documented):
             raise InvalidFieldsError(model.__name__, messages_by_field(error.errors(), model)) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
-        owner, advice = type(self).__name__, f"Write replace({name}={format_value(value)}) for a copy with it"
-        refuse(owner, "a value that stays as it is", f"{name} was to be changed", advice)
+        """Refuse assignments, with advice to use `replace`."""
+        owner, advice = type(self).__name__, f"Write replace({name}={format_value(value)}) for a changed copy"
+        refuse(owner, "no assignment, as settings are immutable", f"got one to {name}", advice)
 
     def replace(self, **values: Any) -> Self:
-        """The same with other values, checked."""
+        """Return a validated copy with other values of some fields."""
         return type(self)(**{name: getattr(self, name) for name in self.model_fields_set} | values)
 
     def __eq__(self, other: object) -> bool:
-        """As pydantic has it, which takes ten times as long over values that differ."""
+        """Return whether the other object has the same class and equal fields.
+
+        This is ten times as fast as the comparison of pydantic.
+        """
         return type(self) is type(other) and vars(self) == vars(other)
 
 
 class SliderRange(NamedTuple):
-    """Where a number lies as a rule: the ends of its slider."""
+    """Ends of the slider of a numeric field."""
 
     low: float
     high: float
@@ -143,12 +148,12 @@ class SliderRange(NamedTuple):
 
 
 def slider(low: float, high: float, *, log: bool = False) -> dict[str, Any]:
-    """For a field's `json_schema_extra`: a slider's range, where the bounds are wider than what is useful."""
+    """Return `json_schema_extra` of a field whose slider covers less than the bounds of the field."""
     return {"slider": SliderRange(low, high, log)}
 
 
 def field_help(model: type[BaseModel], field: str) -> str:
-    """What a field means, on one line, with what each of the names of a registry stands for."""
+    """Return the help text of a field on one line, with a summary of each registered name that it accepts."""
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
     summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]
@@ -156,7 +161,7 @@ def field_help(model: type[BaseModel], field: str) -> str:
 
 
 def field_choices(model: type[BaseModel], field: str) -> tuple[str, ...]:
-    """The words that a field may be; none where it is no choice of words."""
+    """Return the words that a field accepts; empty for fields of other types."""
     info = model.model_fields[field]
     for named in _registry_names(info):
         return named.names
@@ -165,28 +170,28 @@ def field_choices(model: type[BaseModel], field: str) -> tuple[str, ...]:
 
 
 def field_slider_range(model: type[BaseModel], field: str) -> SliderRange | None:
-    """The ends of a number's slider, or of each number in a tuple; None where the model names no two ends."""
+    """Return the slider range of a number or of the numbers in a tuple; None without two bounds."""
     return _slider_range(model.model_fields[field])
 
 
 class Heading(str):
-    """For a field: the heading under which help texts and panels list it, after the fields without one."""
+    """Annotation of a field: heading under which help texts and panels list it."""
 
     __slots__ = ()
 
 
 def field_heading(model: type[BaseModel], field: str) -> str:
-    """Return the heading under which a field is listed; an empty text for one of the main fields."""
+    """Return the heading under which a field is listed; empty for a main field."""
     return next((one for one in model.model_fields[field].metadata if isinstance(one, Heading)), "")
 
 
 def fields_under(heading: str, model: type[BaseModel]) -> list[str]:
-    """Return the fields that are listed under a heading; those without one for an empty text."""
+    """Return the fields listed under a heading; an empty heading selects the main fields."""
     return [name for name in model.model_fields if field_heading(model, name) == heading]
 
 
 def constructor_signature(model: type[BaseModel]) -> Signature:
-    """Return the parameters of a model's constructor; the one required field may come without its name."""
+    """Return the signature of a model's constructor; a single required field may be positional."""
     alone = _required(model)
     return Signature(sorted(_parameters(model, alone), key=lambda one: one.kind))
 
@@ -213,7 +218,7 @@ def _without_checks(kind: Any) -> Any:
 
 
 def model_docstring(model: type[BaseModel]) -> str:
-    """Return a model's own docstring with its fields, those under a heading last, in numpydoc's form."""
+    """Return the docstring of a model in numpydoc form, with a section of its fields for each heading."""
     sections: dict[str, list[str]] = {"Parameters": []}
     for parameter in constructor_signature(model).parameters.values():
         lines = sections.setdefault(field_heading(model, parameter.name) or "Parameters", [])
@@ -225,11 +230,12 @@ def model_docstring(model: type[BaseModel]) -> str:
             text, _DOCSTRING_WIDTH, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False
         )
     listed = ["\n".join(["", title, "-" * len(title), *lines]) for title, lines in sections.items() if lines]
-    return "\n".join([cleandoc(vars(model)["__doc__"] or ""), *listed])
+    text, *examples = re.split(r"\n(?=\nExamples\n-)", cleandoc(vars(model)["__doc__"] or ""))
+    return "\n".join([text, *listed, *examples])
 
 
 def accepted_values(model: type[BaseModel], field: str) -> str:
-    """The words that a field may be, and the bounds of a number where they say something."""
+    """Return the words that a field accepts and its bounds as text, if they are informative."""
     low, high = field_bounds(model.model_fields[field])
     words = [*field_keywords(model, field), *field_choices(model, field)]
     if low is not None and high is not None and high < _DISPLAYED_BOUND:
@@ -238,7 +244,7 @@ def accepted_values(model: type[BaseModel], field: str) -> str:
 
 
 def format_default(value: Any) -> str:
-    """A default as it is typed; nothing where a setting is off or left out."""
+    """Return a default value as a user would type it; empty for None, booleans and required fields."""
     if isinstance(value, tuple):
         return ("x" if all(isinstance(one, int) for one in value) else ",").join(map(format_default, value))
     if value is None or isinstance(value, bool) or value is PydanticUndefined:
@@ -251,7 +257,7 @@ def _registry_names(info: FieldInfo) -> list[RegisteredName]:
 
 
 def _union_members(info: FieldInfo) -> tuple[Any, ...]:
-    """The types that a field's value may have."""
+    """Return the member types of a field's annotation."""
     kind = info.annotation
     return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
 
@@ -273,7 +279,7 @@ def _required(model: type[BaseModel]) -> list[str]:
 
 
 def _positional_field(model: type[BaseModel], value: tuple[Any, ...]) -> str:
-    """The field that a value without a name is for."""
+    """Return the name of the field that a positional argument sets."""
     required = _required(model)
     if len(required) != 1 or len(value) != 1:
         some, actual = (

@@ -1,4 +1,4 @@
-"""Eyes that look at a place: both converge on it, and the lids follow."""
+"""Poses in which the eyes look at a point, with the eyelids following."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from dermis.mesh.rotations import angles_matrix
 Doubles = NDArray[np.float64]
 
 MAX_GAZE_WEIGHT = 1.3
-"""Weight of a target of gaze that no eye turns beyond."""
+"""Largest weight of a gaze target."""
 _MAX_BONE_DEGREES = 36.0
 _ITERATIONS = 6
 _SIDES = "Left", "Right"
@@ -29,12 +29,14 @@ _EYES_ADVICE = "Take the parametric human, or name the groups of the file's eyeb
 
 
 def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float] | None = None) -> Pose:
-    """The pose with the eyes turned to a place, by the targets that turn them, or else by their bones.
+    """Return a pose in which both eyes look at a point.
 
-    place_mm : (3,) from the head's centre, as cameras are placed [mm]
-    pose : of all else; its own gaze is given up
+    The eyes are turned by the morph targets for gaze if the head has them, else by their bones.
 
-    Raises DermisError for heads without eyes of true shape, and for places that are none.
+    target_mm : (3,) point relative to the head's centre [mm]
+    pose : pose of everything else; its own gaze is replaced
+
+    Raises DermisError for heads without anatomical eyes and for invalid points.
     """
     base, rig, eyes = Pose.of(pose) or Pose(), head.control, head.eyes
     if eyes is None or rig.skeleton is None:
@@ -66,14 +68,14 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 
 
 def _eyelid_turns(rig: Rig, side: str) -> list[Turn]:
-    """What ARKit's targets of gaze, which move a file's lids alone, stand for."""
+    """Return the gaze targets of an eye that the head has; in files they move only the lids."""
     arkit_turns = [turn for turn in gaze_turns() if turn.target.endswith(side)]
     known = match_targets([turn.target for turn in arkit_turns], rig.targets.names)
     return [turn._replace(target=known[turn.target]) for turn in arkit_turns if turn.target in known]
 
 
 def _rotation_angles(goal: Doubles, axis: Doubles) -> tuple[float, float]:
-    """Angles about x and y [rad] by which an axis comes to lie along another, unit vectors (3,)."""
+    """Return the angles about x and y that rotate an axis onto a goal, both unit vectors (3,) [rad]."""
     x, y = 0.0, 0.0
     for _ in range(_ITERATIONS):
         current = np.array(angles_matrix((math.degrees(x), math.degrees(y), 0.0))) @ axis
@@ -99,7 +101,7 @@ def _target_names(turns: tuple[Turn, ...], bones: list[str]) -> set[str]:
 
 
 def _weights(turns: list[Turn], goal: tuple[float, float]) -> dict[str, Any]:
-    """Weights of targets for angles about x and y [rad]."""
+    """Return the weights of targets for rotation angles about x and y [rad]."""
     target_weights = {}
     for turn in turns:
         for angle, most in zip(np.degrees(goal), turn.degrees[:2], strict=True):

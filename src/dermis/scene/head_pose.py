@@ -1,4 +1,4 @@
-"""Where a head is and where its eyes look, in a camera's axes as OpenCV has them."""
+"""Head pose and gaze directions in the axes of an OpenCV camera."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _BONE = "head"
 
 
 def head_pose(scene: Scene) -> Doubles:
-    """(3, 4) from the head at rest to the camera: X_cam = R X + t [mm].
+    """Return the transform (3, 4) from the head in rest pose to the camera: X_cam = R X + t [mm].
 
-    X is a place on the rigid head, from its centre where it rests: x to its left, y up, z ahead. The head
-    goes with the bone of that name; one without it stays, and R and t are the camera's own.
+    X is a point of the rigid head relative to its centre in rest pose: x to the head's left, y up, z to the
+    front. The rotation is that of the bone "head"; without such a bone, R and t are those of the camera.
     """
     rotation, shift = _camera(scene)
     head_rotation, head_shift = _rigid_motion(scene)
@@ -25,9 +25,9 @@ def head_pose(scene: Scene) -> Doubles:
 
 
 def gaze_directions(scene: Scene) -> Doubles | None:
-    """(2, 3) unit vectors along which the left and the right eye look, in the camera's axes.
+    """Return the directions (2, 3) in which the left and the right eye look, as unit vectors in camera space.
 
-    None for heads without eyes of true shape.
+    None for heads without anatomical eyes.
     """
     head, motion = scene.head, _motion(scene)
     if head.eyes is None:
@@ -47,7 +47,7 @@ def _motion(scene: Scene) -> Motion:
 
 
 def _rigid_motion(scene: Scene) -> tuple[Doubles, Doubles]:
-    """Rotation and shift [mm] of places from the head's centre, from where it rests."""
+    """Return the rotation and the shift [mm] of the head bone, relative to the head's centre in rest pose."""
     names = [name.replace(":", " ").split()[-1:] for name in scene.head.bones]
     bone = next((k for k, name in enumerate(names) if [part.lower() for part in name] == [_BONE]), None)
     if bone is None:

@@ -1,4 +1,4 @@
-"""The [head] table of a scene: its fields as plain data, and checks of their combinations."""
+"""The [head] table of a scene file: its fields, and checks of their combinations."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     _SubdivisionLevels = int | Literal["auto"]
 else:
     _SubdivisionLevels = Annotated[
-        int, Field(ge=0, le=3), BoundsReason("each has four times the triangles"), Keywords(AUTO)
+        int, Field(ge=0, le=3), BoundsReason("each level has four times the triangles"), Keywords(AUTO)
     ]
 _UNIT_LENGTHS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4, "in": 25.4, "ft": 304.8}
 
@@ -43,22 +43,22 @@ def _eye_limits(name: str) -> Any:
 
 
 class EyeTable(FrozenModel):
-    """What replaces the look of a head's eyes; None leaves their own."""
+    """Overrides of the look of a head's eyes; None keeps the head's own value."""
 
     eumelanin: Annotated[float | None, _eye_limits("eumelanin")] = None
-    """Of the iris, from none, which leaves it blue, to the darkest brown."""
+    """Eumelanin of the iris, from 0 for blue to 1 for the darkest brown."""
     pupil_mm: Annotated[
-        float | None, _eye_limits("pupil_mm"), BoundsReason("mm: pupils in glare and in the dark")
+        float | None, _eye_limits("pupil_mm"), BoundsReason("mm: from bright light to darkness")
     ] = None
     """Radius of the pupil [mm]."""
     redness: Annotated[float | None, _eye_limits("redness")] = None
-    """Of the white of the eye."""
+    """Redness of the white of the eye."""
     seed: Annotated[int | None, _eye_limits("seed"), BoundsReason("32 bits")] = None
-    """Which fibres and vessels."""
+    """Seed of the pattern of fibres and blood vessels."""
 
 
 class HeadTable(FrozenModel):
-    """The [head] of a scene: what `load_head` takes, and a table of regions of the face."""
+    """The [head] table of a scene file: options of `load_head`, and a table of face regions."""
 
     name: str
     """A person (human, human:SEED, .json), a sample (lee_perry_smith) or a mesh (.glb .gltf .obj .ply)."""
@@ -71,52 +71,53 @@ class HeadTable(FrozenModel):
     height_mm: _Relief = None
     """Relief of one grey level of an 8-bit height map [mm]."""
     specular: str | None = None
-    """Map of the surface reflection's strength, scaled to a mean of rho_s."""
+    """Map of the specular strength, scaled to a mean of rho_s."""
     roughness: str | None = None
     """Map of the roughness m, 0 to 1."""
     unit_mm: _Unit = None
     """Length of the file's unit [mm]; 1000 for glTF and 1 for others when left out."""
     v_origin: VOrigin = "auto"
-    """Which row of the maps v = 0 is; "auto" keeps to the format's rule."""
+    """Row of the maps at v = 0; "auto" follows the format."""
     up: UpAxis = "y"
-    """The file's upward axis."""
+    """Upward axis of the file."""
     normal_y: NormalY = "up"
-    """Way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)."""
+    """Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX)."""
     opaque: tuple[str, ...] = ()
-    """Groups of the file to draw as plain surfaces, which light does not enter, such as teeth or clothes.
-    Needed where no group has skin in its name, as all are skin then; where one has, all others are opaque
-    already. Two balls whose groups are called eyes become the package's eyes without it."""
+    """Groups of the file without subsurface scattering, such as teeth or clothes. If a group has skin in its
+    name, all others are opaque already; else all groups are skin. Two balls in groups named as eyes become
+    the package's eyes and need not be listed."""
     eyes: EyeMode = "fitted"
-    """Eyeballs of a file (groups called eyes, Eye_L, cornea ...): replaced by the package's, or plain."""
+    """Eyeballs of a file (groups named eyes, Eye_L, cornea ...): "fitted" replaces them by the package's."""
     eye_groups: tuple[str, ...] = ()
-    """Groups of the file that hold eyeballs, whatever they are called, be it with all of the head."""
+    """Groups of the file that contain eyeballs, whatever their names; they may contain the rest of the
+    head."""
     eye: EyeTable | None = None
-    """What the eyes look like, where it is not as usual."""
+    """Overrides of the look of the eyes."""
     subdivide: _SubdivisionLevels = AUTO
-    """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop; "auto" for as many as
+    """Levels of subdivision: Catmull-Clark for meshes of quads (.obj, .ply), else Loop; "auto" for as many as
     the outline needs to look smooth in a picture of this size from this camera."""
     regions: str = AUTO
-    """Roughness and strength by region of the face: "auto" has the package's values where it knows the head
-    and no map says the roughness, "none" has one value for all; "default" names the package's table (an
-    artist's), and a TOML file is one of your own, which then say rho_s too."""
+    """Roughness and strength by region of the face: "auto" uses the package's table if the regions are known
+    and the head has no roughness map, "none" one value everywhere; "default" is the package's table (an
+    artist's), a TOML file is your own, and both then set rho_s too."""
 
 
 def has_region_table(table: Mapping[str, Any]) -> bool:
-    """Whether a [head] names a table of regions, which says roughness and strength."""
+    """Return whether a [head] table names a table of face regions, which sets roughness and strength."""
     return table.get("regions", AUTO) not in (AUTO, NO_REGIONS)
 
 
 def head_name(head: object) -> str:
-    """The name of what is to be loaded."""
+    """Return the name of the head or the file to load."""
     if not isinstance(head, str | os.PathLike):
         actual = "got None" if head is None else f"got a {type(head).__name__}"
-        advice = "Use a head as it is; write human.head() for that of a Human"
+        advice = "Pass a Head to Scene directly; write human.head() for a Human"
         refuse("load_head", "the name of a head or a file", actual, advice)
     return str(head)
 
 
 def check_files_and_lengths(files: Mapping[str, object], **lengths: object) -> None:
-    """Refuse words for lengths [mm], and pictures that are no files."""
+    """Refuse lengths given as words, and maps that are not file names."""
     for name, value in lengths.items():
         if isinstance(value, str):
             known = value in _UNIT_LENGTHS_MM
@@ -124,12 +125,12 @@ def check_files_and_lengths(files: Mapping[str, object], **lengths: object) -> N
             refuse(name, "a length in mm, as a number", f"got {value!r}", advice)
     for role, file in files.items():
         if file is not None and not isinstance(file, str | os.PathLike):
-            advice = f"Write dataclasses.replace(head, maps=replace(head.maps, {role}=...)) for one in memory"
-            refuse(role, "the name of a picture file", f"got a {type(file).__name__}", advice)
+            advice = f"For an array write dataclasses.replace(head, maps=replace(head.maps, {role}=...))"
+            refuse(role, "the name of an image file", f"got a {type(file).__name__}", advice)
 
 
 def check_options(**options: Any) -> None:
-    """Refuse values that no [head] can have; words where several may stand come as tuples."""
+    """Refuse option values that a [head] table does not accept; options with several words are tuples."""
     regions = options.get("regions", AUTO)
     if regions not in (AUTO, NO_REGIONS):
         advice = "Use with_regions for a table"
@@ -141,7 +142,7 @@ def check_options(**options: Any) -> None:
 
 
 def check_relief(height_mm: float | None, height: object, culprit: str = "height_mm") -> None:
-    """Refuse a length without the heights that it is for."""
+    """Refuse height_mm without a height map."""
     if height_mm is not None and height is None:
         actual = f"got {height_mm} without a height map"
         refuse(culprit, "a height map with it", actual, "Give the map too, or leave height_mm out")

@@ -1,4 +1,4 @@
-"""Heads by name: the package's own, samples, and files."""
+"""Loading of heads by name: the parametric human, samples and files."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 from dermis.base.errors import format_value, notify, refuse
-from dermis.base.pending_maps import is_file
 from dermis.base.progress import logged_step
+from dermis.base.reading import is_file
 from dermis.formats.gltf.embedded import embedded_eye_look, embedded_maps
 from dermis.formats.load import load_rigged
 from dermis.formats.maps import load_maps
@@ -43,10 +43,11 @@ if TYPE_CHECKING:
 
 MapFile = str | os.PathLike[str] | None
 HUMAN = "human"
-_MAX_SEED_DIGITS = 20  # digits
-MIN_HUMAN_LEVELS = 1  # levels of subdivision
+_MAX_SEED_DIGITS = 20
+MIN_HUMAN_LEVELS = 1
+"""Lowest level of subdivision of the parametric human."""
 REMOVED_HEADS = ("bust", "bust_many_charts")
-"""Heads that the package had before `HUMAN`."""
+"""Heads of earlier releases, replaced by `HUMAN`."""
 
 
 def load_head(
@@ -69,33 +70,70 @@ def load_head(
     subdivide: Subdivide = AUTO,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
-    """The parametric human ("human"), a sample ("lee_perry_smith") or a file (.glb, .gltf, .obj, .ply).
+    r"""Load a head: the parametric human, a sample or a file.
 
-    "human:7" is the person drawn by the seed 7, and a .json file of `dermis head` one by its numbers.
+    Options replace what a sample, a glTF file or the .mtl of an OBJ file specifies. Morph targets and bones
+    of a glTF file move the head (`Pose`); its rest pose has the default weights of the file.
 
-    Options replace what a sample, a glTF file or an OBJ file's .mtl has of its own. Morph targets and bones
-    of a glTF file move the head (`Pose`); it rests as the file has it, at the default weights of its targets.
+    Parameters
+    ----------
+    head : str or path
+        "human" for the parametric human, "human:7" for the person of seed 7, a .json file written by `dermis
+        head`, a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply).
+    colour, normal, height, specular, roughness : str or path, optional
+        Image files of the maps; see `dermis.formats.maps.load_maps`.
+    height_mm : float, optional
+        Relief of one grey level of an 8-bit height map [mm].
+    unit_mm : float, optional
+        Length of the file's unit [mm]; by default 1000 for glTF and 1 for other formats.
+    v_origin : {"auto", "top", "bottom"}
+        Row of the maps at v = 0; "auto" follows the format.
+    up : {"y", "z"}
+        Upward axis of the file.
+    normal_y : {"up", "down"}
+        Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX).
+    opaque : str or sequence of str
+        Groups of the file without subsurface scattering. If a group has skin in its name, all others are
+        opaque already. Two balls in groups named as eyes become the package's eyes and need not be listed.
+    eyes : {"fitted", "plain"}
+        "fitted" replaces two balls in groups named as eyes by the package's eyes, "plain" keeps the file's.
+    eye_groups : str or sequence of str
+        Groups of the file that contain eyeballs, whatever their names; they may also contain the rest of the
+        head.
+    eye : mapping, optional
+        Overrides of the look of the eyes: fields of `EyeLook`.
+    subdivide : int, "auto" or callable
+        Levels of subdivision, 0 to 3: Catmull-Clark for meshes of quads, else Loop; at least 1 for the human.
+        "auto" uses as many as the outline needs to look smooth in a portrait of 1024x1024, `SmoothIn(camera,
+        size)` in another picture.
+    regions : {"auto", "none"}
+        "auto" sets roughness and strength by region of the face if the regions are known and the head has no
+        roughness map; "none" keeps them uniform.
 
-    colour, normal, height, specular, roughness : image files; see `load_maps`
-    height_mm : relief of one grey level of an 8-bit height map [mm]
-    unit_mm : length of the file's unit [mm]; metres for glTF and mm otherwise when left out
-    v_origin : which row of the maps v = 0 is; the format's rule when "auto"
-    up : the file's upward axis
-    normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
-    opaque : groups of the file that light does not enter, beside those that are not called skin where one is;
-        two balls that are called eyes get the package's eyes without it
-    eyes : "fitted" puts the package's own eyes where a file has two balls called so, see `with_fitted_eyes`;
-        "plain" keeps the file's
-    eye_groups : groups of the file that hold eyeballs, whatever they are called, be it with all of the head
-    eye : what the eyes look like where it is not as usual: fields of `EyeLook`
-    subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop; the human has one
-        at least. "auto" for as many as its outline needs to look smooth in a portrait of 1024x1024,
-        `SmoothIn(camera, size)` for another picture
-    regions : "auto" for gloss by region of the face where the package knows the head and no map says the
-        roughness; "none" for one roughness all over
+    Returns
+    -------
+    Head
+        The head with its maps, eyes, hair and rig.
 
-    Raises DermisError for files that cannot be rendered as a head; warns with DermisWarning of pictures of
-    an .mtl that are left out.
+    Raises
+    ------
+    DermisError
+        For files that cannot be rendered as a head.
+
+    Warns
+    -----
+    DermisWarning
+        For maps of an .mtl file that are not used.
+
+    Examples
+    --------
+    >>> import dermis, pathlib, tempfile
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "roof.obj"
+    >>> corners = "v -80 0 -60\nv 80 0 -60\nv 80 240 0\nv -80 240 0\n"
+    >>> uv = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+    >>> _ = path.write_text(corners + uv + "f 1/1 2/2 3/3 4/4\n")
+    >>> len(dermis.load_head(path, subdivide=0).mesh.triangles)
+    2
     """
     opaque, eye_groups = ((one,) if isinstance(one, str) else one for one in (opaque, eye_groups))
     name, path = head_name(head), Path(head)
@@ -146,12 +184,12 @@ def load_head(
 
 
 def is_person_name(name: str) -> bool:
-    """Whether a head's name is that of the parametric human, or of a file of its numbers."""
+    """Return whether a name is that of the parametric human or of a file with the numbers of a person."""
     return name == HUMAN or name.startswith(f"{HUMAN}:") or Path(name).suffix.lower() == ".json"
 
 
 def _subdivided(head: Head, levels: SubdivisionLevels) -> Head:
-    """The head on a finer mesh; sequences of files have places for the file's own vertices."""
+    """Return the head on a subdivided mesh; its rig keeps the file's own vertices for sequences."""
     head_model = subdivide_head(head, levels)
     if head_model.levels and head_model.rig is not None:
         return replace(head_model, rig=replace(head_model.rig, corner=head.mesh.point))
@@ -159,9 +197,9 @@ def _subdivided(head: Head, levels: SubdivisionLevels) -> Head:
 
 
 def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
-    """The head with eyes that look as told.
+    """Return the head with overrides of its eyes' look.
 
-    Raises DermisError where it has none of true shape, and for looks that no eyes have.
+    Raises DermisError for a head without anatomical eyes, and for unknown or invalid values.
     """
     if not look:
         return head
@@ -182,7 +220,7 @@ def _read_maps(
     height_mm: float | None,
     normal_y: NormalY,
 ) -> tuple[Maps, str]:
-    """The maps that are given, and those that an OBJ file's materials name for other roles; a notice."""
+    """Return the given maps together with those that the materials of an OBJ file name, and a notice."""
     given = {role: file for role, file in chosen.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y)
     if obj is None:
@@ -214,10 +252,10 @@ def _load_human(
     mesh_options: dict[str, Any],
     levels: SubdivisionLevels,
 ) -> Head:
-    """The parametric human, in its own layout.
+    """Return the head of the parametric human, in its own uv layout.
 
-    name : "human", or with a seed: "human:7", or a file of numbers
-    told : what is told of files alone
+    name : "human", "human:SEED", or a file of numbers
+    mesh_options : options of mesh files, which must have their defaults
     """
     defaults = {
         "unit_mm": None,
@@ -229,20 +267,20 @@ def _load_human(
     }
     for option, value in mesh_options.items():
         if value != defaults[option]:
-            refuse(option, "a file that it tells of", f"it is given with {HUMAN!r}", "Leave it out")
+            refuse(option, "a mesh file to which it applies", f"it is given with {HUMAN!r}", "Leave it out")
     check_relief(height_mm, maps["height"])
     given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
     found = levels if callable(levels) else lambda plain: levels
     head_model = load_person(name).head(subdivide=lambda plain: max(MIN_HUMAN_LEVELS, found(plain)))
-    given_maps = {role: getattr(loaded, role) for role in given}  # all others are painted
+    given_maps = {role: getattr(loaded, role) for role in given}  # the other maps are painted
     return replace(head_model, name=name, maps=replace(head_model.maps, **given_maps))
 
 
 def load_person(name: str) -> Human:
-    """The person of a name that `is_person_name`: the usual one, one drawn by a seed, or that of a file.
+    """Return the person of a name: the default person, one sampled by seed, or that of a file.
 
-    DermisError : no such seed or file
+    Raises DermisError for an invalid seed or file.
     """
     from dermis.human.person import Human
     from dermis.human.person_file import read_person
@@ -259,7 +297,10 @@ def load_person(name: str) -> Human:
 
 
 def _map_files(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
-    """For each role the file given, else the head's own; a normal map that is given replaces its relief."""
+    """Return the file of each map: the given one, else that of the head.
+
+    A given normal map replaces the relief of the head.
+    """
     chosen = {role: files.get(role) if file is None else file for role, file in given.items()}
     return chosen | {"region": files.get("region")}
 

@@ -1,4 +1,4 @@
-"""A light stage: lights all around a head, and how much of each makes the light of any surroundings."""
+"""Light stage: lights in all directions, and their weights that reproduce an environment."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _MAX_LIGHTS = 10_000
 
 
 def light_stage(count: int) -> list[DirectionalLight]:
-    """Lights of irradiance 1, evenly around the head, on a spiral from above to below.
+    """Return directional lights of irradiance 1, distributed evenly on a spiral from above to below.
 
-    Raises DermisError for less than one and for more than ten thousand. Source: [Debevec2000].
+    Raises DermisError unless the count is 1 to 10,000. Source: [Debevec2000].
     """
     count = checked_integer("light stage", count, 1, _MAX_LIGHTS, "lights")
     y = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
@@ -28,19 +28,19 @@ def light_stage(count: int) -> list[DirectionalLight]:
     ]
 
 
-def light_stage_weights(lights: Sequence[DirectionalLight], around: Environment) -> NDArray[np.float64]:
-    """(n, 3) irradiance that arrives from the directions nearest to each light, linear Rec. 709.
+def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environment) -> NDArray[np.float64]:
+    """Return the irradiance (n, 3) that arrives from the directions nearest to each light, linear Rec. 709.
 
-    Pictures of a head under each light, times these and added up, are the head in those surroundings.
+    The sum of pictures under each light, times these weights, is the picture under the environment.
 
     Raises DermisError when the panorama cannot be read.
     """
     from dermis.environment.panorama import directions, load_panorama, solid_angles
 
-    radiance = load_panorama(around.name)
+    radiance = load_panorama(environment.name)
     size = radiance.shape[0], radiance.shape[1]
-    texel_irradiance = around.exposure * radiance * solid_angles(*size)[..., None]
-    azimuth = np.radians(around.rotation_degrees)
+    texel_irradiance = environment.exposure * radiance * solid_angles(*size)[..., None]
+    azimuth = np.radians(environment.rotation_degrees)
     x, y, z = np.moveaxis(directions(*size).reshape(-1, 3), -1, 0)
     rotated = np.stack(
         [np.cos(azimuth) * x + np.sin(azimuth) * z, y, np.cos(azimuth) * z - np.sin(azimuth) * x], axis=-1

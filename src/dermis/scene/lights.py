@@ -1,4 +1,4 @@
-"""Lights as plain data; places are in mm from the head's centre, +X to the head's left, +Z to its front."""
+"""Lights. Positions are in mm from the head's centre, +X to the head's left, +Z to its front."""
 
 from __future__ import annotations
 
@@ -32,51 +32,59 @@ __all__ = [
 _Degrees = Annotated[
     float,
     Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, log=True)),
-    BoundsReason("degrees of half a cone before the lamp"),
+    BoundsReason("degrees: half angle of a cone in front of the lamp"),
 ]
-_LAMP_REASON = BoundsReason("mm: lamps are neither thinner than paper nor larger than a square")
+_LAMP_REASON = BoundsReason("mm: from the thickness of paper to 100 m")
 _Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True)), _LAMP_REASON]
 
 _BRIGHTNESS_SYNONYMS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
 
 
 def _equal_channels(value: Any) -> Any:
-    """A number as that of all three channels."""
+    """Return a number as three equal channels; other values stay the same."""
     return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
 class _LightBase(FrozenModel):
-    """What every light has."""
+    """Fields of all lights."""
 
     synonyms: ClassVar[Mapping[str, str]] = dict.fromkeys(_BRIGHTNESS_SYNONYMS, "irradiance")
 
     irradiance: Annotated[Colour, BeforeValidator(_equal_channels)] = (3.14, 3.14, 3.14)
-    """Irradiance of a surface at the target that faces the light, linear Rec. 709; pi makes white skin 1."""
+    """Irradiance at the target of a surface that faces the light, linear Rec. 709; with pi white skin has
+    radiance 1."""
     shadows: bool = True
-    """Whether it casts shadows."""
+    """Whether the light casts shadows."""
     softness_mm: Annotated[
         float,
         Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, log=True)),
-        BoundsReason("mm: finer than light's own waves no edge is"),
+        BoundsReason("mm: from the wavelength of light to a metre"),
     ] = 1.5
-    """Width over which a shadow's edge fades, at most 12 texels of the shadow map; for lights of some size it
-    is the least width [mm]."""
+    """Width over which the edge of a shadow fades, at most 12 texels of the shadow map; for area lights the
+    minimum width [mm]."""
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Keys of the bibliography: what its kind is drawn by."""
+        """Return the bibliography keys of the methods that draw this light."""
         return ()
 
 
 class PointLight(_LightBase):
-    """Light from a point in all directions; falls off with the square of the distance."""
+    """Point light that emits equally in all directions, with inverse-square falloff.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.PointLight((0, 300, 900), irradiance=2).irradiance
+    (2.0, 2.0, 2.0)
+    """
 
     kind: Literal["point"] = "point"
     """Word for this kind of light in scene files."""
     position: Vector = Field(kw_only=False)
-    """Where it stands [mm]."""
+    """Position of the light [mm]."""
     target: Vector = (0.0, 0.0, 0.0)
-    """Where it is directed, and where its irradiance is given [mm]."""
+    """Point that the light is aimed at, where its irradiance is specified [mm]."""
 
     @model_validator(mode="after")
     def _check_distance(self) -> PointLight:
@@ -86,14 +94,21 @@ class PointLight(_LightBase):
 
 
 class SpotLight(PointLight):
-    """A point light within a cone around the line to the target."""
+    """Point light restricted to a cone around the line to the target.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.SpotLight((0, 300, 900), inner_degrees=10, outer_degrees=20).kind
+    'spot'
+    """
 
     kind: Literal["spot"] = "spot"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
     inner_degrees: _Degrees = 25.0
-    """Half angle at which the cone begins to fade."""
+    """Half angle up to which the light has full strength."""
     outer_degrees: _Degrees = 35.0
-    """Half angle at which the cone ends."""
+    """Half angle at which the light has faded to zero."""
 
     @model_validator(mode="after")
     def _check_cone(self) -> SpotLight:
@@ -103,22 +118,39 @@ class SpotLight(PointLight):
 
 
 class RectangleLight(PointLight):
-    """A window or softbox: an even rectangle that faces the target, one pair of sides level."""
+    """Uniform rectangular area light, such as a window or a softbox.
+
+    It faces the target, with two sides horizontal.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.RectangleLight((900, 300, 900), width_mm=400, height_mm=800).sources
+    ('Baum1989', 'Roberts2018')
+    """
 
     kind: Literal["rectangle"] = "rectangle"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
     width_mm: _Length = 600.0
-    """Length of the level sides [mm]."""
+    """Length of the horizontal sides [mm]."""
     height_mm: _Length = 600.0
     """Length of the other sides [mm]."""
 
     @property
     def sources(self) -> tuple[str, ...]:
+        """Return the bibliography keys of the methods that draw this light."""
         return "Baum1989", "Roberts2018"
 
 
 class SphereLight(PointLight):
-    """An evenly bright sphere, as a lamp with a globe."""
+    """Uniform spherical area light, such as a globe lamp.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.SphereLight((0, 300, 900), radius_mm=50).radius_mm
+    50.0
+    """
 
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
@@ -129,6 +161,7 @@ class SphereLight(PointLight):
 
     @property
     def sources(self) -> tuple[str, ...]:
+        """Return the bibliography keys of the methods that draw this light."""
         return "ShirleyChiu1997", "Roberts2018"
 
     @model_validator(mode="after")
@@ -139,45 +172,64 @@ class SphereLight(PointLight):
 
 
 class DirectionalLight(_LightBase):
-    """Parallel light, as from the sun."""
+    """Parallel light, such as the sun.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> sun = dermis.DirectionalLight((0, -1, -1), angle_degrees=0.53)
+    >>> sun.replace(angle_degrees=0).sources
+    ()
+    """
 
     kind: Literal["directional"] = "directional"
     """Word for this kind of light in scene files."""
     direction: Direction = Field(kw_only=False)
-    """The way in which the light travels."""
-    angle_degrees: Annotated[float, Field(ge=0, le=20), BoundsReason("degrees; wider light is no beam")] = 0.0
-    """Angle that its source spans, 0.53 for the sun: shadows harden towards what casts them."""
+    """Direction in which the light travels."""
+    angle_degrees: Annotated[
+        float, Field(ge=0, le=20), BoundsReason("degrees: wider light is not parallel")
+    ] = 0.0
+    """Angular diameter of the source, 0.53 for the sun; shadows are sharper near the surface that casts
+    them."""
 
     @property
     def sources(self) -> tuple[str, ...]:
+        """Return the bibliography keys of the methods that draw this light."""
         return ("Roberts2018",) if self.angle_degrees > 0 else ()
 
 
 class StripeLight(DirectionalLight):
-    """A sheet of parallel light, as from a laser through a cylindrical lens."""
+    """Sheet of parallel light, such as a laser through a cylindrical lens.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.StripeLight((0, 0, -1), width_mm=1).length_mm
+    300.0
+    """
 
     kind: Literal["stripe"] = "stripe"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
     position: Vector = (0.0, 0.0, 0.0)
-    """A point in the middle of the sheet [mm]."""
+    """Point in the middle of the sheet [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
-    """The way along which the stripe is long."""
+    """Direction of the stripe's length."""
     width_mm: _Length = 1.5
-    """Width of a Gaussian across, between the edges at 1/e^2 of its middle [mm]."""
+    """Width of the Gaussian cross-section, between its points at 1/e^2 of the maximum [mm]."""
     length_mm: _Length = 300.0
     """Length of the stripe [mm]."""
 
     @model_validator(mode="after")
     def _check_sheet(self) -> StripeLight:
         if self.angle_degrees > 0:
-            raise ValueError("no angle_degrees, for a sheet of light is parallel")
+            raise ValueError("angle_degrees of 0, as a sheet of light is parallel")
         if np.linalg.norm(np.cross(self.direction, self.up)) < 1e-6 * np.linalg.norm(self.up):
-            raise ValueError("up in another direction than the light's")
+            raise ValueError("up not parallel to the direction of the light")
         return self
 
 
 Light = PointLight | DirectionalLight
-"""Every kind is one or the other, with more to it."""
+"""Base classes of all lights."""
 
 LIGHTS: Registry[type[Light]] = Registry(
     "light",
@@ -190,32 +242,46 @@ LIGHTS: Registry[type[Light]] = Registry(
         "stripe": StripeLight,
     },
 )
-"""Kinds by their names in scene files. `dermis.frame.lights.kind.KINDS` draws them, MITSUBA and CYCLES of
-`dermis.apps.truths.lights` judge them; exports take others for the kind they derive from."""
+"""Classes of lights by their names in scene files.
+
+`dermis.frame.lights.kind.KINDS` draws them, MITSUBA and CYCLES of `dermis.apps.truths.lights` render the
+reference; exports write a registered light as the class that it derives from."""
 
 
 NO_LIGHTS = "none"
-"""Name of the rig without lights, for an environment alone."""
+"""Name of the preset without lights, for an environment alone."""
 
 
 def light_presets() -> list[str]:
-    """Names of the rigs of the package."""
+    """Return the names of the light presets."""
     names = [entry.name for entry in (resources.files("dermis.scene") / "presets").iterdir()]
     return sorted([NO_LIGHTS, *(name.removesuffix(".toml") for name in names if name.endswith(".toml"))])
 
 
 def preset_lights(name: str) -> tuple[Light, ...]:
-    """The lights of a rig of the package, by its name."""
+    """Return the lights of a preset."""
     if name == NO_LIGHTS:
         return ()
     return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(name))["lights"])
 
 
 def preset_toml(name: str) -> str:
-    """The file of a rig of the package."""
+    """Return the TOML text of a preset."""
     return (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def studio() -> tuple[Light, ...]:
-    """Three shadowed spots: a warm key from the upper left, a weak fill, a cool rim from behind."""
+    """Return the preset "studio": three spot lights with shadows.
+
+    Returns
+    -------
+    tuple of SpotLight
+        A warm key light from the upper left, a weak fill light, and a cool rim light from behind.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> [light.kind for light in dermis.studio()]
+    ['spot', 'spot', 'spot']
+    """
     return preset_lights("studio")

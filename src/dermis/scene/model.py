@@ -1,4 +1,4 @@
-"""The whole of what is to be seen."""
+"""Scene: head, skin, lights, environment, camera and pose."""
 
 from __future__ import annotations
 
@@ -23,19 +23,36 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, init=False)
 class Scene:
-    """A head, its skin, the light on it and the camera before it.
+    """A head, its skin, the lights and the environment around it, and the camera.
 
-    head : or what `load_head` takes, or a `Human`
-    lights : several, one or the name of a preset; the studio preset when left out, or none with an
-        environment
-    camera : or the name of a preset; the portrait of the head when left out
-    skin : or its values by name; the default skin when left out
-    environment : or its name
-    pose : how the head is moved, or weights of its morph targets by name; at rest when left out
+    Scenes are immutable; `scene.replace(skin=...)` returns a changed copy.
 
-    A scene does not change; `scene.replace(skin=...)` is another one.
+    Parameters
+    ----------
+    head : Head, Human, str or path
+        A head, a person, or a name or file that `load_head` accepts.
+    lights : sequence of lights, light or str, optional
+        Lights or the name of a preset; by default the preset "studio", or no lights with an environment.
+    camera : Camera, str or callable, optional
+        A camera, the name of a preset, or a function of the head; by default `portrait`.
+    skin : Skin or mapping, optional
+        Skin settings or their values by name; by default `Skin()`.
+    environment : Environment, str or path, optional
+        An environment or the name of its panorama.
+    pose : Pose or mapping, optional
+        Pose of the head, or weights of its morph targets by name; by default the rest pose.
 
-    Raises DermisError for a pose that the head cannot take, and for parts of another kind.
+    Raises
+    ------
+    DermisError
+        For a pose that the head cannot take, and for arguments of other types.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> scene = dermis.Scene(dermis.Human().head(subdivide=0), lights="window")
+    >>> len(scene.lights), scene.skin.profile
+    (2, 'gpu-gems-3')
     """
 
     head: Head
@@ -67,15 +84,15 @@ class Scene:
             self.motion  # noqa: B018 checks the pose
 
     @classmethod
-    def of(cls, given: object) -> Scene:
-        """A scene that is one, or that of a head alone.
+    def coerce(cls, scene: object) -> Scene:
+        """Return a scene unchanged, or the default scene of a head.
 
-        Raises DermisError for anything else.
+        Raises DermisError for any other object.
         """
-        return given if isinstance(given, Scene) else cls(given)  # type: ignore[arg-type]
+        return scene if isinstance(scene, Scene) else cls(scene)  # type: ignore[arg-type]
 
     def replace(self, **parts: Any) -> Scene:
-        """The same with other parts, checked."""
+        """Return a validated copy with other parts."""
         return replace(self, **parts)
 
     def _set(self, part: str, value: object) -> None:
@@ -83,5 +100,5 @@ class Scene:
 
     @cached_property
     def motion(self) -> Motion | None:
-        """The pose as numbers, None at rest."""
+        """Return the pose as arrays, or None for the rest pose."""
         return None if self.pose is None else self.pose.motion(self.head.control)

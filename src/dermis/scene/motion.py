@@ -1,4 +1,4 @@
-"""Motion by file, of any kind."""
+"""Loading of motion from files of any supported format."""
 
 from __future__ import annotations
 
@@ -29,18 +29,47 @@ def load_motion(
     unit_mm: float | None = None,
     up: UpAxis = "y",
 ) -> Clip:
-    """The motion that a file holds, for a head: `Clip.pose_at` gives its pose at any time.
+    r"""Load the motion of a head from a file.
 
-    path : a glTF file, the head's own or another with nodes or targets of the same names, "file.glb#clip"
-        for one of several clips; a CSV of Live Link Face; lines of JSON with MediaPipe's blend shapes; or
-        files with one topology: a folder, "face_%05d.obj" or "face_*.ply"
-    clip : the clip of a glTF file
-    fps : frames a second of a sequence, 30 when left out; of a CSV's timecode where it does not tell; of
-        lines without time
-    unit_mm, up : of a sequence's files, see `load_head`
+    Parameters
+    ----------
+    path : str or path
+        A glTF file, of the head or with nodes or targets of the same names, "file.glb#clip" for one of
+        several clips; a CSV file of Live Link Face; JSON lines with the blend shapes of MediaPipe; or files
+        of one topology: a folder, "face_%05d.obj" or "face_*.ply".
+    head : Head
+        Head that moves.
+    clip : str, optional
+        Name of the clip in a glTF file.
+    fps : float, optional
+        Frame rate of a sequence, by default 30; of a CSV file whose timecode does not tell it; of JSON lines
+        without time.
+    unit_mm : float, optional
+        Length of the unit of a sequence's files [mm]; see `load_head`.
+    up : {"y", "z"}
+        Upward axis of a sequence's files.
 
-    Raises DermisError for files that cannot be read, which it names with their lines, and for motion of
-    which the head has no name; what it has only in part, `Clip.note` tells.
+    Returns
+    -------
+    Clip
+        Motion of the head; `Clip.pose_at` gives the pose at any time, `Clip.note` lists what the head lacks.
+
+    Raises
+    ------
+    DermisError
+        For files that cannot be read, with the line, and for motion that no part of the head matches.
+
+    Examples
+    --------
+    >>> import dermis, pathlib, tempfile
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> corners = "v -80 {} -60\nv 80 0 -60\nv 80 240 0\nv -80 240 0\n"
+    >>> faces = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n"
+    >>> for k in range(3):
+    ...     _ = (folder / f"face_{k}.obj").write_text(corners.format(10 * k) + faces)
+    >>> head = dermis.load_head(folder / "face_0.obj", subdivide=0)
+    >>> dermis.load_motion(folder, head, fps=10).duration_s
+    0.2
     """
     clip_path = checked_path(path, _KINDS)
     check_options(unit_mm=unit_mm, up=up)
@@ -49,7 +78,7 @@ def load_motion(
     if is_gltf(source):
         return load_gltf_clip(source, head, clip_name)
     if clip_name is not None:
-        refuse(source, "a clip's name with a glTF file alone", f"got {clip_name!r}", "Leave it out")
+        refuse(source, "the name of a clip only with a glTF file", f"got {clip_name!r}", "Leave it out")
     if is_sequence(source):
         return load_sequence(source, head, fps, unit_mm, up)
     if not is_file(source):
@@ -61,7 +90,7 @@ def load_motion(
 
 
 def _split_clip_name(path: Path, clip: str | None) -> tuple[Path, str | None]:
-    """A file, and the name of a clip that was written after it."""
+    """Return the path of a file and the name of a clip, which may follow the path after "#"."""
     file, sign, name = str(path).rpartition("#")
     if sign and not is_file(path) and is_gltf(file):
         return Path(file), clip or name

@@ -1,4 +1,4 @@
-"""Cameras as OpenCV has them: a matrix of intrinsics, a rotation and a translation."""
+"""Conversion between cameras and the matrices of OpenCV: intrinsics, rotation and translation."""
 
 from __future__ import annotations
 
@@ -11,17 +11,15 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_array
 
 Doubles = NDArray[np.float64]
-_PIXEL_CENTRE = (
-    0.5  # from the middle of the first pixel, which is OpenCV's origin, to the picture's corner [pixel]
-)
-_TOLERANCE = 1e-4  # of rotations and skews as they are written in files
+_PIXEL_CENTRE = 0.5  # OpenCV's origin is the centre of the first pixel, not the corner of the picture [pixel]
+_TOLERANCE = 1e-4  # for rotations and skews rounded in files
 _MIN_DISTANCE_MM = 1.0
 _MAX_VALUE = 1e9
 _MAX_PIXELS = 1e6  # along a side
 
 
 class OpenCvCamera(NamedTuple):
-    """X_cam = R X + t [mm], and K X_cam the pixel: x to the right, y down, z forward.
+    """Camera of OpenCV: X_cam = R X + t [mm], pixel K X_cam; x to the right, y down, z forward.
 
     K, R : (3, 3); fx, fy, cx and cy [pixel]
     t : (3,) [mm]
@@ -33,15 +31,15 @@ class OpenCvCamera(NamedTuple):
 
 
 def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> dict[str, Any]:
-    """Fields of a camera.
+    """Return the fields of a `Camera` from the matrices of OpenCV.
 
-    Raises DermisError for matrices that are none of a pinhole camera.
+    Raises DermisError for matrices that do not describe a pinhole camera.
     """
     k, rotation, translation = _matrix("K", K, (3, 3)), _matrix("R", R, (3, 3)), _matrix("t", t, (3,))
     _check_intrinsics(k)
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > _TOLERANCE or np.linalg.det(rotation) < 0:
         actual = f"R R^T is not 1, or its determinant is {np.linalg.det(rotation):.3g}"
-        refuse("R", "a rotation matrix", actual, "Make one of a vector with cv2.Rodrigues")
+        refuse("R", "a rotation matrix", actual, "Convert a rotation vector with cv2.Rodrigues")
     width, height = _size(size)
     fx, fy, cx, cy = k[0, 0], k[1, 1], k[0, 2], k[1, 2]
     position = -rotation.T @ translation
@@ -61,10 +59,10 @@ def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int])
 
 
 def intrinsics(lens: tuple[float, tuple[float, float], float], size: tuple[int, int]) -> Doubles:
-    """(3, 3) K [pixel].
+    """Return the intrinsic matrix K (3, 3) [pixel].
 
-    seen : tangent of half the vertical angle, principal point from the upper left corner in widths and
-        heights, width of a pixel over its height
+    lens : tangent of half the vertical angle of view, principal point as fractions of width and height from
+        the upper left corner, and width of a pixel over its height
     """
     half_tangent, principal_point, pixel_aspect = lens
     size = _size(size)
@@ -74,7 +72,7 @@ def intrinsics(lens: tuple[float, tuple[float, float], float], size: tuple[int, 
 
 
 def extrinsics(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[Doubles, Doubles]:
-    """(3, 3) R and (3,) t [mm] of a camera at a position that looks at a target."""
+    """Return the rotation (3, 3) and the translation (3,) [mm] of a camera that looks at a target."""
     forward = _normalise(np.subtract(target, position))
     right = _normalise(np.cross(forward, np.asarray(up, np.float64)))
     rotation = np.array([right, np.cross(forward, right), forward])
@@ -99,7 +97,7 @@ def _matrix(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Doubles:
     if shape == (3,) and found.shape in ((3, 1), (1, 3)):  # as OpenCV returns them
         found = found.reshape(3)
     if found.shape != shape or not (np.abs(found) <= _MAX_VALUE).all():
-        actual = f"got shape {found.shape}" if found.shape != shape else "got others"
+        actual = f"got shape {found.shape}" if found.shape != shape else "got larger numbers"
         refuse(name, f"numbers of shape {shape} up to {_MAX_VALUE:g}", actual, "Correct it")
     return found
 

@@ -1,4 +1,4 @@
-"""Scattering below the skin of a person of the parametric human."""
+"""Scattering settings of the skin of a parametric human."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dermis.scene.skin import Pigments, Skin
 
 
 def skin_of(person: Human, base: Skin | None = None) -> Skin:
-    """Skin in which light spreads as far as the person's pigments let it: less the darker the skin is.
+    """Return skin settings whose scattering follows the pigments of a person.
 
-    base : of all else; the default skin when left out
+    base : settings to start from; the default skin when left out
 
-    The colour stays that of the person's painted maps.
+    The colour is still that of the person's painted maps; darker skin scatters light less far.
     """
     look = person.look
     own = Pigments(

@@ -1,4 +1,4 @@
-"""Scenes written as the TOML that `load_scene` reads."""
+"""Scenes written as the TOML files that `load_scene` reads."""
 
 from __future__ import annotations
 
@@ -20,29 +20,25 @@ from dermis.scene.toml_text import table_text
 
 _HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
 _SET_BY_REGIONS = {"rho_s"}
-_PATH_FIELDS = {
-    "profile",
-    "profile_map",
-    "other_profiles",
-    "name",
-}  # of skins and environments, unless presets
+# fields of skins and environments that are file names, unless they name presets
+_PATH_FIELDS = {"profile", "profile_map", "other_profiles", "name"}
 
 
 def save_scene(path: Path, scene: Scene, settings: Settings, head: Mapping[str, Any]) -> None:
-    """Write a scene, whole or not at all; `dermis render` makes the same picture of it.
+    """Write a scene to a TOML file from which `dermis render` draws the same picture; the write is atomic.
 
-    head : the [head] table: where the head came from, files by names that hold from anywhere
+    head : the [head] table with absolute file names
 
-    Raises DermisError when that is not possible.
+    Raises DermisError when the file cannot be written.
     """
     with atomic_file(path) as temporary:
         temporary.write_text(scene_text(scene, settings, head), encoding="utf-8")
 
 
 def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str:
-    """The text of a scene's file.
+    """Return the TOML text of a scene.
 
-    Raises DermisError for a pose by places of points.
+    Raises DermisError for a pose with positions of single points.
     """
     excluded = _SET_BY_REGIONS if has_region_table(head) else set()
     parts = [] if scene.lights else ['lights = "none"\n']
@@ -60,27 +56,27 @@ def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
 
 
 def _pose(pose: Pose | None) -> list[str]:
-    """Tables of a pose's weights and bones."""
+    """Return the tables of a pose's weights and bones."""
     if pose is None:
         return []
     if pose.positions_mm is not None:
-        advice = "Keep those in a file of their own, such as .npy"
-        refuse("pose", "weights and bones, which a scene's file can hold", "it has positions_mm", advice)
+        advice = "Keep positions in a separate file, such as .npy"
+        refuse("pose", "weights and bones, which fit into a scene file", "it has positions_mm", advice)
     weights = {name: float(weight) for name, weight in pose.weights.items()}
-    bones = {name: np.asarray(given, np.float64).tolist() for name, given in pose.bones.items()}
+    bones = {name: np.asarray(rotation, np.float64).tolist() for name, rotation in pose.bones.items()}
     tables = {"[pose.weights]": weights, "[pose.bones]": bones}
     return [table_text(title, values) for title, values in tables.items() if values] or ["[pose]\n"]
 
 
-def _model_table(title: str, values: FrozenModel, left_out: set[str] | None = None) -> str:
-    table = values.model_dump(exclude=left_out, exclude_none=True)
+def _model_table(title: str, values: FrozenModel, exclude: set[str] | None = None) -> str:
+    table = values.model_dump(exclude=exclude, exclude_none=True)
     for key in _PATH_FIELDS & table.keys():
         table[key] = _absolute(table[key])
     return table_text(title, table)
 
 
 def _absolute(name: Any) -> Any:
-    """A file's name that holds from anywhere, or several; presets as they are."""
+    """Return the absolute name of an existing file, or a tuple of them; preset names stay the same."""
     if isinstance(name, tuple):
         return tuple(map(_absolute, name))
     return str(Path(name).resolve()) if is_file(name) else name

@@ -1,4 +1,4 @@
-"""How a picture is computed and encoded."""
+"""Settings of how a picture is computed and encoded."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _HEX = re.compile(r"#[0-9a-fA-F]{6}")
 
 
 def _parse_colour(value: Any) -> Any:
-    """#rrggbb and "red,green,blue" as linear Rec. 709."""
+    """Return "#rrggbb" or "red,green,blue" as linear Rec. 709 numbers; other values stay the same."""
     if not isinstance(value, str):
         return value
     if not _HEX.fullmatch(value):
@@ -55,52 +55,62 @@ else:
 
 
 def _both_sides(value: Any) -> Any:
-    """A number as both sides."""
+    """Return a number as width and height; other values stay the same."""
     return (value, value) if isinstance(value, int) else value
 
 
 class Settings(FrozenModel):
-    """Sizes, quality, and what leaves linear light."""
+    """Sizes, quality and encoding of a picture.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.Settings(size=256).size
+    (256, 256)
+    """
 
     synonyms: ClassVar[Mapping[str, str]] = {"resolution": "size", "spp": "samples"}
 
     size: Annotated[tuple[_Side, _Side], BeforeValidator(_both_sides)] = (1024, 1024)
     """Width and height of the picture [pixel]."""
     atlas: Annotated[int, Field(ge=64, le=16384), BoundsReason("texels: what the largest GPUs hold")] = 2048
-    """Side of the atlas, the map in which light scatters [texel]."""
-    samples: Annotated[int, Field(ge=1, le=_MAX_SAMPLES), BoundsReason("more show no difference")] = 4
-    """Samples of each pixel, for smooth edges."""
+    """Side of the atlas, the map in which light is diffused [texel]."""
+    samples: Annotated[int, Field(ge=1, le=_MAX_SAMPLES), BoundsReason("more make no visible difference")] = 4
+    """Samples per pixel for antialiasing."""
     technique: Annotated[str, RegisteredName(TECHNIQUES)] = "texture-space"
-    """How light scatters below the surface."""
+    """Technique for subsurface scattering."""
     stretch: Stretch = "full"
     seams: Seams = "stitch"
     seam_colour: SeamColour = (0.5, 0.35, 0.3)
     transmission: Literal["thin", "none"] = "thin"
-    """Light through the head: "thin" for thin parts such as ears and nostrils, "none" for no part."""
-    shadow_size: Annotated[int, Field(ge=64, le=8192), BoundsReason("texels: finer than skin's pores")] = 2048
+    """Translucency: "thin" for thin parts such as ears and nostrils, "none" to leave it out."""
+    shadow_size: Annotated[
+        int, Field(ge=64, le=8192), BoundsReason("texels: finer than the pores of skin")
+    ] = 2048
     """Side of each shadow map [texel]."""
     occlusion: Literal["baked", "rest", "none"] = "baked"
-    """Ambient occlusion, which dims the environment's light where the head is in its way: "baked" follows a
-    head that moves, "rest" leaves it as the head rests, "none" for none."""
+    """Occlusion of the environment by the head itself: "baked" is updated when the head moves, "rest" is that
+    of the rest pose, "none" leaves it out."""
     interreflection: bool = True
-    """Light from skin to skin through the air: in ears, around eyes, under chin and nose."""
+    """Light reflected from skin to skin: in ears, around the eyes, under chin and nose."""
     exposure: Exposure = 1.0
-    """Factor from radiance to the picture; "auto" meters the light that falls on the skin in view."""
+    """Factor from radiance to picture values; "auto" meters the irradiance of the visible skin."""
     bloom: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0, 0.5))] = 0.0
-    """Share of the light that the lens scatters around."""
+    """Fraction of the light that the lens scatters."""
     tone: Literal["none", "filmic", "neutral"] = "none"
-    """Tone curve before the encoding as bytes; "neutral" is the Khronos group's."""
+    """Tone curve before the sRGB encoding; "neutral" is that of the Khronos Group."""
     gamma: Gamma = "right"
     background: Background = "none"
-    """What is behind the head, which sheds no light: "none", so that pictures have alpha, a studio's grey
-    "gradient", the "environment", or a colour, linear Rec. 709 or #rrggbb."""
+    """Backdrop behind the head, which emits no light: "none" for pictures with alpha, a grey studio
+    "gradient", the "environment", or a colour as linear Rec. 709 or #rrggbb."""
     background_blur: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Roughness of the mirror in which the environment behind the head is seen, at least 0.018; 0 for none,
-    so that it is sharp."""
+    """Blur of an environment as background, as the roughness of a mirror of at least 0.018; 0 for a sharp
+    one."""
     strands: bool = True
-    """Hairs of heads that have them, as the human's hair, beard, brows and lashes."""
+    """Whether to draw hair strands: hair, beard, brows and lashes of heads that have them."""
     parts: Literal["all", "diffuse", "specular"] = "all"
-    """Which light is shown: "all", only the "diffuse" from below the surface, or the "specular" off it."""
+    """Components of the light to show: "all", only the "diffuse" subsurface light, or only the "specular"
+    reflection."""
 
     @model_validator(mode="after")
     def _fits_in_memory(self) -> Settings:
@@ -112,4 +122,4 @@ class Settings(FrozenModel):
 
 
 PHOTOGRAPHIC_SETTINGS: Mapping[str, Any] = MappingProxyType({"exposure": "auto", "background": "gradient"})
-"""Settings that `dermis render`, `animate` and `view` choose where nothing is said."""
+"""Defaults of `dermis render`, `animate` and `view` in place of those of `Settings`."""

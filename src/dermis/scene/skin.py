@@ -1,4 +1,4 @@
-"""What the skin is made of, as far as its maps do not say."""
+"""Settings of the skin: surface reflection and scattering."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from dermis.specular.models import FresnelName, SpecularName
 DirectionName = Literal["lambertian", "half-space"]
 MAX_LAYERS = 8
 MAX_OTHER_PROFILES = 2
-"""Profiles that a map can mix into another."""
+"""Number of profiles that a map can mix with the main profile."""
 _OILY_RHO_S_FACTOR, _OILY_ROUGHNESS_FACTOR = 2.0, 0.6
 DEFAULT_ROUGHNESS, DEFAULT_RHO_S = 0.3, 0.45
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
     "deck-2007": {"specular": "kelemen", "rho_s": 0.18, "direction": "lambertian"},
 }
-"""Fields of skins by name: what dermis takes for skin, and what the talk of 2007 had."""
+"""Values of preset skins: the default, and that of the 2007 talk."""
 
 
 _Fraction = Annotated[float | None, Field(ge=0, le=1)]
@@ -34,43 +34,43 @@ _COEFFICIENT_SLIDER = Field(json_schema_extra=slider(1e-4, 50, log=True))
 
 
 class Pigments(FrozenModel):
-    """What replaces the pigments of a skin made of them; None leaves the skin's own."""
+    """Pigments that replace those of a skin profile; None keeps the value of the profile."""
 
     structure: Structure | None = None
-    """Layers of the skin: "dj2006" has two, "donner2008" a sheet of melanin too, "biospec" four."""
+    """Model of the layers: "dj2006" has two, "donner2008" adds a layer of melanin, "biospec" has four."""
     melanin: Annotated[_Fraction, Field(json_schema_extra=slider(0.0005, 0.6, log=True))] = None
-    """Share of the epidermis' volume that is melanosomes."""
+    """Volume fraction of melanosomes in the epidermis."""
     eumelanin: _Fraction = None
-    """Share of the melanosomes that hold eumelanin."""
+    """Fraction of eumelanin in the melanosomes; the rest is pheomelanin."""
     blood: Annotated[_Fraction, Field(json_schema_extra=slider(0.0005, 0.2, log=True))] = None
-    """Share of the dermis' volume that is blood."""
+    """Volume fraction of blood in the dermis."""
     oxygen: _Fraction = None
-    """Share of the haemoglobin that carries oxygen."""
+    """Oxygen saturation of the blood."""
     epidermis_mm: Annotated[
         float | None,
         Field(ge=1e-3, le=2, json_schema_extra=slider(0.02, 0.5)),
-        BoundsReason("mm: from less than a cell to a callous heel"),
+        BoundsReason("mm: from less than a cell to a callus"),
     ] = None
     """Thickness of the epidermis [mm]."""
     epidermal_blood: Annotated[_Fraction, Field(json_schema_extra=slider(0, 0.1))] = None
-    """Share of the epidermis' volume that is blood, for "donner2008" only."""
+    """Volume fraction of blood in the epidermis, for "donner2008" only."""
 
     def overrides(self) -> dict[str, float]:
-        """Shares and thicknesses that replace something."""
+        """Return the values that replace those of the profile."""
         return self.model_dump(exclude={"structure"}, exclude_none=True)
 
 
 class TissueLayer(FrozenModel):
-    """One layer of a medium, its coefficients for red, green and blue."""
+    """Layer of a medium with coefficients for red, green and blue."""
 
     name: str = "layer"
-    """What the layer is called."""
+    """Name of the layer."""
     thickness_mm: Annotated[
         float | None,
         Field(ge=1e-4, le=1000, json_schema_extra=slider(0.01, 5, log=True)),
-        BoundsReason("mm: from less than a cell's wall to more than a body"),
+        BoundsReason("mm: from a cell membrane to more than a body"),
     ] = None
-    """Thickness; none for the last layer, if it has no end [mm]."""
+    """Thickness; None for a last layer that is infinitely deep [mm]."""
     absorption_per_mm: Annotated[tuple[_Absorption, _Absorption, _Absorption], _COEFFICIENT_SLIDER]
     """Absorption coefficient [1/mm]."""
     scattering_per_mm: Annotated[tuple[_Scattering, _Scattering, _Scattering], _COEFFICIENT_SLIDER]
@@ -78,58 +78,81 @@ class TissueLayer(FrozenModel):
 
 
 class Skin(FrozenModel):
-    """What the skin is: the rough white surface, and what scatters below it.
+    """Surface reflection and subsurface scattering of skin.
 
     Source: [dEonLuebke2007] sections 14.3-14.5; values of [Dudash2007].
+
+    Examples
+    --------
+    >>> import dermis
+    >>> skin = dermis.Skin(oiliness=0.5)
+    >>> round(skin.strength, 3), skin.replace(mix=0).mix
+    (0.675, 0.0)
     """
 
     profile: str = "gpu-gems-3"
-    """Diffusion profile: "gpu-gems-3", a medium or skin (dj3, skin1, light ...), a .toml file such as
-    `dermis profile -o` writes, or a CSV file with variance_mm2,red,green,blue."""
+    """Diffusion profile: "gpu-gems-3", a medium or skin (dj3, skin1, light ...), a .toml file as written by
+    `dermis profile -o`, or a CSV file with variance_mm2,red,green,blue."""
     profile_map: str | None = None
-    """Picture of where the skin has other profiles, in the head's uv, plain numbers: grey, or red, for the
-    first other's share of the skin; green for the second's."""
+    """Map of the weights of the other profiles, in the head's uv, linear values: red (or grey) for the first,
+    green for the second."""
     other_profiles: Annotated[tuple[str, ...], Field(max_length=MAX_OTHER_PROFILES)] = ()
-    """One or two profiles that `profile_map` mixes in; texture space alone does so."""
+    """One or two profiles that `profile_map` mixes with the main one; only for the technique
+    "texture-space"."""
     albedo: Literal["map", "profile"] = "map"
-    """Where skin gets its colour: "map" makes the profile white and takes the colour map; "profile" keeps the
-    profile's own colour and uses no map."""
+    """Source of the skin's colour: "map" normalises the profile to white and uses the colour map; "profile"
+    keeps the colour of the profile and ignores the map."""
     mix: Annotated[float, Field(ge=0, le=1)] = 0.5
-    """Share of the colour map applied before scattering, the rest after it."""
+    """Fraction of the colour map that is applied before scattering; the rest is applied after it."""
     roughness: Annotated[
-        float, Field(ge=0.05, le=1), BoundsReason("smoother skin would mirror, facets lean no farther")
+        float, Field(ge=0.05, le=1), BoundsReason("from near-mirror skin to slopes of 45 degrees")
     ] = DEFAULT_ROUGHNESS
-    """Beckmann roughness m of the surface; where a head has a map of it, 0.3 leaves that as it is, and 0.6
-    makes it twice as rough."""
+    """Beckmann roughness m of the surface; with a roughness map a factor relative to 0.3: 0.6 doubles the
+    values of the map."""
     rho_s: Annotated[float, Field(ge=0, le=1)] = DEFAULT_RHO_S
-    """Strength of the surface reflection: 1 is that of a smooth boundary of index 1.4 cut into facets."""
+    """Specular strength: 1 is that of a rough dielectric boundary of index 1.4."""
     oiliness: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """One dial over strength and roughness: 1 is shiny skin, twice as strong and 0.6 times as rough; an
-    artist's mapping, not a measured one."""
+    """Single control of strength and roughness: 1 is shiny skin, with twice the strength and 0.6 times the
+    roughness; an artist's mapping, not a measured one."""
     specular: SpecularName = "two-lobe"
-    """Model of the surface reflection; "none" leaves it out."""
+    """Specular lobe; "none" leaves it out."""
     fresnel: FresnelName = "schlick"
-    """Schlick's curve with F0 = 0.028, or the exact one of index 1.4."""
+    """Fresnel reflectance: Schlick's approximation with F0 = 0.028, or exact for an index of 1.4."""
     specular_colour: SpecularColour = "white"
     energy: Energy = "full"
     direction: DirectionName = "half-space"
-    """How skin returns light: "lambertian" alike from and to all directions; "half-space" as a half-space
-    of the skin's mean colour: more of what arrives at a slant, and light scattered once leaves at a slant."""
+    """Directional dependence of diffuse light: "lambertian" for none; "half-space" as for a scattering
+    half-space of the skin's mean colour, which reflects more at oblique incidence and for oblique views."""
     anisotropy: Annotated[
-        float, Field(ge=0, le=0.95), BoundsReason("of more, the law takes nearly all as going straight on")
+        float,
+        Field(ge=0, le=0.95),
+        BoundsReason("more is nearly unscattered light, which the model does not describe"),
     ] = 0.0
-    """Mean cosine of scattering in half-space skin, whose reduced scattering stays as it is: at 0.8, as in
-    real flesh, more comes back of light at a slant, and more passes thin parts."""
+    """Mean cosine of the scattering angle, with direction "half-space", at constant reduced scattering: at
+    0.8, as in real tissue, more oblique light is reflected and more light passes thin parts."""
     pigments: Pigments | None = None
-    """What replaces pigments of the profile's skin, of "spectral", "light", "medium", "dark" or a file."""
+    """Overrides of the pigments of the profile, which is "spectral", "light", "medium", "dark" or a file."""
     layers: Annotated[tuple[TissueLayer, ...], Field(max_length=MAX_LAYERS)] = ()
-    """What replaces the layers of the profile's medium ("dj3", "skin1", a file's), topmost first."""
+    """Replacement of the layers of the profile's medium ("dj3", "skin1" or a file), topmost first."""
 
     @classmethod
     def preset(cls, name: str) -> Skin:
-        """The skin of a name in `PRESETS`.
+        """Return the skin of a preset.
 
-        Raises DermisError for any other name.
+        Parameters
+        ----------
+        name : str
+            A key of `PRESETS`: "default" or "deck-2007".
+
+        Returns
+        -------
+        Skin
+            The preset's settings.
+
+        Raises
+        ------
+        DermisError
+            For any other name.
         """
         if not isinstance(name, str) or name not in PRESETS:
             refuse("skin", f"one of {', '.join(PRESETS)}", f"got {format_value(name)}", "Choose one of them")
@@ -137,23 +160,26 @@ class Skin(FrozenModel):
 
     @property
     def overrides_tissue(self) -> bool:
-        """Whether pigments or layers replace what the profile's name stands for."""
+        """Return whether pigments or layers replace those of the profile."""
         return self.pigments is not None or bool(self.layers)
 
     @property
     def strength(self) -> float:
-        """Strength rho_s of the lobe with the skin's oil, at most 1 [-]."""
+        """Return the specular strength rho_s including oiliness, at most 1 [-]."""
         oily = min(1.0, self.rho_s * (1.0 + (_OILY_RHO_S_FACTOR - 1.0) * self.oiliness))
         return 0.0 if self.specular == "none" else oily
 
     @property
     def smoothing(self) -> float:
-        """Factor of the roughness that the skin's oil makes [-]."""
+        """Return the factor of the roughness due to oiliness [-]."""
         return 1.0 - (1.0 - _OILY_ROUGHNESS_FACTOR) * self.oiliness
 
 
 def lobe_name(skin: Skin) -> str:
-    """Return the name of the skin's lobe; skin without one keeps the default, for wet materials beside it."""
+    """Return the name of the skin's lobe, or of the default lobe for skin without one.
+
+    Wet materials beside the skin still need a lobe.
+    """
     from dermis.specular.models import MODELS
 
     return next(iter(MODELS)) if skin.specular == "none" else skin.specular

@@ -1,4 +1,4 @@
-"""How finely a head is subdivided for its silhouette to look smooth in a picture."""
+"""Levels of subdivision that make the silhouette of a head look smooth in a picture."""
 
 from __future__ import annotations
 
@@ -20,33 +20,32 @@ from dermis.scene.head_table import AUTO
 
 SubdivisionLevels = int | Callable[[Head], int]
 Subdivide = SubdivisionLevels | Literal["auto"]
-"""Levels of subdivision, "auto" for a portrait of 1024x1024, or a function of the head as it comes."""
+"""Levels of subdivision, "auto" for a portrait of 1024x1024, or a function of the head before subdivision."""
 Doubles = NDArray[np.float64]
 MAX_SMOOTH_TRIANGLES = 300_000
-"""Of a mesh that is subdivided for its silhouette's sake."""
+"""Largest number of triangles that `SmoothIn` subdivides to."""
 MAX_DEVIATION_PX = 0.6
-"""How far a silhouette's edges may lie off the smooth curve: corners of less are lost in a pixel's filter."""
-_SMOOTH_FRACTION = (
-    0.9  # of the silhouette's length that keeps to it; the rest are creases and what is hidden mostly
-)
-_NEAR_PLANE_MM = 1.0  # before the eye
+"""Largest deviation of a silhouette from its smooth curve that the pixel filter hides."""
+_SMOOTH_FRACTION = 0.9  # of the length of the silhouette; most of the rest are creases and hidden parts
+_NEAR_PLANE_MM = 1.0
 
 
 @dataclass(frozen=True)
 class SmoothIn:
-    """As many levels of subdivision as a head's outline needs to look smooth in a picture.
+    """Choice of the levels of subdivision that make the outline of a head look smooth in a picture.
 
-    camera : from where the head, as it comes, is seen
+    camera : function of the head before subdivision
     size : of the picture [pixel]
 
-    For `subdivide` of `load_head`. It depends on nothing but these and the head at rest.
+    It is a value of `subdivide` of `load_head`. The result depends only on these and on the head in rest
+    pose.
     """
 
     camera: Callable[[Head], Camera] = portrait
     size: tuple[int, int] = (1024, 1024)
 
     def __call__(self, head: Head) -> int:
-        """The levels, 0 to 3, which do not lead to more than `MAX_SMOOTH_TRIANGLES` triangles."""
+        """Return the levels, 0 to 3, with which the mesh has at most `MAX_SMOOTH_TRIANGLES` triangles."""
         triangles = len(head.mesh.triangles)
         if 4 * triangles > MAX_SMOOTH_TRIANGLES:
             return 0
@@ -56,7 +55,7 @@ class SmoothIn:
 
 
 def resolve_levels(subdivide: Subdivide) -> SubdivisionLevels:
-    """Levels, or the function that finds them.
+    """Return the levels, or the function that computes them; "auto" is `SmoothIn()`.
 
     Raises DermisError for other words.
     """
@@ -68,10 +67,10 @@ def resolve_levels(subdivide: Subdivide) -> SubdivisionLevels:
 
 
 class Silhouette(NamedTuple):
-    """The edges between what faces the eye and what does not, in a picture.
+    """Edges between faces that face the camera and faces that do not, in picture space.
 
-    length_px : (e,) of each
-    off_px : (e,) how far each lies off the smooth curve through its ends, at most
+    length_px : (e,) length of each edge
+    deviation_px : (e,) largest distance of each edge from the smooth curve through its ends
     """
 
     length_px: Doubles
@@ -79,7 +78,7 @@ class Silhouette(NamedTuple):
 
     @property
     def typical_deviation_px(self) -> float:
-        """How far most of it lies off the smooth curve at most; 0 for a picture without a silhouette."""
+        """Return the deviation that 90 % of the silhouette's length does not exceed [pixel]; 0 if empty."""
         if not len(self.deviation_px):
             return 0.0
         order = np.argsort(self.deviation_px)
@@ -92,12 +91,12 @@ class Silhouette(NamedTuple):
 
 
 def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, int]) -> Silhouette:
-    """The silhouette of a mesh but for its eyeballs, whether or not something is before it.
+    """Return the silhouette of a mesh without eyeballs; occlusion is ignored.
 
-    K, R, t : of the camera as OpenCV has them, t for places of the mesh itself [mm]
+    K, R, t : matrices of OpenCV; t for positions of the mesh [mm]
     size : width and height of the picture [pixel]
 
-    The curve through two points bends as their normals n say: it leaves the chord d by |dn . dd| / 8.
+    The curve between two points with normals n deviates from its chord d by |dn . dd| / 8.
     """
     camera_points = mesh.points_mm @ R.T + t
     normals = sum_at(mesh.point, mesh.normals.astype(np.float64), len(camera_points))
@@ -121,10 +120,10 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, 
 
 
 def smooth_levels(typical_deviation_px: float, triangles: int) -> int:
-    """The fewest levels of subdivision with which a silhouette looks smooth.
+    """Return the fewest levels of subdivision with which a silhouette looks smooth.
 
-    coarseness_px : of the mesh as it is; a level leaves a quarter of it
-    triangles : of the mesh as it is; a level has four times as many
+    typical_deviation_px : of the mesh; each level leaves a quarter of it
+    triangles : number of triangles of the mesh; each level multiplies it by 4
     """
     needed = math.ceil(math.log(max(typical_deviation_px / MAX_DEVIATION_PX, 1.0), 4))
     affordable = math.floor(math.log(max(MAX_SMOOTH_TRIANGLES / triangles, 1.0), 4))
@@ -132,7 +131,7 @@ def smooth_levels(typical_deviation_px: float, triangles: int) -> int:
 
 
 def _faces_camera(pixels: Doubles, triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """(f,) whether each triangle faces the eye; y is down in the picture."""
+    """Return the mask (f,) of triangles that face the camera; y is down in the picture."""
     a, b, c = (pixels[triangles[:, corner]] for corner in range(3))
     one, other = b - a, c - a
     return np.asarray(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0)

@@ -1,4 +1,4 @@
-"""The works behind a picture, by what its scene and settings use."""
+"""Bibliography keys of the methods that draw a picture."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def picture_sources(
     *,
     relief: bool = True,
 ) -> tuple[str, ...]:
-    """Keys of the bibliography, each once.
+    """Return the bibliography keys of a picture without duplicates.
 
-    relief : whether the head has a normal or a height map
+    relief : whether the head has a normal map or a height map
 
-    Raises DermisError for a profile that is none.
+    Raises DermisError for an unknown profile.
     """
     keys = [*_FRAME, *scattering_sources(settings), *_surface(skin)]
     keys += profile_sources(skin)
@@ -49,7 +49,7 @@ def picture_sources(
 
 
 def scattering_sources(settings: Settings) -> tuple[str, ...]:
-    """Of the technique, of what it does at the seams, and of light through thin parts."""
+    """Return the keys of the technique, its treatment of seams, and translucency."""
     technique = TECHNIQUES[settings.technique]
     substituted = settings.seams != "stitch" or not technique.stitches_seams
     keys: tuple[str, ...] = technique.sources + ("Dudash2007",) * (substituted and technique.uses_atlas)
@@ -59,7 +59,7 @@ def scattering_sources(settings: Settings) -> tuple[str, ...]:
 
 
 def profile_sources(skin: Skin) -> tuple[str, ...]:
-    """Of a diffusion profile; a table's numbers are its own, but for the published ones."""
+    """Return the keys of a diffusion profile; none for a user's table of Gaussians."""
     from dermis.optics.profiles import find_gaussians
     from dermis.scene.tissue import skin_tissue
 

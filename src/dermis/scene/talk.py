@@ -1,7 +1,7 @@
-"""Comparisons of the talk of 2007: dials that show a mistake, or a remedy of its time.
+"""Settings that reproduce faults and historical methods of the 2007 talk, for comparison.
 
-They are fields of `Skin` and `Settings`, which the gallery needs; help texts and the viewer list them last,
-under a heading of their own.
+They are fields of `Skin` and `Settings` because the gallery draws them; help texts and the viewer list them
+last, under a heading of their own.
 
 Source: [dEonLuebke2007].
 """
@@ -17,27 +17,29 @@ from dermis.specular.models import EnergyName
 
 COMPARISONS = Heading("Comparisons of the 2007 talk")
 
-_SPECULAR_COLOUR = 'Colour of reflections; "wrong" tints them by the colour map.'
+_SPECULAR_COLOUR = 'Colour of reflections; "wrong" multiplies them by the colour map.'
 SpecularColour = Annotated[Literal["white", "wrong"], COMPARISONS, Field(description=_SPECULAR_COLOUR)]
 
-_ENERGY = """Light that the surface reflects does not enter: "full" subtracts it all, "published" as the deck
-does, pi times too much, "none" nothing."""
+_ENERGY = """Energy conservation of diffuse light: "full" subtracts what the surface reflects, "published"
+subtracts pi times too much, as the talk does, "none" subtracts nothing."""
 Energy = Annotated[EnergyName, COMPARISONS, Field(description=_ENERGY)]
 
-_STRETCH = """Correction of blurs for the uv layout: "full" for its stretch and shear, "axes" as if u and v
-were at right angles, "none" to blur alike everywhere."""
+_STRETCH = """Correction of blur kernels for the uv layout: "full" for stretch and shear, "axes" for stretch
+alone, "none" for the same kernel everywhere."""
 Stretch = Annotated[Literal["full", "axes", "none"], COMPARISONS, Field(description=_STRETCH)]
 
-_SEAMS = """What is done at the seams of the uv layout: "stitch" lets light cross them; the others are the
-talk's remedies. Techniques that cannot stitch take "clear-colour" instead."""
+_SEAMS = """Treatment of the seams of the uv layout: "stitch" diffuses light across them; the others are methods
+of the talk. Techniques that cannot stitch use "clear-colour" instead."""
 Seams = Annotated[
     Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"],
     COMPARISONS,
     Field(description=_SEAMS),
 ]
 
-_SEAM_COLOUR = 'Light between the charts for "clear-colour" seams, as irradiance over pi.'
+_SEAM_COLOUR = 'Light between the charts with seams "clear-colour", as irradiance over pi.'
 SeamColour = Annotated[Colour, COMPARISONS, Field(description=_SEAM_COLOUR)]
 
-_GAMMA = 'Colour space: "wrong" takes the colour map to be linear and leaves the encoding out.'
+_GAMMA = (
+    'Colour space: "wrong" reads the colour map as linear and leaves out the sRGB encoding of the picture.'
+)
 Gamma = Annotated[Literal["right", "wrong"], COMPARISONS, Field(description=_GAMMA)]

@@ -1,4 +1,4 @@
-"""The techniques that scatter light below the skin, by name."""
+"""Registry of the techniques for subsurface scattering."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ _HOME = "dermis.frame.techniques"
 
 TECHNIQUES: Registry[Any] = Registry("technique")
 for _name, _summary in {
-    "none": "dry skin, without scattering",
+    "none": "no scattering",
     "one-blur": "a single blur of the light map",
-    "gpu-gems-3": "the passes of 2007 as they were",
-    "texture-space": "blurs light over the atlas",
-    "screen-space": "blurs the picture, as engines do",
-    "pre-integrated": "tables over curvature, as engines use them",
+    "gpu-gems-3": "the original passes of 2007",
+    "texture-space": "blurs of irradiance in the atlas",
+    "screen-space": "blurs in the picture, as in game engines",
+    "pre-integrated": "tables by curvature, as in game engines",
 }.items():
     TECHNIQUES.register(_name, f"{_HOME}.{_name.replace('-', '_')}:TECHNIQUE", _summary)

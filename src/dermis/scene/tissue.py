@@ -1,4 +1,4 @@
-"""The tissue below a skin's surface."""
+"""Optical tissue of a skin's settings."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dermis.scene.skin import Pigments, Skin, TissueLayer
 
 
 def skin_tissue(skin: Skin) -> Tissue:
-    """The profile's tissue, with the skin's own pigments or layers in it.
+    """Return the tissue of the skin's profile, with the pigments or layers that the skin overrides.
 
-    Raises DermisError for a profile that is no tissue, and for one that has no such pigments or layers.
+    Raises DermisError for a profile that is not a tissue, and for one without such pigments or layers.
     """
     if skin.layers:
         return load_tissue(skin.profile).with_layers(_to_media_layers(skin.layers))
@@ -23,9 +23,9 @@ def skin_tissue(skin: Skin) -> Tissue:
 
 
 def tissue_layers(skin: Skin) -> tuple[TissueLayer, ...]:
-    """The layers of a skin that is a medium in red, green and blue; none of any other.
+    """Return the layers of a skin whose profile is an RGB medium; empty for any other profile.
 
-    Raises DermisError for a profile that is no tissue.
+    Raises DermisError for a profile that is not a tissue.
     """
     if skin.layers:
         return skin.layers

@@ -1,6 +1,6 @@
-"""Plain values as TOML.
+"""Plain values formatted as TOML.
 
-Data sets are known by the hash of this text, so that its form must not change with a library's.
+Data sets are identified by the hash of this text, so its format must not depend on a library.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from typing import Any
 
 
 def table_text(title: str, values: Mapping[str, Any]) -> str:
-    """A table's lines under its title, none where that is empty."""
+    """Return the text of a table with its title line; an empty title is left out."""
     lines = [f"{key_text(key)} = {value_text(value)}" for key, value in values.items()]
     return "\n".join([*([title] if title else []), *lines, ""])
 
 
 def key_text(name: str) -> str:
-    """A name as a key, quoted where it has other letters than keys may have."""
+    """Return a key, in quotes if it is not a bare key of TOML."""
     return name if re.fullmatch(r"[\w-]+", name, re.ASCII) else value_text(name)
 
 
 def value_text(value: Any) -> str:
-    """A number, a truth value, a text, or lists and mappings of such, on one line."""
+    """Return a number, a boolean, a string, or a list or mapping of them, on one line."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float):
