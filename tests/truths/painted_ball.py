@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.apps.truths.person.subject import Paint, Person
+from dermis.apps.truths.person.person import Person, SkinTextures
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
@@ -19,12 +19,14 @@ CAMERA = Camera(position=(0.0, 0.0, 200.0), frame_mm=50.0)
 EVERYWHERE = Environment(name="uniform")
 
 
-def paint(colour: Any = (0.5, 0.3, 0.2), roughness: float = 0.3, side: int = 16) -> Paint:
+def paint(colour: Any = (0.5, 0.3, 0.2), roughness: float = 0.3, side: int = 16) -> SkinTextures:
     """Even skin; eyes and teeth of one colour each."""
     even = np.ones((side, side), np.float32)
     skin = np.broadcast_to(np.asarray(colour, np.float32), (side, side, 3))
     plain = [even[..., None] * np.float32(c) * np.ones(3, np.float32) for c in (0.1, 0.6, 0.5)]
-    return Paint(skin, even * np.float32(roughness), 0.0 * even, plain[0], 6.5, plain[1], (plain[2],) * 2)
+    return SkinTextures(
+        skin, even * np.float32(roughness), 0.0 * even, plain[0], 6.5, plain[1], (plain[2],) * 2
+    )
 
 
 def ball(**painted: Any) -> Person:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.truths.slab_mc import counted_profile
+from dermis.apps.truths.slab_mc import monte_carlo_profile
 from dermis.optics.media import Layer, Medium, media
 from dermis.optics.tissue import load_tissue
 
 
 def test_per_entering_light_in_rings() -> None:
     seen: list[tuple[int, int]] = []
-    profile = counted_profile(
-        media()["dj3"], photons=40_000, seed=3, report=lambda done, of: seen.append((done, of))
+    profile = monte_carlo_profile(
+        media()["dj3"], photons=40_000, seed=3, progress=lambda done, total: seen.append((done, total))
     )
     assert profile.total_error is not None and profile.standard_error is not None
     truth = np.array([0.47244, 0.38236, 0.28576])  # 12 million photons, per power that entered
@@ -26,19 +26,21 @@ def test_per_entering_light_in_rings() -> None:
 
 def test_light_that_was_given_up_is_told() -> None:
     """Without absorption some photons would walk for ever."""
-    lost = counted_profile(media()["spectralon"].channel(1), photons=2_000)
+    lost = monte_carlo_profile(media()["spectralon"].channel(1), photons=2_000)
     assert any("given up" in text for text in lost.warnings)
-    assert not counted_profile(media()["skin1"].channel(0), photons=2_000).warnings
+    assert not monte_carlo_profile(media()["skin1"].channel(0), photons=2_000).warnings
 
 
 def test_light_beyond_the_rings_is_told() -> None:
     wide = Medium("thin air", (Layer(np.array([1e-3]), np.array([0.05])),))
-    assert any("beyond the widest radius" in text for text in counted_profile(wide, photons=2_000).warnings)
+    assert any(
+        "beyond the widest radius" in text for text in monte_carlo_profile(wide, photons=2_000).warnings
+    )
 
 
 def test_spectra_become_colour_with_errors() -> None:
     tissue = load_tissue("light")
-    profile = counted_profile(tissue.medium, tissue.rgb, photons=4_000, seed=3)
+    profile = monte_carlo_profile(tissue.medium, tissue.rgb, photons=4_000, seed=3)
     assert profile.incident and profile.total.shape == (3,)
     assert profile.total_error is not None
     model = tissue.profile().total

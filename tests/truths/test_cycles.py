@@ -10,7 +10,14 @@ import numpy as np
 import pytest
 from lit_balls import BALL, LIGHTS, ball_scene
 
-from dermis.apps.truths.cycles import PYTHON_VARIABLE, Coated, Method, cycles_passes, cycles_render, describe
+from dermis.apps.truths.cycles import (
+    PYTHON_VARIABLE,
+    Method,
+    PrincipledSkin,
+    cycles_passes,
+    cycles_render,
+    describe_scene,
+)
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.path_traced import Lambertian, path_trace
 from dermis.base.errors import DermisError
@@ -24,7 +31,7 @@ blender = pytest.mark.skipif(not os.environ.get(PYTHON_VARIABLE), reason=f"{PYTH
 
 
 def test_skin_is_told_as_colour_and_radius() -> None:
-    described, arrays = describe(ball_scene(LIGHTS["point"]), SKIN1, "random-walk", (8, 8))
+    described, arrays = describe_scene(ball_scene(LIGHTS["point"]), SKIN1, "random-walk", (8, 8))
     (skin,) = described["materials"]
     (layer,) = SKIN1.layers
     assert skin["method"] == "RANDOM_WALK"
@@ -47,7 +54,7 @@ def test_what_cycles_cannot_do_is_refused() -> None:
         cycles_render(scene, media()["dj3"])
     with pytest.raises(DermisError, match="method: expected one of random-walk, burley"):
         cycles_render(scene, SKIN1, method="gaussian")  # type: ignore[arg-type]
-    with pytest.raises(DermisError, match="samples: expected a whole number from 1, but 0 came"):
+    with pytest.raises(DermisError, match="samples: expected a whole number from 1, but got 0"):
         cycles_passes(scene, SKIN1, [4, 0])
     dark = LIGHTS["point"].model_copy(update={"shadows": False})
     with pytest.raises(DermisError, match="light 1: expected a light with shadows"):
@@ -109,7 +116,7 @@ def test_passes_have_seeds_of_their_own_and_repeat() -> None:
 def test_a_coat_reflects_and_keeps_that_from_the_skin() -> None:
     """Index 1.4 reflects 3 to 6 % of even light off the edge; of the rest the colour's share comes back."""
     scene = ball_scene(environment=Environment(name="uniform"))
-    grey = Coated(np.full((2, 2, 3), 0.5, np.float32), (0.5, 0.5, 0.5), 0.3)
+    grey = PrincipledSkin(np.full((2, 2, 3), 0.5, np.float32), (0.5, 0.5, 0.5), 0.3)
     means = []
     for skin in (grey, replace(grey, colour=np.zeros((2, 2, 3), np.float32))):
         (one,) = cycles_passes(scene, skin, [64], Settings(size=(24, 24)))

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from half_spaces import pan
 
-from dermis.apps.truths.mitsuba_solid import Solid, inwards, skin_solid
+from dermis.apps.truths.mitsuba_solid import ClosedSurface, closed_skin, offset_inwards
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 
 
-def is_closed(solid: Solid) -> bool:
+def is_closed(solid: ClosedSurface) -> bool:
     """Whether each edge is run along once in either direction."""
     t = solid.triangles
     sides = np.vstack((t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]))
@@ -38,7 +38,7 @@ def without(mesh: Mesh, kept: np.ndarray) -> Mesh:
 
 def test_closed_surface_stays_as_it_is() -> None:
     sphere = uv_sphere(10.0, 32, 16)
-    solid = skin_solid(sphere, "sphere")
+    solid = closed_skin(sphere, "sphere")
     assert is_closed(solid) and solid.caps == 0
     assert len(solid.triangles) == len(sphere.triangles)
 
@@ -46,14 +46,14 @@ def test_closed_surface_stays_as_it_is() -> None:
 def test_each_opening_is_shut() -> None:
     sphere = uv_sphere(10.0, 32, 16)
     height = sphere.positions[sphere.triangles][..., 1].mean(axis=1)
-    solid = skin_solid(without(sphere, np.abs(height) < 8.0), "ring")
+    solid = closed_skin(without(sphere, np.abs(height) < 8.0), "ring")
     assert is_closed(solid) and solid.caps == 2
     radius = np.sqrt(100.0 - solid.positions[:, 1].max() ** 2)
     assert solid.cap_area == pytest.approx(2.0 * np.pi * radius**2, rel=0.01)
 
 
 def test_caps_leave_the_front_alone() -> None:
-    solid = skin_solid(pan(40.0, 10.0, 8).mesh, "pan")
+    solid = closed_skin(pan(40.0, 10.0, 8).mesh, "pan")
     assert is_closed(solid) and solid.caps == 1
     assert solid.cap_area == pytest.approx(1600.0)
 
@@ -61,7 +61,7 @@ def test_caps_leave_the_front_alone() -> None:
 def test_seams_of_uv_are_no_openings() -> None:
     sphere = uv_sphere(10.0, 32, 16)
     assert len(edges(sphere.point[sphere.triangles])[0]) < len(edges(sphere.triangles)[0])
-    assert skin_solid(sphere, "sphere").caps == 0
+    assert closed_skin(sphere, "sphere").caps == 0
 
 
 def test_only_skin_counts() -> None:
@@ -69,10 +69,10 @@ def test_only_skin_counts() -> None:
     kinds = (Material("skin"), Material("eye", "opaque"))
     material = (sphere.positions[sphere.triangles][..., 2].mean(axis=1) > 8.0).astype(np.int32)
     mixed = build_mesh(sphere.positions, sphere.uv, sphere.triangles, material, kinds, sphere.normals)
-    assert skin_solid(mixed, "head").caps == 1
+    assert closed_skin(mixed, "head").caps == 1
     blind = build_mesh(sphere.positions, sphere.uv, sphere.triangles, 0 * material, kinds[1:], sphere.normals)
     with pytest.raises(DermisError, match="expected skin to trace"):
-        skin_solid(blind, "head")
+        closed_skin(blind, "head")
 
 
 def test_inside_out_is_refused() -> None:
@@ -81,34 +81,34 @@ def test_inside_out_is_refused() -> None:
         sphere.positions, sphere.uv, sphere.triangles[:, ::-1], sphere.material, SKIN, -sphere.normals
     )
     with pytest.raises(DermisError, match="it is a sheet or inside out"):
-        skin_solid(turned, "sphere")
+        closed_skin(turned, "sphere")
 
 
 @pytest.mark.parametrize("depth", [-0.5, 0.5, 2.0])
 def test_faces_move_by_the_depth_even_at_corners(depth: float) -> None:
-    solid = skin_solid(box(20.0), "box")
-    moved, folded = inwards(solid, np.full(8, depth), "box")
+    solid = closed_skin(box(20.0), "box")
+    moved, folded = offset_inwards(solid, np.full(8, depth), "box")
     assert folded == 0.0
     assert np.abs(moved.positions) == pytest.approx(np.full((8, 3), 10.0 - depth), abs=1e-5)
 
 
 def test_depth_may_differ_from_point_to_point() -> None:
-    solid = skin_solid(uv_sphere(10.0, 64, 32), "sphere")
+    solid = closed_skin(uv_sphere(10.0, 64, 32), "sphere")
     depth = 1.0 + 0.02 * solid.positions[:, 1].astype(np.float64)
-    moved, _ = inwards(solid, depth, "sphere")
+    moved, _ = offset_inwards(solid, depth, "sphere")
     assert np.linalg.norm(moved.positions, axis=1) == pytest.approx(10.0 - depth, abs=0.01)
 
 
 def test_folds_are_refused() -> None:
-    solid = skin_solid(uv_sphere(10.0, 32, 16), "ball")
+    solid = closed_skin(uv_sphere(10.0, 32, 16), "ball")
     with pytest.raises(DermisError, match="ball: expected a body deeper than its layers"):
-        inwards(solid, np.full(len(solid.positions), 12.0), "ball")
+        offset_inwards(solid, np.full(len(solid.positions), 12.0), "ball")
 
 
 def test_creases_tighter_than_the_depth_are_refused() -> None:
     ball = uv_sphere(10.0, 64, 64)
     wave = 1.0 + 0.1 * np.sin(10.0 * np.arctan2(ball.positions[:, 0], ball.positions[:, 2]))
     creased = build_mesh(ball.positions * wave[:, None], ball.uv, ball.triangles, ball.material, SKIN)
-    solid = skin_solid(creased, "gear")
+    solid = closed_skin(creased, "gear")
     with pytest.raises(DermisError, match=r"gear: .* [0-9.]+% of the surface folds over"):
-        inwards(solid, np.full(len(solid.positions), 2.0), "gear")
+        offset_inwards(solid, np.full(len(solid.positions), 2.0), "gear")

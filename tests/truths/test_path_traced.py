@@ -104,11 +104,11 @@ def test_variance_of_a_pixel_is_that_of_another_trial() -> None:
 def test_more_samples_add_to_those_there_are() -> None:
     scene = ball_scene(irradiance=(1, 2, 3))
     steps: list[tuple[int, int]] = []
-    few = path_trace(scene, SKIN1, 8, SMALL, report=lambda *step: steps.append(step))
-    more = path_trace(scene, SKIN1, 15, SMALL, report=lambda *step: steps.append(step))
+    few = path_trace(scene, SKIN1, 8, SMALL, progress=lambda *step: steps.append(step))
+    more = path_trace(scene, SKIN1, 15, SMALL, progress=lambda *step: steps.append(step))
     assert (few.samples, more.samples) == (8, 16)
     assert steps == [(1, 2), (2, 2), (3, 4), (4, 4)]
-    again = path_trace(scene, SKIN1, 8, SMALL, report=lambda *step: steps.append(step))
+    again = path_trace(scene, SKIN1, 8, SMALL, progress=lambda *step: steps.append(step))
     assert len(steps) == 4 and again.samples == 16
     assert np.array_equal(again.image, more.image) and again.seconds == more.seconds
 
@@ -127,10 +127,10 @@ def test_passes_not_to_be_kept_are_neither_read_nor_stored(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
-    alone = path_trace(ball_scene(), SKIN1, 8, SMALL, keep=False)
+    alone = path_trace(ball_scene(), SKIN1, 8, SMALL, use_cache=False)
     assert not list(tmp_path.iterdir())
     path_trace(ball_scene(), SKIN1, 16, SMALL)
-    again = path_trace(ball_scene(), SKIN1, 8, SMALL, keep=False)
+    again = path_trace(ball_scene(), SKIN1, 8, SMALL, use_cache=False)
     assert again.samples == 8 and np.array_equal(again.image, alone.image)
 
 
@@ -152,7 +152,7 @@ def test_interrupted_passes_are_kept() -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        path_trace(scene, SKIN1, 40, SMALL, report=stop)
+        path_trace(scene, SKIN1, 40, SMALL, progress=stop)
     assert path_trace(scene, SKIN1, 8, SMALL).samples == 12
 
 

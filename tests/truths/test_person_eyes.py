@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from painted_ball import ball, paint
 
-from dermis.apps.truths.mitsuba_scene import load_mitsuba, mesh_shape, sensor_of, variant_of
+from dermis.apps.truths.mitsuba_scene import load_mitsuba, mesh_shape, mitsuba_sensor, mitsuba_variant
 from dermis.apps.truths.person import shapes as eyes
-from dermis.apps.truths.person.subject import Person
+from dermis.apps.truths.person.person import Person
 from dermis.mesh.eye_look import LIMITS
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.scene.camera import Camera
@@ -34,15 +34,15 @@ def seen(degrees: float) -> Any:
     middle = np.array([0.0, 0.0, cornea_centre_mm()])
     position = middle + FAR_MM * np.array([np.sin(turn), 0.0, np.cos(turn)])
     camera = Camera(position=tuple(position), target=tuple(middle), frame_mm=FRAME_MM)
-    with variant_of(mi, "scalar_rgb"):
-        person = replace(ball(), eyes=np.eye(4)[None], paint=replace(paint(), reach_mm=reach))
+    with mitsuba_variant(mi, "scalar_rgb"):
+        person = replace(ball(), eyes=np.eye(4)[None], textures=replace(paint(), reach_mm=reach))
         clear = eyes.eye_shapes(mi, person)["eye_0"]
-        flat, fans, _ = eyes.disc()
+        flat, fans, _ = eyes.iris_disc()
         glow = {"type": "bitmap", "bitmap": mi.Bitmap(ramps()), "raw": True, "wrap_mode": "clamp"}
         shines = mi.load_dict({"type": "area", "radiance": glow})
         iris = mesh_shape(mi, flat, fans, None, 0.5 + 0.5 * flat[:, :2] / reach, emitter=shines)
         described = {"type": "scene", "integrator": {"type": "path"}, "eye": clear, "iris": iris}
-        built = mi.load_dict({**described, "sensor": sensor_of(mi, camera, (SIDE, SIDE))})
+        built = mi.load_dict({**described, "sensor": mitsuba_sensor(mi, camera, (SIDE, SIDE))})
         image = np.array(mi.render(built, spp=1024), np.float64)
     rays = pixels(camera)
     return reach * (2.0 * image[..., :2] / np.maximum(image[..., 2:], 1e-9) - 1.0), rays
@@ -80,34 +80,34 @@ def by_snell(places: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[
 def test_the_iris_is_seen_where_snell_says(degrees: float) -> None:
     found, (places, ways) = seen(degrees)
     expected = by_snell(places, ways)
-    clear = np.hypot(places[..., 0], places[..., 1]) < LIMBUS_MM - eyes.SOFT_MM - 0.5
+    clear = np.hypot(places[..., 0], places[..., 1]) < LIMBUS_MM - eyes.LIMBUS_BLUR_MM - 0.5
     clear &= np.hypot(*np.moveaxis(expected, -1, 0)) < 4.5
     assert clear.sum() > 60
     assert np.abs(found - expected)[clear].max() < 0.08  # a fifth of a pixel; paths are few
 
 
 def test_the_ball_is_whole_and_has_the_published_shape() -> None:
-    places, triangles, normals, uv = eyes.ball()
+    places, triangles, normals, uv = eyes.eyeball_mesh()
     assert np.linalg.norm(places, axis=1).min() >= SCLERA_MM - 1e-9
     assert places[:, 2].max() == pytest.approx(apex_mm())
     corners = places[triangles]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert ((facing * corners.mean(axis=1)).sum(axis=1) >= 0.0).all()
     assert (np.einsum("vc,vc->v", normals, places) > 0.0).all()
-    assert np.linalg.norm(uv - 0.5, axis=1).max() == pytest.approx(eyes.RIM)
+    assert np.linalg.norm(uv - 0.5, axis=1).max() == pytest.approx(eyes.UV_RADIUS)
 
 
 def test_the_white_turns_clear_at_the_limbus() -> None:
-    found = eyes.clear_picture()
+    found = eyes.cornea_weight_map()
     middle = len(found) // 2
     assert found[middle, middle] == 1.0 and found[0, 0] == 0.0
     row = found[middle, middle:]
-    half = np.arcsin(LIMBUS_MM / SCLERA_MM) / np.pi * eyes.RIM * len(found)
+    half = np.arcsin(LIMBUS_MM / SCLERA_MM) / np.pi * eyes.UV_RADIUS * len(found)
     assert abs(int(np.argmin(np.abs(row - 0.5))) - half) < 8
 
 
 def test_the_iris_reaches_the_ball_and_is_wider_than_a_pupil() -> None:
-    flat, _, radius = eyes.disc()
+    flat, _, radius = eyes.iris_disc()
     assert np.linalg.norm(flat, axis=1).max() < SCLERA_MM
     assert radius > LIMBUS_MM - 0.2 > LIMITS["pupil_mm"][1]
 
@@ -117,7 +117,7 @@ def test_eyes_stand_where_their_frames_say() -> None:
     frame = np.eye(4)
     frame[:3, :3] *= 2.0  # half as large
     frame[:3, 3] = -2.0 * np.array([30.0, 5.0, 60.0])
-    with variant_of(mi, "scalar_rgb"):
+    with mitsuba_variant(mi, "scalar_rgb"):
         person: Person = replace(ball(), eyes=frame[None])
         box = eyes.eye_shapes(mi, person)["eye_0"].bbox()
     np.testing.assert_allclose(np.array(box.max)[:2], [30.0 + SCLERA_MM / 2, 5.0 + SCLERA_MM / 2], atol=0.02)

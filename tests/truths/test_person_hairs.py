@@ -8,26 +8,32 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.apps.truths.mitsuba_scene import load_mitsuba, variant_of
-from dermis.apps.truths.person.shapes import COLOURS, control_points, groups, hair_shapes, write_curves
-from dermis.apps.truths.person.subject import Hairs
-from dermis.specular.hair import fibre, scattered
+from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
+from dermis.apps.truths.person.person import HairFibres
+from dermis.apps.truths.person.shapes import (
+    MAX_HAIR_GROUPS,
+    absorption_groups,
+    bspline_control_points,
+    hair_shapes,
+    write_curves,
+)
+from dermis.specular.hair import fibre, scattering
 
 pytest.importorskip("mitsuba")
 STEPS = 400
 
 
-def straight(radius_mm: float, absorption: tuple[float, float, float]) -> Hairs:
+def straight(radius_mm: float, absorption: tuple[float, float, float]) -> HairFibres:
     """A hair along x."""
     knots = np.zeros((1, 5, 3))
     knots[0, :, 0] = np.linspace(-20.0, 20.0, 5)
     radius = np.full((1, 5), radius_mm, np.float32)
-    return Hairs(knots, radius, np.array([absorption], np.float32))
+    return HairFibres(knots, radius, np.array([absorption], np.float32))
 
 
 def test_curves_go_through_their_knots() -> None:
     knots = np.random.default_rng(2).normal(size=(4, 9, 3))
-    points = control_points(knots)
+    points = bspline_control_points(knots)
     through = (points[:, :-2] + 4 * points[:, 1:-1] + points[:, 2:]) / 6
     np.testing.assert_allclose(through, knots, atol=1e-12)
 
@@ -41,18 +47,18 @@ def test_files_hold_a_block_for_each_curve(tmp_path: Path) -> None:
 
 def test_hairs_are_parted_by_what_they_absorb() -> None:
     depth = np.random.default_rng(1).random((100, 3))
-    parts = groups(depth)
-    assert len(parts) == COLOURS and sorted(np.concatenate(parts)) == list(range(100))
+    parts = absorption_groups(depth)
+    assert len(parts) == MAX_HAIR_GROUPS and sorted(np.concatenate(parts)) == list(range(100))
     ends = [(depth[part].sum(axis=1).min(), depth[part].sum(axis=1).max()) for part in parts]
     assert all(first[1] <= second[0] for first, second in itertools.pairwise(ends))
-    assert len(groups(depth[:1])) == 1
+    assert len(absorption_groups(depth[:1])) == 1
 
 
 @pytest.mark.parametrize("radius_mm", [0.04, 0.5])
 def test_a_hair_under_even_light_shines_as_our_lobe_does(radius_mm: float) -> None:
     depth = np.array([0.0, 0.2, 1.0])
     mi, r = load_mitsuba(), 0.999 * radius_mm
-    with variant_of(mi, "scalar_rgb"):
+    with mitsuba_variant(mi, "scalar_rgb"):
         shapes = hair_shapes(mi, straight(radius_mm, tuple(depth / radius_mm)))
         to_world = mi.ScalarTransform4f().look_at([0, 0, 10], [0, 0, 0], [0, 1, 0]).scale([r, r, 1])
         film = {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}}
@@ -62,6 +68,6 @@ def test_a_hair_under_even_light_shines_as_our_lobe_does(radius_mm: float) -> No
     sines = (np.arange(STEPS) + 0.5) * 2 / STEPS - 1
     around = (np.arange(STEPS) + 0.5) * 2 * np.pi / STEPS
     s, phi = np.meshgrid(sines, around)
-    lobe = scattered(s, 0.0 * s, phi, depth, fibre())
+    lobe = scattering(s, 0.0 * s, phi, depth, fibre())
     expected = lobe.sum(axis=(0, 1)) * (2 / STEPS) * (2 * np.pi / STEPS)
     np.testing.assert_allclose(found[0, 0, :3], expected, rtol=0.04)

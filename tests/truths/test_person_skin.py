@@ -11,11 +11,16 @@ from numpy.typing import NDArray
 from painted_ball import ball, scene
 
 from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
-from dermis.apps.truths.mitsuba_scene import lit_scene, load_mitsuba, mesh_shape, variant_of
+from dermis.apps.truths.mitsuba_scene import load_mitsuba, mesh_shape, mitsuba_scene, mitsuba_variant
 from dermis.apps.truths.person import medium
 from dermis.apps.truths.person import shapes as skin
-from dermis.apps.truths.person.medium import PASSED, colours_in, mean_free_paths, single_albedo
-from dermis.apps.truths.person.traced import person_scene
+from dermis.apps.truths.person.medium import (
+    COAT_TRANSMITTANCE,
+    colour_grid,
+    mean_free_paths,
+    single_scattering_albedo,
+)
+from dermis.apps.truths.person.path_traced import person_scene
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.scene.lights import RectangleLight
 
@@ -34,21 +39,23 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 def middle(person: Any, paths: NDArray[np.float64] = SHORT, samples: int = 256, **given: Any) -> Any:
     """Mean radiance of the ball's middle."""
     mi = load_mitsuba()
-    with variant_of(mi, "scalar_rgb"):
+    with mitsuba_variant(mi, "scalar_rgb"):
         built, _ = person_scene(mi, scene(**given), person, paths, (16, 16))
         return np.array(mi.render(built, spp=samples))[6:10, 6:10].mean(axis=(0, 1))
 
 
 def test_half_spaces_of_the_single_albedo_give_back_the_colour() -> None:
     for colour in (0.02, 0.2, 0.5, 0.8):
-        assert diffuse_albedo(float(single_albedo(colour))) * PASSED == pytest.approx(colour, abs=1e-3)
+        assert diffuse_albedo(float(single_scattering_albedo(colour))) * COAT_TRANSMITTANCE == pytest.approx(
+            colour, abs=1e-3
+        )
 
 
 def test_light_spreads_as_far_as_asked() -> None:
     wanted = np.array([1.1, 0.26, 0.17])
     paths = mean_free_paths(COLOUR, wanted)
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 200.0, 150)])
-    for path, albedo, distance in zip(paths, single_albedo(COLOUR), wanted, strict=True):
+    for path, albedo, distance in zip(paths, single_scattering_albedo(COLOUR), wanted, strict=True):
         layer = ScatteringLayer((1.0 - albedo) / path, albedo / path, eta=1.0)
         ring = trace_slab([layer], 60_000, 3, edges).reflectance * np.diff(edges**2)
         assert (ring * 0.5 * (edges[1:] + edges[:-1])).sum() / ring.sum() == pytest.approx(distance, rel=0.04)
@@ -56,8 +63,11 @@ def test_light_spreads_as_far_as_asked() -> None:
 
 def test_the_medium_looks_as_such_half_spaces_do(monkeypatch: pytest.MonkeyPatch) -> None:
     """From straight above a little darker than their colour, which is the mean of all directions."""
-    monkeypatch.setattr(skin, "INDEX", 1.0)  # nothing is reflected
-    expected = [PASSED * directional_albedo(1.0, float(albedo)) for albedo in single_albedo(COLOUR)]
+    monkeypatch.setattr(skin, "COAT_INDEX", 1.0)  # nothing is reflected
+    expected = [
+        COAT_TRANSMITTANCE * directional_albedo(1.0, float(albedo))
+        for albedo in single_scattering_albedo(COLOUR)
+    ]
     np.testing.assert_allclose(middle(ball(colour=COLOUR)), expected, rtol=0.03)
 
 
@@ -66,12 +76,18 @@ def test_the_coat_reflects_as_a_rough_dielectric() -> None:
     light = RectangleLight(position=(60.0, 0.0, 300.0), width_mm=400.0, height_mm=400.0)
     black, mi = ball(colour=(0.0, 0.0, 0.0), roughness=0.4), load_mitsuba()
     found = middle(black, lights=(light,))
-    rough = {"type": "roughconductor", "distribution": "beckmann", "alpha": 0.4, "eta": skin.INDEX, "k": 0.0}
-    with variant_of(mi, "scalar_rgb"):
+    rough = {
+        "type": "roughconductor",
+        "distribution": "beckmann",
+        "alpha": 0.4,
+        "eta": skin.COAT_INDEX,
+        "k": 0.0,
+    }
+    with mitsuba_variant(mi, "scalar_rgb"):
         mesh = black.mesh
         alone = mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, bsdf=mi.load_dict(rough))
         path = {"type": "path", "hide_emitters": True}
-        built = lit_scene(mi, scene(lights=(light,)), path, {"ball": alone}, (16, 16))
+        built = mitsuba_scene(mi, scene(lights=(light,)), path, {"ball": alone}, (16, 16))
         expected = np.array(mi.render(built, spp=256))[6:10, 6:10].mean(axis=(0, 1))
     assert expected[0] > 0.01
     np.testing.assert_allclose(found, expected, rtol=0.03)
@@ -82,7 +98,7 @@ def test_relief_bends_the_coat() -> None:
     light = RectangleLight(position=(0.0, 0.0, 300.0), width_mm=60.0, height_mm=60.0)
     flat = ball(colour=(0.0, 0.0, 0.0), roughness=0.1)
     ramp = np.tile(np.linspace(0.0, 40.0, 16, dtype=np.float32), (16, 1))
-    leaning = replace(flat, paint=replace(flat.paint, height_mm=ramp))
+    leaning = replace(flat, textures=replace(flat.textures, height_mm=ramp))
     found = middle(leaning, lights=(light,), samples=64)
     assert found[0] < 0.5 * middle(flat, lights=(light,), samples=64)[0]
 
@@ -93,9 +109,9 @@ def test_the_grid_has_the_colour_of_the_nearest_skin() -> None:
     halves[: side // 2] = (0.6, 0.1, 0.1)  # rows, of the ball's upper half
     halves[side // 2 :] = (0.1, 0.1, 0.6)
     person = ball()
-    person = replace(person, paint=replace(person.paint, colour=halves))
+    person = replace(person, textures=replace(person.textures, colour=halves))
     box = np.full(3, 22.0)
-    grid = colours_in(person, -box, box, voxels=22)
+    grid = colour_grid(person, -box, box, voxels=22)
     above, below = grid[11, 20, 11], grid[11, 1, 11]
     assert above[0] > above[2] and below[2] > below[0]
     np.testing.assert_allclose(grid[11, 11, 11], grid.reshape(-1, 3).mean(axis=0), atol=0.1)

@@ -13,8 +13,8 @@ from painted_ball import scene as ball_scene
 
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.truths.person import medium
-from dermis.apps.truths.person.subject import person_of
-from dermis.apps.truths.person.traced import person_key, trace_person
+from dermis.apps.truths.person.path_traced import path_trace_person, person_key
+from dermis.apps.truths.person.person import posed_person
 from dermis.base.errors import DermisError
 from dermis.human.person import Human
 from dermis.mesh.head import Head
@@ -42,7 +42,7 @@ def scene(**given: Any) -> Scene:
 
 
 def traced(samples: int, **painted: Any) -> PathTraced:
-    return trace_person(scene(), paint(**painted), WAY, COLOUR, (24, 24), samples)
+    return path_trace_person(scene(), paint(**painted), WAY, COLOUR, (24, 24), samples)
 
 
 def test_more_samples_are_added_to_those_that_are_kept() -> None:
@@ -58,7 +58,7 @@ def test_more_samples_are_added_to_those_that_are_kept() -> None:
 
 
 def test_pictures_are_kept_by_what_they_depend_on() -> None:
-    person, path = person_of(scene(), paint()), np.ones(3)
+    person, path = posed_person(scene(), paint()), np.ones(3)
     brows, *others = person.hairs
     thicker = replace(person, hairs=(replace(brows, radius_mm=2 * brows.radius_mm), *others))
     others = [
@@ -67,16 +67,16 @@ def test_pictures_are_kept_by_what_they_depend_on() -> None:
         person_key(scene(), person, path, "another"),
         person_key(scene(), thicker, path, "form"),
         person_key(scene(), replace(person, eyes=2 * person.eyes), path, "form"),
-        person_key(scene(), replace(person, paint=paint(colour=(0.4, 0.3, 0.2))), path, "form"),
+        person_key(scene(), replace(person, textures=paint(colour=(0.4, 0.3, 0.2))), path, "form"),
         person_key(replace(scene(), lights=()), person, path, "form"),
     ]
     assert len(set(others)) == len(others)
-    assert others[0] == person_key(scene(), person_of(scene(), paint()), path, "form")
+    assert others[0] == person_key(scene(), posed_person(scene(), paint()), path, "form")
 
 
 def test_a_pose_moves_skin_eyes_and_hairs() -> None:
-    rest = person_of(scene(), paint())
-    posed = person_of(scene(pose={"jawOpen": 1.0, "eyeLookUpLeft": 1.0, "browInnerUp": 1.0}), paint())
+    rest = posed_person(scene(), paint())
+    posed = posed_person(scene(pose={"jawOpen": 1.0, "eyeLookUpLeft": 1.0, "browInnerUp": 1.0}), paint())
     moved = np.linalg.norm(posed.mesh.positions - rest.mesh.positions, axis=1)
     assert 10.0 < moved.max() < 60.0 and np.median(moved) < 0.5
     assert np.abs(posed.eyes[0, :3, :3] - rest.eyes[0, :3, :3]).max() > 0.1
@@ -86,7 +86,7 @@ def test_a_pose_moves_skin_eyes_and_hairs() -> None:
 
 
 def test_eyes_look_out_of_the_head() -> None:
-    person = person_of(scene(), paint())
+    person = posed_person(scene(), paint())
     back = np.linalg.inv(person.eyes)
     balls = person.mesh.material[:, None] == np.array(person.eye_materials)
     for k, matrix in enumerate(back):
@@ -97,4 +97,4 @@ def test_eyes_look_out_of_the_head() -> None:
 
 def test_heads_without_true_eyes_are_refused() -> None:
     with pytest.raises(DermisError, match="eyes of true shape"):
-        trace_person(ball_scene(), ball().paint, WAY, COLOUR, (8, 8), 4)
+        path_trace_person(ball_scene(), ball().textures, WAY, COLOUR, (8, 8), 4)

@@ -12,7 +12,7 @@ DIRECTIONS = [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, -0.8), (-0.48, 0.64,
 DEFLECTIONS = 20_000
 
 
-def generator() -> photon.Words:
+def generator() -> photon.RandomState:
     return np.random.SeedSequence(0).generate_state(4, np.uint64)
 
 
@@ -31,7 +31,7 @@ def test_random_words_are_those_of_the_published_generator() -> None:
         15849039046786891736,
         10450023813501588000,
     ]
-    assert [int(photon.next_word(rng)) for _ in published] == published
+    assert [int(photon.next_uint64(rng)) for _ in published] == published
 
 
 @pytest.mark.parametrize(("word", "expected"), [(0, 2.0**-53), (2**64 - 1, 1.0 - 2.0**-53)])

@@ -14,7 +14,13 @@ import pytest
 from scipy.stats import chi2
 from tolerances import CHANCE, STANDARD_ERRORS
 
-from dermis.apps.truths.slab_mc import ScatteringLayer, SlabResult, default_edges, trace_medium, trace_slab
+from dermis.apps.truths.slab_mc import (
+    ScatteringLayer,
+    SlabResult,
+    default_ring_edges,
+    trace_medium,
+    trace_slab,
+)
 from dermis.base.errors import DermisError
 from dermis.optics.diffusion.boundary import fresnel, normal_reflectance
 from dermis.optics.media import Layer, Medium
@@ -173,7 +179,9 @@ def test_channels_of_a_medium_are_slabs_of_their_own() -> None:
     top = Layer(np.array([0.5, 0.2]), np.array([4.0, 5.0]), 0.5)
     medium = Medium("two layers", (top, Layer(np.array([0.05, 0.1]), np.array([1.0, 2.0]))), 1.3)
     calls: list[tuple[int, int]] = []
-    first, second = trace_medium(medium, 2000, 3, 0.8, report=lambda done, of: calls.append((done, of)))
+    first, second = trace_medium(
+        medium, 2000, 3, 0.8, progress=lambda done, total: calls.append((done, total))
+    )
     assert calls == [(done, 128) for done in range(1, 129)]
     by_hand = [
         ScatteringLayer(0.2, 5.0 / 0.2, 0.5, 0.8, 1.3),
@@ -185,7 +193,7 @@ def test_channels_of_a_medium_are_slabs_of_their_own() -> None:
 
 
 def test_rings_cover_the_plane_from_the_axis() -> None:
-    edges = default_edges()
+    edges = default_ring_edges()
     assert edges[0] == 0.0 and edges[1] == 1e-3 and edges[-1] == pytest.approx(40.0)
     assert np.allclose(edges[2:] / edges[1:-1], edges[2] / edges[1])
 

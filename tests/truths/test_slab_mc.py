@@ -102,8 +102,8 @@ def test_totals_of_other_runs(sample_folder: Path) -> None:
         deviations.append(R / np.hypot(run.total_reflectance_se, float(row["Rd_se"])))
         if "inf" not in row["d_mm"]:
             T = run.total_transmittance + run.unscattered_transmittance - float(row["Tt_per_incident"])
-            share = float(row["Tt_per_incident"])
-            error = np.sqrt(share * (1.0 - run.specular - share) / run.photons)
+            error_density = float(row["Tt_per_incident"])
+            error = np.sqrt(error_density * (1.0 - run.specular - error_density) / run.photons)
             deviations.append(T / np.hypot(error, float(row["Tt_se"])))
     assert len(deviations) > 40
     assert alike(np.array(deviations))
@@ -129,8 +129,8 @@ def test_profiles_of_other_runs(sample_folder: Path, case: str, face: str) -> No
     computed = run.reflectance if face == "R" else run.transmittance
     axis = run.unscattered_reflectance if face == "R" else run.unscattered_transmittance
     computed = computed + np.append(axis / areas[0], np.zeros(len(areas) - 1))
-    share = expected * areas
-    error = np.sqrt(share * (1.0 - run.specular - share) / run.photons) / areas
-    full = share * run.photons > 25.0
+    error_density = expected * areas
+    error = np.sqrt(error_density * (1.0 - run.specular - error_density) / run.photons) / areas
+    full = error_density * run.photons > 25.0
     assert full.sum() > 50
     assert alike((computed - expected)[full] / np.hypot(error, their_error)[full])

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from scipy.special import eval_legendre
 
 from dermis.apps.truths.surface_diffusion import (
-    STEPS,
+    STEPS_PER_LEVEL,
     diffuse_on_surface,
-    edge_for,
     longest_edge_mm,
-    margin_for,
-    resolved,
+    max_edge_mm,
+    patch_margin_mm,
+    resolved_levels,
     vertex_areas,
-    welded,
+    welded_surface,
 )
 from dermis.base.errors import DermisError
 from dermis.mesh.primitives import plane, uv_sphere
@@ -29,7 +29,7 @@ AXIS = np.array([0.36, 0.48, 0.8])
 
 def rough_plane(size_mm: float, segments: int, roughness: float = 0.0) -> Surface:
     """A square whose inner vertices, but for the middle one, are off their grid by a share of a cell."""
-    positions, triangles = welded(plane(size_mm, segments))
+    positions, triangles = welded_surface(plane(size_mm, segments))
     inside = (np.abs(positions[:, :2]) < 0.49 * size_mm).all(axis=1)
     inside[middle_of(positions)] = False
     off = np.random.default_rng(3).uniform(-roughness, roughness, (len(positions), 2)) * size_mm / segments
@@ -51,10 +51,10 @@ def point_of_light(surface: Surface) -> tuple[Floats, Floats]:
 
 
 def harmonic_decay(
-    radius_mm: float, degree: int, variance: float, segments: int, steps: int = STEPS
+    radius_mm: float, degree: int, variance: float, segments: int, steps: int = STEPS_PER_LEVEL
 ) -> float:
     """How much of a spherical harmonic is left."""
-    surface = welded(uv_sphere(radius_mm, segments, segments // 2))
+    surface = welded_surface(uv_sphere(radius_mm, segments, segments // 2))
     values = eval_legendre(degree, surface[0] @ AXIS / radius_mm)[:, None]
     areas = vertex_areas(*surface)[:, None]
     spread = diffuse_on_surface(*surface, values, [variance], steps)[0]
@@ -71,7 +71,7 @@ def test_point_on_a_plane_spreads_to_the_gaussian(
     A rough mesh costs twice as much, as the point itself, a hat over uneven triangles, is not quite round.
     """
     diagonal = np.sqrt(2) * (1 + 2 * roughness)
-    surface = rough_plane(13.0, 2 * int(np.ceil(6.5 * diagonal / edge_for(variances))), roughness)
+    surface = rough_plane(13.0, 2 * int(np.ceil(6.5 * diagonal / max_edge_mm(variances))), roughness)
     values, areas = point_of_light(surface)
     square = (surface[0] ** 2).sum(axis=1)
     for v, level in zip(variances, diffuse_on_surface(*surface, values, variances), strict=True):
@@ -123,7 +123,7 @@ def test_levels_of_a_cascade_are_the_same_as_alone() -> None:
         assert np.allclose(level, alone, atol=2e-4)
 
 
-@pytest.mark.parametrize("surface", [rough_plane(8.0, 30, 0.25), welded(uv_sphere(3.0, 48, 24))])
+@pytest.mark.parametrize("surface", [rough_plane(8.0, 30, 0.25), welded_surface(uv_sphere(3.0, 48, 24))])
 def test_light_is_conserved_and_a_constant_stays(surface: Surface) -> None:
     areas = vertex_areas(*surface)
     values = np.column_stack((np.random.default_rng(0).random(len(areas)), np.full(len(areas), 0.7)))
@@ -165,10 +165,10 @@ def test_degenerate_triangles_do_no_harm() -> None:
 
 
 def test_resolved_lists_levels_whose_addition_spans_two_edges() -> None:
-    assert resolved([0.0064, 0.0484, 0.187, 0.567, 1.99, 7.41], 0.11).tolist() == [False, *[True] * 5]
-    assert resolved([1.0, 1.5, 2.5], 0.5).tolist() == [True, False, True]
-    assert edge_for([1.0, 1.25, 2.5]) == pytest.approx(0.25)
-    assert margin_for([1.0, 4.0]) == 8.0
+    assert resolved_levels([0.0064, 0.0484, 0.187, 0.567, 1.99, 7.41], 0.11).tolist() == [False, *[True] * 5]
+    assert resolved_levels([1.0, 1.5, 2.5], 0.5).tolist() == [True, False, True]
+    assert max_edge_mm([1.0, 1.25, 2.5]) == pytest.approx(0.25)
+    assert patch_margin_mm([1.0, 4.0]) == 8.0
     positions, triangles = rough_plane(6.0, 20)
     assert longest_edge_mm(positions, triangles) == pytest.approx(0.3 * np.sqrt(2))
 
@@ -176,7 +176,7 @@ def test_resolved_lists_levels_whose_addition_spans_two_edges() -> None:
 def test_long_edges_are_refused_and_the_levels_that_they_allow_named() -> None:
     positions, triangles = rough_plane(6.0, 10)
     values = np.ones((len(positions), 1))
-    with pytest.raises(DermisError, match=r"0\.15 mm.*0\.849 mm came.*variances 3, 7\.5\. Refine"):
+    with pytest.raises(DermisError, match=r"0\.15 mm.*got 0\.849 mm.*variances 3, 7\.5\. Refine"):
         diffuse_on_surface(positions, triangles, values, [0.09, 3.0, 7.5])
 
 

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.apps.truths.surface_diffusion import delaunay, intrinsic, mass_and_stiffness, vertex_areas, welded
+from dermis.apps.truths.surface_diffusion import (
+    delaunay,
+    intrinsic_triangulation,
+    mass_and_stiffness,
+    vertex_areas,
+    welded_surface,
+)
 from dermis.mesh.primitives import plane
 
 Floats = NDArray[np.float64]
@@ -30,7 +36,7 @@ def skewed_plane(cells: int) -> tuple[Floats, NDArray[np.int64]]:
 def test_flips_make_the_best_of_obtuse_triangles() -> None:
     """The leaning triangles become halves of the grid's squares, but for the leaning borders."""
     positions, triangles = skewed_plane(30)
-    skewed = intrinsic(positions, triangles)
+    skewed = intrinsic_triangulation(positions, triangles)
     flipped = delaunay(skewed)
     assert flipped.areas().sum() == pytest.approx(skewed.areas().sum(), rel=1e-9)
     assert (skewed.cotangents().min(axis=1) < -1.99).all()
@@ -42,7 +48,7 @@ def test_flips_make_the_best_of_obtuse_triangles() -> None:
 
 def test_flips_on_a_curved_surface_keep_its_area_and_its_borders() -> None:
     (x, y, _), triangles = skewed_plane(30)[0].T, skewed_plane(30)[1]
-    given = intrinsic(np.column_stack((6 * np.sin(x / 6), y, 6 * np.cos(x / 6))), triangles)
+    given = intrinsic_triangulation(np.column_stack((6 * np.sin(x / 6), y, 6 * np.cos(x / 6))), triangles)
     flipped = delaunay(given)
     assert np.mean(flipped.corners == given.corners) < 0.5
     assert flipped.areas().sum() == pytest.approx(given.areas().sum(), rel=1e-9)
@@ -52,11 +58,13 @@ def test_flips_on_a_curved_surface_keep_its_area_and_its_borders() -> None:
 
 
 def test_operators_have_the_areas_and_linear_functions_have_no_curvature() -> None:
-    positions, triangles = welded(plane(5.0, 12))
+    positions, triangles = welded_surface(plane(5.0, 12))
     inside = (np.abs(positions[:, :2]) < 2.49).all(axis=1)
     off = np.random.default_rng(5).uniform(-0.12, 0.12, (len(positions), 2))
     positions[:, :2] += np.where(inside[:, None], off, 0)
-    mass, stiffness = mass_and_stiffness(delaunay(intrinsic(positions, triangles)), len(positions))
+    mass, stiffness = mass_and_stiffness(
+        delaunay(intrinsic_triangulation(positions, triangles)), len(positions)
+    )
     assert mass.sum() == pytest.approx(25.0)
     assert np.allclose(mass.sum(axis=1), vertex_areas(positions, triangles))
     assert np.allclose((stiffness @ positions)[inside], 0, atol=1e-12)

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.apps.truths.refine import Patch, refine_patch
 from dermis.apps.truths.surface_diffusion import (
     diffuse_on_surface,
-    edge_for,
     longest_edge_mm,
-    margin_for,
+    max_edge_mm,
+    patch_margin_mm,
     vertex_areas,
-    welded,
+    welded_surface,
 )
+from dermis.apps.truths.surface_patch import Patch, refine_patch
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import edges, triangle_areas
 from dermis.mesh.primitives import plane, uv_sphere
@@ -23,11 +23,11 @@ from dermis.scene.heads import load_head
 Floats = NDArray[np.float64]
 
 RADIUS_MM = 12.0
-COARSE = welded(uv_sphere(RADIUS_MM, 24, 12))
+COARSE = welded_surface(uv_sphere(RADIUS_MM, 24, 12))
 PLACE = RADIUS_MM * np.array([0.6, 0.0, 0.8])
 VARIANCES = [1.0, 2.5]
-SMALL = refine_patch(*COARSE, PLACE, 3.0, edge_for(VARIANCES), margin_for(VARIANCES))
-WHOLE = refine_patch(*COARSE, PLACE, np.inf, edge_for(VARIANCES), margin_for(VARIANCES))
+SMALL = refine_patch(*COARSE, PLACE, 3.0, max_edge_mm(VARIANCES), patch_margin_mm(VARIANCES))
+WHOLE = refine_patch(*COARSE, PLACE, np.inf, max_edge_mm(VARIANCES), patch_margin_mm(VARIANCES))
 
 
 def uses(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -36,7 +36,7 @@ def uses(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
 
 @pytest.mark.parametrize("patch", [SMALL, WHOLE])
 def test_edges_are_short_and_the_surface_is_the_same(patch: Patch) -> None:
-    assert longest_edge_mm(patch.positions, patch.triangles) <= edge_for(VARIANCES)
+    assert longest_edge_mm(patch.positions, patch.triangles) <= max_edge_mm(VARIANCES)
     corners = COARSE[0][COARSE[1]][patch.parent]
     assert np.allclose(patch.weights @ corners, patch.positions[patch.triangles], atol=1e-12)
     fine, coarse = (
@@ -47,7 +47,7 @@ def test_edges_are_short_and_the_surface_is_the_same(patch: Patch) -> None:
 
 
 def test_the_whole_is_closed_and_has_its_area() -> None:
-    assert (uses(WHOLE.triangles) == 2).all() and WHOLE.holds(WHOLE.positions).all()
+    assert (uses(WHOLE.triangles) == 2).all() and WHOLE.contains(WHOLE.positions).all()
     area = triangle_areas(WHOLE.positions[WHOLE.triangles])
     per_parent = np.bincount(WHOLE.parent, area)
     assert np.allclose(per_parent, triangle_areas(COARSE[0][COARSE[1]]), rtol=1e-12)
@@ -58,9 +58,9 @@ def test_a_patch_has_one_border_outside_its_margin() -> None:
     border = np.unique(ends[counts == 1])
     assert counts.max() == 2
     distance = np.linalg.norm(SMALL.positions - PLACE, axis=1)
-    assert distance[border].min() >= 3.0 + margin_for(VARIANCES) - edge_for(VARIANCES)
-    assert distance.max() < 3.0 + margin_for(VARIANCES) + 2 * edge_for(VARIANCES)
-    assert 0 < SMALL.holds(SMALL.positions).sum() < len(SMALL.positions)
+    assert distance[border].min() >= 3.0 + patch_margin_mm(VARIANCES) - max_edge_mm(VARIANCES)
+    assert distance.max() < 3.0 + patch_margin_mm(VARIANCES) + 2 * max_edge_mm(VARIANCES)
+    assert 0 < SMALL.contains(SMALL.positions).sum() < len(SMALL.positions)
 
 
 def test_places_are_found_again() -> None:
@@ -68,7 +68,7 @@ def test_places_are_found_again() -> None:
     fine = rng.integers(len(SMALL.triangles), size=500)
     inside = rng.dirichlet(np.ones(3), 500)
     weights = np.einsum("mi,mij->mj", inside, SMALL.weights[fine])
-    found, again = SMALL.find(SMALL.parent[fine], weights)
+    found, again = SMALL.locate(SMALL.parent[fine], weights)
     assert np.array_equal(found, fine) and np.allclose(again, inside, atol=1e-9)
     placed = SMALL.interpolate(SMALL.positions, found, again)
     assert np.allclose(placed, np.einsum("mi,mij->mj", weights, COARSE[0][COARSE[1]][SMALL.parent[fine]]))
@@ -76,12 +76,12 @@ def test_places_are_found_again() -> None:
 
 def test_places_off_the_patch_are_not_found() -> None:
     far = np.setdiff1d(np.arange(len(COARSE[1])), SMALL.parent)[:5]
-    found, _ = SMALL.find(far, np.full((5, 3), 1 / 3))
+    found, _ = SMALL.locate(far, np.full((5, 3), 1 / 3))
     assert (found == -1).all()
 
 
 def test_vertices_know_their_place_on_the_coarse_surface() -> None:
-    triangle, weights = SMALL.vertex_places()
+    triangle, weights = SMALL.vertex_barycentrics()
     placed = np.einsum("mi,mij->mj", weights, COARSE[0][COARSE[1]][triangle])
     assert np.allclose(placed, SMALL.positions, atol=1e-12)
 
@@ -90,7 +90,7 @@ def heat(patch: Patch) -> tuple[Floats, Floats]:
     """Positions and levels where the small patch may judge; the light is everywhere, and uneven."""
     values = 1 + np.cos(patch.positions @ np.array([[1.1, 0.2], [0.4, -0.9], [0.3, 0.7]]))
     levels = diffuse_on_surface(patch.positions, patch.triangles, values, VARIANCES)
-    judged = SMALL.holds(patch.positions)
+    judged = SMALL.contains(patch.positions)
     order = np.lexsort(patch.positions[judged].round(9).T)
     return patch.positions[judged][order], levels[:, judged][:, order]
 
@@ -103,11 +103,11 @@ def test_heat_on_a_patch_is_that_on_the_whole_within_the_margin() -> None:
 
 
 def test_without_a_margin_the_border_is_felt() -> None:
-    bare = refine_patch(*COARSE, PLACE, 3.0, edge_for(VARIANCES), 0.0)
+    bare = refine_patch(*COARSE, PLACE, 3.0, max_edge_mm(VARIANCES), 0.0)
     values = 1 + np.cos(bare.positions[:, :1])
     levels = diffuse_on_surface(bare.positions, bare.triangles, values, VARIANCES)
     wide = diffuse_on_surface(SMALL.positions, SMALL.triangles, 1 + np.cos(SMALL.positions[:, :1]), VARIANCES)
-    assert abs(levels[1, :, 0].max() - wide[1, SMALL.holds(SMALL.positions), 0].max()) > 0.01
+    assert abs(levels[1, :, 0].max() - wide[1, SMALL.contains(SMALL.positions), 0].max()) > 0.01
 
 
 def test_edges_in_need_alone_are_halved() -> None:
@@ -121,7 +121,7 @@ def test_edges_in_need_alone_are_halved() -> None:
 
 
 def test_huge_flat_triangles_are_cut_near_the_place_only() -> None:
-    patch = refine_patch(*welded(plane(1000.0)), [3.0, 4.0, 0.0], 2.0, 0.5, 1.0)
+    patch = refine_patch(*welded_surface(plane(1000.0)), [3.0, 4.0, 0.0], 2.0, 0.5, 1.0)
     assert 100 < len(patch.triangles) < 1500
 
 
@@ -129,11 +129,11 @@ def test_huge_flat_triangles_are_cut_near_the_place_only() -> None:
 def test_the_ear_of_a_scan_keeps_its_light() -> None:
     """Thin, folded and cut by uv seams: the rightmost place at the height of the eyes."""
     head = load_head("lee_perry_smith")
-    surface = welded(head.mesh)
+    surface = welded_surface(head.mesh)
     off = surface[0] - head.centre_mm
     ear = surface[0][np.where(np.abs(off[:, 1]) < 40, off[:, 0], -np.inf).argmax()]
     variances = [1.99, 7.41]
-    patch = refine_patch(*surface, ear, 6.0, edge_for(variances), margin_for(variances))
+    patch = refine_patch(*surface, ear, 6.0, max_edge_mm(variances), patch_margin_mm(variances))
     values = (patch.positions[:, :1] > ear[0] - 5.0).astype(np.float64)
     levels = diffuse_on_surface(patch.positions, patch.triangles, values, variances)
     areas = vertex_areas(patch.positions, patch.triangles)

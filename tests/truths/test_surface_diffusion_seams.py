@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.surface_diffusion import diffuse_on_surface, welded
+from dermis.apps.truths.surface_diffusion import diffuse_on_surface, welded_surface
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN
 
@@ -35,7 +35,7 @@ def light(positions: Floats) -> Floats:
 
 def spread(mesh: Mesh) -> Floats:
     """Diffused light at the corner vertices (v, 1), the seam welded."""
-    surface = welded(mesh)
+    surface = welded_surface(mesh)
     return diffuse_on_surface(*surface, light(surface[0]), [2.0])[0][mesh.point]
 
 
@@ -58,7 +58,7 @@ def test_an_unwelded_seam_is_an_insulator() -> None:
 
 def test_cylinders_are_flat_to_heat() -> None:
     """Once around is a strip of 2 pi R: its cosine decays by exp(-v/2R²)."""
-    surface = welded(cylinder(7))
+    surface = welded_surface(cylinder(7))
     around = surface[0][:, :1] / RADIUS_MM
     decay = diffuse_on_surface(*surface, around, [2.0])[0] / np.where(np.abs(around) > 0.1, around, np.inf)
     kept = decay[np.abs(around[:, 0]) > 0.1]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.apps.truths.irradiance_samples import IrradianceSamples, Places, sample_irradiance
-from dermis.apps.truths.octree import Tree, build_tree
+from dermis.apps.truths.irradiance_samples import IrradianceSamples, MeshPoints, sample_irradiance
+from dermis.apps.truths.octree import Octree, build_octree
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import edges, triangle_areas
 from dermis.mesh.mesh import Material
@@ -18,7 +18,7 @@ from dermis.mesh.primitives import plane, uv_sphere
 Floats = NDArray[np.float64]
 
 
-def even(places: Places) -> Floats:
+def even(places: MeshPoints) -> Floats:
     return np.ones_like(places.positions)
 
 
@@ -42,9 +42,9 @@ def test_sides_are_short_and_meet() -> None:
 
 def test_places_carry_what_the_mesh_knows() -> None:
     mesh = plane(20.0, 3)
-    seen: list[Places] = []
+    seen: list[MeshPoints] = []
 
-    def light(places: Places) -> Floats:
+    def light(places: MeshPoints) -> Floats:
         seen.append(places)
         return even(places)
 
@@ -58,7 +58,7 @@ def test_samples_crowd_where_light_changes() -> None:
     """Only the new ones are asked for, and all keep the light of their own place."""
     asked: list[int] = []
 
-    def disc(places: Places) -> Floats:
+    def disc(places: MeshPoints) -> Floats:
         asked.append(len(places.positions))
         inside = np.hypot(places.positions[:, 0], places.positions[:, 1]) < 3.0
         return np.repeat(inside[:, None].astype(np.float64), 3, axis=1)
@@ -78,7 +78,7 @@ def test_samples_crowd_where_light_changes() -> None:
 def test_crowding_ends_at_a_single_bright_corner() -> None:
     """Sides that fan out from it would stay long for ever if only they were cut."""
 
-    def corner(places: Places) -> Floats:
+    def corner(places: MeshPoints) -> Floats:
         at = np.linalg.norm(places.positions - np.array([5.0, 5.0, 0.0]), axis=1) < 1e-6
         return np.repeat(at[:, None].astype(np.float64), 3, axis=1)
 
@@ -103,50 +103,52 @@ def test_only_skin_is_sampled() -> None:
 
 
 @pytest.fixture(scope="module")
-def tree() -> Tree:
-    def light(places: Places) -> Floats:
+def tree() -> Octree:
+    def light(places: MeshPoints) -> Floats:
         x = places.positions
         return np.column_stack((np.maximum(x[:, 0], 0.0), np.ones(len(x)), np.maximum(5.0 - x[:, 1], 0.0)))
 
-    return build_tree(sample_irradiance(uv_sphere(8.0, 32, 16), light, 0.8))
+    return build_octree(sample_irradiance(uv_sphere(8.0, 32, 16), light, 0.8))
 
 
-def test_nodes_hold_their_triangles_once(tree: Tree) -> None:
+def test_nodes_hold_their_triangles_once(tree: Octree) -> None:
     """A walk that opens every node comes by every triangle exactly once."""
     met = np.zeros(len(tree.area), np.int64)
     for node in range(len(tree.first)):
-        if tree.skip[node] == node + 1:
+        if tree.next_node[node] == node + 1:
             met[tree.first[node] : tree.end[node]] += 1
         else:
             assert tree.first[node + 1] == tree.first[node]
     assert (met == 1).all()
-    leaves = tree.skip == np.arange(len(tree.skip)) + 1
+    leaves = tree.next_node == np.arange(len(tree.next_node)) + 1
     assert (tree.end - tree.first)[leaves].max() <= 16 < (tree.end - tree.first)[~leaves].min()
 
 
 @pytest.mark.parametrize("part", [0.0, 0.003, 0.5, 1.0])
-def test_points_stand_for_a_node(tree: Tree, part: float) -> None:
+def test_points_stand_for_a_node(tree: Octree, part: float) -> None:
     """Flux, centres, second moments and bounds against sums over many points of the triangles."""
     node = round(part * (len(tree.first) - 1))
     inside = slice(tree.first[node], tree.end[node])
     weights = np.random.default_rng(2).dirichlet((1.0, 1.0, 1.0), 150 if part == 0.0 else 4000)
-    share = tree.area[inside][:, None, None] / len(weights)
-    light = (weights @ tree.light[inside] * share).reshape(-1, 3)
+    error_density = tree.area[inside][:, None, None] / len(weights)
+    light = (weights @ tree.irradiance[inside] * error_density).reshape(-1, 3)
     away = (weights @ tree.corners[inside]).reshape(-1, 3) - tree.centre[node]
-    arms, size, power = tree.places[node] - tree.centre[node], tree.radius[node], light.sum(axis=0)
+    arms, size, power = tree.points[node] - tree.centre[node], tree.radius[node], light.sum(axis=0)
     np.testing.assert_allclose(tree.flux[node].sum(axis=0), power, rtol=0.02, atol=1e-9)
     np.testing.assert_allclose(light.sum(axis=1) @ away, 0.0, atol=0.02 * size * light.sum())
     assert max(np.linalg.norm(values, axis=1).max() for values in (away, arms)) <= size * (1.0 + 1e-9)
     np.testing.assert_allclose(arms.mean(axis=0), 0.0, atol=1e-9)
     lit = power > 0.0
-    offset = np.linalg.norm(light.T @ away - tree.flux[node].T @ arms, axis=1)
-    assert tree.offset[node] == pytest.approx((offset[lit] / power[lit]).max(), abs=0.03 * size)
+    centroid_error = np.linalg.norm(light.T @ away - tree.flux[node].T @ arms, axis=1)
+    assert tree.centroid_error[node] == pytest.approx(
+        (centroid_error[lit] / power[lit]).max(), abs=0.03 * size
+    )
     true, points = second_moments(away, light), second_moments(arms, tree.flux[node])
-    mismatch = np.linalg.norm(true - points, axis=(1, 2))[lit] / power[lit]
-    assert tree.mismatch[node] == pytest.approx(mismatch.max(), abs=0.03 * size**2)
+    moment_error = np.linalg.norm(true - points, axis=(1, 2))[lit] / power[lit]
+    assert tree.moment_error[node] == pytest.approx(moment_error.max(), abs=0.03 * size**2)
     both = second_moments(away, light) + second_moments(arms, np.abs(tree.flux[node]))
-    spread = np.trace(both, axis1=1, axis2=2)[lit] / power[lit]
-    assert tree.spread[node] == pytest.approx(spread.max(), rel=0.05)
+    second_moment = np.trace(both, axis1=1, axis2=2)[lit] / power[lit]
+    assert tree.second_moment[node] == pytest.approx(second_moment.max(), rel=0.05)
 
 
 def second_moments(places: Floats, flux: Floats) -> Floats:
@@ -154,13 +156,13 @@ def second_moments(places: Floats, flux: Floats) -> Floats:
 
 
 def test_flat_nodes_of_white_light_keep_second_moments() -> None:
-    tree = build_tree(sample_irradiance(plane(12.0), even, 0.5))
-    places = tree.places[0] - tree.centre[0]
+    tree = build_octree(sample_irradiance(plane(12.0), even, 0.5))
+    places = tree.points[0] - tree.centre[0]
     np.testing.assert_allclose(places.T @ places / 3.0, np.diag([12.0, 12.0, 0.0]), atol=1e-5)
-    assert tree.mismatch.max() < 1e-6 and tree.offset.max() < 1e-6
+    assert tree.moment_error.max() < 1e-6 and tree.centroid_error.max() < 1e-6
 
 
 def test_dark_nodes_do_no_harm() -> None:
-    tree = build_tree(sample_irradiance(plane(12.0), lambda p: 0.0 * p.positions, 0.5))
-    assert (tree.flux == 0.0).all() and np.isfinite(tree.places).all() and np.isfinite(tree.centre).all()
-    assert (tree.spread == 0.0).all() and (tree.offset == 0.0).all()
+    tree = build_octree(sample_irradiance(plane(12.0), lambda p: 0.0 * p.positions, 0.5))
+    assert (tree.flux == 0.0).all() and np.isfinite(tree.points).all() and np.isfinite(tree.centre).all()
+    assert (tree.second_moment == 0.0).all() and (tree.centroid_error == 0.0).all()

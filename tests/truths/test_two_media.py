@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dermis.apps.truths.slab_mc import trace_medium
-from dermis.apps.truths.two_media import exchange
+from dermis.apps.truths.two_media import strip_transfer
 from dermis.optics.media import Layer, Medium
 
 EDGES = np.linspace(-6.0, 6.0, 25)
@@ -14,14 +14,14 @@ EDGES = np.linspace(-6.0, 6.0, 25)
 
 def test_one_medium_on_both_sides_is_that_medium() -> None:
     sigma_a, sigma_s = np.full(2, 0.3), np.full(2, 2.0)
-    left = exchange(sigma_a, sigma_s, EDGES, 4000)[10:14].sum(axis=1)
+    left = strip_transfer(sigma_a, sigma_s, EDGES, 4000)[10:14].sum(axis=1)
     layer = Layer(sigma_a[:1], sigma_s[:1], float("inf"), "half-space")
     true = trace_medium(Medium("one", (layer,)), 20_000)[0]
     assert left.mean() == pytest.approx(true.total_reflectance / (1.0 - true.specular), rel=0.03)
 
 
 def test_light_goes_both_ways_alike_but_for_how_it_falls() -> None:
-    made = exchange(np.array([0.05, 0.4]), np.array([2.0, 2.0]), EDGES, 20_000)
+    made = strip_transfer(np.array([0.05, 0.4]), np.array([2.0, 2.0]), EDGES, 20_000)
     there, back = made[:12, 12:].sum(), made[12:, :12].sum()
     assert there == pytest.approx(back, rel=0.12)
     assert made[:12].sum() > 1.5 * made[12:].sum()

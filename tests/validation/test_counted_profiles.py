@@ -52,6 +52,6 @@ def test_less_light_goes_far(profiles: dict[ModelName, GaussianSum]) -> None:
 
 def test_tables_are_the_default_where_there_are_some() -> None:
     with medium_scene(BALL, "laser", "ear", BODY) as (_, usual):
-        assert usual.counted
+        assert usual.from_photons
     with medium_scene(BALL, "laser", "ear", media()["dj3"].with_eta(1.0)) as (_, usual):
-        assert not usual.counted
+        assert not usual.from_photons

@@ -45,11 +45,11 @@ def no_blender(*given: Any, **named: Any) -> Any:
 
 
 def path_trace(
-    scene: Any, medium: Any, samples: int, settings: Any, *, keep: bool, report: Any
+    scene: Any, medium: Any, samples: int, settings: Any, *, use_cache: bool, progress: Any
 ) -> PathTraced:
-    assert not keep  # a stored truth would have taken no time
+    assert not use_cache  # a stored truth would have taken no time
     for done in range(samples // 4):
-        report(done + 1, samples // 4)
+        progress(done + 1, samples // 4)
     noise = np.random.default_rng(1).normal(size=(SIDE, SIDE, 3)) * 0.05
     variance = np.full((SIDE, SIDE, 3), 0.05**2)
     return PathTraced(picture(1.0) + noise, variance, np.ones((SIDE, SIDE)), samples, 9.0, ())

@@ -10,7 +10,7 @@ import pytest
 
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.truths.person import medium
-from dermis.apps.truths.person.traced import Paint
+from dermis.apps.truths.person.person import SkinTextures
 from dermis.apps.validation.comparisons.person import (
     EYE_MM,
     VIEWS,
@@ -46,11 +46,11 @@ def renderer() -> Renderer:
 
 
 @pytest.fixture(scope="module")
-def paint(renderer: Renderer) -> Paint:
+def paint(renderer: Renderer) -> SkinTextures:
     return paint_of(renderer, scene_of(head(), VIEWS["portrait"]), SIDE)
 
 
-def test_the_iris_is_painted_around_its_pupil(paint: Paint) -> None:
+def test_the_iris_is_painted_around_its_pupil(paint: SkinTextures) -> None:
     side = len(paint.iris)
     along = ((np.arange(side) + 0.5) / side * 2 - 1) * paint.reach_mm
     off = np.hypot(*np.meshgrid(along, along))
@@ -59,7 +59,7 @@ def test_the_iris_is_painted_around_its_pupil(paint: Paint) -> None:
     assert ring[:, 0].mean() > 1.5 * ring[:, 2].mean() > 0.01  # brown
 
 
-def test_the_white_is_white_and_teeth_stand_in_gums(paint: Paint) -> None:
+def test_the_white_is_white_and_teeth_stand_in_gums(paint: SkinTextures) -> None:
     middle = paint.white[480:544, 480:544].mean(axis=(0, 1))
     assert 0.3 < middle[2] < middle[0] < 0.65
     upper, lower = paint.teeth
@@ -68,7 +68,7 @@ def test_the_white_is_white_and_teeth_stand_in_gums(paint: Paint) -> None:
     assert not np.array_equal(upper, lower)  # whose widths differ
 
 
-def test_skin_is_painted_as_the_frame_paints_it(paint: Paint) -> None:
+def test_skin_is_painted_as_the_frame_paints_it(paint: SkinTextures) -> None:
     assert paint.colour.shape == (SIDE, SIDE, 3) and paint.roughness.shape == (SIDE, SIDE)
     assert 0.2 < paint.colour[..., 0].mean() < 0.7 and 0.1 < paint.roughness.min() < paint.roughness.max()
     assert 0.01 < np.ptp(paint.height_mm) < 5.0
@@ -97,11 +97,11 @@ def test_a_picture_is_the_mean_of_one_twice_as_large(renderer: Renderer) -> None
 
 
 def test_an_eye_is_much_like_its_likeness(
-    renderer: Renderer, paint: Paint, monkeypatch: pytest.MonkeyPatch
+    renderer: Renderer, paint: SkinTextures, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mitsuba")
     monkeypatch.setattr(medium, "VOXELS", 8)
-    pair = compare_person(renderer, head(), paint, "eye", side=32, samples=8, atlas=256, keep=False)
+    pair = compare_person(renderer, head(), paint, "eye", side=32, samples=8, atlas=256, use_cache=False)
     assert pair.samples == 16  # eyes take twice as many
     assert 0.6 < pair.energy.value < 1.6 and pair.energy.standard_error > 0.0
     assert pair.shown(pair.ours).shape == (32, 32, 3)
@@ -109,7 +109,7 @@ def test_an_eye_is_much_like_its_likeness(
     assert pupil < 0.3 * pair.truth[pair.mask].mean() and pair.ours[15:17, 15:17].mean() < 0.1
 
 
-def test_unknown_views_are_refused(renderer: Renderer, paint: Paint) -> None:
+def test_unknown_views_are_refused(renderer: Renderer, paint: SkinTextures) -> None:
     with pytest.raises(DermisError, match="expected one of portrait"):
         compare_person(renderer, head(), paint, "aura")
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
-from dermis.apps.validation.comparisons.compare import subject_of
+from dermis.apps.validation.comparisons.compare import load_subject
 from dermis.apps.validation.comparisons.truths import (
     Subject,
     heat_around,
@@ -31,7 +31,7 @@ ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
 def lasered() -> Iterator[Subject]:
     """A narrow stripe of light, seen close by."""
     settings = Settings(size=(64, 64), atlas=64, shadow_size=256)
-    with subject_of(BALL, "laser", "ear", "skin1", settings, ADAPTER) as subject:
+    with load_subject(BALL, "laser", "ear", "skin1", settings, ADAPTER) as subject:
         yield subject
 
 

@@ -1,1 +1,1 @@
-"""Reference solutions that share no model with what they judge: path tracing, photons, surface integrals."""
+"""Reference solutions that share no assumption with the renderer: Monte Carlo, path tracing, heat flow."""

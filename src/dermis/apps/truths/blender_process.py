@@ -1,4 +1,4 @@
-"""Blender's Python as a process of its own: where it is, and how it may fail."""
+"""Scripts run by Blender's Python in a process of its own."""
 
 from __future__ import annotations
 
@@ -18,58 +18,58 @@ _INSTALL_HINT = (
 
 
 class BlenderTask(NamedTuple):
-    """What Blender is to do, as messages say it.
+    """Task of Blender, for messages.
 
-    who : does it
-    task : "to ..."
-    remedy : for one that failed
+    renderer : program that is named as the culprit
+    goal : "to ..."
+    advice : what to do when it fails
     """
 
-    who: str
-    task: str
-    remedy: str
+    renderer: str
+    goal: str
+    advice: str
 
 
 def blender_python(python: str | Path | None = None) -> Path:
-    """Return the Python that has bpy: the one given, or the one that DERMIS_BLENDER_PYTHON names.
+    """Return the path of the Python with bpy: the argument, or else the variable DERMIS_BLENDER_PYTHON.
 
     Raises DermisError when there is no such file.
     """
-    named = python or os.environ.get(PYTHON_VARIABLE) or ""
-    if not named:
+    path = python or os.environ.get(PYTHON_VARIABLE) or ""
+    if not path:
         _refuse_python("none is named")
-    if not Path(named).is_file():
-        _refuse_python(f"there is no file {named}")
-    return Path(named)
+    if not Path(path).is_file():
+        _refuse_python(f"there is no file {path}")
+    return Path(path)
 
 
 def run_blender(
-    python: Path, script: Path, arguments: Sequence[str], longest_s: float, errand: BlenderTask
+    python: Path, script: Path, arguments: Sequence[str], timeout_s: float, task: BlenderTask
 ) -> None:
     """Run a script in Blender's Python, isolated from the modules beside it and from the user's.
 
-    Raises DermisError when it cannot be run, fails, or takes longer.
+    Raises DermisError when it cannot be run, fails, or takes longer than the timeout.
     """
     command = [str(python), "-I", str(script), *arguments]
     try:
-        ran = subprocess.run(command, capture_output=True, check=False, timeout=longest_s)
+        process = subprocess.run(command, capture_output=True, check=False, timeout=timeout_s)
     except OSError as fault:
         _refuse_python(f"{python} cannot be run ({fault.strerror})")
     except subprocess.TimeoutExpired:
-        came = f"it was ended after {longest_s:.0f} s"
-        refuse(errand.who, errand.task, came, "Take fewer samples or a smaller image")
-    if ran.returncode != 0:
-        _refuse_exit(python, ran, errand)
+        actual = f"it was ended after {timeout_s:.0f} s"
+        refuse(task.renderer, task.goal, actual, "Take fewer samples or a smaller image")
+    if process.returncode != 0:
+        _refuse_exit(python, process, task)
 
 
-def _refuse_exit(python: Path, ran: subprocess.CompletedProcess[bytes], errand: BlenderTask) -> NoReturn:
-    said = (ran.stderr.strip() or ran.stdout.strip()).decode("utf-8", "replace").splitlines()
-    last = said[-1] if said else "it said nothing"
-    if "No module named" in last:
-        _refuse_python(f"{python} says: {last}")
-    ended = f"signal {-ran.returncode} ended it" if ran.returncode < 0 else "it failed"
-    refuse(errand.who, errand.task, f"{ended} ({last})", errand.remedy)
+def _refuse_exit(python: Path, process: subprocess.CompletedProcess[bytes], task: BlenderTask) -> NoReturn:
+    output = (process.stderr.strip() or process.stdout.strip()).decode("utf-8", "replace").splitlines()
+    last_line = output[-1] if output else "it said nothing"
+    if "No module named" in last_line:
+        _refuse_python(f"{python} says: {last_line}")
+    outcome = f"signal {-process.returncode} ended it" if process.returncode < 0 else "it failed"
+    refuse(task.renderer, task.goal, f"{outcome} ({last_line})", task.advice)
 
 
-def _refuse_python(came: str) -> NoReturn:
-    refuse("Cycles", "a Python that has Blender's module bpy", came, _INSTALL_HINT)
+def _refuse_python(actual: str) -> NoReturn:
+    refuse("Cycles", "a Python that has Blender's module bpy", actual, _INSTALL_HINT)

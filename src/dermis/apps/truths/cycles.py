@@ -1,6 +1,6 @@
-"""The same head by Cycles, as a Blender user would render it: by random walk or with Burley's profile.
+"""Images of a scene by Blender's Cycles, with random-walk or Burley subsurface scattering.
 
-Blender's Python runs `cycles_script.py` as a process of its own on a folder with the described scene.
+Blender's Python runs `cycles_script.py` in a process of its own on a folder with the described scene.
 """
 
 from __future__ import annotations
@@ -17,11 +17,17 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.blender_process import PYTHON_VARIABLE as PYTHON_VARIABLE
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
-from dermis.apps.truths.scene_description import UNIT_MM, SceneDict, check_camera, cycles_look_at, cycles_world
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.lights import cycles_lamp
 from dermis.apps.truths.mitsuba_scene import Lambertian
 from dermis.apps.truths.path_traced import PathTraced
+from dermis.apps.truths.scene_description import (
+    UNIT_MM,
+    SceneDict,
+    check_camera,
+    cycles_look_at,
+    cycles_world,
+)
 from dermis.base.errors import DermisError, refuse
 from dermis.images.io import read_image
 from dermis.mesh.head import Head
@@ -34,21 +40,21 @@ Floats = NDArray[np.float32]
 Numbers = NDArray[np.generic]
 Method = Literal["random-walk", "burley"]
 _PASS_COUNT = 4
-_TASK = BlenderTask("Cycles", "to render the scene", "Try bpy 5.0, which this was made with")
+_TASK = BlenderTask("Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with")
 _MAX_START_S, _MAX_PATH_S = 300.0, 5e-4
-"""Time limits for the start and for each path: a hundred times what two cores took."""
+"""Time limits for the start and per path: a hundred times the time on two cores."""
 
 
 @dataclass(frozen=True, eq=False)
 class CyclesPass:
-    """One rendering by Cycles, black where there is no head.
+    """One rendering by Cycles, black outside the head.
 
     image : (h, w, 3) radiance, linear Rec. 709
-    coverage : (h, w) share of the pixel that the head fills
-    samples : paths through each pixel
-    seconds : by the clock; for the first pass with building the scene and the acceleration structure
-    core_seconds : summed over all cores
-    version : Blender's
+    coverage : (h, w) fraction of the pixel that the head covers
+    samples : paths per pixel
+    seconds : elapsed time; for the first pass including the scene and its acceleration structure
+    core_seconds : CPU time of all cores
+    version : version of Blender
     """
 
     image: Floats
@@ -68,21 +74,25 @@ def cycles_render(
     method: Method = "random-walk",
     python: str | Path | None = None,
 ) -> PathTraced:
-    """Return the scene by Cycles on the CPU, as the mean of 4 passes; arguments as of `cycles_passes`.
+    """Return the scene rendered by Cycles on the CPU, as the mean of 4 passes.
 
-    samples : at least this many paths through each pixel
+    Parameters are those of `cycles_passes`.
+
+    samples : least number of paths per pixel
     """
     _check_samples(samples)
-    each = -(-int(samples) // _PASS_COUNT)
-    passes = cycles_passes(scene, medium, [each] * _PASS_COUNT, settings, method=method, python=python)
-    images = np.stack([one.image for one in passes]).astype(np.float64)
-    coverage = np.stack([one.coverage for one in passes]).astype(np.float64)
+    samples_per_pass = -(-int(samples) // _PASS_COUNT)
+    passes = cycles_passes(
+        scene, medium, [samples_per_pass] * _PASS_COUNT, settings, method=method, python=python
+    )
+    images = np.stack([p.image for p in passes]).astype(np.float64)
+    coverage = np.stack([p.coverage for p in passes]).astype(np.float64)
     return PathTraced(
         images.mean(axis=0).astype(np.float32),
         (images.var(axis=0, ddof=1) / _PASS_COUNT).astype(np.float32),
         coverage.mean(axis=0).astype(np.float32),
-        each * _PASS_COUNT,
-        sum(one.seconds for one in passes),
+        samples_per_pass * _PASS_COUNT,
+        sum(p.seconds for p in passes),
     )
 
 
@@ -100,84 +110,83 @@ def cycles_passes(
 
     There is no clamping, denoising or surface reflection.
 
-    medium : of one layer; its eta is ignored, because Cycles' walks end at an index-matched surface. Its
-        colour in Cycles is its diffuse reflectance, its radius 4 pi mean free paths. Or a `Lambertian`
-        or `Facets`
-    samples : paths through each pixel, for each pass
-    settings : only the size counts
-    seed : of the first pass; each further pass takes the next
-    python : of an environment with `bpy`; by default the one that DERMIS_BLENDER_PYTHON names
+    medium : of one layer; its eta is ignored, because Cycles' random walks end at an index-matched surface.
+        Its colour in Cycles is its diffuse reflectance, its radius 4 pi mean free paths. Or a `Lambertian`,
+        `BeckmannSurface` or `PrincipledSkin`
+    samples : paths per pixel, for each pass
+    settings : only the size is used
+    seed : of the first pass; each further pass uses the next
+    python : path of a Python with `bpy`; by default the variable DERMIS_BLENDER_PYTHON
 
     Raises DermisError when there is no such Python, when Cycles fails, and for more than one layer.
     """
-    for count in samples:
-        _check_samples(count)
+    for sample_count in samples:
+        _check_samples(sample_count)
     if method not in FALLOFFS:
-        refuse("method", f"one of {', '.join(FALLOFFS)}", f"{method!r} came", "Correct it")
+        refuse("method", f"one of {', '.join(FALLOFFS)}", f"got {method!r}", "Correct it")
     size = (settings or Settings()).size
-    described, arrays = describe_scene(scene, medium, method, size)
-    described["passes"] = [{"samples": int(n), "seed": seed + k} for k, n in enumerate(samples)]
+    scene_dict, arrays = describe_scene(scene, medium, method, size)
+    scene_dict["passes"] = [{"samples": int(n), "seed": seed + k} for k, n in enumerate(samples)]
     interpreter = blender_python(python)
     with tempfile.TemporaryDirectory(prefix="dermis-cycles-") as name:
         folder = Path(name)
-        _write_scene(folder, described, arrays)
+        _write_scene(folder, scene_dict, arrays)
         _run_cycles(interpreter, folder, paths=size[0] * size[1] * sum(samples))
         return read_passes(folder, samples, size)
 
 
 def _check_samples(samples: int) -> None:
     if not (isinstance(samples, int | np.integer) and samples >= 1):
-        refuse("samples", "a whole number from 1", f"{samples} came", "Correct it")
+        refuse("samples", "a whole number from 1", f"got {samples}", "Correct it")
 
 
-def _write_scene(folder: Path, described: SceneDict, arrays: Mapping[str, Numbers]) -> None:
-    (folder / "scene.json").write_text(json.dumps(described), encoding="utf-8")
-    np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its last parameter is no array
+def _write_scene(folder: Path, scene_dict: SceneDict, arrays: Mapping[str, Numbers]) -> None:
+    (folder / "scene.json").write_text(json.dumps(scene_dict), encoding="utf-8")
+    np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its parameter allow_pickle is no array
 
 
 def _run_cycles(python: Path, folder: Path, paths: int) -> None:
     """Render the scene in a folder.
 
-    paths : to be traced, which sets the time limit
+    paths : number of all paths, which sets the time limit
     """
     script = Path(__file__).with_name("cycles_script.py")
     run_blender(python, script, [str(folder)], _MAX_START_S + _MAX_PATH_S * paths, _TASK)
 
 
 def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> list[CyclesPass]:
-    """Return the passes that Cycles left in a folder.
+    """Return the passes that Cycles wrote to a folder.
 
-    samples : of each pass
+    samples : paths per pixel of each pass
     size : width and height [pixel]
 
-    Raises DermisError when they are not what was asked for.
+    Raises DermisError when files are missing or have another size.
     """
     try:
-        done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
+        report = json.loads((folder / "done.json").read_text(encoding="utf-8"))
         files = [folder / f"pass_{k}.exr" for k in range(len(samples))]
         pixels = [read_image(file).astype(np.float32, copy=False) for file in files]
-        if any(one.shape != (size[1], size[0], 4) or not np.isfinite(one).all() for one in pixels):
+        if any(p.shape != (size[1], size[0], 4) or not np.isfinite(p).all() for p in pixels):
             raise ValueError("a pass of another size, or with values that are not finite")
-        found = zip(pixels, samples, done["times"], strict=True)
+        version = str(report["version"])
+        results = zip(pixels, samples, report["times"], strict=True)
         return [
-            CyclesPass(
-                one[..., :3], one[..., 3], int(count), float(clock), float(cores), str(done["version"])
-            )
-            for one, count, (clock, cores) in found
+            CyclesPass(p[..., :3], p[..., 3], int(count), float(clock), float(cores), version)
+            for p, count, (clock, cores) in results
         ]
     except (OSError, ValueError, KeyError, TypeError, DermisError) as fault:
         _refuse_render(f"it left something else ({str(fault) or type(fault).__name__})")
 
 
-def _refuse_render(came: str) -> NoReturn:
-    refuse(_TASK.who, _TASK.task, came, _TASK.remedy)
+def _refuse_render(actual: str) -> NoReturn:
+    refuse(_TASK.renderer, _TASK.goal, actual, _TASK.advice)
 
 
 @dataclass(frozen=True)
 class BeckmannSurface:
-    """A surface alone, over black: a boundary of index 1.4 cut into Beckmann's facets.
+    """Surface reflection alone: a black body with a boundary of index 1.4 and Beckmann's facets.
 
-    The head's normal map is on it.
+    It has the head's normal map.
 
     roughness : Beckmann's m [-]
     """
@@ -187,11 +196,11 @@ class BeckmannSurface:
 
 @dataclass(frozen=True, eq=False)
 class PrincipledSkin:
-    """Skin as a Blender user makes it: Principled, a random walk under a rough boundary of index 1.4.
+    """Skin as a Blender user makes it: Principled BSDF, a random walk below a rough boundary of index 1.4.
 
-    The head's normal map is on it. Cycles has GGX's facets there; what they reflect does not enter.
+    It has the head's normal map. Cycles uses GGX facets here; light that they reflect does not enter.
 
-    colour : (h, w, 3) of the light that comes back from below, linear Rec. 709 [-]
+    colour : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
     radius_mm : (3,) Cycles' radius, 4 pi mean free paths [mm]
     roughness : m [-]
     """
@@ -203,18 +212,18 @@ class PrincipledSkin:
 
 SkinMaterial = Medium | Lambertian | BeckmannSurface | PrincipledSkin
 FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
-"""Our names of Cycles' methods of subsurface scattering."""
+"""Cycles' methods of subsurface scattering by our names."""
 
 
 def describe_scene(
     scene: Scene, medium: SkinMaterial, method: str, size: tuple[int, int]
 ) -> tuple[SceneDict, dict[str, Numbers]]:
-    """Return the contents of scene.json without the passes, and the arrays beside it."""
-    around, panorama = cycles_world(scene.environment)
-    described = {
+    """Return the contents of scene.json without the passes, and the arrays of arrays.npz."""
+    world, panorama = cycles_world(scene.environment)
+    scene_dict = {
         "materials": _materials(scene.head, medium, method),
         "lights": [cycles_lamp(light, number) for number, light in enumerate(scene.lights, start=1)],
-        "world": around,
+        "world": world,
         "camera": cycles_camera(scene),
         "size": list(size),
         "direct": isinstance(medium, Lambertian | BeckmannSurface),
@@ -230,11 +239,11 @@ def describe_scene(
         arrays |= {"uv": mesh.uv, "normal_map": _normal_map(scene.head.maps.normal)}
     if isinstance(medium, PrincipledSkin):
         arrays |= {"uv": mesh.uv, "colour_map": medium.colour}
-    return described, arrays | panorama
+    return scene_dict, arrays | panorama
 
 
 def _normal_map(slopes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return (h, w, 3) normals in tangent space as colours, of slopes (h, w, 2)."""
+    """Return (h, w, 3) tangent-space normals as colours, from slopes (h, w, 2)."""
     normal = np.dstack([-slopes, np.ones(slopes.shape[:2], np.float32)])
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     return np.asarray(0.5 + 0.5 * normal, np.float32)
@@ -253,17 +262,18 @@ def _diffuse_material(colour: Sequence[float]) -> SceneDict:
 
 
 def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
-    """Return skin with the diffuse reflectance of a half-space as colour, 4 pi mean free paths as radius.
+    """Return the skin's material: diffuse reflectance as colour, 4 pi mean free paths as radius.
 
-    Cycles divides radii by 4 pi, and finds the walk's albedo from the colour by a fit whose inverse is
-    `diffuse_albedo` within 1 %, so that its random walk is through this medium; but it enters and leaves as
-    off a Lambertian surface. Its other method is the profile of [ChristensenBurley2015] for the same two. A
-    ball under even light returns its colour within 3 % by the walk, within 0.5 % by the profile.
+    Cycles divides radii by 4 pi, and finds the albedo of its random walk from the colour by a fit whose
+    inverse is `diffuse_albedo` within 1 %, so that the walk is through this medium; but light enters and
+    leaves as off a Lambertian surface. Its other method is the profile of [ChristensenBurley2015] for the
+    same two numbers. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5
+    % by the profile.
     """
     if isinstance(medium, Lambertian):
         return _diffuse_material(medium.albedo)
     if isinstance(medium, BeckmannSurface):
-        # Blender's number is the root of Beckmann's
+        # Blender's roughness is the square root of Beckmann's m.
         return {"method": "FACETS", "roughness": float(np.sqrt(medium.roughness)), "ior": SKIN_ETA}
     if isinstance(medium, PrincipledSkin):
         radius = [part / UNIT_MM for part in medium.radius_mm]
@@ -274,23 +284,23 @@ def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
             "radius": radius,
         }
     if len(medium.layers) != 1:
-        came = f"it has {len(medium.layers)}"
-        refuse(medium.name, "one layer, for Cycles", came, "Take a medium of one layer, such as skin1")
+        actual = f"it has {len(medium.layers)}"
+        refuse(medium.name, "one layer, for Cycles", actual, "Take a medium of one layer, such as skin1")
     (layer,) = medium.layers
-    walk = 4.0 * np.pi * layer.mean_free_path_mm / UNIT_MM
+    radius_cycles = 4.0 * np.pi * layer.mean_free_path_mm / UNIT_MM
     colour = [diffuse_albedo(float(alpha)) for alpha in layer.alpha_prime]
-    return {"method": FALLOFFS[method], "colour": colour, "radius": walk.tolist()}
+    return {"method": FALLOFFS[method], "colour": colour, "radius": radius_cycles.tolist()}
 
 
 def cycles_camera(scene: Scene) -> SceneDict:
     """Return the camera in Cycles' units.
 
-    Raises DermisError for lenses that Cycles has not.
+    Raises DermisError for lenses that Cycles does not support.
     """
     camera = scene.camera
     check_camera(camera, "Cycles")
-    path = np.subtract(camera.target, camera.position)
+    view_direction = np.subtract(camera.target, camera.position)
     return {
-        "to_world": cycles_look_at(camera.position, path, camera.up),
+        "to_world": cycles_look_at(camera.position, view_direction, camera.up),
         "half_tangent": camera.half_tangent,
     }

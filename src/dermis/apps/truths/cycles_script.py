@@ -1,6 +1,6 @@
-"""Renders a described scene with Cycles. Blender's Python runs it by its path: cycles_script.py FOLDER.
+"""Script that renders a described scene with Cycles, run by Blender's Python: cycles_script.py FOLDER.
 
-FOLDER holds scene.json and arrays.npz, written by the module `cycles` beside it. The script adds pass_K.exr
+FOLDER contains scene.json and arrays.npz, written by the module `cycles`. The script adds pass_K.exr
 (radiance and coverage) and finally done.json (Blender's version, times of the passes). It imports nothing of
 dermis, which Blender's Python does not have.
 """
@@ -19,6 +19,7 @@ from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
 
 
 def main(folder: Path) -> None:
+    """Render the scene in a folder and write the passes there."""
     described = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
     with np.load(folder / "arrays.npz") as stored:
         arrays = dict(stored)
@@ -38,6 +39,7 @@ def main(folder: Path) -> None:
 
 
 def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
+    """Add the head's mesh with its materials, normals and uv coordinates."""
     places, corners = arrays["positions"], arrays["triangles"]
     mesh = bpy.data.meshes.new("head")
     mesh.vertices.add(len(places))
@@ -50,7 +52,7 @@ def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
         mesh.materials.append(material)
     mesh.polygons.foreach_set("material_index", arrays["material"])
     if "uv" in arrays:
-        places = arrays["uv"][corners.ravel()] * [1, -1] + [0, 1]  # its first row is the lowest
+        places = arrays["uv"][corners.ravel()] * [1, -1] + [0, 1]  # Blender's first row is the lowest
         mesh.uv_layers.new(name="uv").uv.foreach_set("vector", places.astype(np.float32).ravel())
     mesh.update(calc_edges=True)
     mesh.shade_smooth()
@@ -59,12 +61,13 @@ def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
 
 
 def make_material(described: dict[str, Any], maps: dict[str, Any]) -> Any:
+    """Return the material of a description, with its maps as images."""
     material = bpy.data.materials.new(described["name"])
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     if described["method"] == "FACETS":
-        shader = nodes.new("ShaderNodeBsdfGlass")  # what it lets through ends there: one bounce
+        shader = nodes.new("ShaderNodeBsdfGlass")  # transmitted light is lost, as there is one bounce
         shader.distribution = "BECKMANN"
         shader.inputs["Roughness"].default_value = described["roughness"]
         shader.inputs["IOR"].default_value = described["ior"]
@@ -88,6 +91,7 @@ def make_material(described: dict[str, Any], maps: dict[str, Any]) -> Any:
 
 
 def add_coated(nodes: Any, links: Any, maps: dict[str, Any], described: dict[str, Any]) -> Any:
+    """Return a Principled BSDF with random-walk subsurface scattering and a colour map."""
     shader = nodes.new("ShaderNodeBsdfPrincipled")
     shader.distribution = "GGX"
     shader.subsurface_method = "RANDOM_WALK"
@@ -105,6 +109,7 @@ def add_coated(nodes: Any, links: Any, maps: dict[str, Any], described: dict[str
 
 
 def add_normals(nodes: Any, links: Any, maps: dict[str, Any], shader: Any) -> None:
+    """Connect the normal map, if there is one, to a shader."""
     if "normal_map" not in maps:
         return
     texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeNormalMap")
@@ -115,7 +120,7 @@ def add_normals(nodes: Any, links: Any, maps: dict[str, Any], shader: Any) -> No
 
 
 def packed_image(name: str, rows: Any) -> Any:
-    """Return linear numbers (h, w, 3), the highest row first, as a picture in the file."""
+    """Return an image packed into the file, from linear numbers (h, w, 3) with the top row first."""
     height, width, _ = rows.shape
     image = bpy.data.images.new(name, width, height, float_buffer=True)
     image.colorspace_settings.name = "Non-Color"
@@ -126,6 +131,7 @@ def packed_image(name: str, rows: Any) -> Any:
 
 
 def add_light(described: dict[str, Any]) -> None:
+    """Add a light from its description."""
     light = bpy.data.lights.new("light", described["type"])
     for name, value in described["set"].items():
         setattr(light, name, value)
@@ -135,7 +141,7 @@ def add_light(described: dict[str, Any]) -> None:
 
 
 def paint_stripe(light: Any, stripe: dict[str, Any]) -> None:
-    """Turn a far point of light into a sheet, a Gaussian across and even along, by the ray's direction."""
+    """Shape a distant point light into a stripe by nodes: Gaussian across, constant along its length."""
     light.use_nodes = True
     nodes, links = light.node_tree.nodes, light.node_tree.links
 
@@ -167,6 +173,7 @@ def paint_stripe(light: Any, stripe: dict[str, Any]) -> None:
 
 
 def connected(links: Any, node: Any, inputs: Any) -> Any:
+    """Set or connect the inputs of a node and return its first output."""
     for socket, value in zip(node.inputs, inputs, strict=False):
         if isinstance(value, float):
             socket.default_value = value
@@ -176,6 +183,7 @@ def connected(links: Any, node: Any, inputs: Any) -> Any:
 
 
 def set_world(described: dict[str, Any], panorama: Any) -> None:
+    """Set a constant environment, or a panorama with its rotation."""
     world = bpy.data.worlds.new("world")
     bpy.context.scene.world = world
     world.use_nodes = True
@@ -194,6 +202,7 @@ def set_world(described: dict[str, Any], panorama: Any) -> None:
 
 
 def set_camera(described: dict[str, Any]) -> None:
+    """Add the camera and make it the active one."""
     camera = bpy.data.cameras.new("camera")
     camera.sensor_fit = "VERTICAL"
     camera.sensor_height = 24.0
@@ -205,6 +214,7 @@ def set_camera(described: dict[str, Any]) -> None:
 
 
 def set_render(described: dict[str, Any]) -> None:
+    """Set the size, the file format and the settings of Cycles."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = described["size"]
@@ -218,14 +228,14 @@ def set_render(described: dict[str, Any]) -> None:
     cycles.device = "CPU"
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.pixel_filter_type = "BOX"
-    # Its defaults trade a biased, darker image for less noise.
+    # The defaults give less noise but a biased, darker image.
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.light_sampling_threshold = 0.0
     if described["direct"]:
         cycles.max_bounces = 0
 
 
 def render(path: Path, samples: int, seed: int) -> tuple[float, float]:
-    """Render, and return the seconds by the clock and of all cores together."""
+    """Render, and return the elapsed time and the CPU time of all cores [s]."""
     cycles = bpy.context.scene.cycles
     cycles.samples, cycles.seed = samples, seed
     bpy.context.scene.render.filepath = str(path)
@@ -235,6 +245,7 @@ def render(path: Path, samples: int, seed: int) -> tuple[float, float]:
 
 
 def add_object(name: str, data: Any) -> Any:
+    """Return a new object of the scene with this data."""
     made = bpy.data.objects.new(name, data)
     bpy.context.collection.objects.link(made)
     return made

@@ -1,4 +1,4 @@
-"""Reflection of an index-matched half-space that scatters isotropically, in closed form."""
+"""Closed-form reflection of an index-matched, isotropically scattering half-space."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ _ITERATIONS = 500
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
-    """Return Chandrasekhar's H at cosines to the normal, of their shape [-].
+    """Return Chandrasekhar's H function at cosines to the normal, in their shape [-].
 
-    albedo : of single scattering, below 1 [-]
+    albedo : single-scattering albedo, below 1 [-]
 
-    Source: [Chandrasekhar1960] section 38; its form without cancellation, iterated on Gaussian nodes.
+    Source: [Chandrasekhar1960] section 38, in its form without cancellation, iterated on Gaussian nodes.
     """
     if not 0.0 <= albedo < 1.0:
-        refuse("half-space", "an albedo from 0 to below 1", f"{albedo:g} came", "Correct it")
+        refuse("half-space", "an albedo from 0 to below 1", f"got {albedo:g}", "Correct it")
     mu, weight = _gauss_legendre()
-    kernel, rest = 0.5 * albedo * weight * mu, np.sqrt(1.0 - albedo)
+    kernel, root = 0.5 * albedo * weight * mu, np.sqrt(1.0 - albedo)
     H = np.ones(_NODE_COUNT)
     for _ in range(_ITERATIONS):
-        H = 0.5 * (H + 1.0 / (rest + (kernel * H / (mu[:, None] + mu)).sum(axis=1)))
-    at = np.asarray(cosine, np.float64)[..., None]
-    return np.asarray(1.0 / (rest + (kernel * H / (at + mu)).sum(axis=-1)))
+        H = 0.5 * (H + 1.0 / (root + (kernel * H / (mu[:, None] + mu)).sum(axis=1)))
+    mu_out = np.asarray(cosine, np.float64)[..., None]
+    return np.asarray(1.0 / (root + (kernel * H / (mu_out + mu)).sum(axis=-1)))
 
 
 def directional_albedo(cosine: ArrayLike, albedo: float) -> Floats:
-    """Return share of the light from a direction that is reflected, by the cosine of that direction [-]."""
+    """Return the reflectance for light from one direction, by the cosine of its angle to the normal [-]."""
     return np.asarray(1.0 - np.sqrt(1.0 - albedo) * h_function(cosine, albedo))
 
 
 def diffuse_albedo(albedo: float) -> float:
-    """Return the share of uniform light from all directions that is reflected [-]."""
+    """Return the reflectance for uniform light from all directions [-]."""
     mu, weight = _gauss_legendre()
     return float((2.0 * weight * mu * directional_albedo(mu, albedo)).sum())
 
 
 def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
-    """Return the radiance over the irradiance of parallel light, by the cosines of light and view [1/sr].
+    """Return reflected radiance over the irradiance of parallel light, by cosines of light and view [1/sr].
 
     Source: [Chandrasekhar1960] section 33: S / (4 pi cos_in cos_out).
     """
@@ -52,6 +52,6 @@ def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: floa
 
 
 def _gauss_legendre() -> tuple[Floats, Floats]:
-    """Return nodes and weights on [0, 1]."""
+    """Return nodes and weights of Gauss-Legendre quadrature on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODE_COUNT)
     return 0.5 * (nodes + 1.0), 0.5 * weights

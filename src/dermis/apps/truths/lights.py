@@ -1,4 +1,4 @@
-"""The scene's lights as Mitsuba and as Cycles have them; places are in mm from the head's centre."""
+"""Lights of a scene as Mitsuba and Cycles describe them; positions are in mm from the head's centre."""
 
 from __future__ import annotations
 
@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.scene_description import UNIT_MM, SceneDict, Mitsuba, camera_axes, cycles_light, mitsuba_look_at, mitsuba_projector, mitsuba_shape, rgb
+from dermis.apps.truths.scene_description import (
+    UNIT_MM,
+    Mitsuba,
+    SceneDict,
+    camera_axes,
+    cycles_light,
+    mitsuba_look_at,
+    mitsuba_projector,
+    mitsuba_shape,
+    rgb,
+)
 from dermis.base.errors import refuse
 from dermis.base.registry import Registry
 from dermis.scene.lights import (
@@ -22,12 +32,12 @@ from dermis.scene.lights import (
 )
 
 Floats = NDArray[np.float64]
-_DISTANT_MM = 2e5
-"""Distance of what stands for parallel light: irradiance changes by 0.1 % in 100 mm, and single precision
-places a stripe within 0.02 mm."""
+_FAR_MM = 2e5
+"""Distance of the source of nearly parallel light: irradiance changes by 0.1 % in 100 mm, and a stripe is
+positioned within 0.02 mm in single precision."""
 _SPOT_TEXELS = 1024
-_STRIPE_HALF_EXTENT = 1.25  # widths to each side: there the Gaussian is 4e-6
-_STRIPE_TEXELS = 40, 64  # least across a width and along the length
+_STRIPE_HALF_EXTENT = 1.25  # in widths; the Gaussian is 4e-6 there
+_STRIPE_TEXELS = 40, 64  # least number across a width and along the length
 _MAX_STRIPE_TEXELS = 2**23
 
 
@@ -35,65 +45,65 @@ def mitsuba_emitter(mi: Mitsuba, light: Light, number: int) -> SceneDict:
     """Return Mitsuba's description of a light.
 
     mi : the module, with a variant set
-    number : the light's place in the scene, for messages
+    number : index of the light in the scene, for messages
 
-    Raises DermisError for a light without shadows, which a path tracer has not, and for an unknown kind: a
-    truth approximates nothing.
+    Raises DermisError for a light without shadows, which a path tracer does not support, and for an unknown
+    kind: references use no approximations.
     """
     _check_shadows(light, number, "path tracing")
     return MITSUBA[light.kind](mi, light, f"light {number}")
 
 
 def cycles_lamp(light: Light, number: int) -> SceneDict:
-    """Return Cycles' description of a light, in its units."""
+    """Return Cycles' description of a light, in Cycles' units."""
     _check_shadows(light, number, "Cycles")
     return CYCLES[light.kind](light)
 
 
-def _check_shadows(light: Light, number: int, judge: str) -> None:
+def _check_shadows(light: Light, number: int, renderer: str) -> None:
     if not light.shadows:
-        remedy = "Set shadows = true"
-        refuse(f"light {number}", f"a light with shadows, for {judge}", "it has shadows = false", remedy)
+        advice = "Set shadows = true"
+        refuse(f"light {number}", f"a light with shadows, for {renderer}", "it has shadows = false", advice)
 
 
-def mitsuba_point(mi: Mitsuba, light: PointLight, called: str) -> SceneDict:
+def mitsuba_point(mi: Mitsuba, light: PointLight, label: str) -> SceneDict:
     """Return Mitsuba's point light."""
     intensity = np.multiply(light.irradiance, _distance(light) ** 2)
     return {"type": "point", "position": list(light.position), "intensity": rgb(intensity)}
 
 
-def mitsuba_spot(mi: Mitsuba, light: SpotLight, called: str) -> SceneDict:
-    """Return a projector: Mitsuba's own spot fades evenly in the angle, ours smoothly in its cosine."""
-    steepest = np.tan(np.radians(light.outer_degrees))
-    along = steepest * ((np.arange(_SPOT_TEXELS) + 0.5) / _SPOT_TEXELS * 2.0 - 1.0)
+def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
+    """Return a projector with the smooth edge of our spot light, which Mitsuba's spot does not have."""
+    tangent = np.tan(np.radians(light.outer_degrees))
+    along = tangent * ((np.arange(_SPOT_TEXELS) + 0.5) / _SPOT_TEXELS * 2.0 - 1.0)
     cosine = 1.0 / np.sqrt(1.0 + along[:, None] ** 2 + along[None, :] ** 2)
     outer, inner = (np.cos(np.radians(a)) for a in (light.outer_degrees, light.inner_degrees))
-    share = _smoothstep((cosine - outer) / (inner - outer))
-    slide = share[..., None] * np.multiply(light.irradiance, _distance(light) ** 2)
-    return mitsuba_projector(mi, slide, cosine, mitsuba_look_at(mi, light.position, light.target), steepest)
+    falloff = _smoothstep((cosine - outer) / (inner - outer))
+    slide = falloff[..., None] * np.multiply(light.irradiance, _distance(light) ** 2)
+    return mitsuba_projector(mi, slide, cosine, mitsuba_look_at(mi, light.position, light.target), tangent)
 
 
-def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, called: str) -> SceneDict:
-    """Return an area light of even radiance."""
+def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDict:
+    """Return a rectangle of uniform radiance."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
     to_world = mitsuba_look_at(mi, light.position, light.target).scale(sides)
-    given = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
-    return mitsuba_shape("rectangle", np.divide(light.irradiance, given), to_world=to_world)
+    unit = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
+    return mitsuba_shape("rectangle", np.divide(light.irradiance, unit), to_world=to_world)
 
 
-def mitsuba_sphere(mi: Mitsuba, light: SphereLight, called: str) -> SceneDict:
-    """Return an area light of even radiance."""
-    given = np.pi * (light.radius_mm / _distance(light)) ** 2
+def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
+    """Return a sphere of uniform radiance."""
+    unit = np.pi * (light.radius_mm / _distance(light)) ** 2
     return mitsuba_shape(
         "sphere",
-        np.divide(light.irradiance, given),
+        np.divide(light.irradiance, unit),
         center=[float(c) for c in light.position],
         radius=float(light.radius_mm),
     )
 
 
-def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, called: str) -> SceneDict:
-    """Return Mitsuba's directional light, or a far disc for a sun of some width."""
+def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, label: str) -> SceneDict:
+    """Return Mitsuba's directional light, or a distant disc for a light with an angular diameter."""
     if light.angle_degrees == 0:
         return {
             "type": "directional",
@@ -102,30 +112,30 @@ def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, called: str) -> Sc
         }
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
     half = 0.5 * np.radians(light.angle_degrees)
-    to_world = mitsuba_look_at(mi, -_DISTANT_MM * direction, (0.0, 0.0, 0.0)).scale(float(_DISTANT_MM * np.tan(half)))
+    to_world = mitsuba_look_at(mi, -_FAR_MM * direction, (0.0, 0.0, 0.0)).scale(float(_FAR_MM * np.tan(half)))
     return mitsuba_shape("disk", np.divide(light.irradiance, np.pi * np.sin(half) ** 2), to_world=to_world)
 
 
-def mitsuba_stripe(mi: Mitsuba, light: StripeLight, called: str) -> SceneDict:
-    """Return a far slide projector with the stripe as its slide."""
+def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
+    """Return a distant slide projector with the stripe as its slide."""
     width, length = light.width_mm, light.length_mm
     size = np.array([2.0 * _STRIPE_HALF_EXTENT * width, length])
     texel = min(width / _STRIPE_TEXELS[0], length / _STRIPE_TEXELS[1])
     texel = max(texel, float(np.sqrt(size.prod() / _MAX_STRIPE_TEXELS)))
     if width < 10.0 * texel:
-        came = f"it is {length:g} mm long and {width:g} mm wide"
-        refuse(called, "a stripe less slender, for path tracing", came, "Shorten it")
+        actual = f"it is {length:g} mm long and {width:g} mm wide"
+        refuse(label, "a stripe less slender, for path tracing", actual, "Shorten it")
     columns, rows = np.ceil(size / texel).astype(int)
-    # The slide's texels are square: what the rounding adds is dark.
+    # The slide's texels are square; those added by rounding up are dark.
     across = ((np.arange(columns) + 0.5) - 0.5 * columns) * texel / (0.5 * width)
     along = ((np.arange(rows) + 0.5) - 0.5 * rows) * texel / (0.5 * length)
     with np.errstate(under="ignore"):
         profile = np.exp(-2.0 * across**2)
-    share = (1.0 - _smoothstep((np.abs(along) - 0.95) / 0.05))[:, None] * profile[None, :]
-    slide = share[..., None] * np.multiply(light.irradiance, _DISTANT_MM**2)
+    falloff = (1.0 - _smoothstep((np.abs(along) - 0.95) / 0.05))[:, None] * profile[None, :]
+    slide = falloff[..., None] * np.multiply(light.irradiance, _FAR_MM**2)
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
-    to_world = mitsuba_look_at(mi, light.position - _DISTANT_MM * direction, light.position, light.up)
-    return mitsuba_projector(mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _DISTANT_MM)
+    to_world = mitsuba_look_at(mi, light.position - _FAR_MM * direction, light.position, light.up)
+    return mitsuba_projector(mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _FAR_MM)
 
 
 def cycles_point(light: PointLight) -> SceneDict:
@@ -134,7 +144,7 @@ def cycles_point(light: PointLight) -> SceneDict:
 
 
 def cycles_spot(light: SpotLight) -> SceneDict:
-    """Return a spot light, whose cone fades in its cosine, as ours."""
+    """Return a spot light, whose edge falls off smoothly in the cosine, like ours."""
     inner, outer = (float(np.cos(np.radians(a))) for a in (light.inner_degrees, light.outer_degrees))
     size, blend = 2.0 * np.radians(light.outer_degrees), (inner - outer) / (1.0 - outer)
     return _cycles_point_light("SPOT", light, spot_size=size, spot_blend=blend)
@@ -148,43 +158,45 @@ def cycles_sphere(light: SphereLight) -> SceneDict:
 def cycles_rectangle(light: RectangleLight) -> SceneDict:
     """Return an area light, whose power P gives a surface A the radiance P / pi A."""
     width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
-    given = facing_irradiance(light.width_mm, light.height_mm, _distance(light)) / (np.pi * width * height)
-    path = np.subtract(light.target, light.position)
+    unit = facing_irradiance(light.width_mm, light.height_mm, _distance(light)) / (np.pi * width * height)
+    to_target = np.subtract(light.target, light.position)
     shape: dict[str, float | str] = {"shape": "RECTANGLE", "size": width, "size_y": height}
-    return cycles_light("AREA", light.irradiance, 1.0 / given, light.position, path, **shape)
+    return cycles_light("AREA", light.irradiance, 1.0 / unit, light.position, to_target, **shape)
 
 
 def cycles_directional(light: DirectionalLight) -> SceneDict:
-    """Return a sun, as wide as the light's source."""
+    """Return a sun with the light's angular diameter."""
     angle = float(np.radians(light.angle_degrees))
     return cycles_light("SUN", light.irradiance, 1.0, (0, 0, 0), light.direction, angle=angle)
 
 
 def cycles_stripe(light: StripeLight) -> SceneDict:
-    """Return a far point, on whose light the script paints the stripe."""
+    """Return a distant point light, which the script shapes into a stripe by nodes."""
     across, along, forward = camera_axes(light.direction, light.up)
-    power = 4.0 * np.pi * (_DISTANT_MM / UNIT_MM) ** 2
-    place = light.position - _DISTANT_MM * forward
-    described = cycles_light("POINT", light.irradiance, power, place, light.direction, shadow_soft_size=0.0)
+    power = 4.0 * np.pi * (_FAR_MM / UNIT_MM) ** 2
+    light_position = light.position - _FAR_MM * forward
+    light_dict = cycles_light(
+        "POINT", light.irradiance, power, light_position, light.direction, shadow_soft_size=0.0
+    )
     axes = {
         "forward": (-forward).tolist(),
         "across": (across / (0.5 * light.width_mm)).tolist(),
         "along": (along / (0.5 * light.length_mm)).tolist(),
     }
-    return described | {"stripe": {**axes, "distance": _DISTANT_MM}}
+    return light_dict | {"stripe": {**axes, "distance": _FAR_MM}}
 
 
-def _cycles_point_light(kind: str, light: PointLight, *, radius_mm: float = 0.0, **given: float) -> SceneDict:
+def _cycles_point_light(kind: str, light: PointLight, *, radius_mm: float = 0.0, **unit: float) -> SceneDict:
     power = 4.0 * np.pi * (_distance(light) / UNIT_MM) ** 2
-    path = np.subtract(light.target, light.position)
+    to_target = np.subtract(light.target, light.position)
     round_light = {"shadow_soft_size": radius_mm / UNIT_MM, "use_soft_falloff": False}
-    return cycles_light(kind, light.irradiance, power, light.position, path, **round_light, **given)
+    return cycles_light(kind, light.irradiance, power, light.position, to_target, **round_light, **unit)
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
-    """Return the irradiance from a rectangle of radiance 1 on a surface opposite its middle [-].
+    """Return the irradiance from a rectangle of radiance 1 on a parallel surface opposite its centre [-].
 
-    Source: the view factor of a corner, [Baum1989].
+    Source: view factor from a corner, [Baum1989].
     """
     a, b = 0.5 * width / distance, 0.5 * height / distance
     across, along = np.hypot(1.0, a), np.hypot(1.0, b)
@@ -200,7 +212,7 @@ def _smoothstep(t: Floats) -> Floats:
     return x * x * (3.0 - 2.0 * x)
 
 
-# Any: each function takes its own kind of light.
+# Any, because each function has a parameter of its own kind of light.
 MITSUBA: Registry[Callable[[Mitsuba, Any, str], SceneDict]] = Registry(
     "light of Mitsuba",
     {
@@ -213,8 +225,8 @@ MITSUBA: Registry[Callable[[Mitsuba, Any, str], SceneDict]] = Registry(
     },
     f"Leave the light out, or register in {__name__}.MITSUBA what stands for it",
 )
-"""What describes a kind of light for Mitsuba, given its module with a variant set, the light and its name for
-messages."""
+"""Functions that describe a kind of light for Mitsuba, from its module with a variant set, the light and its
+name for messages."""
 
 CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
     "light of Cycles",
@@ -228,4 +240,4 @@ CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
     },
     f"Leave the light out, or register in {__name__}.CYCLES what stands for it",
 )
-"""What describes a kind of light for Cycles: its type, its fields, and where it stands."""
+"""Functions that describe a kind of light for Cycles: its type, fields and transform."""

@@ -1,4 +1,4 @@
-"""How far a picture is from the truth: relative error free of the truth's noise, energy, FLIP, and where."""
+"""Difference of an image from a reference: relative error without noise, energy ratio, FLIP."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.base.errors import refuse
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 from dermis.images.colour import encode_srgb
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 PIXELS_PER_DEGREE = 67.0
-"""FLIP's own default: a 4K screen 0.7 m wide, seen from 0.7 m."""
+"""FLIP's default: a 4K screen 0.7 m wide, seen from 0.7 m."""
 MID_GREY = 0.5
-"""sRGB of no difference, near the middle of the scale of lightness (L* 53)."""
+"""sRGB value of no difference, near the middle of lightness (L* 53)."""
 
 
 class Estimate(NamedTuple):
-    """A number and its standard error, 0 where the truth has no noise."""
+    """Estimate with its standard error, 0 where the reference has no noise."""
 
     value: float
     standard_error: float
@@ -30,11 +30,11 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Flip:
-    """Perceived difference, 0 to 1.
+    """Perceived difference by FLIP, 0 to 1.
 
-    mean : over the mask
+    mean : mean over the mask
     error : (h, w) 0 outside the mask
-    pixels_per_degree : resolution of the picture as seen
+    pixels_per_degree : assumed resolution at the eye
     """
 
     mean: float
@@ -44,36 +44,42 @@ class Flip:
 
 def relative_rmse(
     image: ArrayLike,
-    truth: ArrayLike,
+    reference: ArrayLike,
     mask: Mask | None = None,
     variance: ArrayLike | None = None,
     image_variance: ArrayLike | None = None,
 ) -> Estimate:
-    """Return the root of squared differences over the truth's squares, free of the truth's noise [-].
+    """Return the relative root mean square error, corrected for the noise of the reference [-].
 
-    image, truth : (h, w) or (h, w, c) linear; the channels count together
-    mask : (h, w) pixels that count
-    variance : of each value of `truth`, an unbiased estimate: that of its samples over their number
-    image_variance : the same of the image, whose noise is then removed too
+    It is the root of the sum of squared differences over the sum of the reference's squares.
 
-    With truth T = t + n, noise n of mean 0 and variance s², and difference D = I - T, the mean of D² is that
-    of (I - t)² plus s², and of T² that of t² plus s²; so E = sum(D² - s²) / sum(T² - s²) is free of noise.
-    A pixel moves E by U = D² - s² - E (T² - s²), whose random part is -2 n (I - t + E t) + (1 - E)(n² - s²).
-    For normal n its variance is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴, with the unbiased estimate
-    4 s² (D + E T)² - 2 (1 - E)² s⁴. Skewed noise is removed as well, but makes this standard error too small,
-    by 7 to 16 % for means of 64 exponential samples. Pixels are independent; channels may share paths, so
-    their deviations are added, which is at most sqrt(c) too much. The root's standard error is the larger
-    distance to sqrt(E ± error of E), or to 0.
+    image, reference : (h, w) or (h, w, c) linear; the channels count together
+    mask : (h, w) pixels to compare
+    variance : of each value of `reference`, an unbiased estimate: that of its samples over their number
+    image_variance : the same for the image, whose noise is then removed too
 
-    An image's own noise of variance v adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of U's
-    variance. Only the first term is counted, because few passes estimate v² badly: the standard error is too
-    large rather than too small.
+    With reference T = t + n, noise n of mean 0 and variance s², and difference D = I - T, the mean of D² is
+    that of (I - t)² plus s², and of T² that of t² plus s²; so E = sum(D² - s²) / sum(T² - s²) is free of
+    noise. A pixel contributes U = D² - s² - E (T² - s²) to the error of E; its random part is -2 n (I - t + E
+    t) + (1 - E)(n² - s²). For normal n its variance is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴, with the unbiased
+    estimate 4 s² (D + E T)² - 2 (1 - E)² s⁴. Skewed noise is removed as well, but makes this standard error
+    too small, by 7 to 16 % for means of 64 exponential samples. Pixels are independent; channels may share
+    paths, so their deviations are added, which is at most sqrt(c) too much. The root's standard error is the
+    larger distance to sqrt(E ± error of E), or to 0.
+
+    Noise of variance v in the image adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of U's variance.
+    Only the first term is counted, because few passes estimate v² badly: the standard error is then too large
+    rather than too small.
     """
-    I, T, s2 = _masked_pixels(image, truth, mask, variance)
-    v = np.zeros_like(I) if image_variance is None else _masked_pixels(image, truth, mask, image_variance)[2]
+    I, T, s2 = _masked_pixels(image, reference, mask, variance)
+    v = (
+        np.zeros_like(I)
+        if image_variance is None
+        else _masked_pixels(image, reference, mask, image_variance)[2]
+    )
     D, energy = I - T, float((T**2 - s2).sum())
     if energy <= 0:
-        refuse("relative error", "a truth that is brighter than its noise", "it is not", "Trace more paths")
+        refuse("relative error", "a reference brighter than its noise", "it is not", "Trace more paths")
     E = float((D**2 - s2 - v).sum()) / energy
     U = 4 * s2 * (D + E * T) ** 2 - 2 * (1 - E) ** 2 * s2**2 + 4 * v * D**2
     error = _sum_standard_error(U) / energy
@@ -83,78 +89,80 @@ def relative_rmse(
 
 
 def energy_ratio(
-    image: ArrayLike, truth: ArrayLike, mask: Mask | None = None, variance: ArrayLike | None = None
+    image: ArrayLike, reference: ArrayLike, mask: Mask | None = None, variance: ArrayLike | None = None
 ) -> Estimate:
-    """Return the sum of the image over sum of the truth [-]; arguments as of `relative_rmse`.
+    """Return the sum of the image over the sum of the reference [-]; parameters as in `relative_rmse`.
 
-    The ratio's relative error is that of the truth's sum, whose variance is the sum of the variances;
+    The ratio's relative error is that of the reference's sum, whose variance is the sum of the variances;
     channels may share paths, so their deviations are added.
     """
-    I, T, s2 = _masked_pixels(image, truth, mask, variance)
+    I, T, s2 = _masked_pixels(image, reference, mask, variance)
     total = float(T.sum())
     if total <= 0:
-        refuse("energy ratio", "a truth with light in it", "its sum is not above 0", "Check the mask")
+        refuse("energy ratio", "a reference with light in it", "its sum is not above 0", "Check the mask")
     ratio = float(I.sum()) / total
     return Estimate(ratio, abs(ratio) * _sum_standard_error(s2) / total)
 
 
 def _sum_standard_error(variance: Floats) -> float:
-    """Return an upper bound of the deviation of a sum of pixels (n, c) with correlated channels."""
+    """Return an upper bound of the standard error of a sum of pixels (n, c) with correlated channels."""
     return float(np.sqrt(np.maximum(variance.sum(axis=0), 0)).sum())
 
 
 def _masked_pixels(
-    image: ArrayLike, truth: ArrayLike, mask: Mask | None, variance: ArrayLike | None
+    image: ArrayLike, reference: ArrayLike, mask: Mask | None, variance: ArrayLike | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return image, truth and variance of the pixels that count, each (n, c)."""
-    I, T = np.asarray(image, np.float64), np.asarray(truth, np.float64)
+    """Return image, reference and variance of the pixels in the mask, each (n, c)."""
+    I, T = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     s2 = np.zeros_like(T) if variance is None else np.asarray(variance, np.float64)
     if I.shape != T.shape or s2.shape != T.shape or I.ndim not in (2, 3):
-        came = f"{I.shape}, {T.shape} and {s2.shape} came"
-        refuse("metrics", "image, truth and variance of one shape, (h, w) or (h, w, c)", came, "Align them")
-    counted = _checked_mask(mask, T.shape[:2])
-    I, T, s2 = (values.reshape(*T.shape[:2], -1)[counted] for values in (I, T, s2))
+        actual = f"got {I.shape}, {T.shape} and {s2.shape}"
+        refuse(
+            "metrics", "image, reference and variance of one shape, (h, w) or (h, w, c)", actual, "Align them"
+        )
+    is_counted = _checked_mask(mask, T.shape[:2])
+    I, T, s2 = (values.reshape(*T.shape[:2], -1)[is_counted] for values in (I, T, s2))
     if not (np.isfinite(I).all() and np.isfinite(T).all() and np.isfinite(s2).all() and (s2 >= 0).all()):
-        refuse("metrics", "finite values and variances of 0 or more", "others came", "Mask them out")
+        refuse("metrics", "finite values and variances of 0 or more", "got others", "Mask them out")
     return I, T, s2
 
 
 def _checked_mask(mask: Mask | None, shape: tuple[int, ...]) -> Mask:
-    counted = np.ones(shape, bool) if mask is None else np.asarray(mask, bool)
-    if counted.shape != shape or not counted.any():
-        came = f"{counted.shape} with {int(counted.sum())} pixels came"
-        refuse("mask", f"one of {shape} with at least one pixel", came, "Correct it")
-    return counted
+    is_counted = np.ones(shape, bool) if mask is None else np.asarray(mask, bool)
+    if is_counted.shape != shape or not is_counted.any():
+        actual = f"got {is_counted.shape} with {int(is_counted.sum())} pixels"
+        refuse("mask", f"one of {shape} with at least one pixel", actual, "Correct it")
+    return is_counted
 
 
 def flip(
     image: ArrayLike,
-    truth: ArrayLike,
+    reference: ArrayLike,
     mask: Mask | None = None,
     pixels_per_degree: float = PIXELS_PER_DEGREE,
     high_dynamic_range: bool = False,
 ) -> Flip:
-    """FLIP of two pictures (h, w, 3).
+    """Return the FLIP error of a picture (h, w, 3) against a reference.
 
-    image, truth : sRGB in 0..1 as shown, after exposure and tone curve; with `high_dynamic_range` linear
-        Rec. 709 of 0 or more, judged at all exposures that suit the truth
-    mask : (h, w) pixels that count; elsewhere the image is taken to equal the truth
-    pixels_per_degree : resolution of the picture as seen
+    image, reference : sRGB in 0..1 as displayed, after exposure and tone curve; with `high_dynamic_range`
+        linear Rec. 709 of 0 or more, compared at all exposures that suit the reference
+    mask : (h, w) pixels to compare; elsewhere the image is set to the reference
+    pixels_per_degree : assumed resolution at the eye
 
     Raises DermisError when the package flip-evaluator is not installed.
 
     Source: [Andersson2020], and [Andersson2021] for high dynamic range.
     """
-    evaluator = needed("flip_evaluator", "FLIP")
-    T = _checked_picture(truth, high_dynamic_range)
-    counted = _checked_mask(mask, T.shape[:2])
-    I = np.where(counted[..., None], _checked_picture(image, high_dynamic_range, T.shape), T)
+    evaluator = import_extra("flip_evaluator", "FLIP")
+    T = _checked_picture(reference, high_dynamic_range)
+    is_counted = _checked_mask(mask, T.shape[:2])
+    I = np.where(is_counted[..., None], _checked_picture(image, high_dynamic_range, T.shape), T)
     mode = "HDR" if high_dynamic_range else "LDR"
     viewing = {"ppd": float(pixels_per_degree)}
     arrays = (np.ascontiguousarray(T), np.ascontiguousarray(I))
     error, _, _ = evaluator.evaluate(*arrays, mode, not high_dynamic_range, False, False, viewing)
-    error = np.where(counted, error[..., 0], np.float32(0))
-    return Flip(float(error[counted].mean(dtype=np.float64)), error, float(pixels_per_degree))
+    error = np.where(is_counted, error[..., 0], np.float32(0))
+    return Flip(float(error[is_counted].mean(dtype=np.float64)), error, float(pixels_per_degree))
 
 
 def _checked_picture(
@@ -162,28 +170,28 @@ def _checked_picture(
 ) -> NDArray[np.float32]:
     values = np.asarray(picture, np.float32)
     if values.ndim != 3 or values.shape[2] != 3 or (shape is not None and values.shape != shape):
-        refuse("flip", f"two pictures of {shape or '(h, w, 3)'}", f"{values.shape} came", "Align them")
+        refuse("flip", f"two pictures of {shape or '(h, w, 3)'}", f"got {values.shape}", "Align them")
     highest = np.inf if high_dynamic_range else 1.0
     if not (np.isfinite(values).all() and values.min() >= 0 and values.max() <= highest):
         expected = "finite values of 0 or more" if high_dynamic_range else "sRGB values of 0 to 1"
-        came = f"they go from {values.min():.4g} to {values.max():.4g}"
-        refuse("flip", expected, came, "Tone-map and encode the picture first, or clip it")
+        actual = f"they go from {values.min():.4g} to {values.max():.4g}"
+        refuse("flip", expected, actual, "Tone-map and encode the picture first, or clip it")
     return values
 
 
-def signed_difference(image: ArrayLike, truth: ArrayLike, gain: float = 4.0) -> Floats:
-    """Return an sRGB picture (h, w, 3) of image minus truth, with mid-grey for no difference.
+def signed_difference(image: ArrayLike, reference: ArrayLike, gain: float = 4.0) -> Floats:
+    """Return an sRGB picture (h, w, 3) of image minus reference, mid-grey where they are equal.
 
-    image, truth : (h, w, 3) linear Rec. 709 of 0 or more; 1 is white
-    gain : of the difference of sRGB values, whose steps look about even
+    image, reference : (h, w, 3) linear Rec. 709 of 0 or more; 1 is white
+    gain : factor of the difference of sRGB values, whose steps look about even
     """
-    I, T = np.asarray(image, np.float64), np.asarray(truth, np.float64)
+    I, T = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     if I.shape != T.shape or I.ndim != 3 or I.shape[2] != 3:
-        came = f"{I.shape} and {T.shape} came"
-        refuse("difference", "two pictures of one shape (h, w, 3)", came, "Align them")
+        actual = f"got {I.shape} and {T.shape}"
+        refuse("difference", "two pictures of one shape (h, w, 3)", actual, "Align them")
     if not (np.isfinite(I).all() and np.isfinite(T).all()):
-        refuse("difference", "finite values", "others came", "Mask them out")
+        refuse("difference", "finite values", "got others", "Mask them out")
     if not gain > 0:
-        refuse("gain", "a number above 0", f"{gain} came", "4 shows what the eye can just see")
+        refuse("gain", "a number above 0", f"got {gain}", "4 shows what the eye can just see")
     difference = encode_srgb(np.maximum(I, 0)) - encode_srgb(np.maximum(T, 0))
     return np.clip(MID_GREY + gain * difference, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Closed surfaces around a scattering medium: a head's skin with its openings shut, moved inwards."""
+"""Closed surfaces around a scattering medium: the skin with its openings closed, offset inwards."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from dermis.mesh.mesh import Mesh
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int32]
-_MIN_DEPTH_MM = 0.05  # of a body of volume V and surface A: 3 V / A, a ball's radius
+_MIN_DEPTH_MM = 0.05  # 3 V / A of a body of volume V and surface A; the radius of a ball
 _MAX_FOLDED = 0.02
 
 
 @dataclass(frozen=True)
 class ClosedSurface:
-    """A closed surface.
+    """Closed surface of triangles.
 
     positions : (p, 3) [mm]
-    triangles : (f, 3)
-    caps, cap_area : number of openings that were shut, and the area that this added [mm2]
+    triangles : (f, 3) vertex indices
+    caps, cap_area : number of openings that were closed, and the area that this added [mm2]
     """
 
     positions: Floats
@@ -33,49 +33,51 @@ class ClosedSurface:
     cap_area: float = 0.0
 
 
-def closed_skin(mesh: Mesh, culprit: str) -> ClosedSurface:
-    """Return the welded skin of a mesh, each opening shut by a fan of triangles around its middle.
+def closed_skin(mesh: Mesh, name: str) -> ClosedSurface:
+    """Return the welded skin of a mesh, each opening closed by a triangle fan around its centroid.
 
-    culprit : the head's name, for messages
+    name : of the head, for messages
 
     Raises DermisError when it encloses no volume: a single sheet, or a surface turned inside out.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     if not skin.any():
-        refuse(culprit, "skin to trace", "all of its groups are opaque", "Leave a group out of opaque")
+        refuse(name, "skin to trace", "all of its groups are opaque", "Leave a group out of opaque")
     used, triangles = np.unique(mesh.point[mesh.triangles[skin]], return_inverse=True)
-    solid = _close_openings(mesh.points_mm[used].astype(np.float32), triangles.reshape(-1, 3).astype(np.int32))
+    solid = _close_openings(
+        mesh.points_mm[used].astype(np.float32), triangles.reshape(-1, 3).astype(np.int32)
+    )
     corners = solid.positions[solid.triangles].astype(np.float64)
     depth = 3.0 * _enclosed_volume(corners) / float(triangle_areas(corners).sum())
     if depth < _MIN_DEPTH_MM:
-        came = "it is a sheet or inside out" if depth < 0.0 else f"it is {depth:.2g} mm deep in the mean"
-        refuse(culprit, "a surface with a volume behind it", came, "Close it, or turn its triangles round")
+        actual = "it is a sheet or inside out" if depth < 0.0 else f"it is {depth:.2g} mm deep in the mean"
+        refuse(name, "a surface with a volume behind it", actual, "Close it, or turn its triangles round")
     return solid
 
 
-def offset_inwards(solid: ClosedSurface, depth_mm: Doubles, culprit: str) -> tuple[ClosedSurface, float]:
-    """Move a surface inwards by a depth at each point; return it and the share that folds over.
+def offset_inwards(solid: ClosedSurface, depth_mm: Doubles, name: str) -> tuple[ClosedSurface, float]:
+    """Return a surface offset inwards by a depth at each point, and the fraction of it that folds over.
 
     depth_mm : (p,) negative for outwards
 
     Raises DermisError when more than 2 % of the surface folds over, or no volume is left. It does not notice
     thin parts whose two sides pass through one another: none may be thinner than twice the depth.
     """
-    moved = (solid.positions - depth_mm[:, None] * _mitre_vectors(solid)).astype(np.float32)
-    before, after = (_area_vectors(places[solid.triangles]) for places in (solid.positions, moved))
+    shifted = (solid.positions - depth_mm[:, None] * _mitre_vectors(solid)).astype(np.float32)
+    before, after = (_area_vectors(vertices[solid.triangles]) for vertices in (solid.positions, shifted))
     area = np.linalg.norm(before, axis=1)
     folded = float(area[(before * after).sum(axis=1) <= 0.0].sum() / area.sum())
-    empty = _enclosed_volume(moved[solid.triangles].astype(np.float64)) <= 0.0
-    if empty or folded > _MAX_FOLDED:
-        came = "nothing is left of it" if empty else f"{folded:.1%} of the surface folds over"
-        remedy = "Trace its layers as one medium"
+    is_empty = _enclosed_volume(shifted[solid.triangles].astype(np.float64)) <= 0.0
+    if is_empty or folded > _MAX_FOLDED:
+        actual = "nothing is left of it" if is_empty else f"{folded:.1%} of the surface folds over"
+        advice = "Trace its layers as one medium"
         where = f"a body deeper than its layers, moved {depth_mm.mean():.2g} mm inwards"
-        refuse(culprit, where, came, remedy)
-    return replace(solid, positions=moved), folded
+        refuse(name, where, actual, advice)
+    return replace(solid, positions=shifted), folded
 
 
 def _mitre_vectors(solid: ClosedSurface) -> Doubles:
-    """Return (p, 3) steps outwards that move the faces around a point by 1; at most 2 long."""
+    """Return (p, 3) outward vectors that move the faces around a point by 1; at most 2 long."""
     points = np.arange(len(solid.positions), dtype=np.int32)
     normals = vertex_normals(solid.positions, points, solid.triangles).astype(np.float64)
     face = _area_vectors(solid.positions[solid.triangles])
@@ -92,46 +94,48 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
     if not len(open_sides):
         return ClosedSurface(positions, triangles)
     group = _edge_components(open_sides)
-    names, opening = np.unique(group, return_inverse=True)
-    middles = np.stack(
-        [positions[open_sides[opening == k]].mean(axis=(0, 1)) for k in range(len(names))]
+    labels, opening = np.unique(group, return_inverse=True)
+    centroids = np.stack(
+        [positions[open_sides[opening == k]].mean(axis=(0, 1)) for k in range(len(labels))]
     ).astype(np.float32)
     apex = (len(positions) + opening).astype(np.int32)
     fan = np.column_stack((open_sides[:, 1], open_sides[:, 0], apex)).astype(np.int32)
-    places = np.vstack((positions, middles))
-    return ClosedSurface(places, np.vstack((triangles, fan)), len(names), float(triangle_areas(places[fan]).sum()))
+    vertices = np.vstack((positions, centroids))
+    return ClosedSurface(
+        vertices, np.vstack((triangles, fan)), len(labels), float(triangle_areas(vertices[fan]).sum())
+    )
 
 
 def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:
-    """Return (n, 2) directed sides that no triangle traverses the other way, as often as they lack one."""
+    """Return (n, 2) directed edges without an opposite edge, each as often as it lacks one."""
     sides = np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])).astype(np.int64)
     low, high = sides.min(axis=1), sides.max(axis=1)
-    edge, of_side = np.unique(low * count + high, return_inverse=True)
-    surplus = np.bincount(of_side, np.where(sides[:, 0] == low, 1.0, -1.0), len(edge)).astype(np.int64)
+    edge, edge_of_side = np.unique(low * count + high, return_inverse=True)
+    surplus = np.bincount(edge_of_side, np.where(sides[:, 0] == low, 1.0, -1.0), len(edge)).astype(np.int64)
     ends = np.column_stack((edge // count, edge % count))
     directed = np.where((surplus > 0)[:, None], ends, ends[:, ::-1])
     return np.repeat(directed, np.abs(surplus), axis=0)
 
 
 def _edge_components(sides: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return (n,) the connected component of each side, as a number."""
+    """Return the index of the connected component of each edge, (n,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    names, ends = np.unique(sides, return_inverse=True)
+    labels, ends = np.unique(sides, return_inverse=True)
     a, b = ends.reshape(-1, 2).T
-    graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(names), len(names)))
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(labels), len(labels)))
     _, label = connected_components(graph, directed=False)
     return np.asarray(label[a], np.int64)
 
 
 def _area_vectors(corners: Floats) -> Doubles:
-    """Return twice the area of each triangle along its normal; corners : (f, 3, 3)."""
-    places = corners.astype(np.float64)
-    return np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
+    """Return normals of triangles (f, 3, 3), as long as twice their area."""
+    vertices = corners.astype(np.float64)
+    return np.cross(vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0])
 
 
 def _enclosed_volume(corners: Doubles) -> float:
-    """Return the enclosed volume [mm3]; negative when inside out."""
-    about = corners - corners.mean(axis=(0, 1))
-    return float((about[:, 0] * np.cross(about[:, 1], about[:, 2])).sum() / 6.0)
+    """Return the enclosed volume [mm3]; negative for a surface turned inside out."""
+    centred = corners - corners.mean(axis=(0, 1))
+    return float((centred[:, 0] * np.cross(centred[:, 1], centred[:, 2])).sum() / 6.0)

@@ -1,4 +1,4 @@
-"""The truth of a scene: volumetric path tracing by Mitsuba, with the variance of each pixel."""
+"""Reference image of a scene by volumetric path tracing in Mitsuba, with the variance of each pixel."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject
 from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
     Lambertian,
     check_traceable,
+    coverage_scene,
     emissive_skin,
     load_mitsuba,
-    radiance_scene,
-    coverage_scene,
     mitsuba_variant,
+    radiance_scene,
 )
-from dermis.base.disk import find, keep
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject
+from dermis.base.disk import load_arrays, try_save_arrays
 from dermis.base.errors import refuse
 from dermis.environment.panorama import load_panorama
 from dermis.optics.media import Medium
@@ -44,14 +44,14 @@ _SAVE_INTERVAL_S = 30.0
 
 @dataclass(frozen=True, eq=False)
 class PathTraced:
-    """A path-traced image, black where there is no head.
+    """Path-traced image, black outside the head.
 
     image : (h, w, 3) radiance, linear Rec. 709
-    variance : (h, w, 3) of each value of the image, as a mean
-    mask : (h, w) share of the pixel that visible skin fills
-    samples : paths through each pixel
-    seconds : that they took
-    notes : what had to be done to the head
+    variance : (h, w, 3) variance of each value of the image
+    mask : (h, w) fraction of the pixel that visible skin covers
+    samples : paths per pixel
+    seconds : time of all paths
+    notes : changes that were made to the head
     """
 
     image: Floats
@@ -69,69 +69,72 @@ def path_trace(
     settings: Settings | None = None,
     *,
     variant: Variant = "scalar_rgb",
-    keep: bool = True,
-    report: ProgressCallback | None = None,
+    use_cache: bool = True,
+    progress: ProgressCallback | None = None,
 ) -> PathTraced:
-    """Return the scene with its skin filled by a medium; maps, profile and surface reflection are ignored.
+    """Return the path-traced image of a scene with a medium inside its skin.
 
-    medium : index-matched (eta 1), isotropic, with three channels; layers become nested bodies, each face the
-        skin moved inwards by its depth. Or a `Lambertian`, for directly lit skin without scattering
-    samples : at least this many paths through each pixel, in passes of 4. Passes are kept on disk by the
-        scene's content, so a later call with more samples adds to them
-    settings : only the size counts
+    Maps, profile and surface reflection are ignored. Light passes the surface without refraction, so that
+    paths connect to point lights from inside the medium; compare with profiles for eta 1. Lights are
+    invisible and do not shadow one another.
+
+    medium : index-matched (eta 1), isotropic, with three channels; layers become nested bodies, each
+        interface the skin offset inwards by its depth. Or a `Lambertian`, for directly lit skin without
+        scattering
+    samples : least number of paths per pixel, in passes of 4. Passes are cached on disk by the scene's
+        content, so a later call with more samples adds to them
+    settings : only the size is used
     variant : of Mitsuba; "llvm_ad_rgb" takes half the time for many samples but needs a recent LLVM (14 and
         15 end the process), "cuda_ad_rgb" needs an NVIDIA GPU
-    keep : whether to use and keep passes on disk; without it `seconds` is that of this call
-    report : called with the number of passes done, and of all
+    use_cache : whether to read and write passes on disk; without it `seconds` is the time of this call
+    progress : called with the number of finished passes and the number of all passes
 
     Raises DermisError when Mitsuba is missing, and for what it cannot trace: a surface without volume, media
     under a refracting surface, lights without shadows.
 
-    Light passes the surface unbent, so point lights connect to what lies below it; compare with profiles for
-    eta 1. Lights are invisible and do not shadow one another.
-
     Sources: [Jakob2022], [Miller2019].
     """
-    wanted = pass_count(samples)
+    target_count = pass_count(samples)
     check_traceable(medium)
     mi, size = load_mitsuba(), (settings or Settings()).size
-    form = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH}"
-    key = scene_key(scene, medium, size, form) if keep else None
+    trace_settings = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH}"
+    key = scene_key(scene, medium, size, trace_settings) if use_cache else None
     return render_passes(
         mi,
         variant,
-        wanted,
+        target_count,
         size,
         key,
         lambda: radiance_scene(mi, scene, medium, size),
         lambda: coverage_scene(mi, scene.camera, size, emissive_skin(mi, scene.head)),
-        report,
+        progress,
     )
 
 
 def render_passes(
     mi: Mitsuba,
     variant: Variant,
-    wanted: int,
+    target_count: int,
     size: tuple[int, int],
     key: str | None,
-    radiance: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
-    share: Callable[[], MitsubaObject],
-    report: ProgressCallback | None,
+    build_radiance: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
+    build_coverage: Callable[[], MitsubaObject],
+    progress: ProgressCallback | None,
 ) -> PathTraced:
-    """Return the mean of as many passes as wanted, those that are kept on disk included.
+    """Return the mean of at least `target_count` passes, including cached ones.
 
-    key : name of the kept passes; None to keep none
-    radiance, share : make the scenes of the radiance, with notes, and of the share of skin in each pixel
+    key : name of the cached passes; None for no cache
+    build_radiance, build_coverage : functions that build Mitsuba's scenes of the radiance, with notes, and of
+        the skin's coverage of each pixel
     """
     passes = load_passes(key, size) if key else None
-    if passes is None or passes.count < wanted:
+    if passes is None or passes.count < target_count:
         with mitsuba_variant(mi, variant):
-            built, notes = radiance()
+            built_scene, notes = build_radiance()
             if passes is None:
-                mask = np.array(mi.render(share(), spp=_COVERAGE_SAMPLES), np.float32)[..., 0]
-                passes = Passes.none(size, np.clip(mask, 0.0, 1.0), notes)
-            add_passes(mi, built, passes, wanted, key, report)
+                mask = np.array(mi.render(build_coverage(), spp=_COVERAGE_SAMPLES), np.float32)[..., 0]
+                passes = Passes.empty(size, np.clip(mask, 0.0, 1.0), notes)
+            add_passes(mi, built_scene, passes, target_count, key, progress)
     return PathTraced(
         passes.mean.astype(np.float32),
         passes.variance.astype(np.float32),
@@ -143,31 +146,36 @@ def render_passes(
 
 
 def pass_count(samples: int) -> int:
-    """Return the number of passes for at least so many samples.
+    """Return the number of passes with at least this many samples per pixel.
 
     Raises DermisError for none and for too many.
     """
     if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MAX_SAMPLES):
-        refuse("samples", f"a whole number from 1 to {_MAX_SAMPLES}", f"{samples} came", "Correct it")
+        refuse("samples", f"a whole number from 1 to {_MAX_SAMPLES}", f"got {samples}", "Correct it")
     return max(_MIN_PASSES, -(-samples // SAMPLES_PER_PASS))
 
 
 def add_passes(
-    mi: Mitsuba, built: MitsubaObject, passes: Passes, wanted: int, key: str | None, report: ProgressCallback | None
+    mi: Mitsuba,
+    built_scene: MitsubaObject,
+    passes: Passes,
+    target_count: int,
+    key: str | None,
+    progress: ProgressCallback | None,
 ) -> None:
-    """Add passes of Mitsuba's scene up to the number wanted; with a key those done are stored in any case."""
-    stored = time.perf_counter()
+    """Render passes of Mitsuba's scene until there are `target_count`; with a key, cache them in any case."""
+    last_save = time.perf_counter()
     try:
-        while passes.count < wanted:
-            began = time.perf_counter()
-            image = np.array(mi.render(built, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
+        while passes.count < target_count:
+            started = time.perf_counter()
+            image = np.array(mi.render(built_scene, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
             ended = time.perf_counter()
-            passes.add(image, ended - began)
-            if report is not None:
-                report(passes.count, wanted)
-            if key and ended - stored > _SAVE_INTERVAL_S and passes.count < wanted:
+            passes.add(image, ended - started)
+            if progress is not None:
+                progress(passes.count, target_count)
+            if key and ended - last_save > _SAVE_INTERVAL_S and passes.count < target_count:
                 save_passes(key, passes)
-                stored = ended
+                last_save = ended
     finally:
         if key and passes.count > 0:
             save_passes(key, passes)
@@ -175,17 +183,17 @@ def add_passes(
 
 Doubles = NDArray[np.float64]
 _CACHE_FOLDER = "path-traced"
-_CACHE_VERSION = 1  # raise when the same scene is traced in another way
+_CACHE_VERSION = 1  # increase when the result for the same scene changes
 
 
 @dataclass
 class Passes:
-    """Running moments of equal renderings.
+    """Running mean and squared deviation of passes with equal settings.
 
-    mean : (h, w, 3) of all passes
-    spread : (h, w, 3) sum of their squared distances from the mean
-    mask : (h, w) share of each pixel that skin fills
-    seconds : that the passes took
+    mean : (h, w, 3) mean of all passes
+    spread : (h, w, 3) sum of their squared deviations from the mean
+    mask : (h, w) fraction of each pixel that skin covers
+    seconds : time of all passes
     """
 
     mean: Doubles
@@ -196,39 +204,39 @@ class Passes:
     seconds: float = 0.0
 
     @classmethod
-    def none(cls, size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]) -> Passes:
-        """Return the start of the passes of an image (width, height)."""
+    def empty(cls, size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]) -> Passes:
+        """Return the state before the first pass of an image (width, height)."""
         shape = (size[1], size[0], 3)
         return cls(np.zeros(shape), np.zeros(shape), np.asarray(mask, np.float32), notes)
 
     @property
     def variance(self) -> Doubles:
-        """(h, w, 3) of the mean."""
+        """Return the variance of the mean, (h, w, 3)."""
         return self.spread / (self.count * (self.count - 1))
 
     def add(self, image: Doubles, seconds: float) -> None:
         """Add a pass (h, w, 3). Source: [Welford1962]."""
         self.count += 1
         self.seconds += seconds
-        before = image - self.mean
-        self.mean = self.mean + before / self.count
-        self.spread = self.spread + before * (image - self.mean)
+        delta = image - self.mean
+        self.mean = self.mean + delta / self.count
+        self.spread = self.spread + delta * (image - self.mean)
 
 
 def hash_lighting(digest: hashlib._Hash, scene: Scene) -> None:
     """Add camera, lights and environment of a scene to a hash."""
     for part in (scene.camera, *scene.lights, *filter(None, [scene.environment])):
         digest.update(f"{type(part).__name__} {part.model_dump_json()}".encode())
-    if scene.environment is not None:  # the file of that name may change
+    if scene.environment is not None:  # the content of the file may change
         digest.update(np.ascontiguousarray(load_panorama(scene.environment.name)).tobytes())
 
 
-def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], form: str) -> str:
-    """Return a hash of all that the image depends on.
+def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], trace_settings: str) -> str:
+    """Return a hash of everything that the image depends on.
 
-    form : versions, and how it is traced
+    trace_settings : versions and settings of the path tracer
     """
-    digest = hashlib.sha256(f"{_CACHE_VERSION} {form} {size} {scene.head.centre_mm}".encode())
+    digest = hashlib.sha256(f"{_CACHE_VERSION} {trace_settings} {size} {scene.head.centre_mm}".encode())
     hash_lighting(digest, scene)
     mesh = scene.head.mesh
     digest.update(repr([(material.kind, material.colour) for material in mesh.materials]).encode())
@@ -244,8 +252,8 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
 
 
 def load_passes(key: str, size: tuple[int, int]) -> Passes | None:
-    """Return the passes of that name, or None when there are none that can be read."""
-    found = find(_CACHE_FOLDER, key, ("mean", "spread", "mask", "notes", "count", "seconds"))
+    """Return cached passes, or None when there are none of this key and size."""
+    found = load_arrays(_CACHE_FOLDER, key, ("mean", "spread", "mask", "notes", "count", "seconds"))
     if found is None or found["mean"].shape != (size[1], size[0], 3):
         return None
     notes = tuple(str(note) for note in found["notes"])
@@ -254,5 +262,5 @@ def load_passes(key: str, size: tuple[int, int]) -> Passes | None:
 
 
 def save_passes(key: str, passes: Passes) -> None:
-    """Keep passes under a name; the disk may fail without harm, and a file is whole or not there."""
-    keep(_CACHE_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})
+    """Write passes to the cache; a full or broken disk does no harm."""
+    try_save_arrays(_CACHE_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})

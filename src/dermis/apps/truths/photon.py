@@ -1,6 +1,7 @@
 """Random walks of photons through a stack of layers, compiled by numba: import this inside functions.
 
-Layers are numbered from 1, topmost first; 0 and the number after the last are air. Face k lies under layer k.
+Layers are numbered from 1, topmost first; layer 0 and the layer after the last are air. Face k lies below
+layer k.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ Counts = NDArray[np.int64]
 RandomState = NDArray[np.uint64]
 
 MAX_EVENTS = 100_000
-"""Scatterings and faces after which a photon is given up: without absorption some would walk forever."""
+"""Scatterings and face crossings after which a photon is dropped; without absorption some never end."""
 
 
 class LayerStack(NamedTuple):
-    """Layers with air on both sides (layers + 2,), and the depths of the faces (layers + 1,)."""
+    """Optical properties of layers with air on both sides (layers + 2,), and face depths (layers + 1,)."""
 
     eta: Floats
     sigma_t: Floats
@@ -32,12 +33,12 @@ class LayerStack(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """How many photons ended where. Rings count from the axis; the last is everything beyond the last edge.
+    """Numbers of photons by where they ended. The last ring is everything beyond the last edge.
 
-    reflected, transmitted : (rings + 1,) left the stack after scattering
-    unscattered : (2,) left upwards and downwards without scattering
-    absorbed : (layers,)
-    unfinished : (1,) still walking after `MAX_EVENTS`
+    reflected, transmitted : (rings + 1,) left the stack above or below after scattering
+    unscattered : (2,) left the stack above and below without scattering
+    absorbed : (layers,) absorbed in each layer
+    unfinished : (1,) dropped after `MAX_EVENTS` events
     """
 
     reflected: Counts
@@ -49,7 +50,7 @@ class Tally(NamedTuple):
 
 @compiled
 def next_uint64(rng: RandomState) -> np.uint64:
-    """Return 64 random bits by xoshiro256++; advances the state rng (4,).
+    """Return 64 random bits by xoshiro256++ and advance the state `rng` (4,).
 
     Source: [BlackmanVigna2021].
     """
@@ -67,13 +68,15 @@ def next_uint64(rng: RandomState) -> np.uint64:
 
 @compiled
 def uniform(rng: RandomState) -> float:
-    """Return a number strictly between 0 and 1, so that its logarithm is finite and not 0."""
+    """Return a random number strictly between 0 and 1, so that its logarithm is finite and not 0."""
     return ((next_uint64(rng) >> np.uint64(12)) + 0.5) * 2.0**-52
 
 
 @compiled
 def refract(cosine: float, eta: float) -> tuple[float, float]:
-    """Return reflectance of unpolarised light, and the cosine beyond the face, 0 for total reflection [-].
+    """Return the Fresnel reflectance of unpolarised light and the cosine of the refracted ray [-].
+
+    The cosine is 0 for total reflection.
 
     eta : index of refraction on the near side over that on the far side
 
@@ -92,9 +95,9 @@ def refract(cosine: float, eta: float) -> tuple[float, float]:
 
 @compiled
 def deflect(x: float, y: float, z: float, g: float, rng: RandomState) -> tuple[float, float, float]:
-    """Return the unit direction (x, y, z) after scattering by Henyey and Greenstein's phase function.
+    """Return a direction sampled from Henyey and Greenstein's phase function about the unit vector (x, y, z).
 
-    g : mean cosine of the deflection [-]
+    g : mean cosine of the scattering angle [-]
 
     Source: [HenyeyGreenstein1941]; [Marsaglia1972] for the azimuth, [Duff2017] for the frame.
     """
@@ -103,7 +106,7 @@ def deflect(x: float, y: float, z: float, g: float, rng: RandomState) -> tuple[f
         s = a * a + b * b
         if 0.0 < s < 1.0:
             break
-    # In the disc s is uniform and independent of the azimuth. This form of the cosine holds for g = 0 too.
+    # In the disc s is uniform and independent of the azimuth. This form of the cosine is valid for g = 0 too.
     v = 1.0 - 2.0 * s
     cosine = (v + 0.5 * g * (v * v + 3.0) + g * g * v + 0.5 * g**3 * (v * v - 1.0)) / (1.0 + g * v) ** 2
     sine = math.sqrt(max(1.0 - cosine * cosine, 0.0) / s)
@@ -119,7 +122,7 @@ def deflect(x: float, y: float, z: float, g: float, rng: RandomState) -> tuple[f
 
 @compiled
 def _ring_index(x: float, y: float, edges2: Floats) -> int:
-    """Return the ring between squared edges (n + 1,) that contains a point; n beyond the last edge."""
+    """Return the index of the ring that contains a point, from squared edges (n + 1,); n beyond the last."""
     return int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
 
 
@@ -135,12 +138,12 @@ def _tally_exit(x: float, y: float, upward: bool, scatterings: int, edges2: Floa
 
 @compiled
 def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Tally) -> None:
-    """Follow one photon that entered straight down on the axis until it leaves or is absorbed."""
+    """Trace one photon, which enters on the axis at normal incidence, until it leaves or is absorbed."""
     x = y = z = ux = uy = 0.0
     uz = 1.0
     layer, bottom = 1, len(stack.eta) - 2
     scatterings = 0
-    depth = -math.log(uniform(rng))  # optical, to the next scattering
+    depth = -math.log(uniform(rng))  # optical depth to the next scattering
     for _ in range(MAX_EVENTS):
         upward = uz < 0.0
         path = depth / stack.sigma_t[layer]
@@ -173,13 +176,12 @@ def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Ta
 
 @compiled
 def trace_photons(photons: int, stack: LayerStack, edges2: Floats, rng: RandomState, tally: Tally) -> None:
-    """Add the fates of this many photons to the tally.
+    """Trace this number of photons and add their ends to the tally.
 
-    Source: [Wang1995], except that absorption takes a photon whole or not at all.
+    Source: [Wang1995], except that absorption removes a photon completely or not at all.
     """
-    # Weights that shrink at each scattering, with roulette below 1e-4 as in the source, gave 0.8 to 2.3 times
-    # the variance of R(r) in equal time on seven media; with roulette below 0.3 they gave 0.6 (albedo 0.5) to
-    # 0.97 times. That gain is small for skin, and whole photons are counts: they conserve energy exactly, add
-    # up alike in any order, and have binomial errors.
+    # Weights that shrink at each scattering, as in the source, hardly reduce the variance of R(r) in equal
+    # time for skin. Whole photons are integer counts: they conserve energy exactly, their sums do not depend
+    # on the order, and their errors are binomial.
     for _ in range(photons):
         _trace_photon(stack, edges2, rng, tally)

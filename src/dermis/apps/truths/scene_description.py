@@ -1,4 +1,4 @@
-"""Places, colours, shapes and environments as Mitsuba and Cycles describe them."""
+"""Positions, colours, shapes and environments in the conventions of Mitsuba and Cycles."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from dermis.scene.environment import Environment
 
 Floats = NDArray[np.float64]
 SceneDict = dict[str, Any]
-"""What Mitsuba loads or JSON holds: numbers, words, lists, Mitsuba's objects and further dictionaries."""
+"""Nested dictionary of numbers, strings, lists and Mitsuba objects, as input of Mitsuba or as JSON."""
 Mitsuba = Any
-"""The module mitsuba with a variant set, which ships no types; or the exporter that writes XML instead."""
+"""Untyped module `mitsuba` with a variant set, or the exporter that writes XML instead."""
 MitsubaObject = Any
-"""An object of Mitsuba, which ships no types: a scene, a mesh, a transform, a material or a medium."""
+"""Untyped object of Mitsuba: a scene, a mesh, a transform, a material or a medium."""
 Vector = Sequence[float] | Floats
 """Three numbers."""
 UNIT_MM = 100.0
-"""Cycles' unit: a head is a few of them, as its sampling expects."""
+"""Length of Cycles' unit; a head is a few units in size, as its sampling expects."""
 
 _TO_CYCLES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-def check_camera(camera: Camera, who: str) -> None:
-    """Refuse a camera that only this package has."""
+def check_camera(camera: Camera, renderer: str) -> None:
+    """Raise DermisError for a shifted principal point or non-square pixels."""
     if camera.principal_point != (0.5, 0.5) or camera.pixel_aspect != 1.0:
-        expected = f"a principal point in the middle and square pixels, for {who}"
-        came = f"principal_point {camera.principal_point} and pixel_aspect {camera.pixel_aspect:g} came"
-        refuse("camera", expected, came, "Render with such a camera, and crop or resample the picture")
+        expected = f"a principal point in the middle and square pixels, for {renderer}"
+        actual = f"got principal_point {camera.principal_point} and pixel_aspect {camera.pixel_aspect:g}"
+        refuse("camera", expected, actual, "Render with such a camera, and crop or resample the picture")
 
 
-def rgb(values: Iterable[float]) -> SceneDict:
-    """Return three numbers, linear Rec. 709, as Mitsuba reads them."""
-    return {"type": "rgb", "value": [float(value) for value in values]}
+def rgb(components: Iterable[float]) -> SceneDict:
+    """Return Mitsuba's description of a linear Rec. 709 colour."""
+    return {"type": "rgb", "value": [float(value) for value in components]}
 
 
 def mitsuba_look_at(
     mi: Mitsuba, origin: Vector, target: Vector, up: Vector = (0.0, 1.0, 0.0)
 ) -> MitsubaObject:
-    """Return the transform to world space, with +Z from the origin to the target and Y upwards."""
+    """Return the transform to world space with +Z from the origin to the target and Y upwards."""
     forward = np.subtract(target, origin)
     if np.linalg.norm(np.cross(forward, up)) < 1e-6 * np.linalg.norm(forward) * np.linalg.norm(up):
         up = (1.0, 0.0, 0.0)
@@ -52,7 +52,7 @@ def mitsuba_look_at(
 
 
 def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> SceneDict:
-    """Return a shape that emits light, and neither shadows nor reflects other light."""
+    """Return a shape that emits light and neither casts shadows nor reflects."""
     return {
         "type": kind,
         **shape,
@@ -64,12 +64,12 @@ def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> SceneD
 def mitsuba_projector(
     mi: Mitsuba, intensity: Floats, cosine: Floats, to_world: MitsubaObject, half_tangent: float
 ) -> SceneDict:
-    """Return a projector with an intensity (h, w, 3) through each texel of a slide [irradiance mm2].
+    """Return a projector with an intensity (h, w, 3) per texel of its slide [irradiance mm2].
 
-    cosine : (h, w) of the angle from the axis
-    half_tangent : of half the angle that the slide spans in x
+    cosine : (h, w) cosine of the angle from the axis
+    half_tangent : tangent of half the horizontal field of view
     """
-    # Mitsuba takes a slide for what falls on a plane across the axis, over pi.
+    # Mitsuba's slide is the irradiance on a plane perpendicular to the axis, over pi.
     slide = intensity * cosine[..., None] ** 3 / np.pi
     return {
         "type": "projector",
@@ -86,43 +86,47 @@ def mitsuba_projector(
     }
 
 
-def cycles_look_at(place: Vector, forward: Vector, up: Vector = (0.0, 1.0, 0.0)) -> list[list[float]]:
-    """Return the matrix to world in Cycles' units of an object that looks along -Z with Y upwards."""
-    right, above, ahead = camera_axes(forward, up)
+def cycles_look_at(position: Vector, forward: Vector, up: Vector = (0.0, 1.0, 0.0)) -> list[list[float]]:
+    """Return the matrix to world space, in Cycles' units, of an object that looks along -Z with Y upwards."""
+    right, upwards, view_direction = camera_axes(forward, up)
     matrix = np.eye(4)
-    matrix[:3] = np.column_stack([right, above, -ahead, np.asarray(place, np.float64) / UNIT_MM])
+    matrix[:3] = np.column_stack(
+        [right, upwards, -view_direction, np.asarray(position, np.float64) / UNIT_MM]
+    )
     return [[float(value) for value in row] for row in matrix]
 
 
 def camera_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
-    """Return unit vectors to the right, upwards and ahead."""
-    ahead = np.asarray(forward, np.float64) / np.linalg.norm(forward)
-    right = np.cross(ahead, up)
+    """Return unit vectors to the right, upwards and forward."""
+    view_direction = np.asarray(forward, np.float64) / np.linalg.norm(forward)
+    right = np.cross(view_direction, up)
     if np.linalg.norm(right) < 1e-6 * np.linalg.norm(up):
-        right = np.cross(ahead, (1.0, 0.0, 0.0))
+        right = np.cross(view_direction, (1.0, 0.0, 0.0))
     right /= np.linalg.norm(right)
-    return right, np.cross(right, ahead), ahead
+    return right, np.cross(right, view_direction), view_direction
 
 
 def cycles_light(
-    kind: str, irradiance: Vector, factor: float, place: Vector, forward: Vector, **given: float | str
+    kind: str, irradiance: Vector, factor: float, position: Vector, forward: Vector, **given: float | str
 ) -> SceneDict:
     """Return a light of Cycles whose energy is the irradiance times a factor."""
-    strength = float(max(irradiance))
-    colour = [float(part) / strength for part in irradiance] if strength > 0.0 else [0.0, 0.0, 0.0]
-    fields = {"color": colour, "energy": strength * float(factor), **given}
+    brightest = float(max(irradiance))
+    colour = (
+        [float(component) / brightest for component in irradiance] if brightest > 0.0 else [0.0, 0.0, 0.0]
+    )
+    fields = {"color": colour, "energy": brightest * float(factor), **given}
     fields = {
         name: float(value) if isinstance(value, np.floating) else value for name, value in fields.items()
     }
-    return {"type": kind, "set": fields, "to_world": cycles_look_at(place, forward)}
+    return {"type": kind, "set": fields, "to_world": cycles_look_at(position, forward)}
 
 
 def mitsuba_environment(mi: Mitsuba, environment: Environment) -> SceneDict:
-    """Return Mitsuba's description of light from all around."""
+    """Return Mitsuba's description of an environment light."""
     if environment.name == UNIFORM:
         return {"type": "constant", "radiance": rgb(np.full(3, environment.exposure))}
     panorama = environment.exposure * load_panorama(environment.name)
-    # Mitsuba's pictures begin where ours have their middle.
+    # Mitsuba's panoramas begin at the middle column of ours.
     to_world = np.eye(4)
     to_world[:3, :3] = (np.diag([-1.0, 1.0, -1.0]) @ _rotation(environment)).T
     return {
@@ -133,15 +137,15 @@ def mitsuba_environment(mi: Mitsuba, environment: Environment) -> SceneDict:
 
 
 def cycles_world(environment: Environment | None) -> tuple[SceneDict, dict[str, NDArray[np.float32]]]:
-    """Return Cycles' description of an environment, and the panorama that goes with it."""
+    """Return Cycles' description of an environment and the panorama as an array."""
     if environment is None:
         return {"strength": 0.0}, {}
-    described: SceneDict = {"strength": environment.exposure}
+    world: SceneDict = {"strength": environment.exposure}
     if environment.name == UNIFORM:
-        return described, {}
-    # Cycles' panoramas have their middle at +X and their top at +Z; ours at -Z and +Y.
-    described["turn"] = (_TO_CYCLES @ _rotation(environment)).tolist()
-    return described, {"panorama": load_panorama(environment.name).astype(np.float32)}
+        return world, {}
+    # Cycles' panoramas have their middle at +X and their top at +Z, ours at -Z and +Y.
+    world["turn"] = (_TO_CYCLES @ _rotation(environment)).tolist()
+    return world, {"panorama": load_panorama(environment.name).astype(np.float32)}
 
 
 def _rotation(environment: Environment) -> Floats:
@@ -151,6 +155,6 @@ def _rotation(environment: Environment) -> Floats:
 
 
 def _with_poles(panorama: Floats) -> Floats:
-    """Return (h + 1, w, 3) at the edges of the rows: Mitsuba has its first and its last row at the poles."""
-    inside = 0.5 * (panorama[1:] + panorama[:-1])
-    return np.concatenate((panorama[:1], inside, panorama[-1:]))
+    """Return (h + 1, w, 3) values at the edges of rows: Mitsuba's first and last rows are at the poles."""
+    between_rows = 0.5 * (panorama[1:] + panorama[:-1])
+    return np.concatenate((panorama[:1], between_rows, panorama[-1:]))

@@ -1,4 +1,4 @@
-"""Monte Carlo: a pencil beam through a stack of scattering layers, with no diffusion approximation."""
+"""Monte Carlo simulation of a pencil beam through a stack of scattering layers."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.base.errors import refuse
-from dermis.base.quantities import whole_number
+from dermis.base.quantities import checked_integer
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
-from dermis.optics.radial import RadialProfile, light_beyond, ring_edges
+from dermis.optics.radial import RadialProfile, missing_light_warnings, ring_edges
 
 if TYPE_CHECKING:
     from dermis.apps.truths.photon import Counts, LayerStack, Tally
@@ -24,17 +24,17 @@ if TYPE_CHECKING:
 ProgressCallback = Callable[[int, int], None]
 
 BATCH_COUNT = 64
-"""Each has its own random numbers, so the result does not depend on how many run at once."""
+"""Number of batches with their own random numbers, so the result does not depend on the number of threads."""
 
 MAX_PHOTONS = 10**10
 
 _MAX_SEED = 2**63 - 1
-_PHOTONS_PER_CALL = 20_000  # photons between two checks for Ctrl-C
+_PHOTONS_PER_CALL = 20_000  # between two checks for Ctrl-C
 _REPORTED_LOSS = 1e-3
 
 
 def default_ring_edges() -> Floats:
-    """Return edges of a disc of 0.001 mm and 92 rings, each 12 % wider than the last, to 40 mm [mm]."""
+    """Return the edges of a disc of 0.001 mm and of 92 rings, each 12 % wider than the last [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
 
 
@@ -43,21 +43,21 @@ def trace_slab(
     photons: int = 1_000_000,
     seed: int = 0,
     edges_mm: Floats | None = None,
-    report: ProgressCallback | None = None,
+    progress: ProgressCallback | None = None,
 ) -> SlabResult:
     """Trace a pencil beam at normal incidence through a stack of layers in air.
 
     layers : topmost first; interfaces between unequal indices of refraction reflect and refract
-    photons : how many to trace; standard errors fall with its square root
+    photons : number of photons; standard errors fall with its square root
     seed : the same seed gives the same result on any number of processors
-    edges_mm : of the rings, from 0; `default_edges` when left out [mm]
-    report : called with the number of batches done, and of all
+    edges_mm : (n + 1,) radii of the ring edges, from 0; None for `default_ring_edges` [mm]
+    progress : called with the number of finished batches and the number of all batches
 
     Source: [Wang1995].
     """
     photons = _checked_photons(layers, photons, seed)
     edges = default_ring_edges() if edges_mm is None else _checked_edges(edges_mm)
-    tally = _trace_batches(_layer_stack(layers), photons, seed, edges, report)
+    tally = _trace_batches(_layer_stack(layers), photons, seed, edges, progress)
     return _slab_result(tally, photons, edges, layers[0].eta)
 
 
@@ -67,22 +67,23 @@ def trace_medium(
     seed: int = 0,
     g: float = 0.0,
     edges_mm: Floats | None = None,
-    report: ProgressCallback | None = None,
+    progress: ProgressCallback | None = None,
 ) -> list[SlabResult]:
     """Run `trace_slab` for each channel of a medium, with independent random numbers.
 
-    g : mean cosine of the deflection in all layers; scattering is the reduced coefficient over 1 - g [-]
+    g : mean cosine of the scattering angle in all layers; scattering is the reduced coefficient over 1 - g
+        [-]
     """
     check_anisotropy(g)
     results: list[SlabResult] = []
 
-    def part(done: int, of: int) -> None:
-        if report is not None:
-            report(len(results) * of + done, medium.channels * of)
+    def report_channel(done: int, of: int) -> None:
+        if progress is not None:
+            progress(len(results) * of + done, medium.channels * of)
 
     for i in range(medium.channels):
         layers = [_scattering_layer(layer, i, g, medium.eta) for layer in medium.layers]
-        results.append(trace_slab(layers, photons, seed + i, edges_mm, part))
+        results.append(trace_slab(layers, photons, seed + i, edges_mm, report_channel))
     return results
 
 
@@ -92,38 +93,38 @@ def monte_carlo_profile(
     photons: int = 1_000_000,
     seed: int = 0,
     g: float = 0.0,
-    report: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> RadialProfile:
     """Return R(r) of a medium by Monte Carlo, averaged over rings, with standard errors.
 
-    rgb : (3, c) weights from wavelengths to linear Rec. 709; the result is then per incident power
-    photons : per channel or wavelength
-    g : mean cosine of the deflection; the reduced scattering coefficient is kept [-]
+    rgb : (3, c) weights from wavelengths to linear Rec. 709; R is then per incident power
+    photons : number per channel or wavelength
+    g : mean cosine of the scattering angle; the reduced scattering coefficient stays the same [-]
 
     Source: [Wang1995].
     """
     edges = ring_edges()
-    runs = trace_medium(medium, photons, seed, g, edges, report)
-    entered = 1.0 - normal_reflectance(medium.eta)
-    weights = np.eye(medium.channels) / entered if rgb is None else np.asarray(rgb)
-    R, error, totals, total_error = (
+    runs = trace_medium(medium, photons, seed, g, edges, progress)
+    entering_fraction = 1.0 - normal_reflectance(medium.eta)
+    weights = np.eye(medium.channels) / entering_fraction if rgb is None else np.asarray(rgb)
+    reflectance_mean, error, total_mean, total_error = (
         np.stack([getattr(run, name) for run in runs])
         for name in ("reflectance", "reflectance_se", "total_reflectance", "total_reflectance_se")
     )
-    reflectance = (weights @ R).T
+    reflectance = (weights @ reflectance_mean).T
     ring_energy = reflectance * np.pi * np.diff(edges**2)[:, None]
     return RadialProfile(
         name=medium.name,
         model="montecarlo",
         radius_mm=np.concatenate([[2.0 / 3.0 * edges[1]], np.sqrt(edges[1:-1] * edges[2:])]),
         reflectance=reflectance,
-        total=weights @ totals,
+        total=weights @ total_mean,
         edges_mm=edges,
         ring_energy=ring_energy,
         standard_error=np.sqrt(weights**2 @ error**2).T,
         total_error=np.sqrt(weights**2 @ total_error**2),
         incident=rgb is not None,
-        warnings=(*light_beyond(weights @ totals, ring_energy), *_unfinished_warnings(runs)),
+        warnings=(*missing_light_warnings(weights @ total_mean, ring_energy), *_unfinished_warnings(runs)),
         sources=(*medium.sources, "Wang1995"),
     )
 
@@ -142,11 +143,11 @@ def _scattering_layer(layer: Layer, channel: int, g: float, eta: float) -> Scatt
 
 def _checked_photons(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:
     if not layers:
-        refuse("slab", "at least one layer", "none came", "Add one")
+        refuse("slab", "at least one layer", "got none", "Add one")
     if np.isinf([layer.thickness_mm for layer in layers[:-1]]).any():
         refuse("slab", "an infinite thickness in the last layer only", "another has it", "Correct it")
-    whole_number("seed", seed, 0, _MAX_SEED)
-    return whole_number("photons", photons, 1, int(MAX_PHOTONS))
+    checked_integer("seed", seed, 0, _MAX_SEED)
+    return checked_integer("photons", photons, 1, int(MAX_PHOTONS))
 
 
 def _checked_edges(edges_mm: ArrayLike) -> Floats:
@@ -154,33 +155,35 @@ def _checked_edges(edges_mm: ArrayLike) -> Floats:
     one_row = edges.ndim == 1 and len(edges) > 1
     if not (one_row and edges[0] == 0.0 and np.isfinite(edges).all() and (np.diff(edges) > 0.0).all()):
         expected = "edges of rings that begin with 0 and increase [mm]"
-        refuse("edges_mm", expected, f"{np.array2string(edges, threshold=8)} came", "Correct them")
+        refuse("edges_mm", expected, f"got {np.array2string(edges, threshold=8)}", "Correct them")
     return edges
 
 
 def _layer_stack(layers: Sequence[ScatteringLayer]) -> LayerStack:
     from dermis.apps.truths.photon import LayerStack
 
-    def with_air(air: float, values: list[float]) -> Floats:
+    def between_air(air: float, values: list[float]) -> Floats:
         return np.array([air, *values, air])
 
     return LayerStack(
-        eta=with_air(1.0, [layer.eta for layer in layers]),
-        sigma_t=with_air(0.0, [layer.sigma_t for layer in layers]),
-        albedo=with_air(0.0, [layer.albedo for layer in layers]),
-        g=with_air(0.0, [layer.g for layer in layers]),
+        eta=between_air(1.0, [layer.eta for layer in layers]),
+        sigma_t=between_air(0.0, [layer.sigma_t for layer in layers]),
+        albedo=between_air(0.0, [layer.albedo for layer in layers]),
+        g=between_air(0.0, [layer.g for layer in layers]),
         face_mm=np.cumsum([0.0, *(layer.thickness_mm for layer in layers)]),
     )
 
 
-def _trace_batches(stack: LayerStack, photons: int, seed: int, edges: Floats, report: ProgressCallback | None) -> Tally:
+def _trace_batches(
+    stack: LayerStack, photons: int, seed: int, edges: Floats, progress: ProgressCallback | None
+) -> Tally:
     from numba import config
 
     from dermis.apps.truths.photon import Tally, trace_photons
 
     stop = Event()
 
-    def trace(size: int, seeds: np.random.SeedSequence) -> Tally:
+    def trace_batch(size: int, seeds: np.random.SeedSequence) -> Tally:
         lengths = (len(edges), len(edges), 2, len(stack.eta) - 2, 1)
         tally = Tally(*(np.zeros(length, np.int64) for length in lengths))
         rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
@@ -192,15 +195,15 @@ def _trace_batches(stack: LayerStack, photons: int, seed: int, edges: Floats, re
 
     sizes = [photons * (i + 1) // BATCH_COUNT - photons * i // BATCH_COUNT for i in range(BATCH_COUNT)]
     tallies = []
-    # The compiled walk releases the GIL, so threads share the work.
+    # The compiled function releases the GIL, so threads run in parallel.
     with ThreadPoolExecutor(config.NUMBA_NUM_THREADS) as pool:
         try:
-            for tally in pool.map(trace, sizes, np.random.SeedSequence(seed).spawn(BATCH_COUNT)):
+            for tally in pool.map(trace_batch, sizes, np.random.SeedSequence(seed).spawn(BATCH_COUNT)):
                 tallies.append(tally)
-                if report is not None:
-                    report(len(tallies), BATCH_COUNT)
+                if progress is not None:
+                    progress(len(tallies), BATCH_COUNT)
         finally:
-            stop.set()  # otherwise the pool would wait for batches that are no longer wanted
+            stop.set()  # otherwise the pool would wait for the remaining batches
     return Tally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
 
 
@@ -208,42 +211,42 @@ def _slab_result(tally: Tally, photons: int, edges: Floats, eta: float) -> SlabR
     from dermis.apps.truths.photon import refract
 
     specular = refract(1.0, 1.0 / eta)[0]
-    areas = np.pi * np.diff(edges**2)
+    ring_areas = np.pi * np.diff(edges**2)
 
-    def share(count: Counts) -> Floats:
+    def fraction(count: Counts) -> Floats:
         return (1.0 - specular) * count / photons
 
     def error(count: Counts) -> Floats:
         p = count / photons
         return (1.0 - specular) * np.sqrt(p * (1.0 - p) / photons)
 
-    R, T = tally.reflected, tally.transmitted
+    reflectance_mean, T = tally.reflected, tally.transmitted
     return SlabResult(
         photons=photons,
         edges_mm=edges,
         specular=specular,
-        reflectance=share(R[:-1]) / areas,
-        reflectance_se=error(R[:-1]) / areas,
-        transmittance=share(T[:-1]) / areas,
-        transmittance_se=error(T[:-1]) / areas,
-        total_reflectance=float(share(R.sum())),
-        total_reflectance_se=float(error(R.sum())),
-        total_transmittance=float(share(T.sum())),
+        reflectance=fraction(reflectance_mean[:-1]) / ring_areas,
+        reflectance_se=error(reflectance_mean[:-1]) / ring_areas,
+        transmittance=fraction(T[:-1]) / ring_areas,
+        transmittance_se=error(T[:-1]) / ring_areas,
+        total_reflectance=float(fraction(reflectance_mean.sum())),
+        total_reflectance_se=float(error(reflectance_mean.sum())),
+        total_transmittance=float(fraction(T.sum())),
         total_transmittance_se=float(error(T.sum())),
-        overflow_reflectance=float(share(R[-1])),
-        overflow_transmittance=float(share(T[-1])),
-        unscattered_reflectance=float(share(tally.unscattered[0])),
-        unscattered_transmittance=float(share(tally.unscattered[1])),
-        absorbed=share(tally.absorbed),
+        overflow_reflectance=float(fraction(reflectance_mean[-1])),
+        overflow_transmittance=float(fraction(T[-1])),
+        unscattered_reflectance=float(fraction(tally.unscattered[0])),
+        unscattered_transmittance=float(fraction(tally.unscattered[1])),
+        absorbed=fraction(tally.absorbed),
         absorbed_se=error(tally.absorbed),
-        unfinished=float(share(tally.unfinished[0])),
+        unfinished=float(fraction(tally.unfinished[0])),
     )
 
 
 def check_anisotropy(g: float) -> None:
-    """Raises DermisError for a mean cosine that no phase function has."""
+    """Raise DermisError unless the mean cosine g of the scattering angle lies between -1 and 1."""
     if not -1.0 < g < 1.0:
-        refuse("scattering", "a mean cosine between -1 and 1", f"{g:g} came", "Correct it")
+        refuse("scattering", "a mean cosine between -1 and 1", f"got {g:g}", "Correct it")
 
 
 @dataclass(frozen=True)
@@ -252,7 +255,7 @@ class ScatteringLayer:
 
     sigma_a, sigma_s : coefficients of absorption and (not reduced) scattering, 0 or more [1/mm]
     thickness_mm : infinite for a half-space [mm]
-    g : mean cosine of the deflection [-]
+    g : mean cosine of the scattering angle [-]
     eta : index of refraction relative to air [-]
     """
 
@@ -263,46 +266,47 @@ class ScatteringLayer:
     eta: float = SKIN_ETA
 
     def __post_init__(self) -> None:
+        """Raise DermisError for values outside their range."""
         culprit = "scattering layer"
         if not (0.0 <= self.sigma_a < np.inf and 0.0 <= self.sigma_s < np.inf):
-            came = f"absorption {self.sigma_a:g} and scattering {self.sigma_s:g} came"
-            refuse(culprit, "absorption and scattering of 0 or more [1/mm]", came, "Correct them")
+            actual = f"got absorption {self.sigma_a:g} and scattering {self.sigma_s:g}"
+            refuse(culprit, "absorption and scattering of 0 or more [1/mm]", actual, "Correct them")
         if not self.thickness_mm > 0.0:
-            refuse(culprit, "a thickness above 0 mm", f"{self.thickness_mm:g} came", "Correct it")
+            refuse(culprit, "a thickness above 0 mm", f"got {self.thickness_mm:g}", "Correct it")
         if np.isinf(self.thickness_mm) and self.sigma_t == 0.0:
-            came = "it neither absorbs nor scatters"
-            refuse(culprit, "an infinite layer to stop light", came, "Give it a thickness")
+            actual = "it neither absorbs nor scatters"
+            refuse(culprit, "an infinite layer to stop light", actual, "Give it a thickness")
         check_anisotropy(self.g)
         if not 1.0 <= self.eta <= 2.5:
-            refuse(culprit, "an index of refraction from 1 to 2.5", f"{self.eta:g} came", "Correct it")
+            refuse(culprit, "an index of refraction from 1 to 2.5", f"got {self.eta:g}", "Correct it")
 
     @property
     def sigma_t(self) -> float:
-        """Extinction [1/mm]."""
+        """Return the extinction coefficient [1/mm]."""
         return self.sigma_a + self.sigma_s
 
     @property
     def albedo(self) -> float:
-        """Share of the extinction that is scattering; 0 without extinction [-]."""
+        """Return the single-scattering albedo, 0 without extinction [-]."""
         return self.sigma_s / self.sigma_t if self.sigma_t > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class SlabResult:
-    """Where the beam's power went, in shares of the incident power [-]; `_se` are standard errors.
+    """Reflected, transmitted and absorbed fractions of the beam's power; `_se` are standard errors [-].
 
-    The specular, total, unscattered, absorbed and unfinished shares sum to 1. The errors are binomial, and 0
-    where no photon arrived.
+    The specular, total, unscattered, absorbed and unfinished fractions sum to 1. The errors are binomial, and
+    0 where no photon arrived.
 
-    photons : traced, all of which had entered the stack
-    edges_mm : (n + 1,) of the rings, from 0 [mm]
-    specular : reflected by the top face
+    photons : number of photons traced, all of which entered the stack
+    edges_mm : (n + 1,) radii of the ring edges, from 0 [mm]
+    specular : fraction reflected by the top face
     reflectance, transmittance : (n,) R(r) and T(r) of scattered light, averaged over each ring [1/mm2]
-    total_reflectance, total_transmittance : scattered light at any radius
-    overflow_reflectance, overflow_transmittance : the part of it beyond the last edge
-    unscattered_reflectance, unscattered_transmittance : left on the axis without having scattered
-    absorbed : (layers,)
-    unfinished : given up after very many scatterings; above 0 only where almost nothing absorbs
+    total_reflectance, total_transmittance : scattered light that leaves above and below, at any radius
+    overflow_reflectance, overflow_transmittance : the part of these totals beyond the last ring
+    unscattered_reflectance, unscattered_transmittance : light that left on the axis without scattering
+    absorbed : (layers,) fraction absorbed in each layer
+    unfinished : fraction dropped after `MAX_EVENTS` events; above 0 only where almost nothing absorbs
     """
 
     photons: int
@@ -326,7 +330,9 @@ class SlabResult:
 
     @property
     def per_entering(self) -> SlabResult:
-        """The same in shares of the light that entered, as diffusion profiles are defined."""
+        """Return the result relative to the power that enters the stack, as in diffusion profiles."""
         names = [field.name for field in fields(self)][3:]
-        entered = 1.0 - self.specular
-        return replace(self, specular=0.0, **{name: getattr(self, name) / entered for name in names})
+        entering_fraction = 1.0 - self.specular
+        return replace(
+            self, specular=0.0, **{name: getattr(self, name) / entering_fraction for name in names}
+        )

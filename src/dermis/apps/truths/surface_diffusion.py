@@ -1,7 +1,7 @@
-"""Light diffused along a surface like heat: what a blur should give on any uv map.
+"""Diffusion of light along a surface as heat: the result that a blur should have on any uv map.
 
-A Gaussian of variance v on a surface is heat diffused for the time v/2. It is solved on the triangles
-themselves, so no uv map, seam or stretch plays a part. Open borders are insulated (Neumann).
+A Gaussian of variance v on a surface is heat diffused for the time v/2. The heat equation is solved on the
+triangles themselves, so no uv map, seam or stretch plays a part. Open borders are insulated (Neumann).
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
 STEPS_PER_LEVEL = 12
-"""Time steps for each level: the peak of a diffused point is then within 0.2 % of the limit."""
+"""Time steps per level; the peak of a diffused point is then within 0.2 % of the limit."""
 EDGES_PER_SIGMA = 2.0
 MARGIN_SIGMAS = 4.0
-"""Beyond them lie 0.03 % of a Gaussian, too little to matter."""
+"""Standard deviations beyond which a Gaussian has 0.03 % of its energy."""
 
 _GAMMA = 2 - np.sqrt(2)
-"""Share of the step that the trapezoidal stage covers; with this one both stages solve the same matrix."""
+"""Fraction of the step by the trapezoidal stage; this value gives both stages the same matrix."""
 
 
 def diffuse_on_surface(
@@ -38,91 +38,91 @@ def diffuse_on_surface(
     variances_mm2: Sequence[float] | Floats,
     steps: int = STEPS_PER_LEVEL,
 ) -> Floats:
-    """Return `values` blurred along the surface by a Gaussian of each variance, (k, n, c).
+    """Return vertex values blurred along the surface by a Gaussian of each variance, (k, n, c).
 
-    Each level starts from the one before. TR-BDF2 advances time: it is of second order and, unlike Crank and
-    Nicolson's rule, does not ring on points of light.
+    Each level starts from the one before. Time steps are by TR-BDF2, which is of second order and, unlike the
+    Crank-Nicolson scheme, does not oscillate around points of light.
 
-    positions : (n, 3) without duplicates: weld what uv seams have split, see `welded` [mm]
+    positions : (n, 3) without duplicates, see `welded_surface` [mm]
     triangles : (f, 3)
     values : (n, c) at the vertices, linear in between
-    variances_mm2 : (k,) rising, above 0 [mm2]
-    steps : time steps for each level
+    variances_mm2 : (k,) increasing, above 0 [mm2]
+    steps : time steps per level
 
-    Raises DermisError when edges are longer than half the standard deviation that a level adds.
+    Raises DermisError when edges are longer than half the standard deviation that a level adds;
     `refine_patch` makes them shorter.
 
     Source: [Bank1985] for TR-BDF2, [BobenkoSpringborn2007] for the Laplacian.
     """
-    places, corners = _checked_surface(positions, triangles)
-    given = _checked_values(values, len(places))
-    added = np.diff(_checked_variances(variances_mm2), prepend=0.0)
-    _check_resolution(places, corners, variances_mm2, steps)
-    mass, stiffness = mass_and_stiffness(delaunay(intrinsic_triangulation(places, corners)), len(places))
-    levels = [given]
-    for variance in added:
+    vertices, corners = _checked_surface(positions, triangles)
+    vertex_values = _checked_values(values, len(vertices))
+    added_variances = np.diff(_checked_variances(variances_mm2), prepend=0.0)
+    _check_resolution(vertices, corners, variances_mm2, steps)
+    mass, stiffness = mass_and_stiffness(delaunay(intrinsic_triangulation(vertices, corners)), len(vertices))
+    levels = [vertex_values]
+    for variance in added_variances:
         levels.append(_diffuse(mass, stiffness, levels[-1], float(variance), steps))
     return np.stack(levels[1:])
 
 
 def welded_surface(mesh: Mesh) -> tuple[Floats, Index]:
-    """Return positions (p, 3) [mm] without duplicates, and the triangles (f, 3) among them in their order."""
+    """Return the positions (p, 3) [mm] without the duplicates of uv seams, and the triangles (f, 3)."""
     return mesh.points_mm, mesh.point[mesh.triangles].astype(np.int64)
 
 
 def vertex_areas(positions: ArrayLike, triangles: ArrayLike) -> Floats:
-    """Return the area of each vertex (n,) [mm2]; diffusion keeps the sum of values times areas."""
-    places, corners = _checked_surface(positions, triangles)
-    surface = delaunay(intrinsic_triangulation(places, corners))
+    """Return the area of each vertex (n,) [mm2]; diffusion preserves the sum of values times areas."""
+    vertices, corners = _checked_surface(positions, triangles)
+    surface = delaunay(intrinsic_triangulation(vertices, corners))
     thirds = np.repeat(surface.areas() / 3, 3)
-    return sum_at(surface.corners.ravel(), thirds[:, None], len(places))[:, 0]
+    return sum_at(surface.corners.ravel(), thirds[:, None], len(vertices))[:, 0]
 
 
 def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
     """Return the length of the longest edge [mm]."""
-    places, corners = _checked_surface(positions, triangles)
-    return float(triangle_edges(places, corners)[2].max())
+    vertices, corners = _checked_surface(positions, triangles)
+    return float(triangle_edges(vertices, corners)[2].max())
 
 
 def resolved_levels(variances_mm2: Sequence[float] | Floats, edge_mm: float) -> NDArray[np.bool_]:
-    """Return the levels (k,) that edges allow: those that add a sigma of two edges to the last allowed.
+    """Return the mask (k,) of levels that edges resolve: each adds a sigma of at least two edges to the last.
 
-    variances_mm2 : (k,) rising, above 0 [mm2]
-    edge_mm : the longest edge, see `longest_edge_mm`
+    variances_mm2 : (k,) increasing, above 0 [mm2]
+    edge_mm : longest edge, see `longest_edge_mm`
     """
-    least, last, allowed = (EDGES_PER_SIGMA * edge_mm) ** 2, 0.0, []
+    min_variance, last_variance, allowed = (EDGES_PER_SIGMA * edge_mm) ** 2, 0.0, []
     for variance in _checked_variances(variances_mm2):
-        allowed.append(bool(variance - last >= least * (1 - 1e-9)))
-        last = float(variance) if allowed[-1] else last
+        allowed.append(bool(variance - last_variance >= min_variance * (1 - 1e-9)))
+        last_variance = float(variance) if allowed[-1] else last_variance
     return np.array(allowed)
 
 
 def max_edge_mm(variances_mm2: Sequence[float] | Floats) -> float:
-    """Return longest edge that allows all levels [mm]: half the smallest standard deviation that one adds."""
-    least = float(np.diff(_checked_variances(variances_mm2), prepend=0.0).min())
-    return float(np.sqrt(least)) / EDGES_PER_SIGMA
+    """Return the longest edge that resolves all levels, half the smallest sigma that a level adds [mm]."""
+    min_variance = float(np.diff(_checked_variances(variances_mm2), prepend=0.0).min())
+    return float(np.sqrt(min_variance)) / EDGES_PER_SIGMA
 
 
 def patch_margin_mm(variances_mm2: Sequence[float] | Floats) -> float:
-    """Return the margin of a patch beyond its radius [mm]: four standard deviations of the widest level."""
+    """Return the margin of a patch beyond its radius, four standard deviations of the widest level [mm]."""
     return MARGIN_SIGMAS * float(np.sqrt(_checked_variances(variances_mm2)[-1]))
 
 
 def _diffuse(mass: csc_array, stiffness: csc_array, values: Floats, variance: float, steps: int) -> Floats:
-    """Return `values` after the time variance/2."""
+    """Return values after diffusion for the time variance/2."""
     step = variance / 2 / steps
     solve = _factorised((mass + (_GAMMA / 2 * step) * stiffness).tocsc())
-    ahead = (mass - (_GAMMA / 2 * step) * stiffness).tocsr()
+    explicit = (mass - (_GAMMA / 2 * step) * stiffness).tocsr()
     first = 1 / (_GAMMA * (2 - _GAMMA))
-    held = mass.tocsr()
+    lumped = mass.tocsr()
     for _ in range(steps):
-        middle = solve(ahead @ values)
-        values = solve(held @ (first * middle + (1 - first) * values))
+        intermediate = solve(explicit @ values)
+        values = solve(lumped @ (first * intermediate + (1 - first) * values))
     return values
 
 
 def _factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
-    """Return a solver of a symmetric, positive definite matrix, without pivoting, ordered for surfaces."""
+    """Return a solver for a symmetric, positive definite matrix, by sparse LU without pivoting."""
     from scipy.sparse.linalg import splu
 
     options = {"SymmetricMode": True}
@@ -131,49 +131,53 @@ def _factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
 
 
 def _checked_surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats, Index]:
-    places, corners = np.asarray(positions, dtype=np.float64), np.asarray(triangles, dtype=np.int64)
-    shaped = places.shape == (len(places), 3) and corners.shape == (len(corners), 3) and len(corners) > 0
-    if not (shaped and np.isfinite(places).all() and 0 <= corners.min() <= corners.max() < len(places)):
-        came = f"arrays of shape {places.shape} and {corners.shape} came, or numbers that are not"
+    vertices, corners = np.asarray(positions, dtype=np.float64), np.asarray(triangles, dtype=np.int64)
+    shaped = vertices.shape == (len(vertices), 3) and corners.shape == (len(corners), 3) and len(corners) > 0
+    if not (shaped and np.isfinite(vertices).all() and 0 <= corners.min() <= corners.max() < len(vertices)):
+        actual = f"got arrays of shape {vertices.shape} and {corners.shape}, or numbers that are not"
         refuse(
-            "surface", "finite positions (n, 3) and triangles (f, 3) among them", came, "Correct the arrays"
+            "surface", "finite positions (n, 3) and triangles (f, 3) among them", actual, "Correct the arrays"
         )
-    return places, corners
+    return vertices, corners
 
 
 def _checked_values(values: ArrayLike, count: int) -> Floats:
-    given = np.asarray(values, dtype=np.float64)
-    if not (given.ndim == 2 and len(given) == count and np.isfinite(given).all()):
-        came = f"an array of shape {given.shape} came, or numbers that are not finite"
-        refuse("surface diffusion", f"finite values ({count}, c)", came, "Give each vertex its values")
-    return given
+    vertex_values = np.asarray(values, dtype=np.float64)
+    if not (vertex_values.ndim == 2 and len(vertex_values) == count and np.isfinite(vertex_values).all()):
+        actual = f"got an array of shape {vertex_values.shape}, or numbers that are not finite"
+        refuse("surface diffusion", f"finite values ({count}, c)", actual, "Give each vertex its values")
+    return vertex_values
 
 
 def _checked_variances(variances_mm2: Sequence[float] | Floats) -> Floats:
     variances = np.asarray(variances_mm2, dtype=np.float64)
     if not (variances.ndim == 1 and len(variances) and (np.diff(variances, prepend=0.0) > 0).all()):
-        refuse("surface diffusion", "variances above 0 that rise", f"{variances.tolist()} came", "Sort them")
+        refuse("surface diffusion", "variances above 0 that rise", f"got {variances.tolist()}", "Sort them")
     return variances
 
 
-def _check_resolution(places: Floats, corners: Index, variances: Sequence[float] | Floats, steps: int) -> None:
+def _check_resolution(
+    vertices: Floats, corners: Index, variances: Sequence[float] | Floats, steps: int
+) -> None:
     if steps < 1:
-        refuse("surface diffusion", "at least one step of time", f"{steps} came", "Choose 8 or more")
-    longest = longest_edge_mm(places, corners)
+        refuse("surface diffusion", "at least one step of time", f"got {steps}", "Choose 8 or more")
+    longest = longest_edge_mm(vertices, corners)
     allowed = resolved_levels(variances, longest)
     if not allowed.all():
         fine = ", ".join(f"{variance:g}" for variance in np.asarray(variances)[allowed]) or "none of them"
-        came = f"one of {longest:.3g} mm came, which allows of the variances {fine}"
-        expected = f"edges of at most {max_edge_mm(variances):.3g} mm, half of the least sigma that a level adds"
+        actual = f"got one of {longest:.3g} mm, which allows of the variances {fine}"
+        expected = (
+            f"edges of at most {max_edge_mm(variances):.3g} mm, half of the least sigma that a level adds"
+        )
         refuse(
-            "surface diffusion", expected, came, "Refine the surface (refine_patch) or ask for wider levels"
+            "surface diffusion", expected, actual, "Refine the surface (refine_patch) or ask for wider levels"
         )
 
 
 _SLACK = 1e-5
-"""Least slack of the triangle inequality, over the mean edge: flatter triangles have no useful angles."""
+"""Least slack of the triangle inequality, over the mean edge; angles of flatter triangles are not usable."""
 _COCIRCULAR = 1e-6
-"""Edges whose cotangents sum to less than minus this are flipped: points on a circle give 0 and rounding."""
+"""Edges whose cotangents sum to less than minus this are flipped; four points on a circle sum to 0."""
 _MAX_SWEEPS = 1000
 
 
@@ -200,13 +204,13 @@ class Triangulation:
     def cotangents(self) -> Floats:
         """Return the cotangent of the angle opposite each side (f, 3)."""
         square = self.length[self.side] ** 2
-        facing = square.sum(axis=1, keepdims=True) - 2 * square
-        cotangents: Floats = facing / (4 * self.areas()[:, None])
+        law_of_cosines = square.sum(axis=1, keepdims=True) - 2 * square
+        cotangents: Floats = law_of_cosines / (4 * self.areas()[:, None])
         return cotangents
 
 
 def intrinsic_triangulation(positions: Floats, triangles: Index) -> Triangulation:
-    """Return triangles by edge lengths; all edges grow by the same tiny amount if one is degenerate.
+    """Return triangles by edge lengths; a tiny length is added to all edges if a triangle is degenerate.
 
     positions : (n, 3) [mm]
     triangles : (f, 3)
@@ -219,29 +223,30 @@ def intrinsic_triangulation(positions: Floats, triangles: Index) -> Triangulatio
     return Triangulation(triangles, side, length + missing)
 
 
-def delaunay(given: Triangulation) -> Triangulation:
-    """Return the same surface with edges flipped until the two angles opposite each sum to at most pi.
+def delaunay(surface: Triangulation) -> Triangulation:
+    """Return the intrinsic Delaunay triangulation of the same surface, by edge flips.
 
-    Heat then flows from hot to cold along every edge, whatever obtuse angles the mesh has. Borders, and edges
-    where more than two triangles meet or two have opposite orientations, stay.
+    Then the two angles opposite each edge sum to at most pi, and heat flows from hot to cold along every
+    edge, however obtuse the mesh's angles. Borders are not flipped, nor edges where more than two triangles
+    meet or two have opposite orientations.
 
     Source: [BobenkoSpringborn2007]; [Fisher2007] for flips by lengths.
     """
-    corners, side, length = given.corners.copy(), given.side.copy(), given.length.copy()
-    now = Triangulation(corners, side, length)
+    corners, side, length = surface.corners.copy(), surface.side.copy(), surface.length.copy()
+    flipped = Triangulation(corners, side, length)
     flippable = _interior_edges(corners, side, len(length))
-    # Each flip lowers the Dirichlet energy of every function on the surface, so this ends.
+    # Each flip lowers the Dirichlet energy of every function on the surface, so the loop ends.
     for _ in range(_MAX_SWEEPS):
-        weight = sum_at(side.ravel(), now.cotangents().reshape(-1, 1), len(length))[:, 0]
-        bad = flippable & (weight < -_COCIRCULAR)
-        if not bad.any():
+        weight = sum_at(side.ravel(), flipped.cotangents().reshape(-1, 1), len(length))[:, 0]
+        illegal = flippable & (weight < -_COCIRCULAR)
+        if not illegal.any():
             break
-        _flip_edges(now, _independent_flips(side, bad, weight))
-    return now
+        _flip_edges(flipped, _independent_flips(side, illegal, weight))
+    return flipped
 
 
 def _interior_edges(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
-    """Return edges (e,) shared by two triangles of the same orientation."""
+    """Return the mask (e,) of edges shared by exactly two triangles of the same orientation."""
     forward = (corners < np.roll(corners, -1, axis=1)).ravel()
     uses = np.bincount(side.ravel(), minlength=count)
     along = np.bincount(side.ravel()[forward], minlength=count)
@@ -249,52 +254,56 @@ def _interior_edges(corners: Index, side: Index, count: int) -> NDArray[np.bool_
     return shared
 
 
-def _independent_flips(side: Index, bad: NDArray[np.bool_], weight: Floats) -> Index:
-    """Return bad edges no two of which share a triangle, as indices (2, m) of their sides in `side.ravel()`.
+def _independent_flips(side: Index, illegal: NDArray[np.bool_], weight: Floats) -> Index:
+    """Return non-Delaunay edges of which no two share a triangle, as (2, m) indices of sides.
 
-    Each triangle votes for its worst edge. Edges with both votes are taken; the worst of all is among them.
+    The indices are those in `side.ravel()`. Each triangle votes for its worst edge; edges with both votes are
+    taken. The worst of all edges is among them.
     """
-    worst_first = np.flatnonzero(bad)[np.argsort(weight[bad], kind="stable")]
-    rank = np.full(len(bad), len(bad), dtype=np.int64)
+    worst_first = np.flatnonzero(illegal)[np.argsort(weight[illegal], kind="stable")]
+    rank = np.full(len(illegal), len(illegal), dtype=np.int64)
     rank[worst_first] = np.arange(len(worst_first))
-    of_side = rank[side]
-    vote = of_side.argmin(axis=1)
-    place = np.arange(len(side)) * 3 + vote
-    place = place[of_side.ravel()[place] < len(bad)]
-    edge = side.ravel()[place]
-    both = place[np.bincount(edge, minlength=len(bad))[edge] == 2]
-    pairs: Index = both[np.argsort(side.ravel()[both], kind="stable")].reshape(-1, 2).T
+    side_rank = rank[side]
+    worst_side = side_rank.argmin(axis=1)
+    side_index = np.arange(len(side)) * 3 + worst_side
+    side_index = side_index[side_rank.ravel()[side_index] < len(illegal)]
+    edge = side.ravel()[side_index]
+    mutual = side_index[np.bincount(edge, minlength=len(illegal))[edge] == 2]
+    pairs: Index = mutual[np.argsort(side.ravel()[mutual], kind="stable")].reshape(-1, 2).T
     return pairs
 
 
-def _flip_edges(now: Triangulation, pairs: Index) -> None:
+def _flip_edges(flipped: Triangulation, pairs: Index) -> None:
     """Flip each edge ab between triangles abc and bad to cd, in place."""
-    (left, i), (right, j) = (np.divmod(place, 3) for place in pairs)
-    a, b, c = (now.corners[left, (i + k) % 3] for k in range(3))
-    d = now.corners[right, (j + 2) % 3]
-    ab, bc, ca = (now.side[left, (i + k) % 3] for k in range(3))
-    ad, db = (now.side[right, (j + k) % 3] for k in (1, 2))
-    along_c, up_c = _apex_coordinates(now.length[ab], now.length[ca], now.length[bc])
-    along_d, down_d = _apex_coordinates(now.length[ab], now.length[ad], now.length[db])
-    now.length[ab] = np.hypot(along_c - along_d, up_c + down_d)
-    now.corners[left], now.side[left] = np.column_stack((c, d, b)), np.column_stack((ab, db, bc))
-    now.corners[right], now.side[right] = np.column_stack((d, c, a)), np.column_stack((ab, ca, ad))
+    (left, i), (right, j) = (np.divmod(side_index, 3) for side_index in pairs)
+    a, b, c = (flipped.corners[left, (i + k) % 3] for k in range(3))
+    d = flipped.corners[right, (j + 2) % 3]
+    ab, bc, ca = (flipped.side[left, (i + k) % 3] for k in range(3))
+    ad, db = (flipped.side[right, (j + k) % 3] for k in (1, 2))
+    along_c, up_c = _apex_coordinates(flipped.length[ab], flipped.length[ca], flipped.length[bc])
+    along_d, down_d = _apex_coordinates(flipped.length[ab], flipped.length[ad], flipped.length[db])
+    flipped.length[ab] = np.hypot(along_c - along_d, up_c + down_d)
+    flipped.corners[left], flipped.side[left] = np.column_stack((c, d, b)), np.column_stack((ab, db, bc))
+    flipped.corners[right], flipped.side[right] = np.column_stack((d, c, a)), np.column_stack((ab, ca, ad))
 
 
 def _apex_coordinates(base: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """Return the position of the apex along the base, from the end at side `first`, and its height [mm]."""
+    """Return the apex of triangles as its position along the base and its height [mm].
+
+    first : length of the side from the base's start to the apex
+    """
     along = (base**2 + first**2 - second**2) / (2 * base)
     return along, np.sqrt(np.maximum(first**2 - along**2, 0))
 
 
 def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, csc_array]:
-    """Return mass M [mm2] and stiffness K [-] (n, n) of linear elements, with M du/dt = -K u for heat.
+    """Return mass M [mm2] and stiffness K [-] (n, n) of linear elements: M du/dt = -K u for heat.
 
-    M is the mean of the lumped and the consistent mass. Their errors in the speed of heat are opposite and,
-    on regular triangles, cancel to fourth order in the edge length. The rows of M sum to the vertices' areas,
-    those of K to 0. A vertex without triangles keeps its value.
+    M is the mean of the lumped and the consistent mass matrix. Their errors in the speed of heat are opposite
+    and, on regular triangles, cancel to fourth order in the edge length. The rows of M sum to the vertices'
+    areas, those of K to 0. A vertex without triangles keeps its value.
 
-    count : n, the number of vertices
+    count : n, number of vertices
 
     Source: [PinkallPolthier1993] for the cotangents.
     """
@@ -302,17 +311,19 @@ def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, c
 
     start = surface.corners
     end = np.roll(start, -1, axis=1)
-    conduct = surface.cotangents() / 2
-    share = np.repeat(surface.areas()[:, None], 3, axis=1)
+    conductance = surface.cotangents() / 2
+    corner_area = np.repeat(surface.areas()[:, None], 3, axis=1)
 
-    def assembled(between: Floats, own: Floats) -> csc_array:
-        """Return entries `between` start and end of each side and `own` at its start."""
+    def assemble(off_diagonal: Floats, diagonal: Floats) -> csc_array:
+        """Return entries `off_diagonal` start and end of each side and `diagonal` at its start."""
         rows = np.concatenate([index.ravel() for index in (start, end, start)])
         columns = np.concatenate([index.ravel() for index in (end, start, start)])
-        values = np.concatenate([entry.ravel() for entry in (between, between, own)])
+        values = np.concatenate([entry.ravel() for entry in (off_diagonal, off_diagonal, diagonal)])
         return coo_array((values, (rows, columns)), shape=(count, count)).tocsc()
 
-    stiffness = assembled(-conduct, conduct + np.roll(conduct, 1, axis=1))
-    alone = np.bincount(start.ravel(), minlength=count) == 0
-    rest = coo_array((alone.astype(np.float64), (np.arange(count), np.arange(count))), shape=(count, count))
-    return (assembled(share / 24, share / 4) + rest).tocsc(), stiffness
+    stiffness = assemble(-conductance, conductance + np.roll(conductance, 1, axis=1))
+    isolated = np.bincount(start.ravel(), minlength=count) == 0
+    identity = coo_array(
+        (isolated.astype(np.float64), (np.arange(count), np.arange(count))), shape=(count, count)
+    )
+    return (assemble(corner_area / 24, corner_area / 4) + identity).tocsc(), stiffness

@@ -1,4 +1,4 @@
-"""The light that a diffusion profile brings to points, integrated over the surface: a profile's truth."""
+"""Surface integral of a diffusion profile over irradiance: the reference for light below the surface."""
 
 from __future__ import annotations
 
@@ -7,69 +7,73 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.truths.irradiance_samples import IrradianceSamples, MeshPoints, sample_irradiance
+from dermis.apps.truths.irradiance_samples import IrradianceSamples
 from dermis.apps.truths.octree import Octree, build_octree
-from dermis.apps.truths.radial_table import GaussianSum, Profile, RadialTable, tabulate_profile
+from dermis.apps.truths.radial_table import Profile, tabulate_profile
 from dermis.base.errors import refuse
-
-__all__ = ["GaussianSum", "IrradianceSamples", "SurfacePoints", "RadialTable", "integrate_exitance", "sample_irradiance"]
 
 Floats = NDArray[np.float64]
 
-_POINTS_PER_CALL = 1024  # points between two checks for Ctrl-C
+_POINTS_PER_CALL = 1024  # between two checks for Ctrl-C
 _ERROR_AT_UNIT_BOUND = 1e-3
-"""Error at a bound of 1, by quadrature of waves, spheres, bumps and the scan. The remainders that three
-points leave are of third order in the size of a patch, their bound of second."""
+"""Error at an error bound of 1, measured on waves, spheres, bumps and the scan. The errors of three points
+are of third order in the size of a patch, their bound is of second order."""
 _UNCANCELLED_FACTOR = 50.0
-"""Where channels are lit differently, the remainders are of second order and cancel less well."""
+"""Factor for errors of differently lit channels, which are of second order and cancel less well."""
 
 
-def integrate_exitance(points: ArrayLike, samples: IrradianceSamples, profile: Profile, error: float = 1e-3) -> Floats:
+def integrate_exitance(
+    points: ArrayLike, samples: IrradianceSamples, profile: Profile, error: float = 1e-3
+) -> Floats:
     """Return radiant exitance (n, 3), the integral of R(|x - y|) E(y) dA over the surface.
 
-    points : (n, 3) x, on the surface [mm]
-    samples : E, linear on small triangles; whether they are fine enough for the light is up to the caller
-    profile : R, by straight-line distance, through thin parts too
-    error : expected root mean square error of the integral, relative to its mean; 1e-5 to 0.05 [-]
+    points : (n, 3) positions x on the surface [mm]
+    samples : irradiance E, linear on small triangles; the caller chooses them fine enough for the light
+    profile : R, by Euclidean distance, through thin parts too
+    error : expected root mean square error of the integral relative to its mean, 1e-5 to 0.05 [-]
 
-    A node of the octree, a triangle or a part of one is replaced by three points if Taylor's remainder stays
-    under its share of a bound, and is opened or cut otherwise, so the profile's steep middle is integrated as
-    finely as it needs. The bound would be exact if no errors cancelled; nearly all do, so the bound that goes
-    with `error` comes from measurement.
+    A node of the octree, a triangle or a part of one is replaced by three points if Taylor's remainder is
+    below its share of an error bound, and is opened or split otherwise, so the profile's steep centre is
+    integrated as finely as it needs. The bound would be exact if no errors cancelled; nearly all do, so the
+    relation between the bound and `error` is measured.
 
     Source: [JensenBuhler2002], with the remainder in place of the solid angle.
     """
-    places = np.ascontiguousarray(points, dtype=np.float64)
-    if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
-        refuse("points", "finite positions (n, 3) in mm", f"{places.shape} came", "Correct them")
+    positions = np.ascontiguousarray(points, dtype=np.float64)
+    if positions.ndim != 2 or positions.shape[1] != 3 or not np.isfinite(positions).all():
+        refuse("points", "finite positions (n, 3) in mm", f"got {positions.shape}", "Correct them")
     if not 1e-5 <= error <= 0.05:
-        refuse("error", "a share from 1e-5 to 0.05", f"{error} came", "0.001 is enough for pictures")
-    return _gather_in_threads(places, samples, profile, error)
+        refuse("error", "a share from 1e-5 to 0.05", f"got {error}", "0.001 is enough for pictures")
+    return _gather_in_threads(positions, samples, profile, error)
 
 
-def _gather_in_threads(places: Floats, samples: IrradianceSamples, profile: Profile, error: float) -> Floats:
+def _gather_in_threads(
+    positions: Floats, samples: IrradianceSamples, profile: Profile, error: float
+) -> Floats:
     from numba import config
 
     from dermis.apps.truths.octree_gather import gather_exitance
 
     bound = (error / _ERROR_AT_UNIT_BOUND) ** (2 / 3)
-    tree, table = _weighted_bounds(build_octree(samples), bound / (_UNCANCELLED_FACTOR * error)), tabulate_profile(profile)
-    exitance = np.zeros_like(places)
-    parts = [slice(i, i + _POINTS_PER_CALL) for i in range(0, len(places), _POINTS_PER_CALL)]
+    tree = _weighted_bounds(build_octree(samples), bound / (_UNCANCELLED_FACTOR * error))
+    table = tabulate_profile(profile)
+    exitance = np.zeros_like(positions)
+    slices = [slice(i, i + _POINTS_PER_CALL) for i in range(0, len(positions), _POINTS_PER_CALL)]
 
-    def fill(part: slice) -> None:
-        gather_exitance(places[part], tree, table, bound, exitance[part])
+    def gather_rows(rows: slice) -> None:
+        gather_exitance(positions[rows], tree, table, bound, exitance[rows])
 
-    # The compiled loop releases the GIL, so threads share the work.
+    # The compiled function releases the GIL, so threads run in parallel.
     pool = ThreadPoolExecutor(config.NUMBA_NUM_THREADS)
     try:
-        for _ in pool.map(fill, parts):
+        for _ in pool.map(gather_rows, slices):
             pass
     finally:
         pool.shutdown(cancel_futures=True)
     return exitance
 
 
-def _weighted_bounds(tree: Octree, strictness: float) -> Octree:
-    """Return the tree with the errors that do not cancel multiplied by `strictness`."""
-    return tree._replace(spread=tree.spread + strictness * tree.mismatch, offset=strictness * tree.offset)
+def _weighted_bounds(tree: Octree, factor: float) -> Octree:
+    """Return the octree with the errors that do not cancel multiplied by a factor."""
+    second_moment = tree.second_moment + factor * tree.moment_error
+    return tree._replace(second_moment=second_moment, centroid_error=factor * tree.centroid_error)

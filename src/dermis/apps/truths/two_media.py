@@ -1,6 +1,6 @@
-"""Monte Carlo: light across the border of two half-spaces side by side, compiled by numba.
+"""Monte Carlo simulation of light across the border of two half-spaces side by side, compiled by numba.
 
-The left medium fills x < 0, the right one x > 0, both z > 0; all scatter isotropically.
+The left medium fills x < 0, the right one x > 0, both z > 0; both scatter isotropically.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ Counts = NDArray[np.int64]
 
 @compiled
 def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: RandomState) -> float:
-    """Return the exit x of a photon that entered straight down at x [mm]; NaN if it is absorbed."""
+    """Return the exit x of a photon that enters at normal incidence at x [mm]; NaN if it is absorbed."""
     z = ux = uy = 0.0
     uz = 1.0
     medium = 0 if x < 0.0 else 1
-    depth = -math.log(uniform(rng))  # optical, to the next scattering
+    depth = -math.log(uniform(rng))  # optical depth to the next scattering
     for _ in range(MAX_EVENTS):
         path = depth / sigma_t[medium]
         to_face = -z / uz if uz < 0.0 else math.inf
@@ -49,11 +49,18 @@ def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: Ra
 
 @compiled
 def tally_exits(
-    photons: int, sigma_t: Floats, albedo: Floats, eta: float, edges_mm: Floats, rng: RandomState, tally: Counts
+    photons: int,
+    sigma_t: Floats,
+    albedo: Floats,
+    eta: float,
+    edges_mm: Floats,
+    rng: RandomState,
+    tally: Counts,
 ) -> None:
-    """Add to tally (n, n) where photons leave, by bins of where they enter and leave; as many into each.
+    """Add photons to a tally (n, n) by the strips where they enter and leave.
 
-    edges_mm : (n + 1,) evenly spaced
+    photons : number that enters each strip
+    edges_mm : (n + 1,) edges of the strips, evenly spaced
     """
     bins = len(edges_mm) - 1
     width = (edges_mm[-1] - edges_mm[0]) / bins
@@ -67,13 +74,13 @@ def tally_exits(
 def strip_transfer(
     sigma_a: Floats, sigma_s_prime: Floats, edges_mm: Floats, photons: int, seed: int = 0, eta: float = 1.4
 ) -> Floats:
-    """Return (n, n) shares of light entering each strip, straight down, that leave from each strip [-].
+    """Return (n, n) fractions of light that enters strip i at normal incidence and leaves from strip j [-].
 
-    The border runs between strips along x = 0; what leaves beyond the outer edges is left out.
+    The border between the media runs along x = 0; light that leaves beyond the outer edges is not counted.
 
-    sigma_a, sigma_s_prime : (2,) of the media left and right [1/mm]
-    edges_mm : (n + 1,) of the strips, evenly spaced [mm]
-    photons : into each strip
+    sigma_a, sigma_s_prime : (2,) coefficients of the left and the right medium [1/mm]
+    edges_mm : (n + 1,) edges of the strips, evenly spaced [mm]
+    photons : number that enters each strip
 
     Source: [Wang1995], with a second medium.
     """

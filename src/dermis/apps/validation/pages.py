@@ -12,10 +12,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 from dermis.base.console import print_lines
 from dermis.base.errors import refuse
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 
 Figures = dict[str, Any]
 """A JSON object: numbers, words, lists and further objects."""
@@ -59,7 +59,7 @@ def data_file(name: str) -> Path:
 def write_page(page: Path, text: str) -> None:
     """Write a page of the documentation, whole or not at all."""
     in_checkout(page.parent)
-    with replacing(page) as unfinished:
+    with atomic_file(page) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
 
 
@@ -85,7 +85,7 @@ def write_figures(path: Path, figures: Mapping[str, Any], digits: int | None = N
     digits : significant digits of floats; all of them when left out
     """
     values = figures if digits is None else _rounded(figures, digits)
-    with replacing(path) as unfinished:
+    with atomic_file(path) as unfinished:
         unfinished.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
@@ -112,7 +112,7 @@ def chromium_page(side: int, flags: Sequence[str] = SOFTWARE_WEBGL) -> Iterator[
 
     Raises DermisError when the package playwright is not installed.
     """
-    with needed("playwright.sync_api", "a page in Chromium").sync_playwright() as play:
+    with import_extra("playwright.sync_api", "a page in Chromium").sync_playwright() as play:
         browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=list(flags))
         yield browser.new_page(viewport={"width": side, "height": side}, offline=True)
         browser.close()

@@ -1,1 +1,1 @@
-"""People by path tracing: coated skin, eyes with real refraction, teeth and hairs as Mitsuba has them."""
+"""Reference images of people by path tracing: coated skin, refracting eyes, teeth and hair fibres."""

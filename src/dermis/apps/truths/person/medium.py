@@ -1,4 +1,4 @@
-"""A medium below painted skin: as far as light spreads in the mean, and for each place what it gives back."""
+"""Scattering medium below painted skin, with a mean free path and an albedo grid."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.person.person import Person
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.mesh.geometry import triangle_areas
 from dermis.optics.media import SKIN_ETA
@@ -19,13 +19,14 @@ Doubles = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 COAT_TRANSMITTANCE = 0.98
-"""Share of light that the coat lets through, see `skin.coat`; the medium makes up for it."""
+"""Fraction of light that the coat transmits, see `coat_bsdf`; the medium compensates for it."""
 COAT_INDEX = SKIN_ETA
 VOXELS = 96
-"""Along the longest side of the grid of colours."""
-_GRID_MARGIN, _MIN_HALF_SIDE_MM = 0.75, 25.0  # of the grid: over the height of the picture; least half of its side
-_COLOUR_DEPTH_MM = 3.0  # from the surface, to which places have its colour
-_SAMPLES_PER_VOXEL = 3.0  # samples of the surface for the square of a voxel's side
+"""Number of cells along the longest side of the albedo grid."""
+_GRID_MARGIN, _MIN_HALF_SIDE_MM = 0.75, 25.0
+"""Half the side of the albedo grid, over the height of the picture, and its lower limit."""
+_COLOUR_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
+_SAMPLES_PER_VOXEL = 3.0  # samples per area of a voxel's side
 _MAX_COLOUR = 0.97
 _MIN_ROOT = 0.01
 _PHOTONS = 40_000
@@ -33,22 +34,22 @@ _PHOTONS = 40_000
 
 @cache
 def _albedo_table() -> tuple[Doubles, Doubles]:
-    """Return albedos of half-spaces, and the roots of their single-scattering absorption, in even steps."""
-    root = np.linspace(1.0, _MIN_ROOT, 32)
-    return np.array([diffuse_albedo(float(1.0 - one**2)) for one in root]), root
+    """Return diffuse albedos of half-spaces and the roots of their single-scattering absorption."""
+    absorption_root = np.linspace(1.0, _MIN_ROOT, 32)
+    return np.array([diffuse_albedo(float(1.0 - one**2)) for one in absorption_root]), absorption_root
 
 
 def single_scattering_albedo(colour: ArrayLike) -> Doubles:
-    """Return the single-scattering albedo of half-spaces of a colour under uniform light [-]."""
-    total, root = _albedo_table()
-    wanted = np.clip(np.asarray(colour, np.float64) / COAT_TRANSMITTANCE, 0.0, _MAX_COLOUR)
-    return np.asarray(1.0 - np.interp(wanted, total, root) ** 2)
+    """Return the single-scattering albedo of half-spaces with a given diffuse albedo below the coat [-]."""
+    diffuse_albedos, absorption_root = _albedo_table()
+    near_cells = np.clip(np.asarray(colour, np.float64) / COAT_TRANSMITTANCE, 0.0, _MAX_COLOUR)
+    return np.asarray(1.0 - np.interp(near_cells, diffuse_albedos, absorption_root) ** 2)
 
 
 def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
-    """Return mean free paths (3,) of media of a colour (3,) by the mean lateral offset (3,) of exits [mm].
+    """Return mean free paths (3,) of media of a colour (3,) and a mean lateral offset of exits (3,) [mm].
 
-    By photons, which fall in at right angles.
+    The offsets of media with a mean free path of 1 mm are found by Monte Carlo at normal incidence.
     """
     pairs = zip(single_scattering_albedo(colour), np.asarray(distance_mm, np.float64), strict=True)
     return np.array([distance / _mean_offset(round(float(albedo), 4)) for albedo, distance in pairs])
@@ -59,12 +60,12 @@ def _mean_offset(albedo: float) -> float:
     """Return the mean lateral offset of exit points, in mean free paths."""
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 400.0, 120)])
     layer = ScatteringLayer(1.0 - albedo, albedo, eta=1.0)
-    found = trace_slab([layer], _PHOTONS, edges_mm=edges).reflectance * np.pi * np.diff(edges**2)
-    return float((found * 0.5 * (edges[1:] + edges[:-1])).sum() / found.sum())
+    energy = trace_slab([layer], _PHOTONS, edges_mm=edges).reflectance * np.pi * np.diff(edges**2)
+    return float((energy * 0.5 * (edges[1:] + edges[:-1])).sum() / energy.sum())
 
 
 def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: Doubles) -> MitsubaObject:
-    """Return Mitsuba's medium below the skin, exact in colour where the camera looks."""
+    """Return Mitsuba's medium below the skin, with an albedo grid around the camera's target."""
     extinction = 1.0 / mean_free_path_mm
     low, high = _grid_box(person, camera)
     grid = single_scattering_albedo(colour_grid(person, low, high, VOXELS)).astype(np.float32)
@@ -78,7 +79,7 @@ def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: 
                 "raw": True,
                 "to_world": to_world.scale([float(c) for c in high - low]),
             },
-            "sigma_t": rgb(extinction / extinction.max()),  # textures hold at most 1
+            "sigma_t": rgb(extinction / extinction.max()),  # textures are limited to 1
             "scale": float(extinction.max()),
             "phase": {"type": "isotropic"},
         }
@@ -86,60 +87,63 @@ def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: 
 
 
 def _grid_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
-    """Return two corners of the part of the head in the picture; beyond it colours are constant."""
-    reach = max(_GRID_MARGIN * camera.frame_mm, _MIN_HALF_SIDE_MM)
+    """Return two corners of the part of the head in the picture; outside it colours are constant."""
+    half_side = max(_GRID_MARGIN * camera.frame_mm, _MIN_HALF_SIDE_MM)
     skin = person.mesh.positions[np.unique(_skin_triangles(person))]
     middle = np.array(camera.target, np.float64)
-    low = np.maximum(skin.min(axis=0) - _COLOUR_DEPTH_MM, middle - reach)
-    high = np.minimum(skin.max(axis=0) + _COLOUR_DEPTH_MM, middle + reach)
+    low = np.maximum(skin.min(axis=0) - _COLOUR_DEPTH_MM, middle - half_side)
+    high = np.minimum(skin.max(axis=0) + _COLOUR_DEPTH_MM, middle + half_side)
     return low, np.maximum(high, low + 1.0)
 
 
 def _skin_triangles(person: Person) -> NDArray[np.int32]:
-    """Return (f, 3) triangles of skin."""
+    """Return the triangles of skin, (f, 3)."""
     mesh = person.mesh
     kinds = np.array([one.kind == "skin" for one in mesh.materials])
     return np.asarray(mesh.triangles[kinds[mesh.material]])
 
 
 def colour_grid(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doubles:
-    """Return (z, y, x, 3) colours of the nearest skin in even cells of a box, deeper inside the mean of all.
+    """Return (z, y, x, 3) skin colours in the cells of a box: of the nearest skin, or the mean deeper inside.
 
     low, high : (3,) corners of the box [mm]
+    voxels : number of cells along the longest side
     """
     from scipy.ndimage import binary_dilation
     from scipy.spatial import cKDTree
 
-    side = float((high - low).max()) / voxels
-    count = np.maximum(np.ceil((high - low) / side).astype(int), 1)
-    places, colour = _skin_samples(person, low, high, side)
-    grid = np.tile(colour.mean(axis=0) if len(colour) else np.full(3, 0.5), (*count[::-1], 1))
-    if not len(places):
+    cell_mm = float((high - low).max()) / voxels
+    cell_count = np.maximum(np.ceil((high - low) / cell_mm).astype(int), 1)
+    positions, colour = _skin_samples(person, low, high, cell_mm)
+    grid = np.tile(colour.mean(axis=0) if len(colour) else np.full(3, 0.5), (*cell_count[::-1], 1))
+    if not len(positions):
         return grid
-    cell = np.clip(((places - low) / (high - low) * count).astype(int), 0, count - 1)
-    near = np.zeros(count[::-1], bool)
-    near[cell[:, 2], cell[:, 1], cell[:, 0]] = True
-    near = binary_dilation(near, iterations=max(2, int(np.ceil(_COLOUR_DEPTH_MM / side))))
-    wanted = np.argwhere(near)
-    middles = low + (wanted[:, ::-1] + 0.5) / count * (high - low)
-    _, nearest = cKDTree(places).query(middles, k=min(4, len(places)))
-    grid[near] = colour[nearest.reshape(len(middles), -1)].mean(axis=1)
+    cell = np.clip(((positions - low) / (high - low) * cell_count).astype(int), 0, cell_count - 1)
+    is_near = np.zeros(cell_count[::-1], bool)
+    is_near[cell[:, 2], cell[:, 1], cell[:, 0]] = True
+    is_near = binary_dilation(is_near, iterations=max(2, int(np.ceil(_COLOUR_DEPTH_MM / cell_mm))))
+    near_cells = np.argwhere(is_near)
+    cell_centres = low + (near_cells[:, ::-1] + 0.5) / cell_count * (high - low)
+    _, nearest = cKDTree(positions).query(cell_centres, k=min(4, len(positions)))
+    grid[is_near] = colour[nearest.reshape(len(cell_centres), -1)].mean(axis=1)
     return grid
 
 
-def _skin_samples(person: Person, low: Doubles, high: Doubles, side: float) -> tuple[Doubles, Doubles]:
-    """Return places on the skin in a box (n, 3) and their colours (n, 3), the same each time."""
+def _skin_samples(person: Person, low: Doubles, high: Doubles, cell_mm: float) -> tuple[Doubles, Doubles]:
+    """Return random points on the skin in a box (n, 3) and their colours (n, 3), with a fixed seed."""
     mesh, triangles = person.mesh, _skin_triangles(person)
     corners = mesh.positions[triangles].astype(np.float64)
-    inside = ((corners.max(axis=1) >= low - _COLOUR_DEPTH_MM) & (corners.min(axis=1) <= high + _COLOUR_DEPTH_MM)).all(axis=1)
+    inside = (
+        (corners.max(axis=1) >= low - _COLOUR_DEPTH_MM) & (corners.min(axis=1) <= high + _COLOUR_DEPTH_MM)
+    ).all(axis=1)
     triangles, corners = triangles[inside], corners[inside]
     rng = np.random.default_rng(0)
-    many = rng.poisson(_SAMPLES_PER_VOXEL * triangle_areas(corners) / side**2) + 1
-    of = np.repeat(np.arange(len(triangles)), many)
-    weights = rng.dirichlet((1.0, 1.0, 1.0), len(of))
-    places = np.einsum("nk,nkc->nc", weights, corners[of])
-    uv = np.einsum("nk,nkc->nc", weights, mesh.uv[triangles[of]].astype(np.float64))
-    picture = person.paint.colour
+    sample_counts = rng.poisson(_SAMPLES_PER_VOXEL * triangle_areas(corners) / cell_mm**2) + 1
+    triangle_of = np.repeat(np.arange(len(triangles)), sample_counts)
+    weights = rng.dirichlet((1.0, 1.0, 1.0), len(triangle_of))
+    positions = np.einsum("nk,nkc->nc", weights, corners[triangle_of])
+    uv = np.einsum("nk,nkc->nc", weights, mesh.uv[triangles[triangle_of]].astype(np.float64))
+    picture = person.textures.colour
     rows, columns = picture.shape[:2]
     x, y = np.clip((uv * [columns, rows]).astype(int), 0, [columns - 1, rows - 1]).T
-    return places, picture[y, x].astype(np.float64)
+    return positions, picture[y, x].astype(np.float64)

@@ -1,4 +1,4 @@
-"""A person by path tracing, with the variance of each pixel."""
+"""Reference images of a person by path tracing, with the variance of each pixel."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.scene_description import SceneDict, Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
-    mitsuba_scene,
+    coverage_scene,
     load_mitsuba,
     mesh_shape,
-    coverage_scene,
+    mitsuba_scene,
 )
 from dermis.apps.truths.path_traced import (
     SAMPLES_PER_PASS,
@@ -21,70 +20,69 @@ from dermis.apps.truths.path_traced import (
     ProgressCallback,
     Variant,
     hash_lighting,
-    render_passes,
     pass_count,
+    render_passes,
 )
 from dermis.apps.truths.person.medium import COAT_TRANSMITTANCE, VOXELS, mean_free_paths, skin_medium
+from dermis.apps.truths.person.person import Person, SkinTextures, posed_person
 from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, mitsuba_texture, skin_shapes
-from dermis.apps.truths.person.person import SkinTextures as Paint
-from dermis.apps.truths.person.person import Person, posed_person
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, rgb
 from dermis.mesh.mesh import Material
 from dermis.scene.model import Scene
 
-_CACHE_VERSION = "person 1"  # raise when the same person is traced in another way
+_CACHE_VERSION = "person 1"  # change when the result for the same person changes
 _SALIVA_ROUGHNESS, _TONGUE_ROUGHNESS = 0.12, 0.25
 _SALIVA_INDEX = 1.4
 
 
 def path_trace_person(
     scene: Scene,
-    paint: Paint,
+    textures: SkinTextures,
     distance_mm: NDArray[np.float64],
     colour: NDArray[np.float64],
     size: tuple[int, int],
     samples: int = 64,
     *,
     variant: Variant = "scalar_rgb",
-    keep: bool = True,
-    report: ProgressCallback | None = None,
+    use_cache: bool = True,
+    progress: ProgressCallback | None = None,
 ) -> PathTraced:
-    """Return the person of a scene as painted, its skin's profile and surface lobe aside.
-
-    paint : pictures of skin, eyes and teeth
-    distance_mm : (3,) from where light enters skin of the mean colour (3,) to where it leaves, in the mean
-    samples, variant, keep, report : as of `path_trace`
+    """Return the path-traced image of the person in a scene, with the given textures.
 
     The skin is a medium under a rough coat that does not refract; its albedo is a grid of painted colours.
-    The cornea refracts, and the iris is a painted disc behind it, so lights must have a size.
+    The cornea refracts, and the iris is a painted disc behind it, so lights must have a size. The skin's
+    profile and surface lobe are ignored.
 
-    Raises DermisError when Mitsuba is missing, and for heads without eyes of true shape.
+    textures : of skin, eyes and teeth
+    distance_mm : (3,) mean lateral offset of exit points in skin of the mean colour
+    colour : (3,) that mean colour
+    samples, variant, use_cache, progress : as in `path_trace`
+
+    Raises DermisError when Mitsuba is missing, and for heads without modelled eyes.
 
     Sources: [Jakob2022], [Miller2019], [Chiang2016].
     """
-    wanted, mi = pass_count(samples), load_mitsuba()
-    person, path = posed_person(scene, paint), mean_free_paths(colour, distance_mm)
-    form = f"{_CACHE_VERSION} {mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {VOXELS} {size}"
-    key = person_key(scene, person, path, form) if keep else None
+    target_count, mi = pass_count(samples), load_mitsuba()
+    person, path = posed_person(scene, textures), mean_free_paths(colour, distance_mm)
+    constants = f"{SAMPLES_PER_PASS} {ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {VOXELS}"
+    trace_settings = f"{_CACHE_VERSION} {mi.__version__} {variant} {constants} {size}"
+    key = person_key(scene, person, path, trace_settings) if use_cache else None
     return render_passes(
         mi,
         variant,
-        wanted,
+        target_count,
         size,
         key,
         lambda: person_scene(mi, scene, person, path, size),
         lambda: coverage_scene(mi, scene.camera, size, _emissive_head(mi, person)),
-        report,
+        progress,
     )
 
 
 def person_scene(
-    mi: Mitsuba,
-    scene: Scene,
-    person: Person,
-    mean_free_path_mm: NDArray[np.float64],
-    size: tuple[int, int],
+    mi: Mitsuba, scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], size: tuple[int, int]
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
-    """Return Mitsuba's scene whose image is the radiance, and notes on what was done to the head."""
+    """Return Mitsuba's scene for the radiance image, and notes on changes to the head."""
     medium = skin_medium(mi, person, scene.camera, mean_free_path_mm)
     shapes, notes = skin_shapes(mi, person, medium)
     shapes |= eye_shapes(mi, person) | _opaque_parts(mi, person)
@@ -95,7 +93,7 @@ def person_scene(
 
 
 def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return parts that are neither skin nor eyes: teeth and tongue under saliva, others matte."""
+    """Return shapes other than skin and eyes: teeth and tongue under saliva, all others diffuse."""
     shapes = {}
     mesh = person.mesh
     for k, material in enumerate(mesh.materials):
@@ -113,9 +111,11 @@ def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
     if material.part is None:
         return {"type": "diffuse", "reflectance": rgb(material.colour)}
     tongue = material.part == "tongue"
-    upper, lower = person.paint.teeth
+    upper, lower = person.textures.teeth
     colour = (
-        rgb(material.colour) if tongue else mitsuba_texture(mi, upper if material.part == "upper teeth" else lower)
+        rgb(material.colour)
+        if tongue
+        else mitsuba_texture(mi, upper if material.part == "upper teeth" else lower)
     )
     return {
         "type": "roughplastic",
@@ -127,17 +127,19 @@ def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
 
 
 def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return the head with radiance 1 and without hairs."""
+    """Return the head with radiance 1 and without hair."""
     glow, mesh = mi.load_dict({"type": "area", "radiance": 1.0}), person.mesh
     return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=glow)}
 
 
-def person_key(scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], form: str) -> str:
-    """Return a hash of all that the image depends on.
+def person_key(
+    scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], trace_settings: str
+) -> str:
+    """Return a hash of everything that the image depends on.
 
-    form : versions, and how it is traced
+    trace_settings : versions and settings of the path tracer
     """
-    digest = hashlib.sha256(f"{form} {person.paint.reach_mm} {person.eye_materials}".encode())
+    digest = hashlib.sha256(f"{trace_settings} {person.textures.reach_mm} {person.eye_materials}".encode())
     hash_lighting(digest, scene)
     digest.update(repr(person.mesh.materials).encode())
     for array in (*person.arrays(), mean_free_path_mm):

@@ -1,4 +1,4 @@
-"""A person as a path tracer takes it: the posed head with its eyes and hairs, and what is painted on it."""
+"""A posed head with eyes, hair fibres and textures, as input of a path tracer."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Doubles = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class SkinTextures:
-    """Pictures of what a person looks like, linear Rec. 709, row 0 at v = 0.
+    """Textures of skin, eyes and teeth of a person, linear Rec. 709, row 0 at v = 0.
 
     colour, roughness : (n, n, 3), (n, n) of the skin by its uv [-]
-    height_mm : (n, n) of its relief
-    iris : (k, k, 3) of the plane of the iris, from -reach_mm to reach_mm along x and y of the eye
-    reach_mm : half of the side of that picture
-    white : (k, k, 3) of the ball, by the uv of its layout: the angle from the axis is the distance from the
-        middle, half a turn of it 0.49
-    teeth : (k, k, 3) of the upper and of the lower ones by their uv
+    height_mm : (n, n) relief of the skin
+    iris : (k, k, 3) texture of the iris plane, from -reach_mm to reach_mm along x and y of the eye
+    reach_mm : half the side of that texture
+    white : (k, k, 3) texture of the eyeball in polar coordinates around its axis: half a turn from the axis
+        is 0.49 of the side from the middle
+    teeth : (k, k, 3) textures of the upper and of the lower teeth by their uv
     """
 
     colour: Floats
@@ -38,17 +38,17 @@ class SkinTextures:
     teeth: tuple[Floats, Floats]
 
     def arrays(self) -> Iterator[Floats]:
-        """Yield all pictures."""
+        """Yield all textures."""
         yield from (self.colour, self.roughness, self.height_mm, self.iris, self.white, *self.teeth)
 
 
 @dataclass(frozen=True, eq=False)
 class HairFibres:
-    """Round fibres in space.
+    """Hair fibres as polylines with round cross sections.
 
-    knots_mm : (n, k, 3) from root to tip, from the head's centre
-    radius_mm : (n, k)
-    absorption : (n, 3) of their inside [1/mm]
+    knots_mm : (n, k, 3) from root to tip, relative to the head's centre
+    radius_mm : (n, k) radius at the knots
+    absorption : (n, 3) absorption coefficient of the fibres [1/mm]
     """
 
     knots_mm: Doubles
@@ -58,10 +58,11 @@ class HairFibres:
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """A posed head with what is painted on it; places are in mm from its centre.
+    """Posed head with its textures; positions are relative to its centre [mm].
 
-    eyes : (m, 4, 4) from that space to each eye's own, in mm of a usual eye, z along its axis
-    eye_materials : (m,) of the mesh, whose triangles true eyes replace
+    eyes : (m, 4, 4) transforms from head space to the space of each eye, in mm of an average eye, z along its
+        axis
+    eye_materials : (m,) materials of the mesh whose triangles are replaced by refracting eyes
     """
 
     name: str
@@ -69,7 +70,7 @@ class Person:
     eyes: Doubles
     eye_materials: tuple[int, ...]
     hairs: tuple[HairFibres, ...]
-    paint: SkinTextures
+    textures: SkinTextures
 
     def arrays(self) -> Iterator[NDArray[np.generic]]:
         """Yield all arrays of the person."""
@@ -78,13 +79,13 @@ class Person:
         yield self.eyes
         for hairs in self.hairs:
             yield from (hairs.knots_mm, hairs.radius_mm, hairs.absorption)
-        yield from self.paint.arrays()
+        yield from self.textures.arrays()
 
 
-def posed_person(scene: Scene, paint: SkinTextures) -> Person:
-    """Return the head of a scene in its pose.
+def posed_person(scene: Scene, textures: SkinTextures) -> Person:
+    """Return the head of a scene in its pose, with textures.
 
-    Raises DermisError for a head without eyes of true shape.
+    Raises DermisError for a head without modelled eyes.
     """
     head, mesh = scene.head, scene.head.mesh
     if head.eyes is None:
@@ -92,7 +93,7 @@ def posed_person(scene: Scene, paint: SkinTextures) -> Person:
     rig = head.control
     motion = scene.motion or rig.rest
     points = rig.points_mm(motion) - np.array(head.centre_mm)
-    made = build_mesh(
+    posed_mesh = build_mesh(
         points[mesh.point].astype(np.float32),
         mesh.uv,
         mesh.triangles,
@@ -109,4 +110,4 @@ def posed_person(scene: Scene, paint: SkinTextures) -> Person:
     centred = np.eye(4)
     centred[:3, 3] = head.centre_mm
     eyes = head.eyes.frames(rig, motion) @ centred
-    return Person(head.name, made, eyes, tuple(head.eyes.material.tolist()), hairs, paint)
+    return Person(head.name, posed_mesh, eyes, tuple(head.eyes.material.tolist()), hairs, textures)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 import dermis
-from dermis.apps.truths.cycles import PrincipledSkin, BeckmannSurface, cycles_passes
+from dermis.apps.truths.cycles import BeckmannSurface, PrincipledSkin, cycles_passes
 from dermis.apps.validation.accuracy.person import sheet_bytes
 from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_figures, write_figures
 from dermis.atlas.build import build_atlas
@@ -26,7 +26,7 @@ from dermis.optics.profiles import load_profile
 from dermis.scene import Scene, Settings, Skin, load_camera
 from dermis.scene.camera import PRESETS
 from dermis.scene.lights import PointLight
-from dermis.specular.two_lobe import NARROW, SHARE_OF_NARROW, WIDE
+from dermis.specular.two_lobe import NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 
 HIGHLIGHTS, LOOKS = RESULTS / "highlights.json", RESULTS / "look.json"
 PICTURE = DOCS / "images" / "look.webp"
@@ -35,7 +35,7 @@ VIEWS = ("cheek", "portrait")
 ROUGHNESS, PATHS = 0.3, 64
 LIGHT = PointLight(position=(-300, 250, 600), irradiance=(3, 3, 3))
 ONE_KIND = ((1.0, ROUGHNESS),)
-TWO_KINDS = ((SHARE_OF_NARROW, NARROW * ROUGHNESS), (1.0 - SHARE_OF_NARROW, WIDE * ROUGHNESS))
+TWO_KINDS = ((NARROW_WEIGHT, NARROW_FACTOR * ROUGHNESS), (1.0 - NARROW_WEIGHT, WIDE_FACTOR * ROUGHNESS))
 BRIGHT = 0.6  # share of the lit pixels that are darker than those that count
 GRAIN = 6.0  # standard deviation of what counts as the picture without its grain [pixel]
 

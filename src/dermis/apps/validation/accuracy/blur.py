@@ -18,12 +18,12 @@ from dermis.atlas.build import build_atlas, cached_atlas
 from dermis.frame.features.atlas import passes as stretched
 from dermis.frame.features.atlas.textures import upload_atlas
 from dermis.frame.features.diffusion import blur as diffuse
-from dermis.frame.features.diffusion.pyramid import Blur, Levels, halvings_of, make_levels
+from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels, choose_halvings, make_levels
 from dermis.frame.features.shape.mesh import upload_geometry
-from dermis.frame.features.shape.shape import rest_shape, shape_tables
-from dermis.frame.programs import usual_texel
+from dermis.frame.features.shape.shape import evaluate_rest_shape, shape_tables
+from dermis.frame.programs import level_format
 from dermis.frame.renderer import Renderer
-from dermis.frame.seams import REMEDIES
+from dermis.frame.seams import SEAM_METHODS
 from dermis.gpu import CommandList, Device, download, open_device, upload
 from dermis.gpu.textures import half_store_rounding
 from dermis.mesh.head import Head
@@ -136,7 +136,7 @@ def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
     left = widest(renderer, *spread(renderer.device, mesh, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
-    area = atlas.own[..., None] / density
+    area = atlas.lit[..., None] / density
     map_share = (area * left * light).sum() / (area * light**2).sum()
     v = PROFILE.variance_mm2[-1] / radius_mm**2
     whole = np.exp(-2 / v)
@@ -146,24 +146,24 @@ def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
 
 def spread(
     device: Device, mesh: Mesh, atlas: Atlas, light: Array, stretch: str = "full"
-) -> tuple[Levels, Blur]:
+) -> tuple[PyramidLevels, Blur]:
     """Blur grey light (n, n, 1) on a mesh's atlas by all Gaussians of PROFILE but the narrowest."""
     textures, variance = upload_atlas(device, atlas, stretch), PROFILE.variance_mm2[1:]
-    most = len(textures.sheets("repeated")) - 1
-    halvings = halvings_of(variance, textures.usual_per_mm, most)
+    most = len(textures.mips_for("repeated")) - 1
+    halvings = choose_halvings(variance, textures.median_texels_per_mm, most)
     blur = Blur(variance, PROFILE.weight[1:], halvings)
-    levels = make_levels(device, len(light), (halvings,), usual_texel(device))
+    levels = make_levels(device, len(light), (halvings,), level_format(device))
     upload(device, levels.stacks[0], np.dstack([light, light, light, np.ones_like(light)]))
     frame = CommandList(device)
     head = Head("", mesh, Maps())
-    shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
+    shape = evaluate_rest_shape(device, shape_tables(device, head), head.positions_mm)
     stretched.draw_stretch(frame, upload_geometry(device, mesh, atlas, shape), textures)
     diffuse.draw(frame, levels, textures, blur)
     frame.submit()
     return levels, blur
 
 
-def level(device: Device, levels: Levels, blur: Blur, k: int) -> Array:
+def level(device: Device, levels: PyramidLevels, blur: Blur, k: int) -> Array:
     """Return level k (n, n), read between the texels of its own resolution."""
     halvings = blur.halvings[k]
     layer = download(device, levels.stacks[halvings], layer=k - levels.first[halvings])[..., 0]
@@ -172,7 +172,7 @@ def level(device: Device, levels: Levels, blur: Blur, k: int) -> Array:
     )
 
 
-def widest(renderer: Renderer, levels: Levels, blur: Blur) -> Array:
+def widest(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
     """Return (n, n, 1) of the widest level."""
     return level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
 
@@ -221,8 +221,8 @@ def row(renderer: Renderer, name: str, head: Head, side: int, where: Choice) -> 
     """Return one line of the table, a column for each remedy."""
     one, other = judged(head, where)
     cells = []
-    for remedy in REMEDIES:
-        found = jumps(renderer, banded(head), remedy, side, one, other)
+    for advice in SEAM_METHODS:
+        found = jumps(renderer, banded(head), advice, side, one, other)
         cells.append(f"{100 * found.mean():.1f} / {100 * np.percentile(found, 95):.1f}")
     return [f"| {name} | {len(one.triangle)} | {' | '.join(cells)} |"]
 
@@ -255,15 +255,15 @@ def banded(head: Head) -> Scene:
     return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
 
 
-def jumps(renderer: Renderer, scene: Scene, remedy: str, side: int, one: Points, other: Points) -> Array:
+def jumps(renderer: Renderer, scene: Scene, advice: str, side: int, one: Points, other: Points) -> Array:
     """Return the change of red light from one side of each seam to the other, of the light there."""
     from atlas_reading import lit_at
 
-    asked = {"size": (16, 16), "atlas": side, "seams": remedy, "transmission": "none"}
+    asked = {"size": (16, 16), "atlas": side, "seams": advice, "transmission": "none"}
     settings = Settings.model_validate(asked | {"interreflection": False})
     renderer.draw(scene, settings)
     scattered = renderer.prepare(scene, settings).resources.scattered
     light = download(renderer.device, scattered).astype(float)[..., :3]
-    atlas = cached_atlas(scene.head.topology.mesh, side, REMEDIES[remedy].layouts[0])
+    atlas = cached_atlas(scene.head.topology.mesh, side, SEAM_METHODS[advice].layouts[0])
     a, b = (lit_at(light, atlas, points)[:, 0] for points in (one, other))
     return np.abs(a - b) / np.maximum((a + b) / 2, 1e-9)

@@ -12,7 +12,12 @@ from dermis.apps.truths.half_space import reflected_radiance
 from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
-from dermis.optics.directions import directional_albedo, directions, mean_of_once, refracted
+from dermis.optics.angular_response import (
+    angular_response,
+    directional_reflectance,
+    mean_single_scattering_kernel,
+    refracted_cosine,
+)
 from dermis.optics.media import media
 from dermis.scene import Scene, Settings, Skin
 from dermis.scene.heads import load_head
@@ -57,7 +62,7 @@ def table(head: Head, adapter: str) -> str:
 
 
 def _ratio(albedo: float, eta: float) -> float:
-    aslant, above = directional_albedo([ASLANT, 1.0], albedo, eta)
+    aslant, above = directional_reflectance([ASLANT, 1.0], albedo, eta)
     return float(aslant / above)
 
 
@@ -76,13 +81,13 @@ def _errors(albedo: float) -> tuple[float, float]:
     free = slice(_NODES, None)  # of both light and view
     through, area = (1.0 - back)[free], flux[free] / flux[free].sum()
     exact = inside[free, free] * through[:, None] / ETA**2
-    above = float(directional_albedo(1.0, albedo, ETA))
+    above = float(directional_reflectance(1.0, albedo, ETA))
     usual = np.outer(through / (area @ through), np.full(_NODES, above))
-    law = directions([above], ETA)
+    law = angular_response([above], ETA)
     cosine = np.sqrt(1.0 - ETA**2 * (1.0 - mu[free] ** 2))
-    entering = directional_albedo(cosine, albedo, ETA) / above
-    once = 1.0 / (mu[free, None] + mu[free]) - mean_of_once(cosine, ETA)
-    made = usual * (entering + law.once[0] * once)
+    entering = directional_reflectance(cosine, albedo, ETA) / above
+    once = 1.0 / (mu[free, None] + mu[free]) - mean_single_scattering_kernel(cosine, ETA)
+    made = usual * (entering + law.single_scattering[0] * once)
     importance = np.outer(area, area)
 
     def error(one: Floats) -> float:
@@ -101,7 +106,7 @@ def _returned(cosine: float, albedo: float, mean_cosine: float, eta: float) -> f
     """Return the share of photons that enter a half-space at a cosine in the air that leave it."""
     rng = np.random.default_rng(1)
     depth, weight, given = np.zeros(PHOTONS), np.ones(PHOTONS), 0.0
-    down = np.full(PHOTONS, float(refracted(cosine, eta)))
+    down = np.full(PHOTONS, float(refracted_cosine(cosine, eta)))
     while len(depth):
         depth = depth - np.log(rng.random(len(depth))) * down
         through = (depth < 0.0) & (rng.random(len(depth)) > _fresnel(np.abs(down), eta))

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 import dermis
 from dermis.apps.validation.pages import print_tables
 from dermis.atlas.build import cached_atlas
-from dermis.environment.mirror_fits import MIRROR_ROUGHNESSES, ROUGH, VIEWS
-from dermis.environment.mirrors import equivalent_mirrors
-from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles, split_suns
+from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES, ROUGH, VIEWS
+from dermis.environment.isotropic_lobes import isotropic_lobe_table
+from dermis.environment.panorama import directions, load_panorama, resample, solid_angles, split_suns
 from dermis.environment.prefilter import (
     ROUGHEST,
     ROUGHNESSES,
@@ -23,7 +23,7 @@ from dermis.environment.prefilter import (
 )
 from dermis.frame.features.occlusion.baked import DIRECTIONS, bake_occlusion
 from dermis.frame.lights.rectangle import facing_irradiance
-from dermis.frame.projection import frame_of
+from dermis.frame.projection import view_axes_array
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene import Environment, Scene, Settings, Skin, load_lights
@@ -66,7 +66,7 @@ def unit(v: Array) -> Array:
 @cache
 def panorama(name: str, rows: int = 256) -> tuple[Array, Array, Prefiltered]:
     """Return directions and light of a panorama's texels without its suns, and what the frame reads."""
-    radiance = resampled(split_suns(load_panorama(name))[0], rows)
+    radiance = resample(split_suns(load_panorama(name))[0], rows)
     light = radiance * solid_angles(*radiance.shape[:2])[..., None]
     return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
 
@@ -113,9 +113,9 @@ def lobe_sum(towards: Array, light: Array, normal: Array, view: Array, m: float)
 def mirror(cosine: float, m: float) -> Array:
     """Return directions, roughness and weight of the round lobes, between the table's nodes."""
     x = np.sqrt(cosine) * (VIEWS - 1)
-    y = np.interp(np.log(m), np.log(MIRROR_ROUGHNESSES), np.arange(ROUGH))
+    y = np.interp(np.log(m), np.log(LOBE_TABLE_ROUGHNESSES), np.arange(ROUGH))
     j, i = min(int(x), VIEWS - 2), min(int(y), ROUGH - 2)
-    rows = equivalent_mirrors()[i : i + 2, j : j + 2]
+    rows = isotropic_lobe_table()[i : i + 2, j : j + 2]
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
 
 
@@ -167,7 +167,7 @@ def as_points(light: RectangleLight, side: int = 8) -> list[PointLight]:
     """Return a rectangle as side x side points, each with a shadow map of its own."""
     position, target = np.array(light.position), np.array(light.target)
     distance = float(np.linalg.norm(target - position))
-    right, up, forward = frame_of(target - position, UP)
+    right, up, forward = view_axes_array(target - position, UP)
     area = light.width_mm * light.height_mm / side**2
     radiance = np.array(light.irradiance) / facing_irradiance(light.width_mm, light.height_mm, distance)
     points = []
@@ -200,7 +200,7 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")
     few, many = (
-        bake_occlusion(renderer.device, head, atlas, inputs.lit, texels, 512, count)[:512]
+        bake_occlusion(renderer.device, head, atlas, inputs.bindings, texels, 512, count)[:512]
         for count in (DIRECTIONS, 1024)
     )
     return float(np.sqrt(np.nanmean((few - many) ** 2)))

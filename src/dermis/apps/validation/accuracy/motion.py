@@ -177,7 +177,7 @@ def baked(renderer: Renderer, head: Head, shape: Head, *exactness: int) -> Open:
     """
     inputs = renderer.prepare(Scene(head), BAKED)
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, SIDE, "stitched")
-    made = bake_occlusion(renderer.device, shape, atlas, inputs.lit, texels, SIDE, *exactness)
+    made = bake_occlusion(renderer.device, shape, atlas, inputs.bindings, texels, SIDE, *exactness)
     return made[:SIDE].astype(float)
 
 
@@ -185,7 +185,7 @@ def followed(renderer: Renderer, scene: Scene, which: str) -> Open:
     """Return (n, n) open shares that a frame of the scene reads."""
     settings = BAKED.model_copy(update={"occlusion": which})
     renderer.draw(scene, settings)
-    made = cast(Texture, renderer.prepare(scene, settings).lit["occlusion_map"])
+    made = cast(Texture, renderer.prepare(scene, settings).bindings["occlusion_map"])
     return download(renderer.device, made)[:SIDE].astype(float)
 
 

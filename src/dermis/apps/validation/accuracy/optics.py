@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.slab_mc import monte_carlo_profile, trace_medium
 from dermis.apps.validation.pages import print_tables
-from dermis.optics.diffusion.models import Model, cut, through_gaussians, through_slab
+from dermis.optics.diffusion.models import Model, gaussian_transmittance, slab_transmittance, truncated_medium
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.fits.burley import fit_burley
 from dermis.optics.fits.gaussian import fit_gaussians
@@ -128,15 +128,15 @@ def transmission_table() -> str:
         tissue = named(name)
         sum_ = fit_gaussians(tissue.profile().rings(), 6).profile
         for thickness in THICK_MM:
-            slab = cut(tissue.medium, thickness)
+            slab = truncated_medium(tissue.medium, thickness)
             runs = trace_medium(slab, PHOTONS // 4, seed=2)
             truth = np.array([run.total_transmittance + run.unscattered_transmittance for run in runs])
             truth = truth / (1.0 - runs[0].specular)
             ways = [
                 truth,
-                through_slab(tissue.medium, [thickness])[0],
-                through_slab(tissue.medium, [thickness], "multipole")[0],
-                through_gaussians(sum_, [thickness])[0],
+                slab_transmittance(tissue.medium, [thickness])[0],
+                slab_transmittance(tissue.medium, [thickness], "multipole")[0],
+                gaussian_transmittance(sum_, [thickness])[0],
             ]
             rows.append(f"| {name} | {thickness:g} mm | {' | '.join(map(_row, ways))} |")
     return "\n".join(rows)

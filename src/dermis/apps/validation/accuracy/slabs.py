@@ -17,12 +17,17 @@ from dermis.apps.validation.accuracy.thin import scattered
 from dermis.apps.validation.pages import print_tables
 from dermis.mesh.primitives import wedge
 from dermis.optics import slabs as adding_doubling
+from dermis.optics.angular_response import (
+    DIRECTION_ROWS,
+    directional_reflectance,
+    mean_single_scattering_kernel,
+    refracted_cosine,
+)
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.directions import ROWS, directional_albedo, mean_of_once, refracted
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.media import Medium, media
-from dermis.optics.profiles import TERMS, write_profile
-from dermis.optics.slabs import forward_directions
+from dermis.optics.profiles import GAUSSIAN_TERMS, write_profile
+from dermis.optics.slabs import anisotropic_response
 from dermis.scene import Skin
 
 Array = NDArray[np.float64]
@@ -44,12 +49,12 @@ def exact(body: Medium, thickness: float, g: float = 0.0) -> Array:
     g : mean cosine of scattering; the body's coefficients are reduced
     """
     layer, made = body.layers[0], np.empty((2, len(DEGREES), 3))
-    below = refracted(np.cos(np.radians(DEGREES)), body.eta)
+    below = refracted_cosine(np.cos(np.radians(DEGREES)), body.eta)
     for c in range(3):
-        cut = adding_doubling.slabs(
+        cut = adding_doubling.solve_slabs(
             float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness, body.eta, g=g
         )
-        made[..., c] = [np.interp(below, cut.cosine, part[0]) for part in (cut.back, cut.through)]
+        made[..., c] = [np.interp(below, cut.cosine, part[0]) for part in (cut.reflected, cut.transmitted)]
     return made
 
 
@@ -69,7 +74,9 @@ def drawn(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
 def skins(body: Medium, folder: str) -> dict[str, Skin]:
     """Return lambertian skin and half-spaces of a medium, in its own colour."""
     file = Path(folder) / f"{body.name}_{body.eta:g}.toml"
-    write_profile(file, fit_gaussians(diffusion_profile(body).rings(), TERMS, name=body.name).profile, {})
+    write_profile(
+        file, fit_gaussians(diffusion_profile(body).rings(), GAUSSIAN_TERMS, name=body.name).profile, {}
+    )
     usual = {"profile": str(file), "albedo": "profile", "energy": "none", "rho_s": 0.0}
     usual |= {"specular": "none"} if body.eta == 1.0 else {}
     return {way: Skin(direction=way, **usual) for way in ("lambertian", "half-space")}  # type: ignore[arg-type]
@@ -116,11 +123,13 @@ def forward_directions_table() -> str:
 
 
 def _pairs_error(albedo: float, eta: float, g: float) -> float:
-    a, share, exact = adding_doubling.leaving_deep(albedo, eta, adding_doubling.NODES, FORWARD)
+    a, share, exact = adding_doubling.half_space_radiance(albedo, eta, adding_doubling.NODES, FORWARD)
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
-    law = forward_directions(float(directional_albedo(1.0, albedo, eta)), eta, g)
-    table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, ROWS), law.returned[:, 0])
-    made = table + law.once[0] * (1.0 / (a[:, None] + a) - mean_of_once(air, eta))
+    law = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, g)
+    table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, DIRECTION_ROWS), law.relative_reflectance[:, 0])
+    made = table + law.single_scattering[0] * (
+        1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta)
+    )
     made *= (share @ exact @ share) / (table @ share)
     weight = np.outer(share, share)
     return float(np.sqrt((weight * (made - exact) ** 2).sum() / (weight * exact**2).sum()))

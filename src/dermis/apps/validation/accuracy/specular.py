@@ -12,7 +12,7 @@ from scipy.interpolate import RegularGridInterpolator
 from dermis.apps.validation.pages import print_tables
 from dermis.specular.albedo import TABLE_COSINES, TABLE_ROUGHNESSES, albedo_table, directional_albedo
 from dermis.specular.beckmann import beckmann, beckmann_table
-from dermis.specular.fresnel import ENERGY, Energy, hemispherical_reflectance, schlick
+from dermis.specular.fresnel import ENERGY, EnergyModel, hemispherical_reflectance, schlick
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
@@ -20,7 +20,7 @@ VIEWS = (np.arange(200) + 0.5) / 200
 LAWS = {
     "none": ENERGY["none"],
     "published": ENERGY["published"],
-    "divided by π, light thrown back inside lost": Energy(1.0, returned=False),
+    "divided by π, light thrown back inside lost": EnergyModel(1.0, returned=False),
     "full": ENERGY["full"],
 }
 SKINS = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
@@ -65,12 +65,12 @@ def peak_error() -> float:
     return float(np.abs(peak[seen] / truth[seen] - 1).max())
 
 
-def furnace_cell(law: Energy, m: float, rho_s: float) -> str:
+def furnace_cell(law: EnergyModel, m: float, rho_s: float) -> str:
     """Return least, mean and largest outgoing over incoming light on a white sphere under uniform light."""
     albedo, mean = (read_albedo("kelemen", VIEWS, np.array(m))[..., k] for k in (0, 1))
     exact = directional_albedo(VIEWS, m)
-    entered = law.enters(mean, rho_s)
-    out = rho_s * exact + entered * law.leaves(albedo, mean, rho_s)
+    entered = law.entering_fraction(mean, rho_s)
+    out = rho_s * exact + entered * law.exitance_factor(albedo, mean, rho_s)
     return f"{out.min():.3f} {(out * VIEWS).sum() / VIEWS.sum():.3f} {out.max():.3f}"
 
 

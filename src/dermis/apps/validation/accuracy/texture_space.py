@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
-from dermis.apps.truths.surface_integral import GaussianSum as Profile
+from dermis.apps.truths.radial_table import GaussianSum as Profile
 from dermis.apps.truths.surface_integral import integrate_exitance
 from dermis.apps.validation.comparisons.compare import subject_of
 from dermis.apps.validation.comparisons.scenes import usual_region

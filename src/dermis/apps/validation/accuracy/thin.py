@@ -17,7 +17,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import wedge
-from dermis.optics.diffusion.models import through_gaussians
+from dermis.optics.diffusion.models import gaussian_transmittance
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.scene import Scene, Settings, Skin
@@ -82,7 +82,7 @@ def slabs(renderer: dermis.Renderer) -> str:
             renderer, wedge(60.0, thickness, thickness), way, MATTE, 256, transmission="thin"
         )
         inner = (normals[:, 2] > 0.9) & (np.abs(places[:, :2]).max(axis=1) < 12.0)
-        made, exact = light[inner].mean(axis=0), through_gaussians(BLURRED, thickness)
+        made, exact = light[inner].mean(axis=0), gaussian_transmittance(BLURRED, thickness)
         shown = (" ".join(f"{value:.4f}" for value in light) for light in (made, exact))
         rows.append(f"| {thickness:g} mm | {' | '.join(shown)} |")
     return "\n".join(rows)

@@ -11,10 +11,10 @@ from typing import Any, cast
 import numpy as np
 
 from dermis.base.errors import DermisError
-from dermis.frame.features.diffusion.pyramid import Blur, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.features.translucency.resources import Translucency
-from dermis.frame.inputs import Inputs
+from dermis.frame.inputs import FrameInputs
 from dermis.frame.techniques.gpu_gems_3 import StretchedLevels
 from dermis.gpu import CommandList, ComputeProgram, Device, Texture, download, make_texture
 from dermis.gpu.textures import FORMAT_BYTES, texel_bytes
@@ -38,14 +38,14 @@ class Moved:
     vertices : of the mesh
     """
 
-    inputs: Inputs
+    inputs: FrameInputs
     texels: int
     seen: int
     shadowing: int
     vertices: int
 
 
-def moved_by(device: Device, inputs: Inputs, vertices: int) -> Moved:
+def moved_by(device: Device, inputs: FrameInputs, vertices: int) -> Moved:
     """Return the counts after a frame was drawn."""
     texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
     seen = np.count_nonzero(download(device, inputs.resources.post.picture.bytes)[..., 3])
@@ -74,7 +74,7 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
         "post": pixels * (radiance + texel_bytes(picture.exposed) + texel_bytes(picture.bytes)),
     }
     if between := inputs.layouts[0].interreflection:
-        found["interreflection"] = float(between.space.nbytes)
+        found["interreflection"] = float(between.buffers.nbytes)
     return (found | _scattering_bytes(moved, looked_up)) if inputs.blurs else found
 
 
@@ -91,11 +91,11 @@ def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
     }
     if thin := inputs.layouts[0].translucency:
         found["translucency"] = _through(thin, levels, blur)
-        found["combine"] += thin.light.size[0] * thin.light.size[1] * texel_bytes(thin.light)
+        found["combine"] += thin.pairs.transmitted.size[0] * thin.pairs.transmitted.size[1] * texel_bytes(thin.pairs.transmitted)
     return found
 
 
-def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
+def _surface_of_blurs(inputs: FrameInputs, texels: int) -> float:
     """Return bytes that blurs read of the surface: stretch, the extent of the chart, and gutters.
 
     The passes of 2007 blur the stretch map along with the light instead.
@@ -114,22 +114,22 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
     return moved
 
 
-def _through(thin: Translucency, levels: Levels, blur: Blur) -> float:
+def _through(thin: Translucency, levels: PyramidLevels, blur: Blur) -> float:
     """Bytes of translucency: pairs and their texels, the light of the sources, and the light that leaves.
 
     Slabs ask for the light at the sources by its direction too, so for the surface there.
     """
-    pairs, halved = thin.pairs, blur.halvings[blur.own[1 + thin.layer]]
+    pairs, halved = thin.pairs, blur.halvings[blur.profile_levels[1 + thin.source_level]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
-    lists = thin.weights.size + pairs.sums.size + (_TEXEL + SURFACE_BYTES * thin.slabs) * sources
+    lists = thin.weights.size + pairs.receiver_ranges.size + (_TEXEL + SURFACE_BYTES * thin.uses_tables) * sources
     level = (levels.size >> halved) ** 2
     read = min(_BILINEAR * sources, level) * FORMAT_BYTES[levels.texel]
-    return float(lists + read + receivers * texel_bytes(thin.light))
+    return float(lists + read + receivers * texel_bytes(thin.pairs.transmitted))
 
 
-def _maps(inputs: Inputs, most: int) -> int:
+def _maps(inputs: FrameInputs, most: int) -> int:
     """Return bytes of the head's maps that `most` points read, a texel each."""
-    textures = [cast(Texture, inputs.lit[name]) for name in _MAPS]
+    textures = [cast(Texture, inputs.bindings[name]) for name in _MAPS]
     return sum(texel_bytes(one) * min(most, one.size[0] * one.size[1]) for one in textures)
 
 

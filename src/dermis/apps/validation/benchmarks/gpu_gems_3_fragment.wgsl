@@ -1,5 +1,5 @@
 // One axis of one blur as published in 2007, as fragments of a render pass: light and the stretch map.
-//#include "covering.wgsl"
+//#include "full_screen_triangle.wgsl"
 //#include "gpu_gems_3_taps.wgsl"
 
 struct Stored {

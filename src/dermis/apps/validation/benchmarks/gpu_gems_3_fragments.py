@@ -8,28 +8,28 @@ import numpy as np
 
 from dermis.frame.features.atlas import passes as stretch
 from dermis.frame.features.atlas.lit import LitAtlas
-from dermis.frame.features.diffusion.combine import nothing
-from dermis.frame.features.diffusion.pyramid import Blur, Halvings, Levels
+from dermis.frame.features.diffusion.combine import no_light
+from dermis.frame.features.diffusion.pyramid import Blur, Halvings, PyramidLevels
 from dermis.frame.features.surface import texels as surface_texels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.features.translucency import passes as translucency_weights
-from dermis.frame.inputs import Inputs
-from dermis.frame.programs import FLOATS, HALVES, registered, shader_folders, suited
+from dermis.frame.inputs import FrameInputs
+from dermis.frame.programs import FLOATS, HALVES, program_constants, registry_version, shader_folders
 from dermis.frame.techniques.gpu_gems_3 import GpuGems3, Pair, StretchedLevels
 from dermis.gpu import (
     ComputeProgram,
     Constants,
     Device,
-    FragmentProgram,
     Graph,
     MutableBindings,
     Recorder,
+    RenderProgram,
     Texture,
     TextureOrView,
-    compiled,
+    cached_program,
     make_texture,
 )
-from dermis.optics.gaussians import MOST_GAUSSIANS
+from dermis.optics.gaussians import MAX_GAUSSIANS
 
 _FOLDER = Path(__file__).parent
 
@@ -37,7 +37,7 @@ _FOLDER = Path(__file__).parent
 class Fragments(GpuGems3):
     """Lights the atlas, blurs and adds up in render passes; the same up to the rounding of halves."""
 
-    def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
+    def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
         """Return space for the light that enters and the blurred levels, all of it halves."""
         count = max(map(len, halvings))
         stack = make_texture(device, (side, side), HALVES, layers=count, use="raster")
@@ -49,7 +49,7 @@ class Fragments(GpuGems3):
         """Return space for the sum."""
         return make_texture(device, (side, side), FLOATS, use="raster")
 
-    def scatter(self, graph: Graph, inputs: Inputs) -> Texture:
+    def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
         """Light the atlas, let the light spread, and add it up."""
         made = inputs.resources
         for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
@@ -60,28 +60,33 @@ class Fragments(GpuGems3):
             thin = layout.translucency
             if thin:
                 translucency_weights.draw_weights(graph, thin)
-                if thin.slabs:
-                    translucency.draw_slants(graph, layout, thin, inputs.light_constants)
+                if thin.uses_tables:
+                    translucency.draw_direction_factors(graph, layout, thin, inputs.light_constants)
             through = translucency.draw(graph, made.diffusion.levels, blur, thin) if thin else None
             self._add_up(
-                graph, made.diffusion.levels, blur, layout.scattered, through, thin.lost if thin else None
+                graph,
+                made.diffusion.levels,
+                blur,
+                layout.scattered,
+                through,
+                thin.pairs.lost if thin else None,
             )
         return made.scattered
 
-    def shader(self, device: Device, constants: Constants) -> FragmentProgram:
+    def shader(self, device: Device, constants: Constants) -> RenderProgram:
         """Return the program of the pass along one axis."""
         return _program(device, "gpu_gems_3_fragment.wgsl", constants, [HALVES, HALVES])
 
     def run(
         self,
         graph: Recorder,
-        shader: ComputeProgram | FragmentProgram,
+        shader: ComputeProgram | RenderProgram,
         bound: MutableBindings,
         into: Pair,
         side: int,
     ) -> None:
         """Fill a texture of light and one of stretch."""
-        assert isinstance(graph, Graph) and isinstance(shader, FragmentProgram)
+        assert isinstance(graph, Graph) and isinstance(shader, RenderProgram)
         graph.fill("diffuse", shader, bound, into)
 
     def _light(
@@ -89,7 +94,7 @@ class Fragments(GpuGems3):
     ) -> None:
         shader = _program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALVES])
         bound = {
-            **layout.lit,
+            **layout.bindings,
             "surfaces": layout.surfaces,
             "entering": shader.record("Entering", scale=scale),
         }
@@ -98,33 +103,33 @@ class Fragments(GpuGems3):
     def _add_up(
         self,
         graph: Graph,
-        levels: Levels,
+        levels: PyramidLevels,
         blur: Blur,
         into: Texture,
         through: Texture | None,
         lost: Texture | None,
     ) -> None:
         shader = _program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOATS])
-        padded = np.zeros((MOST_GAUSSIANS, 4), np.float32)
+        padded = np.zeros((MAX_GAUSSIANS, 4), np.float32)
         padded[: len(blur.weight), :3] = blur.weight / blur.scale
         padded[0, 3] = 1.0
         counts = {"count": len(blur.weight), "through": through is not None}
         bound: MutableBindings = {
             "weights": shader.record("Weights", weight=padded, **counts),
             "levels": levels.stacks[0],
-            "transmitted": nothing(graph.device) if through is None else through,
-            "lost": nothing(graph.device) if lost is None else lost,
+            "transmitted": no_light(graph.device) if through is None else through,
+            "lost": no_light(graph.device) if lost is None else lost,
         }
         graph.fill("combine", shader, bound, [into])
 
 
-def _program(device: Device, name: str, constants: Constants, targets: list[str]) -> FragmentProgram:
-    def make() -> FragmentProgram:
+def _program(device: Device, name: str, constants: Constants, targets: list[str]) -> RenderProgram:
+    def make() -> RenderProgram:
         path, folders = _FOLDER / name, shader_folders()
-        chosen = suited(device, path, folders, constants)
-        return FragmentProgram(device, path, folders, chosen, targets=targets)
+        chosen = program_constants(device, path, folders, constants)
+        return RenderProgram(device, path, folders, chosen, targets=targets)
 
-    return compiled(device, (name, registered()), constants, make)
+    return cached_program(device, (name, registry_version()), constants, make)
 
 
 FRAGMENTS = Fragments()

@@ -1,5 +1,5 @@
 // Light that enters the skin at each texel of the atlas, as irradiance.wgsl has it, as fragments of a render pass.
-//#include "covering.wgsl"
+//#include "full_screen_triangle.wgsl"
 //#include "irradiance/lighting.wgsl"
 //#include "surface/packed_surface.wgsl"
 

@@ -1,5 +1,5 @@
 // The weighted sum of the blurred levels, less what thin parts do not return, and of what comes through thin parts, as fragments of a render pass.
-//#include "covering.wgsl"
+//#include "full_screen_triangle.wgsl"
 //#include "bilinear.wgsl"
 
 struct Weights {

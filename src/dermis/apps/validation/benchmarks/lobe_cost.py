@@ -10,7 +10,7 @@ from dermis.apps.validation.pages import Figures
 from dermis.frame.features.surface.record import surface_constants
 from dermis.frame.programs import shader_folders
 from dermis.gpu import CommandList, ComputeProgram, Device, make_texture
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.scene.skin import Skin
 from dermis.specular.albedo import albedo_table
 from dermis.specular.beckmann import beckmann_table
@@ -40,9 +40,9 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     ]
     bound = {
         "skin": programs[-1].record("Skin", f0=SKIN_F0, eta=SKIN_ETA),
-        "beckmann_table": texture_from(device, beckmann_table(), "r32float"),
+        "beckmann_table": texture_from_array(device, beckmann_table(), "r32float"),
         "nearest_sampler": device.sampler(),
-        "albedo_table": texture_from(device, albedo_table(), "rg32float"),
+        "albedo_table": texture_from_array(device, albedo_table(), "rg32float"),
         "sums": make_texture(device, (side, side), "r32float"),
     }
     started = time.perf_counter()

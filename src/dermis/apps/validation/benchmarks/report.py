@@ -15,8 +15,8 @@ from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3, Case
 from dermis.apps.validation.benchmarks.measure import Row
 from dermis.apps.validation.benchmarks.run import Benchmark
 from dermis.apps.validation.pages import Figures
-from dermis.base.atomic_write import replacing
-from dermis.base.extras import needed
+from dermis.base.atomic_write import atomic_file
+from dermis.base.extras import import_extra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -134,7 +134,7 @@ def write_report(path: Path, made: Benchmark) -> None:
         bars=stage_bars(made.usual) if made.usual else "",
         scaling=scaling(made),
     )
-    with replacing(path) as trial:
+    with atomic_file(path) as trial:
         trial.write_text(page, encoding="utf-8")
 
 
@@ -197,7 +197,7 @@ def stage_bars(row: Row) -> str:
 
 
 def _figure(width: float, height: float, columns: int) -> tuple[Figure, list[Axes]]:
-    figure = needed("matplotlib.figure", "plots").Figure(figsize=(width, height), layout="constrained")
+    figure = import_extra("matplotlib.figure", "plots").Figure(figsize=(width, height), layout="constrained")
     figure.patch.set_alpha(0.0)
     panels = list(figure.subplots(1, columns, squeeze=False)[0])
     for axes in panels:

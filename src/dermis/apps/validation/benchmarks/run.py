@@ -120,5 +120,5 @@ def _all_of(
                 rows.append(measure(renderer, case, subdivided(case.subdivide), Path(folder), rate, effort))
             except DermisError as fault:
                 left_out.append(LeftOut(case, str(fault)))
-                renderer.forget()  # frees what was made before it failed
+                renderer.clear_cache()  # frees what was made before it failed
     return rows, left_out

@@ -26,7 +26,7 @@ _SHOWN_PERCENTILE = 99.0
 
 
 @dataclass(frozen=True)
-class Row:
+class ParameterRow:
     """A technique's figures, with standard errors where the truth is noisy.
 
     relrmse, relrmse_se : root mean square error over the root mean square of the truth [-]
@@ -56,7 +56,7 @@ class Comparison:
     adapter: str
     truth: Truth
     against: str
-    rows: tuple[Row, ...]
+    rows: tuple[ParameterRow, ...]
     images: dict[str, Floats]
 
     @property
@@ -99,7 +99,7 @@ def compare(
     """
     check_choices(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
-    with subject_of(head, light, region, medium, settings, adapter, model) as subject:
+    with load_subject(head, light, region, medium, settings, adapter, model) as subject:
         check_seen(surface_points(subject.renderer, subject.scene, settings).mask)
         report(f"truth: {against}")
         truth = TRUTHS[against](subject, samples)
@@ -112,13 +112,15 @@ def compare(
             images[technique], ms[technique] = _render(judged, technique, truth)
         name = subject.renderer.device.adapter.name
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
-    title += f", {skin.direction} skin, profile by {'photons' if subject.profile.counted else 'diffusion'}"
+    title += (
+        f", {skin.direction} skin, profile by {'photons' if subject.profile.from_photons else 'diffusion'}"
+    )
     made = Comparison(title, name, truth, against, (), images)
     return replace(made, rows=tuple(_row(made, technique, ms[technique]) for technique in techniques))
 
 
 @contextmanager
-def subject_of(
+def load_subject(
     head: Head,
     light: str,
     region: str,
@@ -143,7 +145,7 @@ def check_choices(against: str, light: str, region: str, medium: str) -> None:
     }
     for option, (chosen, known) in choices.items():
         if chosen not in known:
-            refuse(f"--{option}", f"one of {', '.join(known)}", f"{chosen!r} came", "Choose one of them")
+            refuse(f"--{option}", f"one of {', '.join(known)}", f"got {chosen!r}", "Choose one of them")
 
 
 def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, float]:
@@ -157,14 +159,14 @@ def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, flo
     return image, (timed.gpu_ms or {"total": timed.frame_ms})["total"]
 
 
-def _row(made: Comparison, technique: str, ms: float) -> Row:
+def _row(made: Comparison, technique: str, ms: float) -> ParameterRow:
     from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 
     truth, image = made.truth, made.images[technique]
     error = relative_rmse(image, truth.image, truth.mask, truth.variance)
     energy = energy_ratio(image, truth.image, truth.mask, truth.variance)
     perceived = _flip(made.shown(image), made.shown(truth.image), truth.mask)
-    return Row(technique, made.against, *error, perceived, *energy, ms)
+    return ParameterRow(technique, made.against, *error, perceived, *energy, ms)
 
 
 def _flip(image: Floats, truth: Floats, mask: NDArray[np.bool_]) -> float | None:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import PathTraced, Variant
-from dermis.apps.truths.person.path_traced import Paint, path_trace_person
+from dermis.apps.truths.person.path_traced import path_trace_person
+from dermis.apps.truths.person.person import SkinTextures
 from dermis.apps.validation.comparisons.truths import check_seen
 from dermis.base.errors import refuse
 from dermis.environment.panorama import UNIFORM
@@ -70,14 +71,14 @@ class Pair:
 def compare_person(
     renderer: Renderer,
     head: Head,
-    paint: Paint,
+    paint: SkinTextures,
     name: str,
     *,
     side: int = 256,
     samples: int = 64,
     atlas: int = 2048,
-    keep: bool = True,
-    report: Callable[[int, int], None] | None = None,
+    use_cache: bool = True,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Pair:
     """Draw a view of a person by the frame and by path tracing.
 
@@ -86,15 +87,15 @@ def compare_person(
     side : of the pictures [pixel]
     samples : paths through each pixel, more in some views
     atlas : side of the frame's atlas [texel]
-    keep, report : as of `path_trace`
+    use_cache, progress : as of `path_trace`
 
     Raises DermisError for other views, and for heads without eyes of true shape.
     """
     if name not in VIEWS:
-        refuse("view", f"one of {', '.join(VIEWS)}", f"{name!r} came", "Choose one of them")
+        refuse("view", f"one of {', '.join(VIEWS)}", f"got {name!r}", "Choose one of them")
     settings = Settings(size=(side, side), atlas=atlas, samples=4)
     scene, wanted = scene_of(head, VIEWS[name]), round(samples * VIEWS[name].times)
-    truth = traced(renderer, scene, paint, settings.size, wanted, keep, report)
+    truth = traced(renderer, scene, paint, settings.size, wanted, use_cache, progress)
     mask = truth.mask > _COVERED
     check_seen(mask)
     return pair_of(name, drawn(renderer, scene, settings), truth, mask)
@@ -115,23 +116,23 @@ def drawn(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
 def traced(
     renderer: Renderer,
     scene: Scene,
-    paint: Paint,
+    paint: SkinTextures,
     size: tuple[int, int],
     samples: int,
-    keep: bool = True,
-    report: Callable[[int, int], None] | None = None,
+    use_cache: bool = True,
+    progress: Callable[[int, int], None] | None = None,
     variant: Variant = "scalar_rgb",
 ) -> PathTraced:
     """Return a person path-traced; light below skin of the mean colour spreads as far as the profile says.
 
     variant : as of `path_trace`
     """
-    profile, colour = renderer.profile_of(scene.skin), scene.head.maps.mean_colour
+    profile, colour = renderer.skin_profile(scene.skin), scene.head.maps.mean_colour
     assert colour is not None  # painted people have one
     weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
     distance = (weight * width[:, None]).sum(axis=0) / weight.sum(axis=0)
     return path_trace_person(
-        scene, paint, distance, colour, size, samples, variant=variant, keep=keep, report=report
+        scene, paint, distance, colour, size, samples, variant=variant, use_cache=use_cache, progress=progress
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.person.path_traced import Paint
+from dermis.apps.truths.person.person import SkinTextures
 from dermis.base.errors import refuse
 from dermis.frame.features.surface.painting import paint
 from dermis.frame.programs import program
@@ -17,8 +17,8 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download, make_texture
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.painted import PaintedMaps
-from dermis.human.skin.surface import painting
-from dermis.human.skin.textures import TILE_MM, detail_heights_mm
+from dermis.human.skin.surface import painted_surface
+from dermis.human.skin.textures import TILE_LENGTH_MM, detail_heights_mm
 from dermis.mesh.eyeball import SCLERA_MM, iris_mm
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -32,7 +32,7 @@ _DENSITIES = 5.0, 14.0  # binary logarithms of mm in a unit of uv
 _ANY = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
 
 
-def paint_of(renderer: Renderer, scene: Scene, side: int = 2048) -> Paint:
+def paint_of(renderer: Renderer, scene: Scene, side: int = 2048) -> SkinTextures:
     """Return the colours, roughness and relief that frames of the scene show, at rest.
 
     side : of the maps of the skin, a power of two from 256 to 4096 [texels]
@@ -42,18 +42,18 @@ def paint_of(renderer: Renderer, scene: Scene, side: int = 2048) -> Paint:
     head = scene.head
     if not isinstance(head.maps, PaintedMaps) or head.eyes is None:
         refuse(head.name, "a head of the parametric human with painted skin", "it is none", "Load human")
-    return renderer.kept_open.run(partial(_painted, renderer, scene, head.maps.look, side))
+    return renderer.reopening_device.run(partial(_painted, renderer, scene, head.maps.look, side))
 
 
-def _painted(renderer: Renderer, scene: Scene, look: SkinLook, side: int) -> Paint:
+def _painted(renderer: Renderer, scene: Scene, look: SkinLook, side: int) -> SkinTextures:
     head = scene.head
-    surface, device = painting(head.mesh, head.control.stencils), renderer.device
-    colour, gloss, rough, height = paint.painted_texels(device, surface, look, side)
+    surface, device = painted_surface(head.mesh, head.control.stencils), renderer.device
+    colour, gloss, rough, height = paint.paint_raw_arrays(device, surface, look, side)
     height = height + _detail(gloss[..., 1], rough[..., 1], gloss[..., 2])
     roughness = np.maximum(scene.skin.smoothing * rough[..., 0], _LEAST_ROUGH)
     reach = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2))
     iris, white, upper, lower = (_picture(renderer, scene, part, reach) for part in range(len(_PARTS)))
-    return Paint(np.ascontiguousarray(colour[..., :3]), roughness, height, iris, reach, white, (upper, lower))
+    return SkinTextures(np.ascontiguousarray(colour[..., :3]), roughness, height, iris, reach, white, (upper, lower))
 
 
 def _detail(pores: Floats, furrows: Floats, density: Floats) -> Floats:
@@ -64,7 +64,7 @@ def _detail(pores: Floats, furrows: Floats, density: Floats) -> Floats:
     """
     side = len(pores)
     density = np.clip(density, *_DENSITIES)  # beside the charts it may be anything
-    level = density - np.log2(TILE_MM)
+    level = density - np.log2(TILE_LENGTH_MM)
     whole = np.floor(level)
     part = np.clip((level - whole - 0.4) / 0.2, 0.0, 1.0)
     part = part * part * (3.0 - 2.0 * part)
@@ -73,7 +73,7 @@ def _detail(pores: Floats, furrows: Floats, density: Floats) -> Floats:
     for further, share in ((0, 1.0 - part), (1, part)):
         tiles = np.exp2(whole + further)
         # Heights keep their slopes: a tile that is laid smaller or larger is as much lower or higher.
-        mm = np.exp2(density) / tiles / TILE_MM
+        mm = np.exp2(density) / tiles / TILE_LENGTH_MM
         pits, nets = (
             _tiled(tile - np.median(tile), tiles * uv, tiles * uv[:, None]) for tile in detail_heights_mm()
         )
@@ -100,6 +100,6 @@ def _picture(renderer: Renderer, scene: Scene, part: int, reach: float) -> Float
     for name in ("eumelanin", "pupil_mm", "redness", "seed"):
         asked["eye"][name] = eye[name]
     frame = CommandList(device, timed=False)
-    frame.compute("paint", shader, {**inputs.lit, "asked": asked, "painted": painted}, (_SIDE, _SIDE))
+    frame.compute("paint", shader, {**inputs.bindings, "asked": asked, "painted": painted}, (_SIDE, _SIDE))
     frame.submit()
     return np.ascontiguousarray(download(device, painted)[..., :3], np.float32)

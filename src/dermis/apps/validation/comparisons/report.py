@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.metrics import MID_GREY, signed_difference
 from dermis.apps.validation.comparisons.compare import Comparison, Row, comparison_sources
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 from dermis.images.codecs import encode_png
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ def write_report(path: Path, made: Comparison) -> None:
         keys=" ".join(comparison_sources(made.against, made.images)),
         figures="\n".join([truth, *figures]),
     )
-    with replacing(path) as trial:
+    with atomic_file(path) as trial:
         trial.write_text(page, encoding="utf-8")
 
 

@@ -101,8 +101,8 @@ def heat_around(
     lit : of the whole head, see `irradiance_samples`
     least_mm2 : variance below which Gaussians are integrated by straight-line distance
     """
-    from dermis.apps.truths.surface_patch import mesh_patch
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface
+    from dermis.apps.truths.surface_patch import mesh_patch
 
     started = time.perf_counter()
     narrow = subject.profile.variance_mm2 < least_mm2
@@ -112,16 +112,16 @@ def heat_around(
     middle = np.array(place) + subject.scene.head.centre_mm
     centre = places[np.linalg.norm(places - middle, axis=1).argmin()]
     patch = mesh_patch(subject.scene.head.mesh, centre, radius_mm, variances[~narrow])
-    entered = _entered(subject, *patch.vertex_places())
+    entered = _entered(subject, *patch.vertex_barycentrics())
     levels = diffuse_on_surface(patch.positions, patch.triangles, entered, variances[~narrow])
-    fine, weights = patch.find(seen.triangle, seen.barycentric)
-    on = (fine >= 0) & patch.holds(places)
+    fine, weights = patch.locate(seen.triangle, seen.barycentric)
+    on = (fine >= 0) & patch.contains(places)
     spread = np.einsum("knc,kc->nc", levels, weight[~narrow])
     exitance = patch.interpolate(spread, fine[on], weights[on])
     exitance += _straight(places[on], lit, weight[narrow], variances[narrow])
     mask = seen.mask.copy()
     mask[seen.mask] = on
-    judged = MeshPoints(mask, seen.triangle[on], seen.barycentric[on])
+    judged = SurfacePoints(mask, seen.triangle[on], seen.barycentric[on])
     straight = f"{narrow.sum()} Gaussians under {least_mm2:g} mm2 by straight lines"
     made = _by_pixel(judged, exitance, started, f"{radius_mm:g} mm around the middle; {straight}")
     return replace(made, through=False)
@@ -179,7 +179,7 @@ def _entered(subject: Subject, triangle: NDArray[np.int64], barycentric: Floats)
 
 def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
     """Return (n, 3) radiant exitance at points by Gaussians of the straight-line distance."""
-    from dermis.apps.truths.surface_integral import GaussianSum as Profile
+    from dermis.apps.truths.radial_table import GaussianSum as Profile
     from dermis.apps.truths.surface_integral import integrate_exitance
 
     if not len(variance_mm2):
@@ -187,14 +187,14 @@ def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_m
     return integrate_exitance(points, lit, Profile(weight, variance_mm2))
 
 
-def positions(subject: Subject, seen: MeshPoints) -> Floats:
+def positions(subject: Subject, seen: SurfacePoints) -> Floats:
     """Return (n, 3) where rays through the pixels' centres meet the head [mm]."""
     mesh = subject.scene.head.mesh
     corners = mesh.positions[mesh.triangles[seen.triangle]].astype(np.float64)
     return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))
 
 
-def _by_pixel(seen: MeshPoints, exitance: Floats, started: float, note: str) -> Truth:
+def _by_pixel(seen: SurfacePoints, exitance: Floats, started: float, note: str) -> Truth:
     image = np.zeros((*seen.mask.shape, 3))
     image[seen.mask] = exitance / np.pi
     return Truth(

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.fitting import fit_d, lobe
+from dermis.apps.export.fitting import burley_curve, fit_burley_width
 from dermis.apps.export.registry import TARGETS
-from dermis.apps.export.subject import subject_of
+from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.babylon.target import TOO_WIDE, spiral
+from dermis.apps.export.targets.babylon.target import WIDTH_ERROR, spiral_samples
 from dermis.apps.validation.pages import RESULTS, Figures, chromium_page, write_figures
 from dermis.base.errors import refuse
 
@@ -38,8 +38,8 @@ def babylon_library() -> Path:
     """
     folder = Path(os.environ.get(LIBRARY, ""))
     if not (folder / "babylonjs" / "babylon.js").is_file():
-        came = f"{folder} has no babylonjs/babylon.js" if os.environ.get(LIBRARY) else "it is not set"
-        refuse(LIBRARY, "a folder that npm has installed babylonjs into", came, "npm install babylonjs")
+        actual = f"{folder} has no babylonjs/babylon.js" if os.environ.get(LIBRARY) else "it is not set"
+        refuse(LIBRARY, "a folder that npm has installed babylonjs into", actual, "npm install babylonjs")
     return folder
 
 
@@ -62,8 +62,8 @@ def radiance(page: Page, colour: Floats, metres: float, pixel: float, turn: floa
 
 def predicted(colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
     """Return the same by the shader's samples, rounded to pixels; metersPerUnit is of scenes in mm."""
-    r, angle, weight = spiral(colour)
-    across = TOO_WIDE * 1e-3 * r / metres / pixel
+    r, angle, weight = spiral_samples(colour)
+    across = WIDTH_ERROR * 1e-3 * r / metres / pixel
     right, upwards = np.round(across * np.cos(angle)), np.round(across * np.sin(angle))
     middle = np.arange(SIDE) + 0.5 - 0.5 * SIDE
     told = np.zeros((SIDE, SIDE, 3))
@@ -101,7 +101,7 @@ def measured(page: Page, colour: Floats, metres: float, shown_d: Floats) -> Figu
         worst = max(worst, float(np.abs(two[0] - two[1]).max()))
         found.append(two[0])
         told.append(two[1])
-    mean, by_samples, true = np.mean(found, 0), np.mean(told, 0), lobe(shown_d, np.ones(3)).edge(at)
+    mean, by_samples, true = np.mean(found, 0), np.mean(told, 0), burley_curve(shown_d, np.ones(3)).edge_response(at)
     near = np.abs(at)[:, None] <= 6.0 * shown_d
     keep = slice(0, None, 7)
     return {
@@ -125,21 +125,21 @@ def _largest(difference: Floats, near: NDArray[np.bool_]) -> list[float]:
 def fitted_widths(at: Floats, edge: Floats) -> list[float]:
     """Return widths of the lobes with the nearest edge responses [mm]."""
     tried = np.geomspace(at[-1] / 600.0, at[-1], 241)
-    curves = np.stack([lobe(np.full(3, d), np.ones(3)).edge(at)[:, 0] for d in tried])
+    curves = np.stack([burley_curve(np.full(3, d), np.ones(3)).edge_response(at)[:, 0] for d in tried])
     off = ((curves[:, :, None] - edge) ** 2).sum(axis=1)
     return [round(float(x), 4) for x in tried[off.argmin(axis=0)]]
 
 
 def exported(page: Page, name: str) -> Figures:
     """Return the figures of a skin with its exported parameters, also against its profile."""
-    subject, target = subject_of(name), TARGETS["babylon"].with_variant(None)
-    rows = target.parameters(subject, target.known_version(None))
+    subject, target = load_subject(name), TARGETS["babylon"].with_variant(None)
+    rows = target.parameters(subject, target.resolve_version(None))
     colour = np.array(numbers_of(rows, "subSurface.scatteringDiffusionProfile"))
     metres = 1e-3 * numbers_of(rows, "subSurfaceConfiguration.metersPerUnit")[0]
-    told = measured(page, colour, metres, fit_d(subject.curve))
+    told = measured(page, colour, metres, fit_burley_width(subject.curve))
     x, edge = np.array(told["x_mm"]), np.array(told["edge"])
-    near = np.abs(x)[:, None] <= 6.0 * fit_d(subject.curve)
-    return told | {"measured_less_profile": _largest(edge - subject.curve.edge(x), near)}
+    near = np.abs(x)[:, None] <= 6.0 * fit_burley_width(subject.curve)
+    return told | {"measured_less_profile": _largest(edge - subject.curve.edge_response(x), near)}
 
 
 def babylon() -> None:
@@ -150,7 +150,7 @@ def babylon() -> None:
     """
     with opened(babylon_library()) as page:
         plain = {
-            name: measured(page, np.array(colour), 1e-3, TOO_WIDE / np.array(colour))
+            name: measured(page, np.array(colour), 1e-3, WIDTH_ERROR / np.array(colour))
             for name, colour in {
                 "white": (1, 1, 1),
                 "grey": (0.5, 0.5, 0.5),

@@ -12,15 +12,15 @@ from typing import Literal, get_args
 import numpy as np
 from PIL import Image
 
-from dermis.apps.export.fitting import deviation, fit_d
-from dermis.apps.export.subject import subject_of
+from dermis.apps.export.fitting import curve_error, fit_burley_width
+from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
 from dermis.apps.validation.engines.heads import TEXELS, Floats, compared, drawn, rendered
 from dermis.apps.validation.pages import DOCS, RESULTS, Figures, read_figures, write_figures
 from dermis.base.console import print_lines
 from dermis.images.colour import encode_srgb
-from dermis.optics.curve import Curve
+from dermis.optics.cumulative_profile import CumulativeProfile
 
 FIGURES = RESULTS / "engines_blender.json"
 PICTURE = DOCS / "images" / "engines_blender.webp"
@@ -35,7 +35,7 @@ SEEDS = 2  # pictures of each channel, whose difference tells the noise
 SIDE, PATHS, SHOTS = 192, 32, 2  # of heads
 SHOWN, SHOWN_SAMPLES = 320, 48
 METHODS_OF = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
-ERRAND = BlenderTask("Cycles", "to render a half-lit plane", "See what it said")
+TASK = BlenderTask("Cycles", "to render a half-lit plane", "See the message of Blender in brackets")
 
 
 def blender(python_45: Path, python_52: Path, *parts: Part) -> None:
@@ -80,10 +80,10 @@ def columns() -> Floats:
 
 def edge(python: Path, version: str, method: str, name: str) -> Figures:
     """Return the figures of one skin: measured, predicted and true."""
-    subject, target = subject_of(name), TARGET.with_variant(method)
-    rows, d = target.parameters(subject, version), fit_d(subject.curve)
-    shown = target.shown(rows, subject, version)
-    typed = target.shown(target.naive(subject, version), subject, version)
+    subject, target = load_subject(name), TARGET.with_variant(method)
+    rows, d = target.parameters(subject, version), fit_burley_width(subject.curve)
+    shown = target.predicted_curve(rows, subject, version)
+    typed = target.predicted_curve(target.naive_parameters(subject, version), subject, version)
     samples = SAMPLES.get(method, USUAL_SAMPLES)
     passes = [
         {"channel": c, "width_m": 12e-3 * d[c], "size": [BINS * EACH, ROWS], "samples": samples, "seed": k}
@@ -94,7 +94,7 @@ def edge(python: Path, version: str, method: str, name: str) -> Figures:
         folder = Path(place)
         target.write(subject, rows, folder, version)
         (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
-        run_blender(python, SCRIPT, [str(folder)], 3600.0, ERRAND)
+        run_blender(python, SCRIPT, [str(folder)], 3600.0, TASK)
         done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
     seen = np.array([[done["columns"][3 * k + c] for c in range(3)] for k in range(SEEDS)])[..., 0]
     means = seen.reshape(SEEDS, 3, BINS, EACH).mean(axis=-1)
@@ -114,20 +114,20 @@ def edge(python: Path, version: str, method: str, name: str) -> Figures:
         "against_true": np.abs(measured - true).max(axis=1).round(4).tolist(),
         "noise": np.sqrt((noise**2).mean(axis=1)).round(4).tolist(),
         "energy": (np.pi * lit / subject.curve.energy).round(4).tolist(),
-        "typed_in": deviation(subject.curve, typed).edge.round(4).tolist(),
+        "typed_in": curve_error(subject.curve, typed).edge.round(4).tolist(),
         "predicted_energy": (shown.energy / subject.curve.energy).round(4).tolist(),
     }
 
 
-def binned(curve: Curve, d_mm: Floats) -> Floats:
+def binned(curve: CumulativeProfile, d_mm: Floats) -> Floats:
     """Return the (3, BINS) edge response of a curve, averaged as the columns are."""
-    each = [curve.edge(columns() * d_mm[c])[:, c].reshape(BINS, EACH).mean(axis=1) for c in range(3)]
+    each = [curve.edge_response(columns() * d_mm[c])[:, c].reshape(BINS, EACH).mean(axis=1) for c in range(3)]
     return np.array(each)
 
 
 def heads(pythons: dict[str, Path]) -> Iterator[Figures]:
     """Yield outlines and colours of the head without hair, which both draw differently, by each method."""
-    subject = subject_of("human").painted(TEXELS, "auto")
+    subject = load_subject("human").painted(TEXELS, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)
     bald = replace(subject, scene=replace(subject.scene, head=head))
@@ -147,7 +147,7 @@ def heads(pythons: dict[str, Path]) -> Iterator[Figures]:
 
 def picture(pythons: dict[str, Path]) -> None:
     """Write a picture of ours beside Cycles of each version, with hair."""
-    subject = subject_of("human").painted(TEXELS, "auto")
+    subject = load_subject("human").painted(TEXELS, "auto")
     seen = [drawn(subject, SHOWN)]
     for version, python in pythons.items():
         seen += rendered(subject, METHODS_OF[version][0], version, python, SHOWN, SHOWN_SAMPLES, 1)

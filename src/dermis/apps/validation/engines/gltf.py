@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dermis.apps.export.fitting import deviation
-from dermis.apps.export.subject import subject_of
+from dermis.apps.export.fitting import curve_error
+from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARGET
 from dermis.apps.export.targets.gltf.volume import fit_volume, volume_curve
 from dermis.apps.validation.pages import RESULTS, Figures, write_figures
@@ -15,20 +15,20 @@ VERSION = TARGET.versions[-1]
 
 def figures_of(name: str) -> Figures:
     """Return a skin's fitted parameters and their errors, also of values typed in, and of A as the colour."""
-    subject = subject_of(name)
+    subject = load_subject(name)
     volume = fit_volume(subject.curve, subject.albedo)
     coloured = volume_curve(volume._replace(multiscatter=subject.curve.energy))
     found: Figures = {
         "albedo": [round(float(x), 4) for x in subject.curve.energy],
         "multiscatter": [round(float(x), 4) for x in volume.multiscatter],
         "mean_free_path_mm": [round(float(x), 4) for x in volume.mean_free_path_mm],
-        "albedo_as_colour": deviation(subject.curve, coloured).as_json(),
+        "albedo_as_colour": curve_error(subject.curve, coloured).as_json(),
     }
     for variant in (SCATTER, DIFFUSE):
         target = TARGET.with_variant(variant)
         best, naive = (
-            deviation(subject.curve, target.shown(rows, subject, VERSION)).as_json()
-            for rows in (target.parameters(subject, VERSION), target.naive(subject, VERSION))
+            curve_error(subject.curve, target.predicted_curve(rows, subject, VERSION)).as_json()
+            for rows in (target.parameters(subject, VERSION), target.naive_parameters(subject, VERSION))
         )
         found[variant] = {"error": best, "naive_error": naive}
     return found

@@ -19,7 +19,7 @@ from PIL import Image
 from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.truths.metrics import relative_rmse
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
 from dermis.apps.validation.engines.babylon import LIBRARY, babylon_library
@@ -51,7 +51,7 @@ def heads() -> None:
     babylonjs into. Needs Mitsuba.
     """
     in_checkout(PICTURE.parent)
-    subject = subject_of("human").painted(TEXELS, "auto")
+    subject = load_subject("human").painted(TEXELS, "auto")
     assert subject.head is not None and subject.scene is not None
     bald = replace(subject.head, hair=None, strands=None)
     subject = replace(subject, scene=replace(subject.scene, head=bald, lights=LIGHTS))

@@ -12,15 +12,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.fitting import fit_d
-from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.fitting import fit_burley_width
+from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.mitsuba.scene import BOUNDARIES, Boundary, Walked, medium_words, surface_words
+from dermis.apps.export.targets.mitsuba.scene import (
+    BOUNDARIES,
+    Boundary,
+    IsotropicMedium,
+    medium_description,
+    surface_description,
+)
 from dermis.apps.export.targets.mitsuba.target import TARGET
-from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
 from dermis.apps.validation.pages import RESULTS, Figures, write_figures
-from dermis.optics.curve import Curve
+from dermis.optics.cumulative_profile import CumulativeProfile
 
 Floats = NDArray[np.float64]
 FIGURES = RESULTS / "engines_mitsuba.json"
@@ -37,7 +43,7 @@ _BLACK = 1e-9
 
 
 def plane(
-    mi: Mitsuba, medium: Walked, boundary: Boundary, d_mm: float, *, black: bool = False
+    mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, *, black: bool = False
 ) -> MitsubaObject:
     """Return the plane z = 0, lit where x > 0, seen along the normal within `_REACH` d of the edge.
 
@@ -46,7 +52,7 @@ def plane(
     turn = mi.ScalarTransform4f
     size, height = _PLANE_D * d_mm, _LAMP_D * d_mm
     albedo = (_BLACK,) * 3 if black else medium.albedo
-    inside = mi.load_dict(medium_words(Walked(medium.sigma_t, albedo)))
+    inside = mi.load_dict(medium_description(IsotropicMedium(medium.sigma_t, albedo)))
     below = boundary != "rough"
     eye = -1e-3 * height if below else 0.5 * height
     over = turn().translate([size, 0.0, height]).rotate([1, 0, 0], 180).scale([size, size, 1.0])
@@ -68,14 +74,14 @@ def plane(
             "type": "scene",
             "integrator": {"type": "volpath", "rr_depth": 400},
             "sensor": {**sensor, **({"medium": inside} if below else {})},
-            "skin": {**skin, "bsdf": surface_words(boundary)},
+            "skin": {**skin, "bsdf": surface_description(boundary)},
             "lamp": {**lamp, "emitter": {"type": "area", "radiance": rgb((1, 1, 1))}},
         }
     )
 
 
 def measured(
-    mi: Mitsuba, medium: Walked, boundary: Boundary, d_mm: float, samples: int
+    mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, samples: int
 ) -> tuple[Floats, Floats, float]:
     """Return the edge response at the pixels, its standard errors, and what leaves far inside the light."""
     built = plane(mi, medium, boundary, d_mm)
@@ -92,25 +98,25 @@ def measured(
     return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASSES), whole
 
 
-def over_pixels(curve: Curve, channel: int, d_mm: float) -> Floats:
+def over_pixels(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
     """Return a curve's edge response as the mean over each pixel."""
     edges = np.linspace(-_REACH, _REACH, _PIXELS + 1) * d_mm
     at = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(_INSIDE) + 0.5) / _INSIDE
-    return np.asarray(curve.edge(at)[..., channel].mean(axis=1))
+    return np.asarray(curve.edge_response(at)[..., channel].mean(axis=1))
 
 
 def one(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> Figures:
     """Return the figures of a skin under a surface: differences in red, green and blue."""
     target = TARGET.with_variant(boundary)
-    version = target.known_version(None)
+    version = target.resolve_version(None)
     rows = target.parameters(subject, version)
-    shown, d = target.shown(rows, subject, version), fit_d(subject.curve)
+    shown, d = target.predicted_curve(rows, subject, version), fit_burley_width(subject.curve)
     measures: dict[str, list[Any]] = {
         key: [] for key in ("predicted", "exported", "noise", "rms", "energy", "edge")
     }
     for c in range(3):
         sigma, albedo = (numbers_of(rows, name)[c] for name in ("sigma_t", "albedo"))
-        medium = Walked((sigma,) * 3, (albedo,) * 3)
+        medium = IsotropicMedium((sigma,) * 3, (albedo,) * 3)
         found, error, whole = measured(mi, medium, boundary, float(d[c]), samples)
         fault = found - over_pixels(shown, c, float(d[c]))
         measures["predicted"].append(float(np.abs(fault).max()))
@@ -139,7 +145,7 @@ def mitsuba(*, samples: int = 32000, output: Path = FIGURES, variant: str = "sca
     found = []
     with mitsuba_variant(mi, variant):
         for name, boundaries in SKINS.items():
-            subject = subject_of(name)
+            subject = load_subject(name)
             found += [one(mi, subject, boundary, samples) for boundary in boundaries]
     half = _PIXELS // 2
     at = [(k + 0.5) * _REACH / half for k in range(half)]

@@ -8,17 +8,17 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.apps.export.fitting import deviation
-from dermis.apps.export.run import assess, export_skin
-from dermis.apps.export.subject import subject_of
+from dermis.apps.export.fitting import curve_error
+from dermis.apps.export.run import evaluate_export, export_skin
+from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import numbers_of
 from dermis.apps.export.targets.openpbr import target as openpbr_target
 from dermis.apps.export.targets.openpbr.materials import OPEN_PBR
-from dermis.apps.export.targets.openpbr.target import fitted_mm, profile_of_specification
+from dermis.apps.export.targets.openpbr.target import fitted_path_mm, materialx_profile
 from dermis.apps.export.targets.pbrt import target as pbrt_target
 from dermis.apps.validation.pages import RESULTS, Figures, read_figures, write_figures
 from dermis.base.console import print_lines
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 
 FIGURES = RESULTS / "engines_openpbr.json"
 SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"
@@ -29,18 +29,18 @@ def figures() -> Figures:
     """Return by skin: radii, and errors as meant, as typed in, and read as a profile."""
     found: Figures = {}
     for name in SKINS:
-        subject = subject_of(name)
-        walk = assess(subject, openpbr_target.TARGET, "1.1.1")
-        beam = assess(subject, pbrt_target.TARGET, "4")
-        misread = deviation(subject.curve, profile_of_specification(fitted_mm(subject), subject))
+        subject = load_subject(name)
+        walk = evaluate_export(subject, openpbr_target.TARGET, "1.1.1")
+        beam = evaluate_export(subject, pbrt_target.TARGET, "4")
+        profile_error_text = curve_error(subject.curve, materialx_profile(fitted_path_mm(subject), subject))
         found[name] = {
             "model": subject.model,
             "d_mm": numbers(walk.d_mm),
             "openpbr": {
-                "radius_mm": numbers(openpbr_target.radii_mm(walk.rows, OPEN_PBR)),
+                "radius_mm": numbers(openpbr_target.row_radii_mm(walk.rows, OPEN_PBR)),
                 "error": walk.error.as_json(),
                 "naive": walk.naive_error.as_json(),
-                "as_a_profile": misread.as_json(),
+                "as_a_profile": profile_error_text.as_json(),
             },
             "pbrt": {
                 "mfp_mm": numbers(numbers_of(beam.rows, "mfp")),
@@ -53,8 +53,8 @@ def figures() -> Figures:
 
 def checked() -> Figures:
     """Return what the libraries find in documents and stages, and their versions."""
-    MaterialX = needed("MaterialX", "checking its files")
-    needed("pxr", "checking USD")
+    MaterialX = import_extra("MaterialX", "checking its files")
+    import_extra("pxr", "checking USD")
     from pxr import Usd, UsdValidation
 
     with TemporaryDirectory() as folder:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from dermis.apps.export.registry import TARGETS
-from dermis.apps.export.run import assess
-from dermis.apps.export.subject import subject_of
+from dermis.apps.export.run import evaluate_export
+from dermis.apps.export.subject import load_subject
 from dermis.apps.validation.pages import DOCS, RESULTS, Figures, in_checkout, read_figures, write_page
 from dermis.base.console import print_lines
 
@@ -45,12 +45,12 @@ def filled(text: str) -> str:
 def predicted() -> str:
     """Return the errors of all targets, newest versions and variants, by their formulas."""
     lines = []
-    subjects = [subject_of(name) for name in SKINS]
+    subjects = [load_subject(name) for name in SKINS]
     for name in sorted(set(TARGETS) - set(_NO_SKIN), key=str.lower):
         for variant in TARGETS[name].variants or (None,):
             target = TARGETS[name].with_variant(variant)
             for subject in subjects:
-                made = assess(subject, target, target.versions[-1])
+                made = evaluate_export(subject, target, target.versions[-1])
                 errors = made.error.cdf, made.error.edge, made.error.energy, made.naive_error.edge
                 cells = [three(one.round(3).tolist()) for one in errors]
                 lines.append([target.title, made.version, made.variant or "-", subject.name, *cells])

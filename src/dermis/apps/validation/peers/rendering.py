@@ -136,7 +136,7 @@ def measure(
         _add_frames(ours, renderer, scene, plan)
         report(_WORK["ours"])
         worked = time.process_time()
-        truth = path_trace(scene, body, plan.paths, settings, keep=False, report=per_pass)
+        truth = path_trace(scene, body, plan.paths, settings, use_cache=False, progress=per_pass)
         core_seconds = time.process_time() - worked
         _add_frames(ours, renderer, scene, plan)
         report(_WORK["ours"])
@@ -159,10 +159,10 @@ def _add_frames(ours: dict[str, Frames], renderer: Renderer, scene: Scene, plan:
         )
         skin = Skin(**(scene.skin.model_dump() | {"direction": way.direction}))
         turned = replace(scene, skin=skin)
-        drawn = renderer.draw(turned, settings, anew=True)
+        drawn = renderer.draw(turned, settings, force=True)
         frames = ours.setdefault(name, Frames(drawn.linear()))
         for _ in range(plan.frames):
             began, worked = time.perf_counter(), time.process_time()
-            renderer.draw(turned, settings, anew=True)
+            renderer.draw(turned, settings, force=True)
             frames.seconds.append(time.perf_counter() - began)
             frames.core_seconds.append(time.process_time() - worked)

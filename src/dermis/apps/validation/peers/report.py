@@ -20,7 +20,7 @@ from dermis.apps.validation.pages import DOCS, RESULTS, Figures, fill_page, writ
 from dermis.apps.validation.peers.figures import figures
 from dermis.apps.validation.peers.rendering import METHODS, Measured, Plan, measure
 from dermis.base.atomic_write import check_output
-from dermis.base.console import note, print_lines, progress
+from dermis.base.console import note, print_lines, progress_bar
 from dermis.base.errors import DermisError, refuse
 
 FIGURES, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
@@ -78,7 +78,7 @@ def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> Fig
     """
     for light in lights:
         if light not in SCENES:
-            refuse("--lights", f"names of {', '.join(SCENES)} with commas", f"{light!r} came", "Correct it")
+            refuse("--lights", f"names of {', '.join(SCENES)} with commas", f"got {light!r}", "Correct it")
     load_mitsuba()
     try:
         blender_python()
@@ -86,7 +86,7 @@ def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> Fig
         note(f"Cycles is left out. {fault}")
     loaded, renderer = dermis.load_head(head, subdivide=0), dermis.Renderer(adapter)
     scenes: list[Measured] = []
-    with progress("measuring") as bar:
+    with progress_bar("measuring") as bar:
         done = 0
 
         def report(work: int) -> None:
