@@ -31,7 +31,7 @@ def bands(count: int, low: float, high: float) -> tuple[Floats, float]:
 
 def albedo(sin_o: float, depth: Floats, roughness: float = LONGITUDINAL_ROUGHNESS) -> Floats:
     """(3,) what comes back under light from all around."""
-    (sines, ds), (phi, dphi) = bands(2000, -1, 1), bands(180, -np.pi, np.pi)
+    (sines, ds), (phi, dphi) = bands(1000, -1, 1), bands(60, -np.pi, np.pi)
     i, p = np.meshgrid(sines, phi, indexing="ij")
     return np.asarray(scattering(i, sin_o, p, depth, fibre(roughness)).sum(axis=(0, 1)) * ds * dphi)
 
