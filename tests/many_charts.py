@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.atlas.unwrap.charts import grow
+from dermis.atlas.unwrap.charts import grow_charts
 from dermis.atlas.unwrap.unwrap import unwrap
 from dermis.human.person import Human
 from dermis.mesh.geometry import triangle_areas
@@ -21,7 +21,7 @@ def many_charts_mesh(charts: int, subdivide: int = 0) -> Mesh:
     positions, normals = (np.zeros((int(mesh.point.max()) + 1, 3)) for _ in range(2))
     positions[mesh.point], normals[mesh.point] = mesh.positions, mesh.normals
     triangles = points[triangle_areas(positions[points]) > LEAST_MM2]
-    chart = grow(positions, triangles, charts)
+    chart = grow_charts(positions, triangles, charts)
     upright = np.random.default_rng(0).normal(size=(int(chart.max()) + 1, 3))
     layout = unwrap(positions, triangles, chart, upright=upright[chart])
     places, smooth = positions[layout.point], normals[layout.point]

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from dermis.atlas.unwrap.charts import tidy
+from dermis.atlas.unwrap.charts import smooth_charts
 from dermis.atlas.unwrap.flatten import flatten, singular_values
-from dermis.atlas.unwrap.seams import border_sides
-from dermis.atlas.unwrap.unwrap import pack
+from dermis.atlas.unwrap.seams import border_edges
+from dermis.atlas.unwrap.unwrap import pack_charts
 from dermis.mesh.geometry import halves
 
 Doubles = NDArray[np.float64]
@@ -45,8 +45,8 @@ def human_layout(
         pieces.append(own)
         points = np.unique(corner[own])
         flat[points] = _laid(places, quads[own], corner[own], uv, int(group[own[0]]))[points]
-    outlines = [flat[border_sides(halves(corner[own]))[0]] for own in pieces]
-    scale, offset = pack(outlines, PADDING)
+    outlines = [flat[border_edges(halves(corner[own]))[0]] for own in pieces]
+    scale, offset = pack_charts(outlines, PADDING)
     for own, move in zip(pieces, offset, strict=True):
         points = np.unique(corner[own])
         flat[points] = scale * flat[points] + move
@@ -82,7 +82,7 @@ def _parted(places: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[
     island, middle = _islands(corner)[corner[:, 0]], places[quads].mean(axis=1)
     head = np.flatnonzero(island == island[middle[:, 1].argmax()])
     behind = middle[head, 2] < _CROWN_Z + _CROWN_SLOPE * (middle[head, 1] - _EAR_Y)
-    behind = tidy(np.repeat(behind, 2).astype(np.int64), halves(quads[head]))[::2] > 0
+    behind = smooth_charts(np.repeat(behind, 2).astype(np.int64), halves(quads[head]))[::2] > 0
     far, made = head[behind], corner.copy()
     used, again = np.unique(made[far], return_inverse=True)
     made[far] = len(uv) + again.reshape(-1, 4)
@@ -106,7 +106,7 @@ def _head_density(middle: Doubles) -> Doubles:
 
 def _filled(triangles: Index, points: Doubles) -> tuple[Index, Doubles]:
     """The sheet with a fan in each hole, and its points with the middles of these."""
-    sides, _ = border_sides(triangles)
+    sides, _ = border_edges(triangles)
     _, loop = connected_components(
         coo_array((np.ones(len(sides)), sides.T), shape=(len(points),) * 2), directed=False
     )

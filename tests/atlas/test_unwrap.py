@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.atlas.raster import rasterise
-from dermis.atlas.unwrap.charts import grow, join_strays, neighbours, pieces, tidy
+from dermis.atlas.unwrap.charts import connected_pieces, grow_charts, merge_strays, neighbours, smooth_charts
 from dermis.atlas.unwrap.flatten import flatten, singular_values, untangle
-from dermis.atlas.unwrap.seams import border_sides, crossed, cut_open, faults
-from dermis.atlas.unwrap.unwrap import PADDING, Layout, pack, unwrap
+from dermis.atlas.unwrap.seams import border_edges, crossing_edges, faulty_triangles, split_at_seams
+from dermis.atlas.unwrap.unwrap import PADDING, UvLayout, pack_charts, unwrap
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.mesh import Material, Mesh, build_mesh
@@ -59,18 +59,18 @@ def one_chart(triangles: Index) -> Index:
     return np.zeros(len(triangles), dtype=np.int64)
 
 
-def stretch(layout: Layout, positions: Doubles) -> Doubles:
+def stretch(layout: UvLayout, positions: Doubles) -> Doubles:
     return singular_values(positions[layout.point[layout.triangles]], layout.uv[layout.triangles])
 
 
-def as_mesh(layout: Layout, positions: Doubles) -> Mesh:
+def as_mesh(layout: UvLayout, positions: Doubles) -> Mesh:
     normals = np.tile([0.0, 0.0, 1.0], (len(layout.point), 1))
     kind = np.zeros(len(layout.triangles))
     places = positions[layout.point]
     return build_mesh(places, layout.uv, layout.triangles, kind, (Material("skin"),), normals, layout.point)
 
 
-def owners_of_texels(mesh: Mesh, layout: Layout, size: int = SIZE) -> Index:
+def owners_of_texels(mesh: Mesh, layout: UvLayout, size: int = SIZE) -> Index:
     """Chart (size, size) at each texel, -1 where none; no texel lies in two triangles."""
     corners = mesh.uv[mesh.triangles]
     # a little smaller, for a texel whose centre lies on an edge is in both its triangles
@@ -84,7 +84,7 @@ def owners_of_texels(mesh: Mesh, layout: Layout, size: int = SIZE) -> Index:
     return owner.reshape(size, size)
 
 
-def check_valid(layout: Layout, positions: Doubles) -> None:
+def check_valid(layout: UvLayout, positions: Doubles) -> None:
     assert (layout.uv >= 0).all() and (layout.uv <= 1).all()
     assert (stretch(layout, positions)[:, 1] > 0).all()
     owners_of_texels(as_mesh(layout, positions), layout)
@@ -139,7 +139,7 @@ def test_cap_of_a_sphere() -> None:
 def test_density_sets_the_size_of_charts() -> None:
     positions, triangles = square()
     apart = (positions[triangles].mean(axis=1)[:, 1] > 0).astype(np.int64)
-    corner, point = cut_open(triangles, apart)
+    corner, point = split_at_seams(triangles, apart)
     density = np.where(apart == 0, 1.0, 0.25)
     places = flatten(positions[point], corner, density, np.ones(len(corner)))
     values = singular_values(positions[triangles], places[corner]).mean(axis=1)
@@ -149,7 +149,7 @@ def test_density_sets_the_size_of_charts() -> None:
 def test_weight_keeps_stretch_away() -> None:
     positions, triangles = sphere()
     cap = triangles[positions[triangles].mean(axis=1)[:, 2] > 0]
-    corner, point = cut_open(cap, one_chart(cap))
+    corner, point = split_at_seams(cap, one_chart(cap))
     heavy, even = np.abs(positions[cap].mean(axis=1)[:, 1]) > 4, np.ones(len(cap))
     anisotropy = []
     for weight in (even, np.where(heavy, 20.0, 1.0)):
@@ -167,7 +167,7 @@ def test_charts_lie_upright() -> None:
 
 def test_space_between_charts() -> None:
     positions, triangles = square(24)
-    layout = unwrap(positions, triangles, grow(positions, triangles, 30))
+    layout = unwrap(positions, triangles, grow_charts(positions, triangles, 30))
     owner = owners_of_texels(as_mesh(layout, positions), layout)
     reach = int(PADDING * SIZE)
     y, x = np.nonzero(owner >= 0)
@@ -182,13 +182,13 @@ def test_space_between_charts() -> None:
 
 def test_same_input_same_bytes() -> None:
     positions, triangles = sphere()
-    one, other = (unwrap(positions, triangles, grow(positions, triangles, 9)) for _ in range(2))
+    one, other = (unwrap(positions, triangles, grow_charts(positions, triangles, 9)) for _ in range(2))
     assert one.uv.tobytes() == other.uv.tobytes() and one.triangles.tobytes() == other.triangles.tobytes()
 
 
 def test_layout_keeps_the_points_of_the_mesh() -> None:
     positions, triangles = sphere()
-    layout = unwrap(positions, triangles, grow(positions, triangles, 9))
+    layout = unwrap(positions, triangles, grow_charts(positions, triangles, 9))
     assert np.array_equal(layout.point[layout.triangles], triangles)
 
 
@@ -201,7 +201,7 @@ def test_triangle_without_area_is_refused() -> None:
 def test_points_between_charts_become_two() -> None:
     positions, triangles = square(8, 0.0)
     chart = (positions[triangles].mean(axis=1)[:, 1] > 0).astype(np.int64)
-    corner, point = cut_open(triangles, chart)
+    corner, point = split_at_seams(triangles, chart)
     assert np.array_equal(point[corner], triangles)
     middle = np.flatnonzero(np.abs(positions[:, 1]) < 1e-6)
     assert sorted(np.flatnonzero(np.bincount(point) == 2)) == sorted(middle)
@@ -209,20 +209,22 @@ def test_points_between_charts_become_two() -> None:
 
 def test_charts_are_grown_in_one_piece_each() -> None:
     positions, triangles = sphere()
-    chart = grow(positions, triangles, 20)
+    chart = grow_charts(positions, triangles, 20)
     assert chart.max() == 19
-    assert pieces(chart, neighbours(triangles)).max() == 19
+    assert connected_pieces(chart, neighbours(triangles)).max() == 19
     two = np.vstack((triangles, triangles + len(positions)))
-    assert grow(np.vstack((positions, positions)), two, 1).max() == 1, "each piece of a mesh has its own"
+    assert grow_charts(np.vstack((positions, positions)), two, 1).max() == 1, (
+        "each piece of a mesh has its own"
+    )
 
 
 def test_tidy_charts_have_short_borders() -> None:
     positions, triangles = square(20)
     side = (positions[triangles].mean(axis=1)[:, 1] > 0).astype(np.int64)
     noisy = np.where(np.random.default_rng(2).random(len(side)) < 0.15, 1 - side, side)
-    mended = tidy(noisy, triangles)
+    mended = smooth_charts(noisy, triangles)
     assert (mended == side).mean() > 0.97
-    assert pieces(mended, neighbours(triangles)).max() == 1
+    assert connected_pieces(mended, neighbours(triangles)).max() == 1
 
 
 def test_strays_join_what_surrounds_them() -> None:
@@ -232,29 +234,29 @@ def test_strays_join_what_surrounds_them() -> None:
     low = int(height.argmin())
     stray = half.copy()
     stray[low] = 1
-    assert np.array_equal(join_strays(stray, triangles), half)
+    assert np.array_equal(merge_strays(stray, triangles), half)
 
 
 def test_faults_are_found() -> None:
     positions, triangles = square(8)
     places = flatten(positions, triangles, np.ones(len(triangles)), np.ones(len(triangles)))
     whole = one_chart(triangles)
-    assert not faults(places, triangles, whole).any()
-    assert faults(places * (-1, 1), triangles, whole).all(), "mirrored"
+    assert not faulty_triangles(places, triangles, whole).any()
+    assert faulty_triangles(places * (-1, 1), triangles, whole).all(), "mirrored"
     inner = np.flatnonzero((np.abs(positions[:, 1]) < 1) & (np.abs(positions[:, 0]) < 1))[0]
     moved = places.copy()
     moved[inner] += 4.0
-    assert faults(moved, triangles, whole).any()
-    assert not faults(untangle(moved, triangles), triangles, whole).any()
-    sides, _ = border_sides(triangles)
-    assert len(sides) == 32 and not crossed(places[sides]).any()
+    assert faulty_triangles(moved, triangles, whole).any()
+    assert not faulty_triangles(untangle(moved, triangles), triangles, whole).any()
+    sides, _ = border_edges(triangles)
+    assert len(sides) == 32 and not crossing_edges(places[sides]).any()
 
 
 def test_crossings() -> None:
     sides = np.array(
         [[[0, 0], [2, 2]], [[0, 2], [2, 0]], [[2, 2], [3, 0]], [[5, 0], [5, 1]]], dtype=np.float64
     )
-    assert crossed(sides).tolist() == [True, True, False, False]
+    assert crossing_edges(sides).tolist() == [True, True, False, False]
 
 
 def test_rectangles_are_packed_well() -> None:
@@ -262,7 +264,7 @@ def test_rectangles_are_packed_well() -> None:
     size = random.uniform(1, 4, (25, 2))
     box = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     outlines = [np.stack((box * s, np.roll(box, -1, axis=0) * s), axis=1) + 7.0 for s in size]
-    scale, offset = pack(outlines, PADDING)
+    scale, offset = pack_charts(outlines, PADDING)
     low, high = scale * 7.0 + offset, scale * (7.0 + size) + offset
     assert (low > PADDING / 3).all() and (high < 1 - PADDING / 3).all()
     gap = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
@@ -274,4 +276,4 @@ def test_rectangles_are_packed_well() -> None:
 def test_too_many_sheets_are_refused() -> None:
     box = np.array([[[0, 0], [1, 0]], [[1, 0], [0, 1]], [[0, 1], [0, 0]]], dtype=np.float64)
     with pytest.raises(DermisError, match="fewer charts"):
-        pack([box] * 40, 0.2)
+        pack_charts([box] * 40, 0.2)

@@ -11,7 +11,7 @@ from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
 from dermis.atlas.stitched.pack import pack_pieces
 from dermis.atlas.stitched.surface import Doubles, FlatSurface, Index, survey
-from dermis.atlas.unwrap.charts import pieces as connected
+from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.mesh.mesh import Mesh
 
 _COLLAPSED = 0.05  # of the mesh's mean density: what has less holds nothing that could be blurred
@@ -24,8 +24,8 @@ def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     """Piece of each triangle (f,), -1 without a place, and scale (f,) of its uv that evens out density."""
     mirrored = (surface.area_uv < 0).astype(np.int64)
     beside = surface.beside_uv
-    chart = connected(np.zeros(len(mirrored), np.int64), beside)
-    piece = connected(2 * chart + mirrored, beside)
+    chart = connected_pieces(np.zeros(len(mirrored), np.int64), beside)
+    piece = connected_pieces(2 * chart + mirrored, beside)
     piece = _with_specks(surface, chart, piece)
     piece = np.where(surface.sound, piece, -1)
     density, mean = _density(surface, piece)

@@ -20,7 +20,7 @@ from dermis.atlas.stitched.gutter import (
 from dermis.atlas.stitched.nearest import Nearest, Sides, nearest_sides
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 from dermis.atlas.stitched.texels import Rooted, gap_mm, opposed, owners, unsure, weights_in
-from dermis.atlas.unwrap.charts import pieces as connected
+from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.mesh.geometry import components
 
 _FINEST_MM = 0.9  # texels of the grids on which overlaps are looked for
@@ -257,9 +257,9 @@ def _parts(surface: FlatSurface, own: Index, part: Index, gutter_mm: float) -> I
     index[own] = np.arange(len(own))
     there = index[surface.beside_uv[own]]
     beside = np.where(there >= 0, there, np.arange(len(own))[:, None])
-    part = connected(part, beside)
+    part = connected_pieces(part, beside)
     area = np.bincount(part, surface.area_mm2[own])
     crumbs = area[part] < _CRUMB * gutter_mm**2
     host = np.take_along_axis(part[beside], area[part[beside]].argmax(axis=1)[:, None], axis=1)[:, 0]
-    part = connected(np.where(crumbs, host, part), beside)
+    part = connected_pieces(np.where(crumbs, host, part), beside)
     return part if part.max() > 0 else None

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.unwrap.charts import across
+from dermis.atlas.unwrap.charts import opposite_sides
 from dermis.mesh.geometry import MIN_UV_CROSS, tangents, triangle_areas, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
@@ -99,7 +99,7 @@ def survey(mesh: Mesh) -> FlatSurface:
     flat, axes = _flat(corners)
     along, lengths = _steps(mesh, flat, axes, uv, area_uv)
     same_uv = weld(np.hstack((mesh.positions, mesh.uv)))[mesh.triangles]
-    beside_uv = (across(same_uv.astype(np.int64)) % len(uv)).reshape(3, -1).T
+    beside_uv = (opposite_sides(same_uv.astype(np.int64)) % len(uv)).reshape(3, -1).T
     return FlatSurface(
         corners,
         uv,
@@ -128,7 +128,7 @@ def sides_across(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int8], Flags
     """(f, 3) triangle across each side, -1 for none, its side of this edge, and whether it is turned over."""
     points, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.triangles)
     side = np.arange(3 * count)
-    other = across(points)
+    other = opposite_sides(points)
     start = points.T.ravel()
     beside = np.where(other == side, -1, other % count).reshape(3, -1).T
     entry = (other // count).reshape(3, -1).T

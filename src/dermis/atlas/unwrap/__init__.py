@@ -1,1 +1,1 @@
-"""Uv layouts: a mesh cut into charts, each laid flat with little stretch, all packed into one map."""
+"""Unwrapping of a mesh: charts that are flattened with little stretch and packed into one uv map."""

@@ -1,4 +1,4 @@
-"""Charts: which triangles are laid flat together."""
+"""Charts of a mesh: growth from random triangles, smooth borders, connected pieces."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from dermis.mesh.geometry import components, edges, sum_at, triangle_areas
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]
 
-_SMOOTHINGS = 4
-_BEND = 3.0  # extra distance across a right angle, in multiples of the distance
+_SMOOTHING_STEPS = 4
+_BEND_PENALTY = 3.0  # extra distance across a right angle, in multiples of the distance
 
 
-def across(triangles: Index) -> Index:
-    """The neighbour's side along each side (3 f,), itself where there is none or more than one.
+def opposite_sides(triangles: Index) -> Index:
+    """Return the neighbouring triangle's side for each side (3 f,), or itself without exactly one neighbour.
 
     Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20.
     """
@@ -29,51 +29,56 @@ def across(triangles: Index) -> Index:
 
 
 def neighbours(triangles: Index) -> Index:
-    """The triangles across the sides 01, 12 and 20 of each (f, 3); itself where there is none."""
-    return (across(triangles) % len(triangles)).reshape(3, -1).T
+    """Return the triangles across the sides 01, 12 and 20 of each triangle (f, 3), or itself for none."""
+    return (opposite_sides(triangles) % len(triangles)).reshape(3, -1).T
 
 
-def tidy(chart: Index, triangles: Index) -> Index:
-    """Charts (f,) with smooth borders, each in one piece."""
-    return join_strays(_smooth(chart, triangles), triangles)
+def smooth_charts(chart: Index, triangles: Index) -> Index:
+    """Return charts (f,) with smoothed borders, each in one connected piece."""
+    return merge_strays(_smooth_borders(chart, triangles), triangles)
 
 
-def join_strays(chart: Index, triangles: Index) -> Index:
-    """Charts (f,) with all but the largest piece of each given to the charts beside them."""
-    beside = neighbours(triangles)
-    strays = _strays(chart, beside)
-    while strays.any():
-        # a stray on the rim of other strays waits until those have joined
-        host = np.where(strays[beside] | (beside == np.arange(len(chart))[:, None]), -1, chart[beside])
-        found = host.max(axis=1)
-        if not (strays & (found >= 0)).any():
+def merge_strays(chart: Index, triangles: Index) -> Index:
+    """Return charts (f,) with all but the largest connected piece of each merged into adjacent charts."""
+    adjacent = neighbours(triangles)
+    is_stray = _stray_triangles(chart, adjacent)
+    while is_stray.any():
+        # strays beside other strays are assigned after those
+        adjacent_chart = np.where(
+            is_stray[adjacent] | (adjacent == np.arange(len(chart))[:, None]), -1, chart[adjacent]
+        )
+        found = adjacent_chart.max(axis=1)
+        if not (is_stray & (found >= 0)).any():
             break
-        chart = np.where(strays & (found >= 0), found, chart)
-        strays = _strays(chart, beside)
+        chart = np.where(is_stray & (found >= 0), found, chart)
+        is_stray = _stray_triangles(chart, adjacent)
     return chart
 
 
-def _smooth(chart: Index, triangles: Index) -> Index:
-    """Each triangle goes to the chart that has the largest share of its surroundings."""
+def _smooth_borders(chart: Index, triangles: Index) -> Index:
+    """Return charts (f,) in which each triangle belongs to the prevailing chart of its neighbourhood."""
     corner = triangles.ravel()
-    around = np.maximum(np.bincount(corner), 1)
-    share = np.eye(int(chart.max()) + 1)[chart]
-    for _ in range(_SMOOTHINGS):
-        at_point = sum_at(corner, np.repeat(share, 3, axis=0), len(around)) / around[:, None]
-        share = at_point[triangles].mean(axis=1)
-    return np.asarray(share.argmax(axis=1), dtype=np.int64)
+    triangle_count = np.maximum(np.bincount(corner), 1)
+    weight = np.eye(int(chart.max()) + 1)[chart]
+    for _ in range(_SMOOTHING_STEPS):
+        at_point = sum_at(corner, np.repeat(weight, 3, axis=0), len(triangle_count)) / triangle_count[:, None]
+        weight = at_point[triangles].mean(axis=1)
+    return np.asarray(weight.argmax(axis=1), dtype=np.int64)
 
 
-def pieces(chart: Index, beside: Index) -> Index:
-    """Number (f,) of the connected piece of one chart that each triangle belongs to."""
-    here, there = np.repeat(np.arange(len(chart)), 3), beside.ravel()
+def connected_pieces(chart: Index, adjacent: Index) -> Index:
+    """Return the number (f,) of each triangle's connected piece, where a piece is within one chart.
+
+    adjacent : (f, 3) from `neighbours`
+    """
+    here, there = np.repeat(np.arange(len(chart)), 3), adjacent.ravel()
     same = (chart[here] == chart[there]) & (here < there)
     return components(len(chart), here[same], there[same])
 
 
-def _strays(chart: Index, beside: Index) -> NDArray[np.bool_]:
-    """Triangles (f,) apart from the largest piece of their chart."""
-    piece = pieces(chart, beside)
+def _stray_triangles(chart: Index, adjacent: Index) -> NDArray[np.bool_]:
+    """Return the mask (f,) of triangles outside the largest piece of their chart."""
+    piece = connected_pieces(chart, adjacent)
     size = np.bincount(piece)
     owner = np.zeros(len(size), dtype=np.int64)
     owner[piece] = chart
@@ -82,8 +87,8 @@ def _strays(chart: Index, beside: Index) -> NDArray[np.bool_]:
     return ~np.isin(piece, order[largest])
 
 
-def grow(positions: Doubles, triangles: Index, count: int, seed: int = 0) -> Index:
-    """About `count` charts (f,) grown from random triangles, avoiding bends.
+def grow_charts(positions: Doubles, triangles: Index, count: int, seed: int = 0) -> Index:
+    """Return about `count` charts (f,) grown from random triangles, with borders along bends.
 
     positions : (n, 3) [mm]
     triangles : (f, 3)
@@ -91,22 +96,22 @@ def grow(positions: Doubles, triangles: Index, count: int, seed: int = 0) -> Ind
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
 
-    corners, beside = positions[triangles], neighbours(triangles)
-    here, there = np.repeat(np.arange(len(triangles)), 3), beside.ravel()
+    corners, adjacent = positions[triangles], neighbours(triangles)
+    here, there = np.repeat(np.arange(len(triangles)), 3), adjacent.ravel()
     here, there = here[here != there], there[here != there]
-    middle = corners.mean(axis=1)
+    centre = corners.mean(axis=1)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     bend = 1 - np.einsum("fi,fi->f", normal[here], normal[there])
-    far = np.linalg.norm(middle[here] - middle[there], axis=1) * (1 + _BEND * bend)
-    graph = coo_array((far, (here, there)), shape=(len(triangles),) * 2).tocsr()
-    seeds = _seeds(corners, pieces(np.zeros(len(triangles), dtype=np.int64), beside), count, seed)
+    distance = np.linalg.norm(centre[here] - centre[there], axis=1) * (1 + _BEND_PENALTY * bend)
+    graph = coo_array((distance, (here, there)), shape=(len(triangles),) * 2).tocsr()
+    seeds = _seeds(corners, connected_pieces(np.zeros(len(triangles), dtype=np.int64), adjacent), count, seed)
     source = dijkstra(graph, indices=seeds, min_only=True, return_predecessors=True)[2]
     return np.unique(source, return_inverse=True)[1].astype(np.int64)
 
 
 def _seeds(corners: Doubles, piece: Index, count: int, seed: int) -> Index:
-    """Triangles drawn by their area, and at least one of each piece."""
+    """Return triangles chosen at random by their area, with at least one from each piece."""
     area = triangle_areas(corners)
     drawn = np.random.default_rng(seed).choice(
         len(area), min(count, len(area)), replace=False, p=area / area.sum()

@@ -1,4 +1,4 @@
-"""Unwrapping of a mesh to a uv layout by given or found charts, and their packing."""
+"""Unwrapping of a mesh into a uv layout with given or new charts, and packing of charts."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from math import factorial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.atlas.unwrap.charts import grow, tidy
-from dermis.atlas.unwrap.seams import Flat, Surface, border_sides, lay_flat
+from dermis.atlas.raster import expand_runs
+from dermis.atlas.unwrap.charts import grow_charts, smooth_charts
+from dermis.atlas.unwrap.seams import FlatCharts, Triangles, border_edges, flatten_charts
 from dermis.base.errors import refuse
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.mesh import Mesh, build_mesh
@@ -18,113 +19,115 @@ from dermis.mesh.mesh import Mesh, build_mesh
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]
 
-_CELLS = 512  # columns and rows of the square
-_PLACINGS = 1000  # of sheets, over all orders that are tried
-_HALVINGS = 9  # in the search for the scale
-_GAIN = 1.004  # of the scale, for an order to be worth a search
+_GRID = 512  # columns and rows of cells on the map
+_MAX_PLACEMENTS = 1000  # of charts, in all orders together
+_BISECTIONS = 9  # in the search for the scale
+_MIN_GAIN = 1.004  # factor of the scale for which an order is worth a search
 PADDING = 1 / 128
-"""Empty space between charts, of the map's side: 8 texels at 1024."""
+"""Empty space between charts as a fraction of the map's side: 8 texels at 1024."""
 UPRIGHT = (0.0, 1.0, -0.1)
-"""Direction in space that points up on a map: up and, for level surfaces, towards the back."""
-_LEAST_MM2 = 1e-10
-_CHARTS = 16
-_LEAST_CHART_MM2 = 1e-6
+"""Direction in space that points up on a map: up and, for horizontal surfaces, backwards."""
+_MIN_AREA_MM2 = 1e-10
+_CHART_COUNT = 16
+_MIN_CHART_AREA_MM2 = 1e-6
 
 
-def pack(outlines: list[Doubles], padding: float) -> tuple[float, Doubles]:
-    """Scale, and offset (c, 2) of each sheet, that bring scale * places + offset into the unit square.
+def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles]:
+    """Return the scale, and the offset (c, 2) of each chart, that pack charts into the unit square.
 
-    outlines : ends (k, 2, 2) of the sides of each sheet's border, counter-clockwise around it
-    padding : empty space between sheets, half as much to the edge of the square, of the square's side
+    Each chart is dropped onto those below at the column where it gets lowest [Levy2002]; the best of several
+    orders is returned.
 
-    Each sheet is let down onto those below, where it comes to lie lowest [Levy2002], in several orders.
+    outlines : edges (k, 2, 2) of each chart's border, counter-clockwise
+    padding : empty space between charts, half as much at the edge of the square, as a fraction of the
+        square's side
 
-    Raises DermisError when there are more sheets than fit side by side.
+    Raises DermisError if there are more charts than fit side by side.
     """
-    corner = np.array([sides.min(axis=(0, 1)) for sides in outlines])
-    moved = [sides - low for sides, low in zip(outlines, corner, strict=True)]
-    size = np.array([sides.max(axis=(0, 1)) for sides in moved])
-    bound = _CELLS / np.sqrt(max(sum(_area(sides) for sides in moved), (size**2).max()))
+    corner = np.array([edges.min(axis=(0, 1)) for edges in outlines])
+    shifted = [edges - low for edges, low in zip(outlines, corner, strict=True)]
+    size = np.array([edges.max(axis=(0, 1)) for edges in shifted])
+    bound = _GRID / np.sqrt(max(sum(_area(edges) for edges in shifted), (size**2).max()))
     best, cells = 0.0, None
     for order in _orders(size):
         low, high = best, bound
-        if cells is not None and _place(moved, order, best * _GAIN, padding) is None:
+        if cells is not None and _drop_charts(shifted, order, best * _MIN_GAIN, padding) is None:
             continue
-        for _ in range(_HALVINGS):
+        for _ in range(_BISECTIONS):
             scale = (low + high) / 2
-            found = _place(moved, order, scale, padding)
+            found = _drop_charts(shifted, order, scale, padding)
             if found is None:
                 high = scale
             else:
                 best, cells, low = scale, found, scale
     if cells is None:
         refuse("charts", "fewer charts", f"got {len(outlines)}", "Cut the mesh into larger charts")
-    return best / _CELLS, (cells - best * corner) / _CELLS
+    return best / _GRID, (cells - best * corner) / _GRID
 
 
-def _area(sides: Doubles) -> float:
-    (x0, y0), (x1, y1) = sides[:, 0].T, sides[:, 1].T
+def _area(edges: Doubles) -> float:
+    (x0, y0), (x1, y1) = edges[:, 0].T, edges[:, 1].T
     return float((x0 * y1 - x1 * y0).sum() / 2)
 
 
 def _orders(size: Doubles) -> Iterator[Index]:
-    """Which sheet comes first: the highest, the widest, or any."""
+    """Yield orders of the charts: by height, by width, and random ones."""
     yield np.argsort(-size[:, 1], kind="stable")
     yield np.argsort(-size[:, 0], kind="stable")
     random = np.random.default_rng(0)
-    for _ in range(min(_PLACINGS // len(size), factorial(len(size)) - 2)):
+    for _ in range(min(_MAX_PLACEMENTS // len(size), factorial(len(size)) - 2)):
         yield random.permutation(len(size))
 
 
-def _place(moved: list[Doubles], order: Index, scale: float, padding: float) -> Doubles | None:
-    """Where the lower left corners (c, 2) of the sheets come to lie [cells], None if they do not all fit.
+def _drop_charts(shifted: list[Doubles], order: Index, scale: float, padding: float) -> Doubles | None:
+    """Return the lower left corners (c, 2) of the dropped charts [cell], or None if they do not all fit.
 
-    moved : outlines with their lower left corner at 0
-    scale : [cells per unit of these]
+    shifted : outlines with their lower left corner at 0
+    scale : cells per unit of the outlines
     """
-    margin = int(np.ceil(padding * _CELLS / 2))
-    horizon, cells = np.zeros(_CELLS, dtype=np.int64), np.zeros((len(moved), 2))
+    margin = int(np.ceil(padding * _GRID / 2))
+    horizon, cells = np.zeros(_GRID, dtype=np.int64), np.zeros((len(shifted), 2))
     for k in order:
-        low, high = _profile(moved[k] * scale, margin)
-        if len(low) > _CELLS:
+        low, high = _height_profile(shifted[k] * scale, margin)
+        if len(low) > _GRID:
             return None
-        rest = (np.lib.stride_tricks.sliding_window_view(horizon, len(low)) - low).max(axis=1)
-        x = int(rest.argmin())
-        y = int(rest[x])
-        if y + high.max() >= _CELLS:
+        heights = (np.lib.stride_tricks.sliding_window_view(horizon, len(low)) - low).max(axis=1)
+        x = int(heights.argmin())
+        y = int(heights[x])
+        if y + high.max() >= _GRID:
             return None
         horizon[x : x + len(low)] = np.maximum(horizon[x : x + len(low)], y + high + 1)
         cells[k] = x + margin, y + margin
     return cells
 
 
-def _profile(sides: Doubles, margin: int) -> tuple[Index, Index]:
-    """Lowest and highest cell (w,) of a sheet in each column, with empty cells around it.
+def _height_profile(edges: Doubles, margin: int) -> tuple[Index, Index]:
+    """Return the lowest and highest cell (w,) of a chart in each column, with a margin of empty cells.
 
-    sides : ends (k, 2, 2) [cells]
+    edges : (k, 2, 2) edges of the border [cell]
     """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    steps = np.ceil(2 * np.abs(sides[:, 1] - sides[:, 0]).max(axis=1)).astype(np.int64) + 1
-    which = np.repeat(np.arange(len(sides)), steps)
-    t = (np.arange(len(which)) - np.repeat(np.cumsum(steps) - steps, steps)) / steps[which]
-    x, y = (sides[which, 0] * (1 - t)[:, None] + sides[which, 1] * t[:, None]).astype(np.int64).T
+    steps = np.ceil(2 * np.abs(edges[:, 1] - edges[:, 0]).max(axis=1)).astype(np.int64) + 1
+    which, step = expand_runs(np.zeros_like(steps), steps)
+    t = step / steps[which]
+    x, y = (edges[which, 0] * (1 - t)[:, None] + edges[which, 1] * t[:, None]).astype(np.int64).T
     width = int(x.max()) + 1 + 2 * margin
-    low, high = np.full(width, _CELLS), np.full(width, -_CELLS)
+    low, high = np.full(width, _GRID), np.full(width, -_GRID)
     np.minimum.at(low, x + margin, y)
     np.maximum.at(high, x + margin, y)
-    around = 2 * margin + 1
-    return minimum_filter1d(low, around), maximum_filter1d(high, around) + 2 * margin
+    window = 2 * margin + 1
+    return minimum_filter1d(low, window), maximum_filter1d(high, window) + 2 * margin
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Where the triangles of a mesh lie on its maps.
+class UvLayout:
+    """Uv layout of a mesh.
 
-    uv : (v, 2) of each corner vertex, u to the right, v down
-    triangles : (f, 3) corner vertices, in the order of the mesh's triangles
-    point : (v,) point of the mesh that each corner vertex is
-    chart : (f,) chart of each triangle, from 0
+    uv : (v, 2) of each vertex, u to the right, v down
+    triangles : (f, 3) vertices, in the order of the mesh's triangles
+    point : (v,) point of the mesh that each vertex is at
+    chart : (f,) chart of each triangle, numbered from 0
     """
 
     uv: Doubles
@@ -139,78 +142,83 @@ def unwrap(
     chart: Index,
     upright: ArrayLike = UPRIGHT,
     padding: float = PADDING,
-) -> Layout:
-    """The layout with each chart laid flat by itself.
+) -> UvLayout:
+    """Unwrap a mesh into a uv layout in which no triangle is mirrored and none overlaps another.
+
+    Where the border of a flattened chart crosses itself, triangles are moved to an adjacent chart; a chart
+    that does not flatten even then is split.
 
     positions : (n, 3) [mm]
     triangles : (f, 3), each with an area
-    chart : (f,) what is laid flat together; a chart in several pieces becomes several charts
-    upright : (3,), or one for each triangle (f, 3), the direction in space that points up on the map
-    padding : empty space between charts, of the map's side
+    chart : (f,) desired charts; a chart in several pieces becomes several charts
+    upright : (3,), or (f, 3) for each triangle, direction in space that points up on the map
+    padding : empty space between charts as a fraction of the map's side
 
-    No triangle is mirrored and none lies on another: where a chart's border crosses itself, triangles go to
-    the chart beside it; what cannot be laid flat even so is halved.
-
-    Raises DermisError when a triangle has no area, and when there are too many charts for one map.
+    Raises DermisError if a triangle has no area or if there are too many charts for one map.
     """
     _check_areas(positions, triangles)
-    flat = lay_flat(Surface(positions, triangles), chart)
+    flat = flatten_charts(Triangles(positions, triangles), chart)
     up = np.broadcast_to(np.asarray(upright, dtype=np.float64), (len(triangles), 3))
-    first = np.unique(flat.piece, return_index=True)[1]
-    height = np.einsum("fki,fi->fk", positions[triangles], up[first][flat.piece])
-    uv = _pack(_turn(flat, height), flat, padding)
-    return Layout(uv, flat.corner, flat.point, flat.piece)
+    first = np.unique(flat.chart, return_index=True)[1]
+    height = np.einsum("fki,fi->fk", positions[triangles], up[first][flat.chart])
+    uv = _packed_uv(_orient(flat, height), flat, padding)
+    return UvLayout(uv, flat.corners, flat.point, flat.chart)
 
 
 def _check_areas(positions: Doubles, triangles: Index) -> None:
-    flat = int((triangle_areas(positions[triangles]) < _LEAST_MM2).sum())
-    if flat:
-        refuse("mesh", "triangles with an area", f"{flat} have none", "Remove them first")
+    degenerate = int((triangle_areas(positions[triangles]) < _MIN_AREA_MM2).sum())
+    if degenerate:
+        refuse("mesh", "triangles with an area", f"{degenerate} have none", "Remove them first")
 
 
-def _turn(flat: Flat, height: Doubles) -> Doubles:
-    """The places (v, 2), each sheet turned so that `height` (f, 3) of the corners grows upwards."""
-    z = flat.places[:, 0] + 1j * flat.places[:, 1]
-    z3 = z[flat.corner]
-    # i times the side opposite a corner points along the gradient of what is 1 there and 0 on that side
+def _orient(flat: FlatCharts, height: Doubles) -> Doubles:
+    """Return the positions (v, 2) with each chart rotated so that `height` grows upwards.
+
+    height : (f, 3) at the corners
+    """
+    z = flat.uv_mm[:, 0] + 1j * flat.uv_mm[:, 1]
+    z3 = z[flat.corners]
+    # i times the edge opposite a corner is the direction of the gradient of its hat function
     slope = 1j * (height * (np.roll(z3, -2, axis=1) - np.roll(z3, -1, axis=1))).sum(axis=1)
-    up = np.bincount(flat.piece, slope.real) + 1j * np.bincount(flat.piece, slope.imag)
-    turn = np.where(np.abs(up) > 0, 1j * np.conj(up) / np.maximum(np.abs(up), 1e-300), 1)
-    z *= turn[_owners(flat)]
+    up = np.bincount(flat.chart, slope.real) + 1j * np.bincount(flat.chart, slope.imag)
+    rotation = np.where(np.abs(up) > 0, 1j * np.conj(up) / np.maximum(np.abs(up), 1e-300), 1)
+    z *= rotation[_vertex_charts(flat)]
     return np.column_stack((z.real, z.imag))
 
 
-def _owners(flat: Flat) -> Index:
-    """Piece of each corner vertex (v,)."""
-    owner = np.empty(len(flat.point), dtype=np.int64)
-    owner[flat.corner] = flat.piece[:, None]
-    return owner
+def _vertex_charts(flat: FlatCharts) -> Index:
+    """Return the chart of each vertex (v,)."""
+    chart = np.empty(len(flat.point), dtype=np.int64)
+    chart[flat.corners] = flat.chart[:, None]
+    return chart
 
 
-def _pack(places: Doubles, flat: Flat, padding: float) -> Doubles:
-    """uv (v, 2), v down."""
-    sides, triangle = border_sides(flat.corner)
-    owner = flat.piece[triangle]
-    order = np.argsort(owner, kind="stable")
-    starts = np.flatnonzero(np.diff(owner[order])) + 1
-    scale, offset = pack([places[some] for some in np.split(sides[order], starts)], padding)
-    uv = scale * places + offset[_owners(flat)]
+def _packed_uv(uv_mm: Doubles, flat: FlatCharts, padding: float) -> Doubles:
+    """Return the uv (v, 2) of the packed charts, v down."""
+    edges, triangle = border_edges(flat.corners)
+    chart = flat.chart[triangle]
+    order = np.argsort(chart, kind="stable")
+    starts = np.flatnonzero(np.diff(chart[order])) + 1
+    scale, offset = pack_charts([uv_mm[some] for some in np.split(edges[order], starts)], padding)
+    uv = scale * uv_mm + offset[_vertex_charts(flat)]
     return np.column_stack((uv[:, 0], 1 - uv[:, 1]))
 
 
-def with_other_seams(mesh: Mesh) -> Mesh:
-    """The same triangles in the same order on a layout of about 16 charts grown from random places.
+def unwrap_mesh(mesh: Mesh) -> Mesh:
+    """Return a mesh with the same triangles, unwrapped into about 16 charts that are grown at random.
 
-    Triangles without an area keep no place on it: their uv is 0.
+    Triangles without an area get uv 0.
     """
     positions = np.zeros((int(mesh.point.max()) + 1, 3))
     positions[mesh.point] = mesh.positions
     points = mesh.point[mesh.triangles].astype(np.int64)
-    kept = np.flatnonzero(triangle_areas(positions[points]) > _LEAST_CHART_MM2)
-    triangles = points[kept]
-    layout = unwrap(positions, triangles, tidy(grow(positions, triangles, _CHARTS), triangles))
+    valid = np.flatnonzero(triangle_areas(positions[points]) > _MIN_CHART_AREA_MM2)
+    triangles = points[valid]
+    layout = unwrap(
+        positions, triangles, smooth_charts(grow_charts(positions, triangles, _CHART_COUNT), triangles)
+    )
     corner = np.full((len(points), 3), len(layout.uv), dtype=np.int64)
-    corner[kept] = layout.triangles
+    corner[valid] = layout.triangles
     normals = np.zeros((len(positions), 3))
     normals[mesh.point] = mesh.normals
     point = np.append(layout.point, 0)
