@@ -37,13 +37,13 @@ def field(entry: str, name: str) -> str | None:
 
 @pytest.mark.parametrize("path", sorted(SOURCE.rglob("*.py")), ids=lambda p: str(p.relative_to(SOURCE)))
 def test_cited_works_are_in_the_bibliography(path: Path) -> None:
-    unknown = {key for text in docstrings(path) for key in cited_keys(text)} - cite.keys()
+    unknown = {key for text in docstrings(path) for key in cited_keys(text)} - cite.citation_keys()
     assert not unknown, f"{path.name} cites {sorted(unknown)}: add them to references.bib or correct the key"
 
 
 def test_works_cited_by_shaders_are_in_the_bibliography() -> None:
     unknown = {key for path in SOURCE.rglob("*.wgsl") for key in cited_keys(path.read_text(encoding="utf-8"))}
-    assert not unknown - cite.keys()
+    assert not unknown - cite.citation_keys()
 
 
 def test_keys_are_found_in_every_form() -> None:
@@ -53,7 +53,7 @@ def test_keys_are_found_in_every_form() -> None:
     assert cited_keys(text) == ["Loop1987", "dEon2007", "Donner2008", "Jensen2001", "Green2004a"]
 
 
-@pytest.mark.parametrize("key", sorted(cite.keys()))
+@pytest.mark.parametrize("key", sorted(cite.citation_keys()))
 def test_entries_are_complete(key: str) -> None:
     entry = cite.bibtex([key])
     assert entry.startswith("@") and f"{{{key}," in entry

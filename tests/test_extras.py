@@ -14,7 +14,7 @@ from png_bytes import png
 from small_head import write_head
 
 from dermis.base.errors import DermisError
-from dermis.base.extras import EXTRAS, distribution, needed
+from dermis.base.extras import EXTRAS, distribution_name, import_extra
 from dermis.images.codecs import decode_with_pillow, encode_png
 from dermis.images.io import read_image
 
@@ -68,13 +68,13 @@ def test_each_extra_is_one_of_the_packages() -> None:
     text = (SOURCE.parent / "pyproject.toml").read_text("utf-8")
     for module, extra in EXTRAS.items():
         (line,) = [line for line in text.splitlines() if line.startswith(f"{extra} = [")]
-        assert distribution(module) in line
+        assert distribution_name(module) in line
 
 
 def test_what_is_missing_is_named() -> None:
     sys.modules["matplotlib.nothing"] = None  # type: ignore[assignment]
     with pytest.raises(DermisError, match=r"plots: expected the package matplotlib, .*dermis\[plots\]"):
-        needed("matplotlib.nothing", "plots")
+        import_extra("matplotlib.nothing", "plots")
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])

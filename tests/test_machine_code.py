@@ -106,7 +106,7 @@ def test_code_that_others_could_have_written_is_not_run(
     assert not _was_found(_outer())
     data = np.frombuffer(pickle.dumps(_Marks(folder / "mark")), np.uint8)
     for file in _files(folder):
-        disk.store("machine-code", file.stem, {"code": data})
+        disk.save_arrays("machine-code", file.stem, {"code": data})
     folder.chmod(0o777)
     with pytest.warns(DermisWarning, match="other users can write"):
         assert not _was_found(_outer())

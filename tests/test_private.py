@@ -13,7 +13,7 @@ import pytest
 
 from dermis.base import disk
 from dermis.base.errors import DermisWarning
-from dermis.base.private import make_private, open_private, stranger
+from dermis.base.private import make_private_folder, open_private_file, other_writers
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="owners and modes are POSIX's")
 _NOBODY = 54321
@@ -69,7 +69,7 @@ def test_what_is_kept_is_this_users_alone(place: Path) -> None:
 @pytest.mark.parametrize("name", ["", "cache", "cache/arrays"])
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o773])
 def test_a_folder_that_others_write_to_is_not_used(place: Path, name: str, mode: int) -> None:
-    make_private(place / name)
+    make_private_folder(place / name)
     (place / name).chmod(mode)
     if mode == 0o1777 and name != "cache/arrays":  # others cannot rename there what is not theirs
         assert _kept()
@@ -101,10 +101,10 @@ def test_links_are_followed_step_by_step(place: Path) -> None:
     (place / "open" / "inner").mkdir(0o700)
     (place / "one").symlink_to(place / "open" / ".." / "open" / "inner")
     (place / "cache").symlink_to("one")
-    assert stranger(place / "cache") == f"other users can write to {place / 'open'}"
+    assert other_writers(place / "cache") == f"other users can write to {place / 'open'}"
     (place / "round").symlink_to("round")
     with pytest.raises(OSError, match="symbolic links"):
-        stranger(place / "round" / "more")
+        other_writers(place / "round" / "more")
 
 
 def test_a_file_that_others_write_to_is_made_again(place: Path) -> None:
@@ -118,11 +118,11 @@ def test_a_file_that_others_write_to_is_made_again(place: Path) -> None:
 
 def test_a_pipe_does_not_hold_the_reader_up(place: Path) -> None:
     os.mkfifo(place / "pipe", 0o600)
-    with pytest.raises(ValueError, match="no file of this user"):
-        open_private(place / "pipe")
+    with pytest.raises(ValueError, match="not a private file of this user"):
+        open_private_file(place / "pipe")
     (place / "link").symlink_to(place / "pipe")
     with pytest.raises(OSError, match="symbolic link"):
-        open_private(place / "link")
+        open_private_file(place / "link")
 
 
 @pytest.mark.parametrize("kind", ["pipe", "link", "folder", "link to nowhere"])
@@ -141,7 +141,7 @@ def test_something_else_in_a_files_place_costs_only_time(place: Path, kind: str)
     assert _kept() == (kind != "folder")
     assert kind == "folder" or not file.is_symlink()
     other = disk.cached_array(np.ones(1), "other", lambda: np.ones(3))
-    assert disk.find("arrays", disk.array_key([np.ones(1)], "other"), ["array"]) is not None
+    assert disk.load_arrays("arrays", disk.array_key([np.ones(1)], "other"), ["array"]) is not None
     assert np.array_equal(other, np.ones(3))
 
 

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from dermis.base.errors import DermisError
-from dermis.base.quantities import numbers
+from dermis.base.quantities import checked_array
 
 
 def test_an_array_of_the_shape_is_taken() -> None:
-    assert np.array_equal(numbers("place", [[1, 2, 3]], (0, 3), -5, 5), [[1, 2, 3]])
+    assert np.array_equal(checked_array("place", [[1, 2, 3]], (0, 3), -5, 5), [[1, 2, 3]])
 
 
 @pytest.mark.parametrize("values", [[["1"]], [[True]], [1, [2, 3]], "123", [[6.0]], [[float("nan")]]])
 def test_what_is_no_array_of_numbers_is_refused(values: object) -> None:
     with pytest.raises(DermisError, match=r"place: expected n x 1 numbers from -5 to 5, but"):
-        numbers("place", values, (0, 1), -5, 5)
+        checked_array("place", values, (0, 1), -5, 5)
 
 
 def test_lists_without_end_are_refused() -> None:
@@ -27,4 +27,4 @@ def test_lists_without_end_are_refused() -> None:
         nested = [nested]
     nested.append(nested)
     with pytest.raises(DermisError, match="3 numbers"):
-        numbers("place", nested, (3,), -5, 5)
+        checked_array("place", nested, (3,), -5, 5)

@@ -23,7 +23,7 @@ def test_no_regular_file_is_refused_at_once(device: str) -> None:
 
 def test_a_pipe_without_a_writer_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(DermisError, match="no regular file"):
+    with pytest.raises(DermisError, match="not a regular file"):
         read_file(tmp_path / "pipe", "a table", _MOST)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dermis
-from dermis.base.summary import summary
+from dermis.base.summary import short_repr
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -39,8 +39,8 @@ def test_nothing_that_a_head_holds_prints_its_numbers(person: Head) -> None:
 
 
 def test_short_values_print_as_they_are() -> None:
-    assert summary((1, 2)) == "(1, 2)"
-    assert summary("a name") == "'a name'"
-    assert summary(list(range(1000))) == "<1,000 in a list>"
-    assert summary(np.zeros((3, 2))) == "float64[3, 2]"
-    assert summary((np.zeros(9),)) == "<1 in a tuple>"
+    assert short_repr((1, 2)) == "(1, 2)"
+    assert short_repr("a name") == "'a name'"
+    assert short_repr(list(range(1000))) == "<1,000 in a list>"
+    assert short_repr(np.zeros((3, 2))) == "float64[3, 2]"
+    assert short_repr((np.zeros(9),)) == "<1 in a tuple>"

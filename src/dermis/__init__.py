@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer, render
     from dermis.human.hair.look import HairLook
     from dermis.human.person import Human
-    from dermis.human.published import human_targets
+    from dermis.human.makehuman import human_targets
     from dermis.human.regions.apply import with_regions
     from dermis.human.skin.look import SkinLook
     from dermis.images.io import write_image
@@ -59,7 +59,7 @@ _HOME = {
     "SkinLook": "human.skin.look",
     "EyeLook": "mesh.eye_look",
     "HairLook": "human.hair.look",
-    "human_targets": "human.published",
+    "human_targets": "human.makehuman",
     "with_regions": "human.regions.apply",
     "DermisError": "base.errors",
     "write_image": "images.io",

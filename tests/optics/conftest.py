@@ -8,26 +8,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.optics.fits.targets import Rings
+from dermis.optics.fits.targets import RingTarget
 
 
 @pytest.fixture(scope="session")
-def counted(sample_folder: Path) -> Callable[[str], Rings]:
+def counted(sample_folder: Path) -> Callable[[str], RingTarget]:
     """Rings of a case such as "dj3/g0.8" in three channels, per incident power."""
     stored = np.load(sample_folder / "reference" / "data" / "mc_profiles.npz")
 
-    def rings(case: str) -> Rings:
+    def rings(case: str) -> RingTarget:
         name, g = case.split("/")
         keys = [f"{name}_{channel}_{g}" for channel in "RGB"]
         edges = stored[f"{keys[0]}/edges"]
         area = np.pi * np.diff(edges**2)[:, None]
         energy = area * np.stack([stored[f"{key}/R"] for key in keys], axis=1)
-        return Rings(edges, energy, energy.sum(axis=0))
+        return RingTarget(edges, energy, energy.sum(axis=0))
 
     return rings
 
 
 @pytest.fixture(scope="session")
-def counted_skin(counted: Callable[[str], Rings]) -> Rings:
+def counted_skin(counted: Callable[[str], RingTarget]) -> RingTarget:
     """The medium skin1 with isotropic scattering."""
     return counted("skin1/g0")

@@ -10,10 +10,10 @@ import pytest
 from tolerances import COUNTED_FLESH, COUNTED_RINGS, COUNTED_TOTAL
 
 from dermis.apps.truths.half_space import directional_albedo
-from dermis.apps.truths.slab_mc import counted_profile
+from dermis.apps.truths.slab_mc import monte_carlo_profile
 from dermis.base.errors import DermisError
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.flesh import medium_of
+from dermis.optics.equivalent_medium import equivalent_medium
 from dermis.optics.media import Layer, Medium, media
 from dermis.optics.profiles import fit_profile, fit_radial, load_profile, write_profile
 from dermis.optics.tissue import Tissue, load_tissue
@@ -33,13 +33,13 @@ def test_totals_are_those_of_h_functions(name: str) -> None:
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 def test_rings_are_those_of_photons_one_by_one(eta: float) -> None:
     tissue = of("skin1", eta)
-    now, table = counted_profile(tissue.medium, photons=400_000, seed=3), tissue.profile()
+    now, table = monte_carlo_profile(tissue.medium, photons=400_000, seed=3), tissue.profile()
     assert now.standard_error is not None
     miss = np.linalg.norm(table.ring_energy - now.ring_energy, axis=0)
     assert (miss < COUNTED_RINGS * np.linalg.norm(now.ring_energy, axis=0)).all()
     told = (now.reflectance > 10.0 * now.standard_error) & (now.reflectance > 0.0)
-    near = np.stack([np.interp(now.radius_mm, table.radius_mm, one) for one in table.reflectance.T], axis=1)
-    off = (near - now.reflectance)[told] / now.standard_error[told]
+    initial = np.stack([np.interp(now.radius_mm, table.radius_mm, one) for one in table.reflectance.T], axis=1)
+    off = (initial - now.reflectance)[told] / now.standard_error[told]
     assert np.sqrt((off**2).mean()) < 1.5  # both have noise
 
 
@@ -69,16 +69,16 @@ def test_layered_diffusion_can_still_be_asked_for() -> None:
 
 def test_gaussians_keep_their_light_and_tell_that_they_are_of_photons() -> None:
     radial, profile = load_tissue("skin2").profile(), load_profile("skin2")
-    assert profile.counted and profile.albedo == pytest.approx(radial.total, rel=1e-9)
-    assert not load_profile("dj3").counted and not load_profile("gpu-gems-3").counted
-    own = fit_radial(radial, "skin2", near=profile)
-    assert own.counted and own.albedo == pytest.approx(radial.total, rel=1e-9)
+    assert profile.from_photons and profile.albedo == pytest.approx(radial.total, rel=1e-9)
+    assert not load_profile("dj3").from_photons and not load_profile("gpu-gems-3").from_photons
+    own = fit_radial(radial, "skin2", initial=profile)
+    assert own.from_photons and own.albedo == pytest.approx(radial.total, rel=1e-9)
 
 
 @pytest.mark.parametrize(("model", "counted"), [("counted", True), ("montecarlo", True), ("layered", False)])
 def test_files_tell_it_too(tmp_path: Path, model: str, counted: bool) -> None:
     write_profile(tmp_path / "own.toml", load_profile("skin1"), {"model": model})
-    assert load_profile(tmp_path / "own.toml").counted is counted
+    assert load_profile(tmp_path / "own.toml").from_photons is counted
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])
@@ -87,8 +87,8 @@ def test_flesh_of_such_a_profile_is_its_medium(name: str, eta: float) -> None:
     """Told from diffusion's widths, it would be up to two thirds denser."""
     tissue = of(name, eta)
     profile, layer = fit_profile(tissue, name), tissue.medium.layers[0]
-    found = medium_of(profile, profile.albedo, eta).layers[0]
+    found = equivalent_medium(profile, profile.albedo, eta).layers[0]
     assert found.alpha_prime == pytest.approx(layer.alpha_prime, abs=0.001)
     assert found.sigma_t_prime == pytest.approx(layer.sigma_t_prime, rel=COUNTED_FLESH)
-    other = medium_of(replace(profile, counted=False), profile.albedo, eta).layers[0]
+    other = equivalent_medium(replace(profile, from_photons=False), profile.albedo, eta).layers[0]
     assert (other.sigma_t_prime > 1.06 * layer.sigma_t_prime).all()

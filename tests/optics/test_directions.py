@@ -7,7 +7,13 @@ import pytest
 from walk import fresnel, returned
 
 from dermis.apps.truths import half_space
-from dermis.optics.directions import ROWS, directional_albedo, directions, h_function, mean_of_once
+from dermis.optics.angular_response import (
+    DIRECTION_ROWS,
+    angular_response,
+    directional_reflectance,
+    h_function,
+    mean_single_scattering_kernel,
+)
 
 COSINES = np.array([0.0, 0.03, 0.2, 0.5, 0.8, 1.0])
 MU, WEIGHT = (0.5 * (np.polynomial.legendre.leggauss(64)[0] + 1.0), np.polynomial.legendre.leggauss(64)[1])
@@ -21,18 +27,20 @@ def test_h_function_is_that_of_the_iteration(albedo: float) -> None:
 @pytest.mark.parametrize("albedo", [0.68, 0.96])
 def test_matched_half_space_is_the_closed_form(albedo: float) -> None:
     exact = half_space.directional_albedo(COSINES, albedo)
-    np.testing.assert_allclose(directional_albedo(COSINES, albedo, 1.0), exact, atol=2e-4)
-    law = directions(half_space.directional_albedo(1.0, albedo), 1.0)
+    np.testing.assert_allclose(directional_reflectance(COSINES, albedo, 1.0), exact, atol=2e-4)
+    law = angular_response(half_space.directional_albedo(1.0, albedo), 1.0)
     above = half_space.directional_albedo(1.0, albedo)
-    np.testing.assert_allclose(law.from_everywhere[0] * above, half_space.diffuse_albedo(albedo), rtol=5e-4)
-    np.testing.assert_allclose(law.once[0], albedo / (4.0 * above), rtol=5e-4)
+    np.testing.assert_allclose(
+        law.relative_diffuse_reflectance[0] * above, half_space.diffuse_albedo(albedo), rtol=5e-4
+    )
+    np.testing.assert_allclose(law.single_scattering[0], albedo / (4.0 * above), rtol=5e-4)
 
 
 @pytest.mark.parametrize("albedo", [0.68, 0.96])
 @pytest.mark.parametrize("cosine", [1.0, 0.5, 0.15])
 def test_refracting_half_space_agrees_with_photons(albedo: float, cosine: float) -> None:
     share, error, _ = returned(cosine, albedo, 1.4, 60_000)
-    assert abs(directional_albedo(cosine, albedo, 1.4) - share) < 3.5 * error
+    assert abs(directional_reflectance(cosine, albedo, 1.4) - share) < 3.5 * error
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])
@@ -41,19 +49,23 @@ def test_what_scattered_once_is_even_in_the_mean(eta: float) -> None:
     for cosine in (0.1, 0.6, 1.0):
         a = np.sqrt(1.0 - (1.0 - cosine**2) / eta**2)
         mean = (WEIGHT * MU / (a + inside)).sum()
-        np.testing.assert_allclose(mean_of_once(cosine, eta), mean, rtol=2e-4)
-    law = directions([0.5], eta)
-    np.testing.assert_allclose(law.mean_once, (WEIGHT * MU * mean_of_once(MU, eta)).sum(), rtol=1e-4)
+        np.testing.assert_allclose(mean_single_scattering_kernel(cosine, eta), mean, rtol=2e-4)
+    law = angular_response([0.5], eta)
+    np.testing.assert_allclose(
+        law.mean_kernel, (WEIGHT * MU * mean_single_scattering_kernel(MU, eta)).sum(), rtol=1e-4
+    )
 
 
 def test_law_is_nearer_to_the_exact_one_than_a_diffuse_surface() -> None:
     """Radiance of an index-matched half-space of red skin, all pairs of directions."""
     albedo = 0.9585
     above = float(half_space.directional_albedo(1.0, albedo))
-    law = directions([above], 1.0)
+    law = angular_response([above], 1.0)
     exact = np.pi * half_space.reflected_radiance(MU[:, None], MU, albedo)
-    table = np.interp(np.sqrt(MU), np.linspace(0.0, 1.0, ROWS), law.returned[:, 0])
-    turned = law.once[0] * (1.0 / (MU[:, None] + MU) - mean_of_once(MU, 1.0)[:, None])
+    table = np.interp(np.sqrt(MU), np.linspace(0.0, 1.0, DIRECTION_ROWS), law.relative_reflectance[:, 0])
+    turned = law.single_scattering[0] * (
+        1.0 / (MU[:, None] + MU) - mean_single_scattering_kernel(MU, 1.0)[:, None]
+    )
     ours = above * (table[:, None] + turned)
 
     def error(made: np.ndarray) -> float:
@@ -65,22 +77,27 @@ def test_law_is_nearer_to_the_exact_one_than_a_diffuse_surface() -> None:
 
 
 def test_white_skin_returns_everything_from_anywhere() -> None:
-    np.testing.assert_allclose(directions([1.0], 1.4).returned, 1.0, atol=1e-3)
+    np.testing.assert_allclose(angular_response([1.0], 1.4).relative_reflectance, 1.0, atol=1e-3)
 
 
 def test_black_skin_has_a_law_of_its_own() -> None:
-    assert np.isfinite(directions([0.0], 1.4).returned).all()
+    assert np.isfinite(angular_response([0.0], 1.4).relative_reflectance).all()
 
 
 def test_photons_leave_a_refracting_half_space_as_told() -> None:
     """Light that enters at 81 degrees, by quarters of the squared cosine outside."""
     albedo, cosine = 0.68, 0.15
     _, _, walked = returned(cosine, albedo, 1.4, 400_000)
-    law = directions([float(directional_albedo(1.0, albedo, 1.4))], 1.4)
+    law = angular_response([float(directional_reflectance(1.0, albedo, 1.4))], 1.4)
     square = (np.arange(400) + 0.5) / 400
     a, b = (np.sqrt(1.0 - (1.0 - c2) / 1.4**2) for c2 in (cosine**2, square))
-    entering = np.interp(np.sqrt(cosine), np.linspace(0.0, 1.0, ROWS), law.returned[:, 0])
-    factor = 1.0 + law.once[0] * (1.0 / (a + b) - mean_of_once(cosine, 1.4)) / entering
+    entering = np.interp(
+        np.sqrt(cosine), np.linspace(0.0, 1.0, DIRECTION_ROWS), law.relative_reflectance[:, 0]
+    )
+    factor = (
+        1.0
+        + law.single_scattering[0] * (1.0 / (a + b) - mean_single_scattering_kernel(cosine, 1.4)) / entering
+    )
 
     def quarters(radiance: np.ndarray) -> np.ndarray:
         passed = (radiance * (1.0 - fresnel(b, 1.4))).reshape(4, 100).mean(axis=1)

@@ -5,29 +5,36 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.optics.directions import STEPS, directional_albedo, directions, interpolated
+from dermis.optics.angular_response import (
+    TABLE_STEPS,
+    angular_response,
+    directional_reflectance,
+    interpolate_table,
+)
 
 
 def test_what_is_linear_is_itself() -> None:
     for at in (0.0, 0.3, 0.999, 1.0):
-        assert interpolated(lambda x: np.array([2.0 * x, 1.0 - x]), at) == pytest.approx([2.0 * at, 1.0 - at])
+        assert interpolate_table(lambda x: np.array([2.0 * x, 1.0 - x]), at) == pytest.approx(
+            [2.0 * at, 1.0 - at]
+        )
 
 
 def test_only_the_two_beside_are_made() -> None:
     asked: list[float] = []
 
     def made(at: float) -> np.ndarray:
-        asked.append(at * STEPS)
+        asked.append(at * TABLE_STEPS)
         return np.array([at])
 
-    interpolated(made, 0.5 + 0.25 / STEPS)
-    assert asked == [STEPS / 2, STEPS / 2 + 1]
+    interpolate_table(made, 0.5 + 0.25 / TABLE_STEPS)
+    assert asked == [TABLE_STEPS / 2, TABLE_STEPS / 2 + 1]
 
 
 def test_beyond_the_ends_are_the_ends() -> None:
     assert (
-        interpolated(lambda x: np.array([x]), -0.2) == 0.0
-        and interpolated(lambda x: np.array([x]), 1.5) == 1.0
+        interpolate_table(lambda x: np.array([x]), -0.2) == 0.0
+        and interpolate_table(lambda x: np.array([x]), 1.5) == 1.0
     )
 
 
@@ -36,7 +43,7 @@ def test_half_spaces_between_steps(eta: float) -> None:
     """Beside those solved for their own albedo; darker than 0.05 no skin is."""
     cosine = np.linspace(0.1, 1.0, 10)
     for albedo in (0.4, 0.73, 0.91, 0.984, 0.9991):
-        above = float(directional_albedo(1.0, albedo, eta))
-        law = directions([above], eta).returned[:, 0]
+        above = float(directional_reflectance(1.0, albedo, eta))
+        law = angular_response([above], eta).relative_reflectance[:, 0]
         found = np.interp(np.sqrt(cosine), np.linspace(0.0, 1.0, len(law)), law)
-        assert found == pytest.approx(directional_albedo(cosine, albedo, eta) / above, abs=2e-3), albedo
+        assert found == pytest.approx(directional_reflectance(cosine, albedo, eta) / above, abs=2e-3), albedo

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from dermis.optics.flesh import aside_mm
+from dermis.optics.equivalent_medium import oblique_offset_mm
 from dermis.optics.media import Layer, Medium
 
 Floats = NDArray[np.float64]
@@ -51,10 +51,10 @@ def test_light_lies_where_photons_do(albedo: float) -> None:
     leaving = left(albedo, angle)
     near, far = (middle(*leaving, beyond) / np.sin(angle) for beyond in (1.0, 2.0))
     layer = Layer(np.array([1.0 - albedo]), np.array([albedo]))
-    assert near < aside_mm(Medium("flesh", (layer,), 1.0)) < far
+    assert near < oblique_offset_mm(Medium("flesh", (layer,), 1.0)) < far
 
 
 def test_it_is_the_mean_of_channels_and_less_below_a_surface() -> None:
     layer = Layer(np.array([0.0, 0.0, 0.0]), np.array([0.5, 1.0, 2.0]))
-    assert aside_mm(Medium("flesh", (layer,), 1.0)) == pytest.approx((2.0 + 1.0 + 0.5) / 3)
-    assert aside_mm(Medium("flesh", (layer,), 1.4)) == pytest.approx((2.0 + 1.0 + 0.5) / 3 / 1.4)
+    assert oblique_offset_mm(Medium("flesh", (layer,), 1.0)) == pytest.approx((2.0 + 1.0 + 0.5) / 3)
+    assert oblique_offset_mm(Medium("flesh", (layer,), 1.4)) == pytest.approx((2.0 + 1.0 + 0.5) / 3 / 1.4)

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dermis.optics.angular_response import angular_response
 from dermis.optics.diffusion.boundary import fresnel
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.directions import directions
+from dermis.optics.equivalent_medium import equivalent_medium
 from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.flesh import medium_of
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Layer, Medium, media
-from dermis.optics.slabs import slabs
-from dermis.optics.thin_parts import ROWS, across, thin_parts
+from dermis.optics.slabs import solve_slabs
+from dermis.optics.thin_parts import THICKNESS_ROWS, oblique_transmittance, solve_thin_parts
 
 BODY = media()["skin1"].with_eta(1.0)
 REACH = 12.0
-DEPTH = REACH * np.linspace(0.0, 1.0, ROWS) ** 2
+DEPTH = REACH * np.linspace(0.0, 1.0, THICKNESS_ROWS) ** 2
 
 
 @pytest.fixture(scope="module")
@@ -26,24 +26,24 @@ def profile() -> GaussianSum:
 
 
 def test_a_profile_tells_its_medium(profile: GaussianSum) -> None:
-    found, body = medium_of(profile, profile.albedo, 1.0).layers[0], BODY.layers[0]
+    found, body = equivalent_medium(profile, profile.albedo, 1.0).layers[0], BODY.layers[0]
     assert found.alpha_prime == pytest.approx(body.alpha_prime, rel=0.01)
     assert found.sigma_t_prime == pytest.approx(body.sigma_t_prime, rel=0.02)
 
 
 def test_what_passes_from_any_direction(profile: GaussianSum) -> None:
     """Beside the exact slab: red to a sixth of what passes from above, from 1 to 8 mm, to 70 degrees."""
-    made = thin_parts(BODY, profile.variance_mm2, REACH)
-    layer, law = BODY.layers[0], across(profile.albedo, 1.0)[:, 0]
+    made = solve_thin_parts(BODY, profile.variance_mm2, REACH)
+    layer, law = BODY.layers[0], oblique_transmittance(profile.albedo, 1.0)[:, 0]
     cosine = np.cos(np.radians([0.0, 30.0, 50.0, 70.0]))
-    whole = slabs(float(layer.alpha_prime[0]), 1e4, 1.0)
+    whole = solve_slabs(float(layer.alpha_prime[0]), 1e4, 1.0)
     back = np.interp(cosine, whole.cosine, whole.back[0])
     slant = np.interp(np.sqrt(cosine), np.linspace(0.0, 1.0, len(law)), law)
     for thickness in (1.0, 2.0, 4.0, 8.0):
-        share = np.interp(thickness, DEPTH, made.through[..., 0].sum(axis=1))
-        deep = np.interp(thickness, DEPTH, made.deep)
-        cut = slabs(float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0]) * thickness, 1.0)
-        exact = np.interp(cosine, cut.cosine, cut.through[0])
+        share = np.interp(thickness, DEPTH, made.transmitted[..., 0].sum(axis=1))
+        deep = np.interp(thickness, DEPTH, made.directionality)
+        cut = solve_slabs(float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0]) * thickness, 1.0)
+        exact = np.interp(cosine, cut.cosine, cut.transmitted[0])
         found = share * back * (1.0 + deep * (slant - 1.0))
         assert np.abs(found - exact).max() < exact[0] / 6.0, thickness
 
@@ -52,13 +52,13 @@ def test_what_passes_from_any_direction(profile: GaussianSum) -> None:
 def test_amounts_are_those_of_slabs_cut_one_by_one(profile: GaussianSum, eta: float) -> None:
     """Found with twice as many cosines, and for each thickness."""
     body = media()["skin1"].with_eta(eta)
-    made, layer = thin_parts(body, profile.variance_mm2, REACH), body.layers[0]
+    made, layer = solve_thin_parts(body, profile.variance_mm2, REACH), body.layers[0]
     for c in range(3):
         albedo, extinction = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c])
-        cut, whole = slabs(albedo, extinction * DEPTH[1:], eta), slabs(albedo, 1e4, eta)
+        cut, whole = solve_slabs(albedo, extinction * DEPTH[1:], eta), solve_slabs(albedo, 1e4, eta)
         returned = whole.back @ whole.flux
-        assert made.through[1:, :, c].sum(axis=1) == pytest.approx(
-            cut.through @ cut.flux / returned, abs=1e-3
+        assert made.transmitted[1:, :, c].sum(axis=1) == pytest.approx(
+            cut.transmitted @ cut.flux / returned, abs=1e-3
         )
         lost = 1.0 - cut.back @ cut.flux / returned
         assert made.lost[1:, :, c].sum(axis=1) == pytest.approx(lost, abs=1e-3)
@@ -66,8 +66,8 @@ def test_amounts_are_those_of_slabs_cut_one_by_one(profile: GaussianSum, eta: fl
 
 def test_light_that_a_white_medium_lets_pass_is_lost_to_its_near_side() -> None:
     white = Medium("white", (Layer(np.array([1e-6]), np.array([2.0])),), 1.0)
-    made = thin_parts(white, np.array([0.01, 0.1, 1.0, 10.0]), 8.0)
-    through, lost = made.through[1:, :, 0].sum(axis=1), made.lost[1:, :, 0].sum(axis=1)
+    made = solve_thin_parts(white, np.array([0.01, 0.1, 1.0, 10.0]), 8.0)
+    through, lost = made.transmitted[1:, :, 0].sum(axis=1), made.lost[1:, :, 0].sum(axis=1)
     clear = DEPTH[1:] / REACH * 8.0 > 4.0  # beyond, nothing passes unscattered
     assert (lost >= through - 5e-3).all()
     assert lost[clear] == pytest.approx(through[clear], abs=5e-3)
@@ -76,25 +76,31 @@ def test_light_that_a_white_medium_lets_pass_is_lost_to_its_near_side() -> None:
 def test_nothing_passes_deep_in_dark_flesh() -> None:
     """So dark that not even a double holds what would."""
     dark = Medium("dark", (Layer(np.array([40.0]), np.array([10.0])),), 1.4)
-    made = thin_parts(dark, np.array([0.01, 0.1, 1.0, 100.0]), 40.0)
-    assert np.isfinite(made.through).all() and np.isfinite(made.lost).all() and np.isfinite(made.deep).all()
-    assert made.through[-5:].max() < 1e-12 and made.lost[-5:].max() < 1e-6
+    made = solve_thin_parts(dark, np.array([0.01, 0.1, 1.0, 100.0]), 40.0)
+    assert (
+        np.isfinite(made.transmitted).all()
+        and np.isfinite(made.lost).all()
+        and np.isfinite(made.directionality).all()
+    )
+    assert made.transmitted[-5:].max() < 1e-12 and made.lost[-5:].max() < 1e-6
 
 
 def test_thicker_parts_spread_light_wider() -> None:
     variance = np.array([0.05, 0.5, 5.0, 20.0])
-    made = thin_parts(BODY.channel(0), variance, REACH).through[1:, :, 0]
+    made = solve_thin_parts(BODY.channel(0), variance, REACH).transmitted[1:, :, 0]
     width = made @ variance / made.sum(axis=1)
     assert (np.diff(width)[4:] > -0.02 * width[5:]).all() and width[-1] > 10.0 * width[4]
 
 
 def test_directions_cancel_in_uniform_light() -> None:
-    """`across` is over what uniform light brings of which as much comes back."""
+    """`oblique_transmittance` is over what uniform light brings of which as much comes back."""
     for eta in (1.0, 1.4):
-        law = across(np.array([0.5]), eta)[:, 0]
+        law = oblique_transmittance(np.array([0.5]), eta)[:, 0]
         cosine = np.linspace(0.0, 1.0, len(law)) ** 2
         fine = np.linspace(1e-3, 1.0, 2001)
-        returned = np.interp(np.sqrt(fine), np.sqrt(cosine), directions([0.5], eta).returned[:, 0])
+        returned = np.interp(
+            np.sqrt(fine), np.sqrt(cosine), angular_response([0.5], eta).relative_reflectance[:, 0]
+        )
         weight = returned * fine * (1.0 - fresnel(fine, eta))
         mean = (weight * np.interp(np.sqrt(fine), np.sqrt(cosine), law)).sum() / weight.sum()
         assert mean == pytest.approx(1.0, abs=0.01)

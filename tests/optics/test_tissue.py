@@ -10,18 +10,18 @@ import pytest
 from dermis.base.errors import DermisError
 from dermis.base.reading import read_toml
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
-from dermis.optics.profiles import find_table, load_profile, preset_names, write_profile
-from dermis.optics.tissue import load_tissue, names
+from dermis.optics.profiles import find_gaussians, load_profile, preset_names, write_profile
+from dermis.optics.tissue import load_tissue, tissue_names
 
 SKIN = "[skin]\nstructure = 'biospec'\nmelanin = 0.03\n"
 
 
 def test_names_cover_media_and_skins() -> None:
-    assert {"dj3", "skin1", "spectral", "light", "medium", "dark"} <= set(names())
+    assert {"dj3", "skin1", "spectral", "light", "medium", "dark"} <= set(tissue_names())
     assert preset_names()[0] == "gpu-gems-3"
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", tissue_names())
 def test_every_name_gives_a_profile_of_skin_like_size(name: str) -> None:
     profile = load_profile(name)
     assert profile.weight.shape == (6, 3)
@@ -51,17 +51,17 @@ def test_skin_of_a_file(tmp_path: Path) -> None:
     assert tissue.medium.name == "own" and tissue.medium.layers[0].name == "stratum corneum"
     assert tissue.parameters is not None
     assert (tissue.parameters.melanin, tissue.parameters.blood) == (0.03, 0.02)
-    assert find_table(path) is None
+    assert find_gaussians(path) is None
     assert load_profile(path).weight.shape == (6, 3)
 
 
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        (SKIN + "colour = 1\n", "colour came"),
-        (SKIN + "blood = 'red'\n", "blood: expected a number .*'red' came"),
-        (SKIN + "oxygen = true\n", "oxygen: expected a number .*True came"),
-        (SKIN.replace("biospec", "bark"), "a structure of dj2006.*'bark' came"),
+        (SKIN + "colour = 1\n", "got colour"),
+        (SKIN + "blood = 'red'\n", "blood: expected a number .*got 'red'"),
+        (SKIN + "oxygen = true\n", "oxygen: expected a number .*got True"),
+        (SKIN.replace("biospec", "bark"), "a structure of dj2006.*got 'bark'"),
         (SKIN.replace("0.03", "3"), "--melanin"),
         ("eta = 1\n" + SKIN, "a table .skin. and a name only"),
         ("skin = 4", "a table .skin."),
@@ -100,7 +100,7 @@ def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
 
 
 def test_pigments_need_a_skin() -> None:
-    with pytest.raises(DermisError, match=r"--blood: .*dj3 came"):
+    with pytest.raises(DermisError, match=r"--blood: .*got dj3"):
         load_tissue("dj3", pigments={"blood": 0.1})
 
 

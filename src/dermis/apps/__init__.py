@@ -1,1 +1,1 @@
-"""Applications: what people do with frames."""
+"""Applications built on the renderer: data sets, exports, validation, galleries and viewers."""

@@ -1,1 +1,1 @@
-"""Small modules that all packages share: errors, registries, files on disk, reading limits, numbers."""
+"""Modules that all packages share: errors, registries, disk cache, file reading and number checks."""

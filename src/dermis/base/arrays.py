@@ -1,4 +1,4 @@
-"""Types of arrays, one name each.
+"""Short names for array types.
 
 >>> points: Doubles = np.zeros((4, 3))
 """
@@ -16,4 +16,4 @@ Intp = NDArray[np.intp]
 Bytes = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 Numbers = NDArray[np.number]
-"""Of any kind: whole or not, of any size."""
+"""Array of integers or floats of any size."""

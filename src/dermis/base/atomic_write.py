@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Atomic writes: files and folders that are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -10,26 +10,27 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
-from dermis.base.errors import DermisError, refuse, shown_value
+from dermis.base.errors import DermisError, error_text, format_value, refuse
 
 
 def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choose one of them") -> Path:
-    """The path, after a trial that a file can be written there: call it before long work.
+    """Check that a file can be written to a path, and return the path; call it before long work.
 
-    suffixes : what the name may end in, such as ".png"
+    suffixes : allowed suffixes of the name, such as ".png"
+    advice : what to do about another suffix
 
-    Raises DermisError when the name ends otherwise, or when the folder is missing or not writable.
+    Raises DermisError for another suffix, and when the folder is missing or not writable.
     """
     if not isinstance(path, str | os.PathLike):
-        refuse("output", "the name of a file", f"{shown_value(path)} came", "Write its name")
+        refuse("output", "the name of a file", f"got {format_value(path)}", "Pass its name")
     target = Path(path)
     if target.suffix.lower() not in suffixes:
-        came = f"its suffix is {target.suffix!r}" if target.suffix else "it has no suffix"
-        refuse(path, f"a name that ends in {' or '.join(suffixes)}", came, advice)
+        actual = f"its suffix is {target.suffix!r}" if target.suffix else "it has no suffix"
+        refuse(path, f"a name that ends in {' or '.join(suffixes)}", actual, advice)
     trial = _temporary_name(target)
     try:
         if not target.parent.is_dir():
-            refuse(path, "a folder that exists", f"there is no folder {target.parent}", "Make it first")
+            refuse(path, "a folder that exists", f"there is no folder {target.parent}", "Create it first")
         if target.exists() and not target.is_file():
             refuse(path, "a file or a free name", "something else has this name", "Choose another name")
         trial.touch()
@@ -42,8 +43,8 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
 
 
 @contextmanager
-def replacing(path: str | Path) -> Iterator[Path]:
-    """A name in the same folder, moved to `path` when all went well and removed when not."""
+def atomic_file(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path that replaces `path` after success and is deleted after an error."""
     try:
         target = Path(os.path.realpath(path))
     except ValueError as fault:  # a NUL in the name
@@ -53,7 +54,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         yield temporary
         temporary.replace(target)
     except BaseException as fault:
-        with suppress(OSError):  # it was never made
+        with suppress(OSError):  # not created
             temporary.unlink()
         if isinstance(fault, OSError | RuntimeError):  # OpenEXR reports a full disk as a RuntimeError
             refuse_output(path, fault)
@@ -61,33 +62,33 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def replacing_folder(path: str | Path, kept: str) -> Iterator[Path]:
-    """A new empty folder beside, moved to `path` when all went well and removed when not.
+def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
+    """Yield a new empty folder that replaces `path` after success and is deleted after an error.
 
-    kept : a file that a folder of this name has to hold if it is to be replaced; an empty one is anyway
+    marker : name of a file that an existing folder must contain to be replaced, unless it is empty
 
-    Raises DermisError for another folder there, and for what cannot be written.
+    Raises DermisError for any other existing folder, and for paths that cannot be written.
     """
     try:
         target = Path(os.path.realpath(path))
-        if target.exists() and not (target.is_dir() and (_is_empty(target) or (target / kept).is_file())):
-            expected, came = (
-                f"a free name, or a folder of before that holds {kept}",
+        if target.exists() and not (target.is_dir() and (_is_empty(target) or (target / marker).is_file())):
+            expected, actual = (
+                f"a free name, or a folder that holds {marker}",
                 "something else is there",
             )
-            refuse(path, expected, came, "Choose another name")
+            refuse(path, expected, actual, "Choose another name")
     except (OSError, ValueError) as fault:
         refuse_output(path, fault)
-    with folder_beside(target) as temporary:
+    with temporary_folder(target) as temporary:
         yield temporary
         _move_folder(temporary, target)
 
 
 @contextmanager
-def folder_beside(target: Path) -> Iterator[Path]:
-    """A new empty folder for parts of what is to be written; whatever is left in it goes with it.
+def temporary_folder(target: Path) -> Iterator[Path]:
+    """Yield a new empty folder next to `target` and delete it with all its content afterwards.
 
-    Raises DermisError when the folder cannot be made, or what is done inside cannot be written.
+    Raises DermisError when the folder cannot be created, or when writing into it fails.
     """
     temporary = _temporary_name(target).with_suffix("")
     try:
@@ -104,15 +105,15 @@ def _is_empty(folder: Path) -> bool:
     return next(folder.iterdir(), None) is None
 
 
-def _move_folder(made: Path, target: Path) -> None:
-    """In place of a folder that is there, which goes only when the new one is in its place."""
+def _move_folder(source: Path, target: Path) -> None:
+    """Move a folder to a path; an existing folder there is deleted only after the move."""
     if not target.exists():
-        made.replace(target)
+        source.replace(target)
         return
     old = _temporary_name(target)
     target.replace(old)
     try:
-        made.replace(target)
+        source.replace(target)
     except OSError:
         old.replace(target)
         raise
@@ -120,17 +121,11 @@ def _move_folder(made: Path, target: Path) -> None:
 
 
 def refuse_output(path: str | Path, fault: Exception) -> NoReturn:
-    """Raise the `DermisError` of a file that cannot be written."""
+    """Raise the `DermisError` of a file or folder that cannot be written."""
     raise DermisError(
-        f"{path}: expected a place to write a file to, but it cannot be written ({reason(fault)}). "
+        f"{path}: expected a writable path, but it cannot be written ({error_text(fault)}). "
         "Choose a writable folder with space left."
     ) from fault
-
-
-def reason(fault: Exception) -> str:
-    """A fault in one line, without the path that an OSError repeats."""
-    text = getattr(fault, "strerror", None) or str(fault) or type(fault).__name__
-    return text.splitlines()[0].rstrip(".")
 
 
 def _temporary_name(target: Path) -> Path:
@@ -138,18 +133,18 @@ def _temporary_name(target: Path) -> Path:
 
 
 def check_folder(folder: Path, summary: str) -> None:
-    """Make a folder, after a trial that something can be written there: call it before long work.
+    """Create a folder and check that it is writable; call it before long work.
 
-    summary : name of the .json that will stand in it
+    summary : name of the .json file that will be written into it
 
-    Raises DermisError when it cannot be.
+    Raises DermisError when the folder cannot be created or is not writable.
     """
     if folder.exists() and not folder.is_dir():
         refuse(folder, "a folder or a free name", "a file has this name", "Choose another name")
     try:
         folder.mkdir(exist_ok=True)
     except FileNotFoundError:
-        refuse(folder, "a folder inside one that exists", f"there is no {folder.parent}", "Make it first")
+        refuse(folder, "a folder inside one that exists", f"there is no {folder.parent}", "Create it first")
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
         refuse_output(folder, fault)
     check_output(folder / summary, (".json",))

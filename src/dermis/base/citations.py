@@ -1,6 +1,6 @@
-"""The works that the package rests on: author-year keys to BibTeX.
+"""Bibliography of the package: BibTeX entries by author-year key.
 
-Entries are printed as they are written, which libraries that parse BibTeX do not keep.
+Entries are kept and printed as they are written, which libraries that parse BibTeX do not do.
 """
 
 from __future__ import annotations
@@ -15,20 +15,21 @@ from dermis.base.errors import refuse
 _HEAD = re.compile(r"@(?P<kind>\w+)\s*\{\s*(?P<key>[^\s,{}]+)\s*,")
 
 
-def keys() -> frozenset[str]:
-    """The keys that a docstring may cite."""
+def citation_keys() -> frozenset[str]:
+    """Return the keys that a docstring may cite."""
     return frozenset(_references())
 
 
 def bibtex(keys: Iterable[str]) -> str:
-    """BibTeX of the named works, each once, in the order given.
+    """Return the BibTeX entries of works, each once, in the order of their keys.
 
     keys : author-year keys, as between the brackets of a docstring
+
     Raises DermisError for a key that is not in `base/references.bib`.
     """
     known = _references()
-    wanted = tuple(dict.fromkeys(keys))
-    for key in wanted:
+    unique = tuple(dict.fromkeys(keys))
+    for key in unique:
         if key not in known:
             refuse(
                 f"citation key {key!r}",
@@ -36,13 +37,15 @@ def bibtex(keys: Iterable[str]) -> str:
                 "it is not there",
                 f"Choose from: {', '.join(sorted(known))}",
             )
-    return "".join(f"{known[key]}\n\n" for key in wanted).rstrip("\n")
+    return "".join(f"{known[key]}\n\n" for key in unique).rstrip("\n")
 
 
 def parse_bibtex(text: str, source: str = "base/references.bib") -> dict[str, str]:
-    """Key to entry, as it is written, of a BibTeX text.
+    """Parse a BibTeX text into a dictionary from keys to the unchanged text of each entry.
 
-    source : the file's name, for the message of the DermisError that a broken text raises
+    source : name of the file, for error messages
+
+    Raises DermisError for invalid BibTeX.
     """
     found: dict[str, str] = {}
     for entry in _split(text, source):
@@ -61,7 +64,10 @@ def _references() -> dict[str, str]:
 
 
 def _split(text: str, source: str) -> Iterator[str]:
-    """The entries: from an `@` outside braces to the brace that closes it. Text between them is comment."""
+    """Yield the text of each entry, from an `@` outside braces to its closing brace.
+
+    Text between entries is a comment.
+    """
     depth, start = 0, -1
     for i, character in enumerate(text):
         if character == "@" and depth == 0:

@@ -1,4 +1,4 @@
-"""Command lines: functions as commands, wrong input as one message and exit status 2, no traceback."""
+"""Command-line programs: functions as commands, invalid input as one message and exit status 2."""
 
 from __future__ import annotations
 
@@ -21,16 +21,15 @@ from cyclopts.exceptions import (
     UnusedCliTokensError,
 )
 
-from dermis.base.atomic_write import reason
-from dermis.base.errors import DermisError, DermisWarning, shortened, shown_value
+from dermis.base.errors import DermisError, DermisWarning, error_text, format_value, shorten
 
-_LONGEST = 400  # letters
+_MAX_LENGTH = 400  # characters
 _TYPES = {float: "a number", int: "a whole number", NoneType: ""}
-_NO_MEMORY = "failed to map segment", "allocate memory"  # messages of a library that cannot be loaded
+_NO_MEMORY = "failed to map segment", "allocate memory"  # in the messages of libraries that cannot be loaded
 
 
 def make_app(name: str, help_text: str | None) -> App:
-    """Return an empty command line that returns exit statuses and prints plain help."""
+    """Return an empty command-line app that returns exit statuses and prints plain help."""
     return App(
         name=name,
         help=help_text,
@@ -41,135 +40,143 @@ def make_app(name: str, help_text: str | None) -> App:
     )
 
 
-def run_app(app: App, words: Sequence[str] | None = None) -> int:
-    """Run a command line and return its exit status: 2, with a message on stderr, for wrong input.
+def run_app(app: App, arguments: Sequence[str] | None = None) -> int:
+    """Run a command line and return its exit status: 2, with a message on stderr, for invalid input.
 
-    words : of the command line; those of the process when left out
+    arguments : of the command line; by default those of the process
     """
     name = app.name[0]
     try:
         with warnings.catch_warnings():
             _show_notes()
-            given = sys.argv[1:] if words is None else words
-            return int(app(given, exit_on_error=False, print_error=False) or 0)
+            tokens = sys.argv[1:] if arguments is None else arguments
+            return int(app(tokens, exit_on_error=False, print_error=False) or 0)
     except DermisError as error:
-        return failed(name, str(error))
+        return print_failure(name, str(error))
     except CycloptsError as error:
-        return failed(name, explain(error, name))
+        return print_failure(name, usage_message(error, name))
     except (MemoryError, ImportError) as error:
-        if isinstance(error, ImportError) and not any(words in str(error) for words in _NO_MEMORY):
+        if isinstance(error, ImportError) and not any(text in str(error) for text in _NO_MEMORY):
             raise
-        lack = f"memory: expected enough for this, but there is no more ({error}). Ask for less."
-        return failed(name, lack)
+        return print_failure(name, f"memory: expected more, but none is left ({error}). Request less.")
 
 
 def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | None = None) -> NoReturn:
-    """Run the command line of a script, whose docstring is the help, and exit.
+    """Run the command line of a script, print its docstring as help if asked to, and exit.
 
-    run : function; or summaries of commands by "module:function"
-    name : of the script; that of its file when left out
+    run : function; or summaries of several commands by "module:function"
+    name : of the program; by default the name of the script's file
     """
-    name, help_text = name or Path(sys.argv[0]).name, reflowed(sys.modules["__main__"].__doc__)
+    name, help_text = name or Path(sys.argv[0]).name, reflow(sys.modules["__main__"].__doc__)
     if isinstance(run, Mapping):
         app = make_app(name, help_text)
-        for place, summary in run.items():
-            add_command(app, place.partition(":")[2].replace("_", "-"), place, summary)
+        for target, summary in run.items():
+            add_command(app, target.partition(":")[2].replace("_", "-"), target, summary)
     else:
         app = make_app(name, help_text)
         app.default(run)
     try:
         code = run_app(app)
     except OSError as error:
-        code = failed(name, f"{error.filename}: expected a usable file, but {reason(error)}. Name another.")
+        code = print_failure(
+            name, f"{error.filename}: expected a usable file, but {error_text(error)}. Name another."
+        )
     sys.exit(code)
 
 
-def add_command(app: App, name: str, place: str, summary: str) -> None:
-    """Add a command by the "module:function" it is, which is imported only when it is chosen."""
+def add_command(app: App, name: str, target: str, summary: str) -> None:
+    """Add a command given as "module:function", which is imported only when the user runs that command."""
     chosen = sys.argv[1:2] == [name]
     if chosen:
-        module, _, function = place.partition(":")
+        module, _, function = target.partition(":")
         command = getattr(import_module(module), function)
-        command.__doc__ = reflowed(command.__doc__)
-    app.command(place, name=name, help=None if chosen else summary, version_flags=())
+        command.__doc__ = reflow(command.__doc__)
+    app.command(target, name=name, help=None if chosen else summary, version_flags=())
 
 
-def failed(name: str, message: str) -> int:
-    """Print what a program failed by, and return the exit status 2."""
+def print_failure(name: str, message: str) -> int:
+    """Print an error message of a program to stderr and return the exit status 2."""
     sys.stderr.write(f"{name}: {message}\n")
     return 2
 
 
 def _show_notes() -> None:
-    """Print the package's own warnings as notes, each once."""
-    usual = warnings.showwarning
+    """Print warnings of this package as notes on stderr, each once."""
+    default = warnings.showwarning
 
-    def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
+    def show(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
         if issubclass(category, DermisWarning):
             sys.stderr.write(f"note: {message}\n")
         else:
-            usual(message, category, *more, **named)
+            default(message, category, *args, **kwargs)
 
     warnings.simplefilter("default", DermisWarning)
     warnings.showwarning = show
 
 
-def explain(error: CycloptsError, name: str) -> str:
-    """Return what was expected on the command line of a program, what came, and where to read on."""
+def usage_message(error: CycloptsError, name: str) -> str:
+    """Return the error message for an invalid command line: expected, got, and where to find help."""
     command = " ".join((name, *(error.command_chain or ())))
-    culprit, expected, came = (shortened(part, _LONGEST) for part in _finding(error, command))
+    culprit, expected, actual = (shorten(part, _MAX_LENGTH) for part in _describe_error(error, command))
     error.verbose = False
     hint = str(error).partition("Did you mean ")[2]
     did_you_mean = f"Did you mean {hint} " if hint else ""
-    return f"{culprit}: expected {expected}, but {came}. {did_you_mean}See {command} --help."
+    return f"{culprit}: expected {expected}, but {actual}. {did_you_mean}See {command} --help."
 
 
-def _finding(error: CycloptsError, command: str) -> tuple[str, str, str]:
-    """Culprit, what was expected, what came."""
-    left = (error.unused_tokens or ["?"])[0]
+def _describe_error(error: CycloptsError, command: str) -> tuple[str, str, str]:
+    """Return the invalid argument, what was expected and what was given."""
+    unused = (error.unused_tokens or ["?"])[0]
     match error:
         case UnknownOptionError():
-            return error.token.keyword or error.token.value, f"an option of {command}", "it has none so named"
+            return (
+                error.token.keyword or error.token.value,
+                f"an option of {command}",
+                "it has none of this name",
+            )
         case CoercionError():
             value = error.token.value if error.token else "something else"
-            return _name(error), _wanted(error.target_type), f"{shown_value(value)} came"
+            return _option_name(error), _type_text(error.target_type), f"got {format_value(value)}"
         case MissingArgumentError():
-            return error.keyword or _name(error), "a value", "there is none"
+            return error.keyword or _option_name(error), "a value", "there is none"
         case RepeatArgumentError():
-            return _name(error), "it once", "it came twice"
+            return _option_name(error), "one value", "it is given twice"
         case UnknownCommandError():
-            return left, f"a command of {command}", "it has none so named"
+            return unused, f"a command of {command}", "it has none of this name"
         case UnusedCliTokensError():
-            return left, "options only after the first word", "this word came"
-    return command, "other options", str(error).strip().rstrip(".")
+            return unused, "only options after the first argument", "got this argument"
+    return command, "valid options", str(error).strip().rstrip(".")
 
 
-def _name(error: Any) -> str:
-    """The option at fault as it was written, or the argument's name."""
+def _option_name(error: Any) -> str:
+    """Return the name of the invalid option as the user wrote it, or the name of the argument."""
     token = getattr(error, "token", None)
     return str((token and token.keyword) or (error.argument and error.argument.name) or "an option")
 
 
-def _wanted(kind: Any) -> str:
-    """A type in words; the choices of a literal."""
+def _type_text(kind: Any) -> str:
+    """Return a type in words, or the choices of a literal."""
     if get_args(kind):
-        return " or ".join(filter(None, map(_wanted, get_args(kind))))
+        return " or ".join(filter(None, map(_type_text, get_args(kind))))
     return _TYPES.get(kind, str(kind))
 
 
-def reflowed(docstring: str | None) -> str:
-    """The text with each paragraph on a line of its own, as a terminal wraps it."""
-    made: list[str] = []
+def reflow(docstring: str | None) -> str:
+    """Return a docstring with each paragraph joined into one line, so that the terminal can wrap it."""
+    paragraphs: list[str] = []
     for line in cleandoc(docstring or "").splitlines():
-        if made and _goes_on(made[-1], line):
-            made[-1] += f" {line.strip()}"
+        if paragraphs and _continues_paragraph(paragraphs[-1], line):
+            paragraphs[-1] += f" {line.strip()}"
         else:
-            made.append(line)
-    return "\n".join(made)
+            paragraphs.append(line)
+    return "\n".join(paragraphs)
 
 
-def _goes_on(before: str, line: str) -> bool:
-    """Whether a line belongs to the paragraph before it: blank lines, indents and underlines part them."""
+def _continues_paragraph(before: str, line: str) -> bool:
+    """Return whether a line belongs to the same paragraph as the line before it.
+
+    Blank lines, changes of indent and underlines end a paragraph.
+    """
     if not before.strip() or not line.strip() or {*before.strip()} == {"-"} or {*line.strip()} == {"-"}:
         return False
     return _indent(before) == _indent(line)

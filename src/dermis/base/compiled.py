@@ -1,4 +1,4 @@
-"""How loops become machine code. Import it inside a function: it loads numba."""
+"""Compilation of loops to machine code, cached on disk. Import it inside a function: it loads numba."""
 
 from __future__ import annotations
 
@@ -13,63 +13,63 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from dermis.base.disk import find, keep
-from dermis.base.extras import needed
+from dermis.base.disk import load_arrays, try_save_arrays
+from dermis.base.extras import import_extra
 
-numba = needed("numba", "ground truth")
-caching = needed("numba.core.caching", "ground truth")
-compiler = needed("numba.core.compiler", "ground truth")
-serialize = needed("numba.core.serialize", "ground truth")
+numba = import_extra("numba", "ground truth")
+caching = import_extra("numba.core.caching", "ground truth")
+compiler = import_extra("numba.core.compiler", "ground truth")
+serialize = import_extra("numba.core.serialize", "ground truth")
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _FOLDER, _NAME = "machine-code", "code"
 
 
 def compiled(function: Function) -> Function:
-    """The function as machine code, kept on disk like everything else."""
-    made = numba.njit(nogil=True, error_model="numpy")(function)
-    if hasattr(made, "enable_caching") and function.__closure__ is None:
-        made._cache = _KeptCode(function)
-    return cast(Function, made)
+    """Compile a function with numba and cache its machine code on disk."""
+    dispatcher = numba.njit(nogil=True, error_model="numpy")(function)
+    if hasattr(dispatcher, "enable_caching") and function.__closure__ is None:
+        dispatcher._cache = _CodeCache(function)
+    return cast(Function, dispatcher)
 
 
-_HOLDS_ADDRESSES = attrgetter("library.has_dynamic_globals")  # of this process
+_HOLDS_ADDRESSES = attrgetter("library.has_dynamic_globals")  # addresses of this process
 
 
-class _KeptCode(caching.NullCache):  # type: ignore[misc, name-defined]
-    """In place of numba's own cache, which unpickles, and so runs, whatever lies in its files.
+class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
+    """Disk cache of compiled functions in place of numba's, which unpickles any file in its folder.
 
-    Files of `disk` are read whole, and only where nobody else can write; the hash is checked first.
+    Cached files are read only from private folders, and their hash is checked before they are unpickled.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         file = Path(function.__code__.co_filename)
-        named = function.__module__, function.__qualname__, function.__code__.co_firstlineno
-        # what other files give to it, functions and constants, belongs to what it is made from
-        self._made_of = f"{named} {_code(file.parent)} {numba.__version__} {sys.version}"
+        identity = function.__module__, function.__qualname__, function.__code__.co_firstlineno
+        # functions and constants that the loop takes from other files of its folder belong to the key
+        self._source_key = f"{identity} {_source_hash(file.parent)} {numba.__version__} {sys.version}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was compiled for these types, or None."""
+        """Return the code compiled for a signature, or None."""
         target_context.refresh()
-        found = find(_FOLDER, self._key(sig, target_context.codegen()), [_NAME])
+        found = load_arrays(_FOLDER, self._key(sig, target_context.codegen()), [_NAME])
         if found is None:
             return None
         return compiler.CompileResult._rebuild(target_context, *pickle.loads(found[_NAME].tobytes()))
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled, where another process can use it."""
+        """Cache compiled code unless it is valid in this process only."""
         if data.lifted or _HOLDS_ADDRESSES(data):
             return
         code = np.frombuffer(serialize.dumps(data._reduce()), np.uint8)
-        keep(_FOLDER, self._key(sig, data.codegen), {_NAME: code})
+        try_save_arrays(_FOLDER, self._key(sig, data.codegen), {_NAME: code})
 
     def _key(self, sig: Any, codegen: Any) -> str:
-        text = f"{self._made_of} {sig} {codegen.magic_tuple()}"
+        text = f"{self._source_key} {sig} {codegen.magic_tuple()}"
         return hashlib.sha256(text.encode()).hexdigest()[:40]
 
 
 @cache
-def _code(folder: Path) -> str:
-    """What stands for the text of all files that loops of a folder may take functions and constants from."""
+def _source_hash(folder: Path) -> str:
+    """Return a hash of all Python files in a folder, from which loops may use functions and constants."""
     texts = (file.read_bytes() for file in sorted(folder.rglob("*.py")))
     return hashlib.sha256(b"".join(texts)).hexdigest()[:12]

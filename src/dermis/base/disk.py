@@ -1,8 +1,8 @@
-"""Results kept on disk by the content of what they were made from.
+"""Disk cache of arrays, addressed by a hash of their inputs.
 
-A file begins with a line that is the SHA-256 of the next one; that one tells the file's key, its arrays and
-the SHA-256 of each block of the bytes that follow. What does not fit is as good as not there, and removed.
-Only folders that nobody else can write to are used.
+The first line of a file is the SHA-256 of the second. The second line is JSON with the file's key, the types
+and shapes of its arrays and the SHA-256 of each block of the bytes that follow. Files that do not match are
+deleted. Only folders that no other user can write to are used.
 """
 
 from __future__ import annotations
@@ -24,127 +24,131 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import notify
-from dermis.base.private import cache_folder, make_private, open_private, stranger
+from dermis.base.private import cache_folder, make_private_folder, open_private_file, other_writers
 
 Array = NDArray[Any]
 Arrays = dict[str, Array]
 _SUFFIX, _UNFINISHED = ".arrays", ".part"
-_MOST_BYTES = 2 << 30  # of each folder
-_START_S = 300.0  # longer than a process takes to read all that it wants
-_LONGEST_S = 24 * 3600.0  # after that nobody is still writing a file
-_DAMAGED = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
-_PLAIN = "biufcSU"  # kinds of arrays that are bytes and nothing else
-_BLOCK = 2 << 20  # bytes that a thread reads, or tells the hash of, at once
-_MOST_HEAD = 1 << 20  # bytes of a line
-_LARGE = 4 << 20  # bytes that more than one thread takes
-_MOST_THREADS = 4
+_MAX_FOLDER_BYTES = 2 << 30
+_START_S = 300.0  # longer than a process takes to read all its cached files
+_MAX_WRITE_S = 24 * 3600.0  # older unfinished files are of processes that were killed
+_DAMAGE_ERRORS = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
+_PLAIN_KINDS = "biufcSU"  # NumPy kinds without pointers
+_BLOCK = 2 << 20  # bytes that a thread reads or hashes at once
+_MAX_LINE = 1 << 20  # bytes
+_MIN_THREADED_BYTES = 4 << 20
+_MAX_THREADS = 4
 
 
-def cached_array(sources: Array | Sequence[Array], form: str, make: Callable[[], Array]) -> Array:
-    """The array that `make` returns for one or more others, kept on disk in the same way.
+def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callable[[], Array]) -> Array:
+    """Return the array that `make` computes from other arrays, from the disk cache if it is there.
 
-    form : all that it depends on besides their content
+    parameters : text with everything that the result depends on besides the content of `sources`
     """
-    return cached_arrays(sources, form, ["array"], lambda: {"array": make()})["array"]
+    return cached_arrays(sources, parameters, ["array"], lambda: {"array": make()})["array"]
 
 
 def cached_arrays(
-    sources: Array | Sequence[Array], form: str, names: list[str], make: Callable[[], Arrays]
+    sources: Array | Sequence[Array], parameters: str, names: list[str], make: Callable[[], Arrays]
 ) -> Arrays:
-    """The arrays `names` that `make` returns for others, kept on disk in the same way."""
+    """Return the named arrays that `make` computes from other arrays, from the disk cache if possible."""
     sources = [sources] if isinstance(sources, np.ndarray) else sources
-    return stored("arrays", array_key(sources, form), names, make)
+    return load_or_make("arrays", array_key(sources, parameters), names, make)
 
 
-def array_key(sources: Sequence[Array], form: str) -> str:
-    """The key of what follows from these arrays.
+def array_key(sources: Sequence[Array], parameters: str) -> str:
+    """Return the cache key of a result that is computed from arrays.
 
-    form : all that it depends on besides their content
+    parameters : text with everything that the result depends on besides the content of `sources`
     """
-    digest = hashlib.sha256(form.encode())
+    digest = hashlib.sha256(parameters.encode())
     for source in sources:
         digest.update(f" {source.shape} {source.dtype}".encode())
         digest.update(np.ascontiguousarray(source).data)
     return digest.hexdigest()[:40]
 
 
-def stored(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
-    """The arrays `names` from the file of that key, or made and stored."""
-    found = find(folder, key, names)
-    if found is None:
-        found = make()
-        keep(folder, key, found)
-    return found
+def load_or_make(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
+    """Return the named arrays of a cached file, or compute them with `make` and cache them."""
+    arrays = load_arrays(folder, key, names)
+    if arrays is None:
+        arrays = make()
+        try_save_arrays(folder, key, arrays)
+    return arrays
 
 
-def keep(folder: str, key: str, arrays: Arrays) -> None:
-    """`store` where there is room; the disk may fail without harm."""
-    place = cache_folder() / folder
+def try_save_arrays(folder: str, key: str, arrays: Arrays) -> None:
+    """Save arrays to the cache if it has room; errors of the disk are ignored."""
+    path = cache_folder() / folder
     with contextlib.suppress(OSError):
-        if _has_room(place, sum(array.nbytes for array in arrays.values())):
-            store(folder, key, arrays)
-            _prune(place)
+        if _has_room(path, sum(array.nbytes for array in arrays.values())):
+            save_arrays(folder, key, arrays)
+            _prune(path)
 
 
-def find(folder: str, key: str, names: Sequence[str]) -> Arrays | None:
-    """The arrays `names` from the file of that key, None when it is not there or not as it was stored."""
+def load_arrays(folder: str, key: str, names: Sequence[str]) -> Arrays | None:
+    """Return the named arrays of a cached file, or None if it is missing or damaged."""
     path = cache_folder() / folder / f"{key}{_SUFFIX}"
     with contextlib.suppress(OSError, MemoryError):
         if not _is_trusted(path.parent):
             return None
         try:
             arrays = _read(path, f"{folder}/{key}")
-        except _DAMAGED:
+        except _DAMAGE_ERRORS:
             path.unlink()
             return None
-        with contextlib.suppress(OSError):  # others' folder: to be read only
+        with contextlib.suppress(OSError):  # a read-only folder
             os.utime(path)
         return {name: arrays[name] for name in names} if arrays.keys() >= set(names) else None
     return None
 
 
-def store(folder: str, key: str, arrays: Arrays) -> None:
-    """Write arrays for `find`, whole or not at all.
+def save_arrays(folder: str, key: str, arrays: Arrays) -> None:
+    """Write arrays to the cache atomically.
 
-    Raises OSError when the disk fails, or the folder is others' too.
+    Raises OSError when the disk fails, or when other users can write to the folder.
     """
     path = cache_folder() / folder / f"{key}{_SUFFIX}"
     if not _is_trusted(path.parent):
         raise PermissionError(path.parent)
     data = {k: a if a.flags.fnc else np.ascontiguousarray(a).reshape(a.shape) for k, a in arrays.items()}
     blocks = _blocks(data.values())
-    told = {
+    header = {
         "key": f"{folder}/{key}",
         "arrays": [[k, a.dtype.str, a.shape, "F" if a.flags.fnc else "C"] for k, a in data.items()],
-        "blocks": _in_threads(lambda block: hashlib.sha256(block).hexdigest(), blocks),
+        "blocks": _map_threaded(lambda block: hashlib.sha256(block).hexdigest(), blocks),
     }
-    head = json.dumps(told).encode() + b"\n"
-    with _whole(path) as file:
-        file.write(_line_of(head) + head)
+    head = json.dumps(header).encode() + b"\n"
+    with _temporary_file(path) as file:
+        file.write(_digest_line(head) + head)
         file.writelines(blocks)
 
 
 def _is_trusted(folder: Path) -> bool:
-    """Whether only this user can have written what lies there; else a note says why nothing is kept."""
-    if why := stranger(folder):
-        _tell(f"{cache_folder()} is not used, as {why}: make it yours alone, or name another in DERMIS_CACHE")
-    return not why
+    """Return whether only this user can write to a folder; if not, print a note once."""
+    if reason := other_writers(folder):
+        advice = "make it private, or name another in DERMIS_CACHE"
+        _notify_once(f"{cache_folder()} is not used, because {reason}: {advice}")
+    return not reason
 
 
 @cache
-def _tell(message: str) -> None:
+def _notify_once(message: str) -> None:
     notify(message)
 
 
 def _has_room(folder: Path, size: int) -> bool:
-    """Whether that many bytes fit beside what was just used; in turn, they would drive each other out."""
+    """Return whether a new file fits into a folder next to all files used in the last minutes.
+
+    Otherwise files that one process needs together would evict each other.
+    """
     now = time.time()
-    used = sum(told.st_size for _, told in _files(folder, _SUFFIX) if now - told.st_mtime < _START_S)
-    return size + used <= _MOST_BYTES
+    used = sum(status.st_size for _, status in _files(folder, _SUFFIX) if now - status.st_mtime < _START_S)
+    return size + used <= _MAX_FOLDER_BYTES
 
 
 def _files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]]:
-    """The files there whose names end so; others may come and go meanwhile."""
+    """Return path and status of all files with a suffix; files that vanish meanwhile are skipped."""
     found = []
     with contextlib.suppress(FileNotFoundError), os.scandir(folder) as entries:
         for entry in entries:
@@ -155,66 +159,68 @@ def _files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]]:
 
 
 def _read(path: Path, key: str) -> Arrays:
-    """The arrays of a file.
+    """Return the arrays of a cached file.
 
-    Raises OSError or MemoryError when it cannot be read, one of `_DAMAGED` unless it is as it was stored
-    under that key.
+    Raises OSError or MemoryError when the file cannot be read, one of `_DAMAGE_ERRORS` when its key or its
+    content is wrong.
     """
-    with open_private(path) as raw, io.BufferedReader(raw) as file:
-        digest, head = file.readline(_MOST_HEAD), file.readline(_MOST_HEAD)
+    with open_private_file(path) as raw, io.BufferedReader(raw) as file:
+        digest, head = file.readline(_MAX_LINE), file.readline(_MAX_LINE)
         start, size = file.tell(), os.fstat(file.fileno()).st_size
-    told = json.loads(head) if digest == _line_of(head) else {}
-    if told.get("key") != key:
+    header = json.loads(head) if digest == _digest_line(head) else {}
+    if header.get("key") != key:
         raise ValueError(key)
-    kinds = [(name, np.dtype(kind), shape, order) for name, kind, shape, order in told["arrays"]]
-    if start + sum(_length(kind, shape) for _, kind, shape, _ in kinds) != size:
+    kinds = [(name, np.dtype(kind), shape, order) for name, kind, shape, order in header["arrays"]]
+    if start + sum(_byte_count(kind, shape) for _, kind, shape, _ in kinds) != size:
         raise ValueError(key)
     arrays = {name: np.empty(shape, kind, order) for name, kind, shape, order in kinds}
     blocks = _blocks(arrays.values())
-    places = start + np.cumsum([0, *(len(block) for block in blocks)])
-    if _in_threads(partial(_read_block, path), blocks, places.tolist()) != told["blocks"]:
+    offsets = start + np.cumsum([0, *(len(block) for block in blocks)])
+    if _map_threaded(partial(_read_block, path), blocks, offsets.tolist()) != header["blocks"]:
         raise ValueError(key)
     return arrays
 
 
-def _line_of(head: bytes) -> bytes:
+def _digest_line(head: bytes) -> bytes:
     return hashlib.sha256(head).hexdigest().encode() + b"\n"
 
 
-def _length(kind: np.dtype[Any], shape: Sequence[int]) -> int:
-    """Bytes of an array, told before there is room for it."""
-    if kind.kind not in _PLAIN or not kind.itemsize or any(type(n) is not int or n < 0 for n in shape):
+def _byte_count(kind: np.dtype[Any], shape: Sequence[int]) -> int:
+    """Return the size of an array in bytes, checked before memory is allocated."""
+    if kind.kind not in _PLAIN_KINDS or not kind.itemsize or any(type(n) is not int or n < 0 for n in shape):
         raise ValueError(f"no array: {kind} {shape}")
     return math.prod(shape) * kind.itemsize
 
 
-def _read_block(path: Path, block: memoryview, place: int) -> str:
-    """Fill a block with what the file holds from a place on, and tell its hash."""
-    with open_private(path) as file:
-        file.seek(place)
-        if file.readinto(block) != len(block):  # what lay in memory before may be right
+def _read_block(path: Path, block: memoryview, offset: int) -> str:
+    """Fill a block from an offset in a file and return its SHA-256."""
+    with open_private_file(path) as file:
+        file.seek(offset)
+        if file.readinto(block) != len(block):  # uninitialised memory may hold the right bytes
             raise ValueError(path)
     return hashlib.sha256(block).hexdigest()
 
 
 def _blocks(arrays: Iterable[Array]) -> list[memoryview]:
-    """The bytes of arrays one after the other."""
-    whole = [array.reshape(-1, order="A").view(np.uint8).data for array in arrays]
-    return [data[start : start + _BLOCK] for data in whole for start in range(0, len(data), _BLOCK)]
+    """Return the bytes of arrays, one after the other, as views of at most 2 MiB."""
+    buffers = [array.reshape(-1, order="A").view(np.uint8).data for array in arrays]
+    return [data[start : start + _BLOCK] for data in buffers for start in range(0, len(data), _BLOCK)]
 
 
-def _in_threads(work: Callable[..., str], blocks: list[memoryview], *more: Sequence[int]) -> list[str]:
-    """What a function returns of each block; neither reading nor hashing holds other threads up."""
-    if sum(map(len, blocks)) < _LARGE:
-        return list(map(work, blocks, *more))
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
-        return list(pool.map(work, blocks, *more))
+def _map_threaded(
+    function: Callable[..., str], blocks: list[memoryview], *arguments: Sequence[int]
+) -> list[str]:
+    """Return the results of a function for all blocks, in threads if the blocks are large."""
+    if sum(map(len, blocks)) < _MIN_THREADED_BYTES:
+        return list(map(function, blocks, *arguments))
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MAX_THREADS)) as pool:
+        return list(pool.map(function, blocks, *arguments))
 
 
 @contextlib.contextmanager
-def _whole(path: Path) -> Iterator[BinaryIO]:
-    """A file that takes its name when all was written, and is removed when not."""
-    make_private(path.parent)
+def _temporary_file(path: Path) -> Iterator[BinaryIO]:
+    """Yield a new file that is renamed to `path` after success and deleted after an error."""
+    make_private_folder(path.parent)
     unfinished = path.with_name(f"{path.name}.{os.urandom(6).hex()}{_UNFINISHED}")
     try:
         with open(unfinished, "xb", opener=partial(os.open, mode=0o600)) as file:
@@ -226,13 +232,13 @@ def _whole(path: Path) -> Iterator[BinaryIO]:
 
 
 def _prune(folder: Path) -> None:
-    """Forget the files used longest ago while the folder holds more than its share, and unfinished ones."""
-    stored = sorted(_files(folder, _SUFFIX), key=lambda one: one[1].st_mtime, reverse=True)
+    """Delete the least recently used files beyond the folder's size limit, and old unfinished files."""
+    newest_first = sorted(_files(folder, _SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True)
     total, now = 0, time.time()
-    for path, told in stored:
-        total += told.st_size
-        if total > _MOST_BYTES:
+    for path, status in newest_first:
+        total += status.st_size
+        if total > _MAX_FOLDER_BYTES:
             path.unlink(missing_ok=True)
-    for path, told in _files(folder, _UNFINISHED):  # of processes that were killed
-        if now - told.st_mtime > _LONGEST_S:
+    for path, status in _files(folder, _UNFINISHED):
+        if now - status.st_mtime > _MAX_WRITE_S:
             path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""What the package raises when the input, the machine or the disk is at fault."""
+"""Errors and warnings of the package for invalid input, unsuitable machines and full disks."""
 
 from __future__ import annotations
 
@@ -7,19 +7,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NoReturn
 
-_LONGEST_NAME, _LONGEST_TEXT = 300, 400  # letters of a message
+_MAX_NAME, _MAX_TEXT = 300, 400  # characters in a message
 
 
 class DermisError(Exception):
-    """The caller can mend this: the message says what was expected, what came and what to do.
+    """Error that the caller can fix: the message says what was expected, what was found and what to do.
 
-    The command line prints it without a traceback and exits with 2.
+    The command line prints the message without a traceback and exits with status 2.
+
+    Examples
+    --------
+    >>> from dermis import DermisError, load_profile
+    >>> try:
+    ...     load_profile("granite")
+    ... except DermisError as error:
+    ...     print("expected a preset" in str(error))
+    True
     """
 
 
 @contextmanager
-def about(culprit: object) -> Iterator[None]:
-    """Say of what is refused inside what it is about, unless that is said already."""
+def error_context(culprit: object) -> Iterator[None]:
+    """Prefix errors raised inside with the name of what they are about, unless they contain it."""
     try:
         yield
     except DermisError as error:
@@ -29,43 +38,53 @@ def about(culprit: object) -> Iterator[None]:
 
 
 class DermisWarning(UserWarning):
-    """The picture may not be what was meant: the message says why and what to do."""
+    """Warning that a result may not be what was meant; the message says why and what to do."""
 
 
 def notify(message: str) -> None:
-    """Warn with a `DermisWarning`; the command line prints it as a note."""
+    """Issue a `DermisWarning`; the command line prints it as a note."""
     warnings.warn(message, DermisWarning, stacklevel=3)
 
 
-def refuse(culprit: object, expected: str, came: str, remedy: str) -> NoReturn:
-    """Raise a `DermisError` in the package's one form.
+def refuse(culprit: object, expected: str, actual: str, advice: str) -> NoReturn:
+    """Raise a `DermisError` with what was expected, what was found and what to do.
 
-    culprit : the file, option or object at fault, named first
-    expected, came, remedy : sentences without a full stop
+    The message is "culprit: expected EXPECTED, but ACTUAL. ADVICE."
+
+    culprit : file, option or object at fault
+    expected : phrase after "expected"
+    actual : clause after "but", such as "got 3" or "it has none"
+    advice : what to do, without a full stop
     """
-    named, what = shortened(str(culprit), _LONGEST_NAME), shortened(came, _LONGEST_TEXT)
-    end = "" if remedy.endswith("?") else "."
-    raise DermisError(f"{named}: expected {expected}, but {what}. {remedy}{end}")
+    named, what = shorten(str(culprit), _MAX_NAME), shorten(actual, _MAX_TEXT)
+    end = "" if advice.endswith("?") else "."
+    raise DermisError(f"{named}: expected {expected}, but {what}. {advice}{end}")
 
 
-def shown_value(value: object, most: int = 60) -> str:
-    """What came, short: a class by its name, other things as they print or by their kind.
+def format_value(value: object, max_length: int = 60) -> str:
+    """Return a short text for a value in an error message: its repr, or its type if that is too long.
 
-    most : letters that it may take
+    max_length : of the text, in characters
     """
     if isinstance(value, type):
         return f"the class {value.__name__}"
     try:
         text = f"{value!r}"
-    except Exception:  # a whole number of thousands of digits, say
+    except Exception:  # such as an integer of thousands of digits
         return f"something too long to print ({type(value).__name__})"
-    if len(text) <= most:
+    if len(text) <= max_length:
         return text
     is_plain = isinstance(value, str | bytes | int | list | tuple | dict)
-    return f"{text[:most]} ..." if is_plain else f"a {type(value).__name__}"
+    return f"{text[:max_length]} ..." if is_plain else f"a {type(value).__name__}"
 
 
-def shortened(text: str, most: int) -> str:
-    """A text without its middle where it is too long for a message."""
-    half = (most - 5) // 2
-    return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
+def error_text(error: Exception) -> str:
+    """Return an error in one line, without the path that an OSError repeats."""
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return text.splitlines()[0].rstrip(".")
+
+
+def shorten(text: str, max_length: int) -> str:
+    """Return a text without its middle part where it is too long for a message."""
+    half = (max_length - 5) // 2
+    return text if len(text) <= max_length else f"{text[:half]} ... {text[-half:]}"

@@ -1,4 +1,4 @@
-"""Packages that only some tasks need, and the extras that bring them."""
+"""Optional packages, and the extras of this package that install them."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ EXTRAS = {
     "pxr": "engines",
     "MaterialX": "engines",
 }
-"""Extra by module, for those that `needed` is asked for."""
-_CALLED = {"pxr": "usd-core"}  # what is called otherwise where it is installed from
+"""Name of the extra that installs each optional module."""
+_DISTRIBUTIONS = {"pxr": "usd-core"}  # distributions with other names than their modules
 
 
-def needed(module: str, task: str) -> Any:
-    """The module, one of a package in `EXTRAS` or one inside it.
+def import_extra(module: str, task: str) -> Any:
+    """Import a module of an optional package listed in `EXTRAS` and return it.
 
-    task : what needs it, for the message
+    task : what needs the module, for the error message
 
-    Raises DermisError when it is not installed.
+    Raises DermisError when the package is not installed.
     """
     package = module.partition(".")[0]
     try:
         return import_module(module)
     except ImportError as fault:
-        remedy = f'Install it: pip install "dermis[{EXTRAS[package]}]", or ".[{EXTRAS[package]}]" in a clone'
-        name = distribution(package)
-        refuse(task, f"the package {name}", f"it cannot be imported ({fault})", remedy)
+        advice = f'Install it: pip install "dermis[{EXTRAS[package]}]", or ".[{EXTRAS[package]}]" in a clone'
+        name = distribution_name(package)
+        refuse(task, f"the package {name}", f"it cannot be imported ({fault})", advice)
 
 
-def distribution(module: str) -> str:
-    """What the package of a module is called where it is installed from."""
-    return _CALLED.get(module, module.replace("_", "-"))
+def distribution_name(module: str) -> str:
+    """Return the name under which a module's package is installed from PyPI."""
+    return _DISTRIBUTIONS.get(module, module.replace("_", "-"))

@@ -1,4 +1,4 @@
-"""Folders and files that nobody but their user, and root, can have written to."""
+"""Private folders and files: only their user and root can have written to them."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-_READING = os.O_RDONLY | sum(
+_READ_FLAGS = os.O_RDONLY | sum(
     getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY")
 )
-_MOST_LINKS = 40  # as Linux follows
-_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+_MAX_LINKS = 40  # as in Linux
+_WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_folder() -> Path:
-    """Where files lie that can all be had again: DERMIS_CACHE, else the user's cache folder.
+    """Return the folder for cached files: DERMIS_CACHE, or the user's cache folder.
 
-    For a user without a home it is a place that can hold nothing.
+    For a user without a home folder it is a path in which nothing can be stored.
     """
     import platformdirs
 
@@ -30,89 +30,91 @@ def cache_folder() -> Path:
         return Path(os.devnull)
 
 
-def make_private(folder: Path) -> None:
-    """Make a folder, and those above it, for this user alone.
+def make_private_folder(folder: Path) -> None:
+    """Create a folder and its missing parents with access for this user only.
 
     Raises OSError where that is not possible.
     """
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
-    for one in reversed(missing):
-        one.mkdir(0o700, exist_ok=True)
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    for path in reversed(missing):
+        path.mkdir(0o700, exist_ok=True)
     if not folder.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
 
 
-def stranger(folder: Path) -> str:
-    """What lets another user write to a folder, in words; empty if nothing does.
+def other_writers(folder: Path) -> str:
+    """Return a description of how other users can write to a folder; empty if they cannot.
 
-    Folders above the user's home count as safe, and those that root alone writes to.
+    Folders above the user's home and folders that only root can write to count as safe.
     """
     if os.name != "posix":
-        return ""  # profiles are their user's there
+        return ""  # Windows profiles are private
     above_home: set[Path] = set()
-    with contextlib.suppress(RuntimeError):  # there is none
+    with contextlib.suppress(RuntimeError):  # no home
         above_home = set(Path.home().parents)
-    steps = [one for one in _steps(folder) if one not in above_home]
-    for one in steps:
+    components = [path for path in _path_components(folder) if path not in above_home]
+    for path in components:
         try:
-            told = one.lstat()
+            status = path.lstat()
         except FileNotFoundError:
             return ""
-        if not stat.S_ISDIR(told.st_mode) and not stat.S_ISLNK(told.st_mode):
-            return ""  # nothing lies below it
-        if told.st_uid not in (0, os.geteuid()):
-            return f"{one} belongs to another user"
-        sticky = told.st_mode & stat.S_ISVTX and one != steps[-1]  # there only the owner renames and removes
-        if not stat.S_ISLNK(told.st_mode) and not sticky and _is_shared(told):
-            return f"other users can write to {one}"
+        if not stat.S_ISDIR(status.st_mode) and not stat.S_ISLNK(status.st_mode):
+            return ""  # a file has no content below it
+        if status.st_uid not in (0, os.geteuid()):
+            return f"{path} belongs to another user"
+        sticky = status.st_mode & stat.S_ISVTX and path != components[-1]  # only owners rename and remove
+        if not stat.S_ISLNK(status.st_mode) and not sticky and _is_shared(status):
+            return f"other users can write to {path}"
     return ""
 
 
-def open_private(path: Path) -> io.FileIO:
-    """A file opened for reading, without a buffer; never a link, a pipe or a device.
+def open_private_file(path: Path) -> io.FileIO:
+    """Open a regular file for unbuffered reading; links, pipes and devices are refused.
 
-    Raises OSError when it cannot be read, ValueError when others may have written it.
+    Raises OSError when it cannot be read, ValueError when other users may have written it.
     """
-    descriptor = os.open(path, _READING)
-    told = os.fstat(descriptor)
-    mine = os.name != "posix" or (told.st_uid in (0, os.geteuid()) and not told.st_mode & _OTHERS)
-    if not stat.S_ISREG(told.st_mode) or not mine:
+    descriptor = os.open(path, _READ_FLAGS)
+    status = os.fstat(descriptor)
+    private = os.name != "posix" or (
+        status.st_uid in (0, os.geteuid()) and not status.st_mode & _WRITABLE_BY_OTHERS
+    )
+    if not stat.S_ISREG(status.st_mode) or not private:
         os.close(descriptor)
-        raise ValueError(f"{path} is no file of this user alone")
+        raise ValueError(f"{path} is not a private file of this user")
     return io.FileIO(descriptor)
 
 
-def _steps(path: Path) -> Iterator[Path]:
-    """Each folder and link on the way to a path, and itself."""
-    whole = path.absolute()
-    todo, at, links = list(reversed(whole.parts[1:])), Path(whole.anchor), 0
-    yield at
-    while todo:
-        name = todo.pop()
+def _path_components(path: Path) -> Iterator[Path]:
+    """Yield each folder and symbolic link along a path, and the path itself."""
+    absolute = path.absolute()
+    names, current, links = list(reversed(absolute.parts[1:])), Path(absolute.anchor), 0
+    yield current
+    while names:
+        name = names.pop()
         if name == "..":
-            at = at.parent
+            current = current.parent
             continue
-        yield (at := at / name)
-        if at.is_symlink():
+        yield (current := current / name)
+        if current.is_symlink():
             links += 1
-            if links > _MOST_LINKS:
+            if links > _MAX_LINKS:
                 raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
-            target = at.readlink()
-            todo += reversed(target.parts[1:] if target.anchor else target.parts)
-            at = Path(target.anchor) if target.anchor else at.parent
+            target = current.readlink()
+            names += reversed(target.parts[1:] if target.anchor else target.parts)
+            current = Path(target.anchor) if target.anchor else current.parent
 
 
-def _is_shared(told: os.stat_result) -> bool:
-    """Whether somebody else can write there; a group that holds its user alone is nobody else."""
+def _is_shared(status: os.stat_result) -> bool:
+    """Return whether other users have write access; a group with this user alone does not count."""
     import grp
     import pwd
 
-    if told.st_mode & stat.S_IWOTH:
+    if status.st_mode & stat.S_IWOTH:
         return True
-    if not told.st_mode & stat.S_IWGRP:
+    if not status.st_mode & stat.S_IWGRP:
         return False
     try:
-        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(told.st_gid)
+        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(status.st_gid)
     except KeyError:
         return True
     return (

@@ -1,4 +1,4 @@
-"""What takes long before the first picture, told to whoever listens to the logger "dermis"."""
+"""Log messages about slow preparation steps, on the logger "dermis"."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ LOGGER = logging.getLogger("dermis")
 
 
 @contextmanager
-def preparing(what: str) -> Iterator[None]:
-    """Around what may take seconds: INFO when it begins, DEBUG with the time when it ends.
+def logged_step(step: str) -> Iterator[None]:
+    """Log the start of a slow step with level INFO and its duration with level DEBUG.
 
-    what : is done, as "fitting the eyes"
+    step : description, such as "fitting the eyes"
     """
-    began = time.perf_counter()
-    LOGGER.info(what)
+    start = time.perf_counter()
+    LOGGER.info(step)
     try:
         yield
     finally:
-        LOGGER.debug("%s: %.2f s", what, time.perf_counter() - began)
+        LOGGER.debug("%s: %.2f s", step, time.perf_counter() - start)

@@ -1,47 +1,51 @@
-"""Numbers that callers and files give: finite, within what can be, and Python's own."""
+"""Checks of numbers from callers and files: finite, within a range, and converted to Python types."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from dermis.base.errors import refuse, shown_value
+from dermis.base.errors import format_value, refuse
 
-if TYPE_CHECKING:  # loading it takes longer than all of --help
+if TYPE_CHECKING:  # importing NumPy takes longer than printing --help
     import numpy as np
     from numpy.typing import NDArray
 
 
-def number(culprit: object, value: object, low: float, high: float, why: str = "") -> float:
-    """The value as a float, from `low` to `high`.
+def checked_number(culprit: object, value: object, low: float, high: float, reason: str = "") -> float:
+    """Return a value as a float after checking that it lies in a range.
 
-    culprit : named in messages
-    why : the reason of the bounds
+    culprit : named in error messages
+    low, high : limits, both included
+    reason : why these are the limits, or the unit
 
-    DermisError : it is text, a truth value, an array, not finite, or out of the range
+    Raises DermisError for text, booleans, arrays, NaN, infinity and numbers outside the range.
     """
-    found = _within(value, low, high)
+    found = _number_in_range(value, low, high)
     if found is None:
-        _refuse_number(culprit, "a number", value, low, high, why)
+        _refuse_number(culprit, "a number", value, low, high, reason)
     return float(found)
 
 
-def whole_number(culprit: object, value: object, low: float, high: float, why: str = "") -> int:
-    """As `number`, for counts and seeds; 4.0 is 4."""
-    found = _within(value, low, high)
+def checked_integer(culprit: object, value: object, low: float, high: float, reason: str = "") -> int:
+    """Return a value as an int after checking that it is a whole number in a range; 4.0 becomes 4.
+
+    Parameters and errors as in `checked_number`.
+    """
+    found = _number_in_range(value, low, high)
     if found is None or found != int(found):
-        _refuse_number(culprit, "a whole number", value, low, high, why)
+        _refuse_number(culprit, "a whole number", value, low, high, reason)
     return int(found)
 
 
-def numbers(
-    culprit: object, values: object, shape: tuple[int, ...], low: float, high: float, why: str = ""
+def checked_array(
+    culprit: object, values: object, shape: tuple[int, ...], low: float, high: float, reason: str = ""
 ) -> NDArray[np.float64]:
-    """The values as an array of a shape, each from `low` to `high`.
+    """Return values as a float64 array after checking its shape and the range of all elements.
 
-    shape : with 0 for a side of any length
+    shape : expected shape, with 0 for an axis of any length
 
-    DermisError : they have another shape, or one is no such number
+    Raises DermisError for another shape, and when an element is not a number in the range.
     """
     import numpy as np
 
@@ -55,25 +59,25 @@ def numbers(
         fits = False
     if not fits:
         form = " x ".join(str(side or "n") for side in shape)
-        expected = f"{form} numbers from {low:.10g} to {high:.10g}{f' ({why})' if why else ''}"
-        refuse(culprit, expected, f"{shown_value(values)} came", "Correct it")
+        expected = f"{form} numbers from {low:.10g} to {high:.10g}{f' ({reason})' if reason else ''}"
+        refuse(culprit, expected, f"got {format_value(values)}", "Correct it")
     return found
 
 
-def check_numbers(owner: object, ranges: Mapping[str, tuple[float, float]], prefix: str = "") -> None:
-    """Refuse fields of an object that are not within their ranges; those with whole bounds are whole.
+def check_fields(owner: object, ranges: Mapping[str, tuple[float, float]], prefix: str = "") -> None:
+    """Check that attributes of an object lie in their ranges; ranges of ints require whole numbers.
 
-    DermisError : as `number`
+    Raises DermisError as `checked_number` does.
     """
     for name, (low, high) in ranges.items():
-        check = whole_number if isinstance(low, int) and isinstance(high, int) else number
+        check = checked_integer if isinstance(low, int) and isinstance(high, int) else checked_number
         check(f"{prefix}{name}", getattr(owner, name), low, high)
 
 
-def _within(value: object, low: float, high: float) -> int | float | None:
-    """The value as Python's number; None for what is none, or not in the range."""
+def _number_in_range(value: object, low: float, high: float) -> int | float | None:
+    """Return a value as a Python number, or None if it is not a number in the range."""
     found: Any = value
-    if type(value) not in (int, float):  # numbers of a default need no NumPy
+    if type(value) not in (int, float):  # plain numbers need no NumPy
         import numpy as np
 
         found = value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
@@ -81,21 +85,23 @@ def _within(value: object, low: float, high: float) -> int | float | None:
     return found if is_number and low <= found <= high else None
 
 
-def _has_text(values: Any, sides: int) -> bool:
-    """Whether texts or truth values are among the values, which NumPy would read as numbers.
+def _has_text(values: Any, dimensions: int) -> bool:
+    """Return whether values contain text or booleans, which NumPy would convert to numbers.
 
-    sides : of the array that they should be; deeper lists count as text
+    dimensions : of the expected array; lists nested more deeply count as text
     """
     import numpy as np
 
-    if sides and isinstance(values, list | tuple):
-        return any(_has_text(one, sides - 1) for one in values)
+    if dimensions and isinstance(values, list | tuple):
+        return any(_has_text(value, dimensions - 1) for value in values)
     return isinstance(values, list | tuple | str | bytes | bool | np.bool_) or (
         isinstance(values, np.ndarray) and values.dtype.kind not in "iuf"
     )
 
 
-def _refuse_number(culprit: object, kind: str, value: object, low: float, high: float, why: str) -> NoReturn:
-    reason = f" ({why})" if why else ""
-    expected = f"{kind} from {low:.10g} to {high:.10g}{reason}"
-    refuse(culprit, expected, f"{shown_value(value)} came", "Choose within")
+def _refuse_number(
+    culprit: object, kind: str, value: object, low: float, high: float, reason: str
+) -> NoReturn:
+    suffix = f" ({reason})" if reason else ""
+    expected = f"{kind} from {low:.10g} to {high:.10g}{suffix}"
+    refuse(culprit, expected, f"got {format_value(value)}", "Choose one in this range")

@@ -1,7 +1,7 @@
-"""The one door for bytes that others wrote: files that a user names, and files that those name in turn.
+"""Safe reading of files from users, and of files that these refer to.
 
-Only regular files are opened, no more is read than the kind may have, and what a parser says of text that it
-cannot take becomes a sentence that names the file.
+Only regular files are opened, their size is limited, and errors of parsers become messages that name the
+file.
 """
 
 from __future__ import annotations
@@ -18,118 +18,124 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
-from dermis.base.errors import DermisError, refuse
+from dermis.base.errors import DermisError, error_text, refuse
 
-BROKEN = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
-"""What code raises that trusts the form of what it is given, see `understood`."""
-MOST_TEXT = 1 << 20  # bytes of settings: scenes, lights, tables
+MALFORMED_DATA_ERRORS = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
+"""Exceptions raised by code that assumes well-formed data; pass them to `parsing`."""
+MAX_TEXT_BYTES = 1 << 20  # of settings: scenes, lights, tables
 _PAGE = 1 << 16
-_MOST_BITS = 64  # of a whole number, as in TOML; any of them is a float as well
-_DEEPEST = 32  # parts of a key with dots: the parser's time grows with their square
-_DEEP = re.compile(
+_MAX_BITS = 64  # of an integer, as in TOML; each can be converted to a float
+_MAX_KEY_PARTS = 32  # parts of a dotted key: parsing time grows with the square of their number
+_LONG_KEY = re.compile(
     r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
-    f"{{{_DEEPEST}}}"
+    f"{{{_MAX_KEY_PARTS}}}"
 )
 _NONBLOCKING = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
-def read_file(path: str | Path, expected: str, most: int, name: object = None) -> bytes:
-    """All bytes of a regular file.
+def read_file(path: str | Path, expected: str, max_bytes: int, name: object = None) -> bytes:
+    """Return the bytes of a regular file.
 
-    expected : what it should be, for messages
-    most : bytes that such a file may have
-    name : what messages call it, the path where None
-    DermisError : it is missing, no regular file, larger, or cannot be read
+    expected : what the file should be, for error messages
+    max_bytes : largest accepted size
+    name : of the file in error messages; by default its path
+
+    Raises DermisError when the file is missing, not regular, too large or unreadable.
     """
     culprit = path if name is None else name
     try:
         with os.fdopen(_open_regular(path, culprit, expected), "rb") as file:
-            told = os.fstat(file.fileno()).st_size
-            most_now = min(most, max(told, _PAGE))  # a file of the system tells no size
-            data = file.read(most_now + 1) if told <= most else b""
-    except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; what is no name
-        refuse(culprit, expected, f"it cannot be read ({_reason_of(fault)})", "Check its name")
+            size = os.fstat(file.fileno()).st_size
+            limit = min(max_bytes, max(size, _PAGE))  # system files such as /proc report a size of 0
+            data = file.read(limit + 1) if size <= max_bytes else b""
+    except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; not a name
+        refuse(culprit, expected, f"it cannot be read ({error_text(fault)})", "Check its name")
     if data is None:
         refuse(culprit, expected, "nothing can be read from it", "Copy its contents to a file first")
-    if told > most or len(data) > most_now:
-        came = f"it has {_megabytes(told)}" if told > most else "it grows while it is read"
-        refuse(culprit, f"{expected} of at most {_megabytes(most)}", came, "Check its name or its size")
+    if size > max_bytes or len(data) > limit:
+        actual = f"it has {_megabytes(size)}" if size > max_bytes else "it grows while it is read"
+        refuse(
+            culprit, f"{expected} of at most {_megabytes(max_bytes)}", actual, "Check its name or its size"
+        )
     return data
 
 
 @contextmanager
-def opened(path: str | Path, expected: str) -> Iterator[BinaryIO]:
-    """A regular file of any size, of which the caller takes no more at a time than it checked.
+def open_regular_file(path: str | Path, expected: str) -> Iterator[BinaryIO]:
+    """Open a regular file of any size; the caller limits how much it reads at a time.
 
-    expected : what it should be, for messages
-    DermisError : it is missing, no regular file, or cannot be read
+    expected : what the file should be, for error messages
+
+    Raises DermisError when the file is missing, not regular or unreadable.
     """
     try:
         descriptor = _open_regular(path, path, expected)
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
-        refuse(path, expected, f"it cannot be read ({_reason_of(fault)})", "Check its name")
+        refuse(path, expected, f"it cannot be read ({error_text(fault)})", "Check its name")
     try:
         with os.fdopen(descriptor, "rb") as file:
             yield file
     except OSError as fault:
-        refuse(path, expected, f"it cannot be read ({_reason_of(fault)})", "Check the disk")
+        refuse(path, expected, f"it cannot be read ({error_text(fault)})", "Check the disk")
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether a regular file of this name is there; none is of a name that no file can have."""
+    """Return whether a regular file exists; False for names that no file can have."""
     try:
         return Path(path).is_file()
     except (OSError, ValueError):  # too long, or with a NUL
         return False
 
 
-def read_text(path: str | Path, expected: str, most: int = MOST_TEXT) -> str:
-    """A file's text, UTF-8 with or without a mark of its order.
+def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) -> str:
+    """Return the text of a UTF-8 file with or without a byte order mark.
 
-    DermisError : as for `read_file`, or it is not text
+    Raises DermisError as `read_file` does, and for files that are not text.
     """
-    with understood(path, expected):
-        return read_file(path, expected, most).decode("utf-8-sig")
+    with parsing(path, expected):
+        return read_file(path, expected, max_bytes).decode("utf-8-sig")
 
 
 def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]:
-    """A TOML file's tables.
+    """Return the tables of a TOML file.
 
-    DermisError : as for `read_text`, or it is not TOML
+    Raises DermisError as `read_text` does, and for invalid TOML.
     """
     text = read_text(path, expected)
-    with understood(path, expected):
-        if _DEEP.search(text):
-            raise ValueError(f"a key has more than {_DEEPEST} parts with dots between them")
+    with parsing(path, expected):
+        if _LONG_KEY.search(text):
+            raise ValueError(f"a key has more than {_MAX_KEY_PARTS} parts with dots between them")
         tables = tomllib.loads(text)
-        _check_whole_numbers(tables)
+        _check_integers(tables)
     return tables
 
 
 def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
-    """What a JSON text says; all its numbers are finite.
+    """Return the value of a JSON text in which all numbers are finite.
 
-    DermisError : it is not JSON, nested too deeply, or holds a number beyond floats
+    Raises DermisError for invalid JSON, deep nesting, and numbers that are too large.
     """
-    with understood(culprit, expected):
-        return json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_whole)
+    with parsing(culprit, expected):
+        return json.loads(
+            text, parse_constant=_refuse_constant, parse_float=_finite_float, parse_int=_bounded_int
+        )
 
 
-def named_path(name: object, expected: str) -> Path:
-    """The path of a name.
+def checked_path(name: object, expected: str) -> Path:
+    """Return a name as a path.
 
-    DermisError : it is neither a text nor a path
+    Raises DermisError when it is neither text nor a path.
     """
     if not isinstance(name, str | os.PathLike):
-        refuse("file", f"the name of {expected}", f"a {type(name).__name__} came", "Write its name")
+        refuse("file", f"the name of {expected}", f"got a {type(name).__name__}", "Pass its name")
     return Path(name)
 
 
 @contextmanager
-def understood(culprit: object, expected: str, *more: type[Exception]) -> Iterator[None]:
-    """Refuse the file where a parser inside gives up.
+def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
+    """Convert errors of a parser into a DermisError that names the file.
 
-    more : errors that it raises besides the usual ones
+    errors : exception types that the parser raises besides ValueError and OverflowError
     """
     try:
         yield
@@ -138,53 +144,49 @@ def understood(culprit: object, expected: str, *more: type[Exception]) -> Iterat
     except RecursionError:
         refuse(culprit, expected, "it is nested too deeply", "Export it again, or correct it")
     except MemoryError:
-        refuse(culprit, expected, "it asks for more memory than there is", "Make it smaller")
+        refuse(culprit, expected, "it needs more memory than there is", "Make it smaller")
     except Exception as fault:
-        if not isinstance(fault, (ValueError, OverflowError, *more)):
+        if not isinstance(fault, (ValueError, OverflowError, *errors)):
             raise
-        refuse(culprit, expected, f"it cannot be understood ({_reason(fault)})", "Check its contents")
+        refuse(culprit, expected, f"it cannot be understood ({_short_error(fault)})", "Check its contents")
 
 
 def _open_regular(path: str | Path, culprit: object, expected: str) -> int:
-    """A descriptor of the file; a pipe or a device is never waited for."""
+    """Return a file descriptor of a regular file without blocking on pipes or devices."""
     descriptor = os.open(path, os.O_RDONLY | _NONBLOCKING)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        refuse(culprit, expected, "it is no regular file", "Copy its contents to a file first")
+        refuse(culprit, expected, "it is not a regular file", "Copy its contents to a file first")
     return descriptor
 
 
-def _reason_of(fault: Exception) -> str:
-    return getattr(fault, "strerror", None) or str(fault)
-
-
-def _finite(text: str) -> float:
+def _finite_float(text: str) -> float:
     number = float(text)
     if not math.isfinite(number):
-        raise ValueError(f"{text[:20]} is beyond what a number may be")
+        raise ValueError(f"{text[:20]} is too large for a number")
     return number
 
 
-def _whole(text: str) -> int:
+def _bounded_int(text: str) -> int:
     number = int(text)
-    if number.bit_length() > _MOST_BITS:
-        raise ValueError(f"{text[:20]}... is beyond what a whole number may be")
+    if number.bit_length() > _MAX_BITS:
+        raise ValueError(f"{text[:20]}... is too large for a whole number")
     return number
 
 
-def _check_whole_numbers(tables: dict[str, Any]) -> None:
-    waiting: list[Any] = [tables]
-    while waiting:
-        value = waiting.pop()
+def _check_integers(tables: dict[str, Any]) -> None:
+    pending: list[Any] = [tables]
+    while pending:
+        value = pending.pop()
         if isinstance(value, dict):
-            waiting.extend(value.values())
+            pending.extend(value.values())
         elif isinstance(value, list):
-            waiting.extend(value)
-        elif isinstance(value, int) and value.bit_length() > _MOST_BITS:
-            raise ValueError(f"a whole number has {value.bit_length()} bits, more than {_MOST_BITS}")
+            pending.extend(value)
+        elif isinstance(value, int) and value.bit_length() > _MAX_BITS:
+            raise ValueError(f"a whole number has {value.bit_length()} bits, more than {_MAX_BITS}")
 
 
-def _no_number(text: str) -> NoReturn:
+def _refuse_constant(text: str) -> NoReturn:
     raise ValueError(f"{text} is not a number")
 
 
@@ -192,8 +194,8 @@ def _megabytes(size: int) -> str:
     return f"{size / 1e6:,.1f} MB" if size >= 1e5 else f"{size:,} bytes"
 
 
-def _reason(fault: BaseException) -> str:
-    """What a fault says, short enough for one line."""
+def _short_error(fault: BaseException) -> str:
+    """Return an error's text shortened to one line."""
     text = " ".join(str(fault)[:1000].split())
     text = text if text and isinstance(fault, ValueError) else f"{type(fault).__name__}: {text}"
     return text if len(text) <= 200 else f"{text[:197]}..."

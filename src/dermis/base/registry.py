@@ -1,4 +1,4 @@
-"""Things that can be chosen by name: techniques, lights, lobes."""
+"""Registries: objects that users choose by name, such as techniques, lights and lobes."""
 
 from __future__ import annotations
 
@@ -13,36 +13,59 @@ T = TypeVar("T")
 
 
 class Registry(Mapping[str, T], Generic[T]):
-    """Entries of one kind by name, in the order in which they were registered.
+    """Mapping from names to objects of one kind, in the order of registration.
 
-    An entry is the object itself, or "module:attribute" for one that is imported on first use.
+    An entry is the object itself, or "module:attribute", which is imported on first use.
 
-    changes : how often entries have been added or taken away
+    Parameters
+    ----------
+    kind : str
+        What an entry is, for error messages, such as "technique".
+    entries : Mapping of str to object or str, optional
+        First entries by name.
+    advice : str, optional
+        What to do about a name that is not registered, for error messages.
+
+    Attributes
+    ----------
+    changes : int
+        Number of entries added or removed since the registry was created.
+
+    Examples
+    --------
+    >>> shapes = Registry("shape", {"square": 4})
+    >>> shapes.register("triangle", 3, "three corners")
+    >>> shapes["triangle"], shapes.names, shapes.summaries()
+    (3, ('square', 'triangle'), ['triangle: three corners'])
     """
 
     def __init__(
         self, kind: str, entries: Mapping[str, T | str] | None = None, advice: str = "Correct it"
     ) -> None:
-        """kind : what an entry is, for messages: "technique", say
-
-        advice : what to do about a name that is not registered
-        """
         self.kind, self.advice = kind, advice
         self.changes = 0
         self._entries: dict[str, T | str] = dict(entries or {})
         self._summaries: dict[str, str] = {}
 
     def register(self, name: str, entry: T | str, summary: str = "") -> None:
-        """Add an entry, from inside the package or outside of it.
+        """Add an entry; packages outside this one may do so as well.
 
-        summary : what the name stands for, in a few words for the help texts
+        Parameters
+        ----------
+        name : str
+            Name that users write.
+        entry : object or str
+            The object, or "module:attribute".
+        summary : str, optional
+            Description in a few words, for help texts.
 
-        Raises DermisError when the name is taken.
+        Raises
+        ------
+        DermisError
+            The name is already registered.
         """
         if name in self._entries:
-            refuse(
-                f"{self.kind} {name}", "a name of its own", "it is registered already", "Choose another name"
-            )
+            refuse(f"{self.kind} {name}", "an unused name", "it is already registered", "Choose another name")
         self._entries[name] = entry
         self.changes += 1
         if summary:
@@ -50,7 +73,7 @@ class Registry(Mapping[str, T], Generic[T]):
 
     @contextmanager
     def including(self, name: str, entry: T | str) -> Iterator[None]:
-        """While it lasts, an entry more."""
+        """Add an entry for the duration of a with block."""
         self.register(name, entry)
         try:
             yield
@@ -58,62 +81,73 @@ class Registry(Mapping[str, T], Generic[T]):
             self.remove(name)
 
     def remove(self, name: str) -> None:
-        """Take an entry out again; nothing happens when it is not there."""
+        """Remove an entry if it is registered."""
         self._entries.pop(name, None)
         self._summaries.pop(name, None)
         self.changes += 1
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all entries."""
+        """Return the names of all entries."""
         return tuple(self._entries)
 
     def summaries(self) -> list[str]:
-        """What each name stands for, of those that say so: "name: summary"."""
+        """Return "name: summary" of each entry that has a summary."""
         return [f"{name}: {summary}" for name, summary in self._summaries.items()]
 
     def __getitem__(self, name: str) -> T:
-        """Raises DermisError for a name that is not registered."""
+        """Return an entry, importing it if necessary.
+
+        Raises DermisError for a name that is not registered.
+        """
         entry = self._entries.get(name)
         if entry is None:
-            refuse(self.kind, f"one of {', '.join(self._entries)}", f"{name!r} came", self.advice)
+            refuse(self.kind, f"one of {', '.join(self._entries)}", f"got {name!r}", self.advice)
         if isinstance(entry, str):
             module, _, attribute = entry.partition(":")
             entry = self._entries[name] = cast(T, getattr(import_module(module), attribute))
         return entry
 
     def __contains__(self, name: object) -> bool:
+        """Return whether a name is registered, without importing its entry."""
         return name in self._entries
 
     def __iter__(self) -> Iterator[str]:
+        """Return an iterator over the names."""
         return iter(self._entries)
 
     def __len__(self) -> int:
+        """Return the number of entries."""
         return len(self._entries)
 
 
-class Named:
-    """For pydantic: `Annotated[str, Named(REGISTRY)]` is a name that is registered when it is checked."""
+class RegisteredName:
+    """Pydantic annotation: `Annotated[str, RegisteredName(REGISTRY)]` accepts registered names only.
 
-    def __init__(self, registry: Registry[Any], *others: str) -> None:
-        """others : words that the value may be besides, "none", say"""
-        self.registry, self.others = registry, others
+    Parameters
+    ----------
+    registry : Registry
+        Registry of the accepted names, as it is when a value is checked.
+    *words : str
+        Further accepted words, such as "none".
+    """
+
+    def __init__(self, registry: Registry[Any], *words: str) -> None:
+        self.registry, self.words = registry, words
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All that the value may be."""
-        return (*self.registry, *self.others)
+        """Return all accepted names."""
+        return (*self.registry, *self.words)
 
     def check(self, name: str) -> str:
-        """The name itself.
-
-        Raises ValueError for one that is neither registered nor one of the others, worded as expected.
-        """
+        """Return the name if it is accepted, else raise ValueError."""
         if name not in self.names:
             raise ValueError(f"one of {', '.join(self.names)}")
         return name
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Return the schema of the annotated type, followed by `check`."""
         from pydantic_core.core_schema import no_info_after_validator_function
 
         return no_info_after_validator_function(self.check, handler(source))

@@ -1,4 +1,4 @@
-"""Names of earlier releases, which work for one release more and warn.
+"""Names of earlier releases, which work with a warning for one more release.
 
 To rename a public name or a module, add it to `NAMES` or `MODULES`; remove the entry one release later.
 """
@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
 from importlib import import_module
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 NAMES: Mapping[str, str] = {
     "profile": "side",
@@ -37,11 +38,14 @@ MODULES: Mapping[str, str] = {
 }
 """Old to new paths of modules and packages, both without the package's name."""
 
+P = ParamSpec("P")
+R = TypeVar("R")
 _PACKAGE = __name__.partition(".")[0]
+_REMOVAL = "the old name will be removed in the next release"
 
 
 def successor(module: str, name: str) -> str | None:
-    """Return the new name of an object of a module, after a DeprecationWarning; None for all other names."""
+    """Return the new name of a renamed object after a DeprecationWarning, or None for other names."""
     old = f"{module}.{name}".removeprefix(f"{_PACKAGE}.")
     if old not in NAMES:
         return None
@@ -49,32 +53,53 @@ def successor(module: str, name: str) -> str | None:
     return NAMES[old].rpartition(".")[2]
 
 
+def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Return a decorator for functions that accept old names of keyword arguments with a warning.
+
+    new_names : new names by old names
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        @wraps(function)
+        def with_new_names(*args: P.args, **kwargs: P.kwargs) -> R:
+            for old, new in new_names.items():
+                if old in kwargs:
+                    text = f"{function.__qualname__}: {old} is now {new}"
+                    warnings.warn(f"{text}; {_REMOVAL}", DeprecationWarning, stacklevel=2)
+                    kwargs[new] = kwargs.pop(old)
+            return function(*args, **kwargs)
+
+        return with_new_names
+
+    return decorate
+
+
 def find_renamed_modules() -> None:
-    """Let the import system find modules by their old paths."""
+    """Install an import hook that finds modules by their old paths."""
     sys.meta_path.insert(0, _Finder())
 
 
 class _Finder:
-    """Import of a module by its old path: the module of the new path, under both names."""
+    """Import hook that imports the new module and registers it under both paths."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        return ModuleSpec(fullname, cast(Any, self)) if _moved(fullname) else None
+        return ModuleSpec(fullname, cast(Any, self)) if _new_path(fullname) else None
 
     def create_module(self, spec: ModuleSpec) -> None:
-        """Leave it to the import system, whose module `exec_module` replaces."""
+        """Leave the creation of the module to the import system; `exec_module` replaces it."""
 
     def exec_module(self, module: ModuleType) -> None:
         old = module.__name__
-        new = _moved(old)
+        new = _new_path(old)
         assert new is not None
         sys.modules[old] = import_module(f"{_PACKAGE}.{new}")
         _warn(old.removeprefix(f"{_PACKAGE}."), new, stacklevel=3)
 
 
-def _moved(fullname: str) -> str | None:
-    """Return the new path of a module, without the package's name; None for one that is where it was."""
+def _new_path(fullname: str) -> str | None:
+    """Return the new path of a renamed module without the package's name, or None for other modules."""
     package, _, path = fullname.partition(".")
     if package != _PACKAGE:
         return None
@@ -85,5 +110,5 @@ def _moved(fullname: str) -> str | None:
 
 
 def _warn(old: str, new: str, stacklevel: int) -> None:
-    text = f"{_PACKAGE}.{old} is now {_PACKAGE}.{new}; the old name goes with the next release"
-    warnings.warn(text, DeprecationWarning, stacklevel)
+    text = f"{_PACKAGE}.{old} is now {_PACKAGE}.{new}"
+    warnings.warn(f"{text}; {_REMOVAL}", DeprecationWarning, stacklevel)

@@ -1,35 +1,36 @@
-"""What data of many numbers print as: a line, in which arrays are told by kind and shape."""
+"""Short representations of objects that hold large arrays."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import fields
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-_MOST = 6  # of a collection that are written out
-_LONGEST = 60  # letters of a value
+_MAX_ITEMS = 6  # of a collection that is written out
+_MAX_LENGTH = 60  # characters of a value
 
 
-class Summarised:
-    """For dataclasses with `repr=False`: their fields, but no megabytes."""
+class ShortRepr:
+    """Mixin for dataclasses with `repr=False` whose repr shows types and shapes instead of large arrays."""
 
     def __repr__(self) -> str:
-        told: Any = self
-        parts = [f"{one.name}={summary(getattr(self, one.name))}" for one in fields(told) if one.repr]
+        """Return the class name and its fields by `short_repr`."""
+        own_fields = fields(cast(Any, self))
+        parts = [f"{one.name}={short_repr(getattr(self, one.name))}" for one in own_fields if one.repr]
         return f"{type(self).__name__}({', '.join(parts)})"
 
 
-def summary(value: object) -> str:
-    """A value as it prints if that is short; arrays, collections and others by what they are."""
+def short_repr(value: object) -> str:
+    """Return the repr of a value if it is short, else its type with its shape or length."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{list(value.shape)}"
-    if isinstance(value, Collection) and (len(value) > _MOST or not _is_short(value)):
+    if isinstance(value, Collection) and (len(value) > _MAX_ITEMS or not _is_short(value)):
         return value.__repr__() if isinstance(value, str) else f"<{len(value):,} in a {type(value).__name__}>"
     text = repr(value)
-    return text if len(text) <= _LONGEST else f"<{type(value).__name__}>"
+    return text if len(text) <= _MAX_LENGTH else f"<{type(value).__name__}>"
 
 
 def _is_short(value: Collection[Any]) -> bool:
-    return not any(isinstance(one, np.ndarray) for one in value) and len(repr(value)) <= _LONGEST
+    return not any(isinstance(one, np.ndarray) for one in value) and len(repr(value)) <= _MAX_LENGTH

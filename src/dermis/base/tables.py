@@ -1,4 +1,4 @@
-"""Tables that the package ships: CSV with a header in comments (quantity, unit, source, licence)."""
+"""CSV tables of the package, with comments above the header: quantity, unit, source and licence."""
 
 from __future__ import annotations
 
@@ -13,15 +13,18 @@ Rows = list[dict[str, str]]
 
 
 def read_rows(package: str, name: str) -> Rows:
-    """The rows of a package's table `name`.csv."""
+    """Return the rows of a package's table `name`.csv as dictionaries by column name."""
     return parse_rows(resources.files(package).joinpath(f"{name}.csv").read_text("utf-8"))
 
 
 def parse_rows(text: str) -> Rows:
-    """The rows of a table by the names of their columns, without the comments after #."""
+    """Return the rows of a CSV text as dictionaries by column name, without lines that start with #."""
     return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
 
 
-def numbers(rows: Sequence[Mapping[str, str]], columns: str) -> NDArray[np.float64]:
-    """(rows, columns) numbers of the columns named, with spaces between the names."""
+def float_columns(rows: Sequence[Mapping[str, str]], columns: str) -> NDArray[np.float64]:
+    """Return columns of a table as floats, (rows, columns).
+
+    columns : names of the columns, separated by spaces
+    """
     return np.array([[float(row[name]) for name in columns.split()] for row in rows])

@@ -54,7 +54,7 @@ def bench(
     from dermis.apps.validation.benchmarks.cases import PRESETS
     from dermis.apps.validation.benchmarks.report import as_json as to_json
     from dermis.apps.validation.benchmarks.report import write_report
-    from dermis.apps.validation.benchmarks.run import run
+    from dermis.apps.validation.benchmarks.run import run_benchmark
     from dermis.base.atomic_write import check_output
     from dermis.base.extras import import_extra
     from dermis.formats.samples import is_available
@@ -71,7 +71,7 @@ def bench(
     is_software = select_adapters(adapter)[0][0].kind == "CPU"
     cases = PRESETS[preset or ("cpu" if is_software else "interactive")].cases()
     with progress_bar("measuring") as report_progress:
-        benchmark = run(cases, name, adapter, report_progress, file)
+        benchmark = run_benchmark(cases, name, adapter, report_progress, file)
     print_report(as_json, to_json(benchmark), lambda: _report_lines(benchmark))
     if output is not None:  # last: the figures are printed even if the report cannot be written
         write_report(output, benchmark)
@@ -82,7 +82,7 @@ def _report_lines(benchmark: Benchmark) -> list[str]:
     from dermis.apps.validation.benchmarks.report import (
         COLUMNS,
         cells,
-        left_out_lines,
+        skipped_lines,
         published_text,
         stage_table,
         summary,
@@ -94,7 +94,7 @@ def _report_lines(benchmark: Benchmark) -> list[str]:
     )
     usual_lines = ["", "the default frame:", *stages] if stages else []
     published_lines = ["", text] if (text := published_text(benchmark)) else []
-    return [summary(benchmark), "", *rows, *left_out_lines(benchmark), *usual_lines, *published_lines]
+    return [summary(benchmark), "", *rows, *skipped_lines(benchmark), *usual_lines, *published_lines]
 
 
 def _align_columns(table: Sequence[tuple[str, ...]]) -> list[str]:

@@ -140,7 +140,7 @@ def _refuse_unused_options(subject: str, options: Options) -> None:
 
 def _comparison_arguments(options: Options, sizes: Options) -> Options:
     """Return the keyword arguments of `dermis.apps.validation.comparisons.compare`."""
-    from dermis.apps.validation.comparisons.scenes import usual_region
+    from dermis.apps.validation.comparisons.scenes import default_region
 
     names = [name.strip() for name in options.get("techniques", ",".join(TECHNIQUES)).split(",")]
     size_settings = {**_SIZES, **sizes}
@@ -151,7 +151,7 @@ def _comparison_arguments(options: Options, sizes: Options) -> Options:
         "against": options.get("against", "surface-integral"),
         "techniques": names,
         "light": light,
-        "region": options.get("region", usual_region(light)),
+        "region": options.get("region", default_region(light)),
         "medium": options.get("medium", "skin1"),
         "direction": options.get("direction"),
         "model": options.get("model"),
@@ -170,7 +170,7 @@ def _compare_techniques(
     from dermis.scene.heads import load_head
 
     check_head(head, shape)
-    comparison.check_choices(*(arguments[option] for option in ("against", "light", "region", "medium")))
+    comparison.check_names(*(arguments[option] for option in ("against", "light", "region", "medium")))
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
     with spinner("comparing"):

@@ -209,7 +209,7 @@ class AnimationOutput:
         if not self.numbered:
             return numbers
         files = FrameFiles(self.path)
-        files.claim(digest, anew=self.anew)
+        files.start(digest, anew=self.anew)
         return files.missing(numbers, size)
 
     @contextmanager

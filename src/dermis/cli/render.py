@@ -18,7 +18,7 @@ from dermis.scene.techniques import TECHNIQUES
 
 if TYPE_CHECKING:
     from dermis.frame.features.outputs.planes import PlaneArray
-    from dermis.frame.rendered import RenderedFrame
+    from dermis.frame.rendered_frame import RenderedFrame
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
 

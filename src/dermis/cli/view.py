@@ -83,7 +83,15 @@ def view(
 
     window = scene.settings.get("size", _WINDOW)
     if browser:
-        serve(load, adapter, window, host or _HOST, _PORT if port is None else port, _print_url, secret=token)
+        serve(
+            load,
+            adapter,
+            window,
+            host or _HOST,
+            _PORT if port is None else port,
+            _print_url,
+            require_token=token,
+        )
     else:
         with spinner("loading"):
             state, motion_clip = load()
@@ -93,7 +101,7 @@ def view(
 
 def _initial_state(name: str, options: SceneOptions, adapter: str) -> ViewerState:
     """Return the viewer state described by the options."""
-    from dermis.apps.viewer.state import opened
+    from dermis.apps.viewer.state import initial_state
     from dermis.gpu.adapters import select_adapters
     from dermis.scene.files import head_table, with_absolute_paths
 
@@ -103,7 +111,7 @@ def _initial_state(name: str, options: SceneOptions, adapter: str) -> ViewerStat
         settings = settings.model_copy(update={"atlas": _ATLAS_ON_CPU})
     table = head_table(Path(name)) if is_scene else with_absolute_paths({"name": name} | options.head, Path())
     rig = "" if is_scene else "none" if "name" in options.environment else "studio"
-    return opened(scene, settings, table, rig if options.lights is None else options.lights)
+    return initial_state(scene, settings, table, rig if options.lights is None else options.lights)
 
 
 def _load_motion(file: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
@@ -113,7 +121,7 @@ def _load_motion(file: str | None, fps: float | None, state: ViewerState) -> Mot
     from dermis.apps.viewer.player import MotionFile
 
     motion = MotionFile(file, fps)
-    if text := motion.clip(state.scene.head).note:
+    if text := motion.load_clip(state.scene.head).note:
         note(text)
     return motion
 

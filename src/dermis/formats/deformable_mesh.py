@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 
-_LEAST_MM = 1e-3  # a smaller displacement is none
-_LEAST_TURN = 2e-3  # of a normal, a tenth of a degree
-_LEAST = 1e-6  # a share below it is none
-_MOST = 8  # bones among which four are chosen
-_NEAR_MM2 = 1.0  # how much a share is worth that stays as the control points have it
+_MIN_DISPLACEMENT_MM = 1e-3  # a smaller displacement is none
+_MIN_NORMAL_CHANGE = 2e-3  # of a normal, a tenth of a degree
+_MIN_WEIGHT = 1e-6  # a share below it is none
+_MAX_CANDIDATES = 8  # bones among which four are chosen
+_PRIOR_MM2 = 1.0  # how much a share is worth that stays as the control points have it
 
 
-class Target(NamedTuple):
+class VertexTarget(NamedTuple):
     """Vertices that a morph target moves, by how much at weight 1, and what that adds to their normals.
 
     vertex : (n,)
@@ -44,7 +44,7 @@ class Target(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MovedPoints:
+class DeformableMesh:
     """The vertices of a head's mesh, and what moves them."""
 
     head: Head
@@ -55,7 +55,7 @@ class MovedPoints:
         return self.head.control
 
     @cached_property
-    def finer(self) -> csr_array | None:
+    def refinement(self) -> csr_array | None:
         """(q, p) the points of the mesh as means of control points; None where they are the same."""
         from scipy.sparse import csr_array
 
@@ -73,31 +73,31 @@ class MovedPoints:
             return mesh.positions
         control = np.zeros((len(self.rig.positions_mm), 3))
         for number, weight in enumerate(rest.tolist()):
-            control += weight * self._control_mm(number)
-        return (mesh.positions - self._carried(control)[mesh.point]).astype(np.float32)
+            control += weight * self._control_displacements(number)
+        return (mesh.positions - self._refine(control)[mesh.point]).astype(np.float32)
 
     @cached_property
     def normals(self) -> Floats:
         """(v, 3) normals there."""
-        return self._smooth if self.rig.targets.rest is not None else self.head.mesh.normals
+        return self._smooth_normals if self.rig.targets.rest is not None else self.head.mesh.normals
 
     @cached_property
-    def _smooth(self) -> Floats:
+    def _smooth_normals(self) -> Floats:
         mesh = self.head.mesh
         return vertex_normals(self.positions_mm, mesh.point, mesh.triangles)
 
-    def targets(self) -> Iterator[Target]:
+    def targets(self) -> Iterator[VertexTarget]:
         """Each of the morph targets."""
         mesh = self.head.mesh
         for number in range(len(self.rig.targets.names)):
-            delta = self._carried(self._control_mm(number))
-            delta[np.abs(delta).max(axis=1) < _LEAST_MM] = 0.0
+            delta = self._refine(self._control_displacements(number))
+            delta[np.abs(delta).max(axis=1) < _MIN_DISPLACEMENT_MM] = 0.0
             moved = delta[mesh.point].astype(np.float32)
-            turned = self._turned(moved)
+            turned = self._normal_changes(moved)
             vertex = np.flatnonzero(moved.any(axis=1) | turned.any(axis=1))
-            yield Target(vertex, moved[vertex], turned[vertex])
+            yield VertexTarget(vertex, moved[vertex], turned[vertex])
 
-    def _turned(self, moved: Floats) -> Floats:
+    def _normal_changes(self, moved: Floats) -> Floats:
         """(v, 3) what displacements [mm] add to the normals, by the triangles around them."""
         mesh, found = self.head.mesh, np.zeros_like(moved)
         moves = np.asarray(moved.any(axis=1))
@@ -110,28 +110,28 @@ class MovedPoints:
         vertex, corner = np.unique(around, return_inverse=True)
         point = np.unique(mesh.point[vertex], return_inverse=True)[1].astype(np.int32)
         places, triangles = self.positions_mm[vertex] + moved[vertex], corner.reshape(-1, 3).astype(np.int32)
-        found[vertex] = vertex_normals(places, point, triangles) - self._smooth[vertex]
-        found[~touched[mesh.point] | (np.abs(found).max(axis=1) < _LEAST_TURN)] = 0.0
+        found[vertex] = vertex_normals(places, point, triangles) - self._smooth_normals[vertex]
+        found[~touched[mesh.point] | (np.abs(found).max(axis=1) < _MIN_NORMAL_CHANGE)] = 0.0
         return found
 
     @cached_property
-    def bones(self) -> tuple[Numbers, Floats]:
+    def bone_influences(self) -> tuple[Numbers, Floats]:
         """(v, 4) bones that each vertex follows, and by what share."""
-        bone, share = influences(self.rig, self.finer)
+        bone, share = influences(self.rig, self.refinement)
         kind = np.uint8 if bone.max() < 256 else np.uint16
         point = self.head.mesh.point
         return bone[point].astype(kind), share[point].astype(np.float32)
 
-    def _control_mm(self, target: int) -> Doubles:
+    def _control_displacements(self, target: int) -> Doubles:
         """(p, 3) displacements of the control points."""
         targets, found = self.rig.targets, np.zeros((len(self.rig.positions_mm), 3))
         part = targets.of(target)
         found[targets.point[part]] = targets.delta_mm[part]
         return found
 
-    def _carried(self, control: Doubles) -> Doubles:
+    def _refine(self, control: Doubles) -> Doubles:
         """(q, 3) of the points of the mesh."""
-        return control if self.finer is None else np.asarray(self.finer @ control)
+        return control if self.refinement is None else np.asarray(self.refinement @ control)
 
 
 if TYPE_CHECKING:
@@ -149,9 +149,9 @@ def influences(rig: Rig, finer: csr_array | None) -> tuple[Index, Doubles]:
     """
     skeleton = rig.skeleton
     assert skeleton is not None
-    shares = _shares(skeleton)
+    shares = _bone_weights(skeleton)
     if finer is not None:
-        shares = _fitted(rig.positions_mm.astype(np.float64), skeleton, shares, finer)
+        shares = _fit_weights(rig.positions_mm.astype(np.float64), skeleton, shares, finer)
     bone = np.argsort(-shares, axis=1, kind="stable")[:, :INFLUENCES]
     bone = np.pad(bone, ((0, 0), (0, INFLUENCES - bone.shape[1])))
     weight = np.take_along_axis(shares, bone, axis=1)
@@ -160,7 +160,7 @@ def influences(rig: Rig, finer: csr_array | None) -> tuple[Index, Doubles]:
     return np.where(weight > 0, bone, 0), weight
 
 
-def _shares(skeleton: Skeleton) -> Doubles:
+def _bone_weights(skeleton: Skeleton) -> Doubles:
     """(p, b) of each bone at each control point."""
     count = len(skeleton.bone)
     shares = np.zeros((count, len(skeleton.names)))
@@ -168,11 +168,11 @@ def _shares(skeleton: Skeleton) -> Doubles:
     return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
 
-def _fitted(places_mm: Doubles, skeleton: Skeleton, control: Doubles, finer: csr_array) -> Doubles:
+def _fit_weights(places_mm: Doubles, skeleton: Skeleton, control: Doubles, finer: csr_array) -> Doubles:
     """(q, b) with at most four shares in a row."""
     shares = np.asarray(finer @ control)
-    shares[shares < _LEAST] = 0.0
-    below = _below(skeleton)
+    shares[shares < _MIN_WEIGHT] = 0.0
+    below = _descendants(skeleton)
     kinds, kind = np.unique(shares > 0, axis=0, return_inverse=True)
     order = np.argsort(kind.reshape(-1), kind="stable")
     ends = np.cumsum(np.bincount(kind.reshape(-1), minlength=len(kinds)))
@@ -180,16 +180,18 @@ def _fitted(places_mm: Doubles, skeleton: Skeleton, control: Doubles, finer: csr
         mean = shares[rows]
         bones = np.flatnonzero(used)
         if len(bones) > 1:
-            if len(bones) > _MOST:
-                bones = np.sort(np.argsort(-mean.sum(axis=0), kind="stable")[:_MOST])
-            hessian, slope = _misses(places_mm, skeleton, control @ below.T, finer[rows], below[:, bones])
-            hessian += _NEAR_MM2 * np.eye(len(bones))
+            if len(bones) > _MAX_CANDIDATES:
+                bones = np.sort(np.argsort(-mean.sum(axis=0), kind="stable")[:_MAX_CANDIDATES])
+            hessian, slope = _quadratic_error(
+                places_mm, skeleton, control @ below.T, finer[rows], below[:, bones]
+            )
+            hessian += _PRIOR_MM2 * np.eye(len(bones))
             shares[rows] = 0.0
-            shares[rows[:, None], bones] = _best(hessian, slope + _NEAR_MM2 * mean[:, bones])
+            shares[rows[:, None], bones] = _best_weights(hessian, slope + _PRIOR_MM2 * mean[:, bones])
     return shares
 
 
-def _below(skeleton: Skeleton) -> Doubles:
+def _descendants(skeleton: Skeleton) -> Doubles:
     """(b, b) 1 where the second bone is the first, or below it."""
     below = np.eye(len(skeleton.names))
     for bone, parent in enumerate(skeleton.parent.tolist()):
@@ -198,7 +200,7 @@ def _below(skeleton: Skeleton) -> Doubles:
     return below
 
 
-def _misses(
+def _quadratic_error(
     places_mm: Doubles, skeleton: Skeleton, follow: Doubles, finer: csr_array, below: Doubles
 ) -> tuple[Doubles, Doubles]:
     """How far points miss, as w H w - 2 g w of their shares w [mm2]: H (n, u, u) and g (n, u).
@@ -218,7 +220,7 @@ def _misses(
     return hessian, slope
 
 
-def _best(hessian: Doubles, slope: Doubles) -> Doubles:
+def _best_weights(hessian: Doubles, slope: Doubles) -> Doubles:
     """(n, u) shares of 0 and more, at most four of them not 0, that add up to 1 and miss least."""
     count, bones = slope.shape
     best, found = np.full(count, np.inf), np.zeros(slope.shape)

@@ -8,22 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.formats.parts import Part, default_unit_mm
-from dermis.formats.size_limits import MOST_TRIANGLES, MOST_VERTICES
+from dermis.formats.parts import MeshPart, default_unit_mm
+from dermis.formats.size_limits import MAX_TRIANGLES, MAX_VERTICES
 from dermis.mesh.geometry import edges, triangle_areas
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
 
 UV_TOLERANCE = 1e-4
-FARTHEST_MM = 1e6
+MAX_DISTANCE_MM = 1e6
 """A kilometre: beyond it single precision is too coarse for skin, and the mesh is hardly a head."""
-HEAD_MM = (100.0, 1000.0)
-LIKELY_HEAD_MM = (150.0, 500.0)
+HEAD_HEIGHT_MM = (100.0, 1000.0)
+LIKELY_HEAD_HEIGHT_MM = (150.0, 500.0)
 UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
-FLAT = 1e-6
+MIN_RELATIVE_AREA = 1e-6
 """Area over squared longest side below which a triangle is degenerate in single precision [-]."""
 _DAMAGED = "The file is damaged: export it again"
-_UNIT = "Set the millimetres per unit of the file with --unit-mm"
+_UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
 
 
 def check_mesh(mesh: Mesh, culprit: object) -> None:
@@ -55,24 +55,24 @@ def check_arrays(
     if len(triangles) == 0:
         refuse(culprit, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
     if triangles.min() < 0 or triangles.max() >= len(positions):
-        came = f"they run from {triangles.min()} to {triangles.max()}"
-        refuse(culprit, f"triangle indices from 0 to {len(positions) - 1}", came, _DAMAGED)
+        actual = f"they run from {triangles.min()} to {triangles.max()}"
+        refuse(culprit, f"triangle indices from 0 to {len(positions) - 1}", actual, _DAMAGED)
     for name, values in (("positions", positions), ("uv", uv)):
         _check_finite(name, values, culprit)
     farthest = float(np.abs(positions).max())
-    if farthest > FARTHEST_MM:
-        expected, came = (
-            f"positions within {FARTHEST_MM:g} mm of the origin",
+    if farthest > MAX_DISTANCE_MM:
+        expected, actual = (
+            f"positions within {MAX_DISTANCE_MM:g} mm of the origin",
             f"one is {farthest:.3g} mm away",
         )
-        refuse(culprit, expected, came, f"{_UNIT}, or move the head to the origin")
+        refuse(culprit, expected, actual, f"{_UNIT_ADVICE}, or move the head to the origin")
 
 
 def _check_finite(name: str, values: NDArray[np.floating], culprit: object, of: str = "vertices") -> None:
     lost = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
     if len(lost):
-        came = f"{len(lost)} {of} are NaN or infinite, first {lost[0]}"
-        refuse(culprit, f"finite {name}", came, _DAMAGED)
+        actual = f"{len(lost)} {of} are NaN or infinite, first {lost[0]}"
+        refuse(culprit, f"finite {name}", actual, _DAMAGED)
 
 
 def check_rig(rig: Rig, culprit: object) -> None:
@@ -88,33 +88,33 @@ def check_rig(rig: Rig, culprit: object) -> None:
             _check_finite(f"bones ({name})", getattr(rig.skeleton, name), culprit, "of them")
 
 
-def check_amount(parts: Sequence[Part], culprit: object) -> None:
+def check_counts(parts: Sequence[MeshPart], culprit: object) -> None:
     """Refuse parts that have more triangles or vertices than a head's, before they are put together."""
     for name, most, count in (
-        ("triangles", MOST_TRIANGLES, sum(len(part.triangles) for part in parts)),
-        ("vertices", MOST_VERTICES, sum(len(part.positions) for part in parts)),
+        ("triangles", MAX_TRIANGLES, sum(len(part.triangles) for part in parts)),
+        ("vertices", MAX_VERTICES, sum(len(part.positions) for part in parts)),
     ):
         if count > most:
-            remedy = "Decimate it (in Blender: Modifiers > Decimate)"
-            refuse(culprit, f"a mesh of at most {most:,} {name}", f"it has {count:,}", remedy)
+            advice = "Decimate it (in Blender: Modifiers > Decimate)"
+            refuse(culprit, f"a mesh of at most {most:,} {name}", f"it has {count:,}", advice)
 
 
 def _check_uv_range(mesh: Mesh, culprit: object) -> None:
     low, high = mesh.uv.min(axis=0), mesh.uv.max(axis=0)
     if min(low) < -UV_TOLERANCE or max(high) > 1 + UV_TOLERANCE:
-        came = f"u runs from {low[0]:.4g} to {high[0]:.4g} and v from {low[1]:.4g} to {high[1]:.4g}"
-        remedy = "Move every uv island into the one tile (in Blender: UV Editor, UV > Pack Islands)"
-        refuse(culprit, "uv in [0, 1]: one tile, no UDIM tiles, no repeats", came, remedy)
+        actual = f"u runs from {low[0]:.4g} to {high[0]:.4g} and v from {low[1]:.4g} to {high[1]:.4g}"
+        advice = "Move every uv island into the one tile (in Blender: UV Editor, UV > Pack Islands)"
+        refuse(culprit, "uv in [0, 1]: one tile, no UDIM tiles, no repeats", actual, advice)
 
 
 def _check_areas(mesh: Mesh, culprit: object) -> None:
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    flat = np.flatnonzero(triangle_areas(corners) <= FLAT * longest**2)
+    flat = np.flatnonzero(triangle_areas(corners) <= MIN_RELATIVE_AREA * longest**2)
     if len(flat):
-        came = f"{len(flat)} have none (zero area): the first are {', '.join(map(str, flat[:5]))}"
-        remedy = "In Blender: Edit Mode, Mesh > Clean Up > Degenerate Dissolve"
-        refuse(culprit, "triangles with an area", came, remedy)
+        actual = f"{len(flat)} have none (zero area): the first are {', '.join(map(str, flat[:5]))}"
+        advice = "In Blender: Edit Mode, Mesh > Clean Up > Degenerate Dissolve"
+        refuse(culprit, "triangles with an area", actual, advice)
 
 
 def _check_manifold(mesh: Mesh, culprit: object) -> None:
@@ -123,29 +123,29 @@ def _check_manifold(mesh: Mesh, culprit: object) -> None:
     if len(crowded):
         place = mesh.positions[np.flatnonzero(mesh.point == ends[crowded[0], 0])[0]]
         where = f"{counts[crowded[0]]} triangles at ({', '.join(f'{x:.4g}' for x in place)}) mm"
-        came = f"{len(crowded)} edges are non-manifold, the first has {where}"
-        remedy = "In Blender: Select > All by Trait > Non Manifold, delete inner or double faces, "
-        remedy += "then Mesh > Merge > By Distance"
-        refuse(culprit, "a surface of one sheet, two triangles to an edge", came, remedy)
+        actual = f"{len(crowded)} edges are non-manifold, the first has {where}"
+        advice = "In Blender: Select > All by Trait > Non Manifold, delete inner or double faces, "
+        advice += "then Mesh > Merge > By Distance"
+        refuse(culprit, "a surface of one sheet, two triangles to an edge", actual, advice)
 
 
 def _check_skin(mesh: Mesh, culprit: object) -> None:
     if mesh.material.min() < 0 or mesh.material.max() >= len(mesh.materials):
-        came = f"they run from {mesh.material.min()} to {mesh.material.max()}"
-        refuse(culprit, f"material indices below {len(mesh.materials)}", came, "Build the mesh again")
+        actual = f"they run from {mesh.material.min()} to {mesh.material.max()}"
+        refuse(culprit, f"material indices below {len(mesh.materials)}", actual, "Build the mesh again")
     for one in mesh.materials:
         if not all(0 <= value <= 1 for value in one.colour):  # NaN is not either
-            came = f"that of {one.name!r} is {', '.join(f'{value:g}' for value in one.colour)}"
-            refuse(culprit, "colours of materials from 0 to 1", came, "Correct it there")
+            actual = f"that of {one.name!r} is {', '.join(f'{value:g}' for value in one.colour)}"
+            refuse(culprit, "colours of materials from 0 to 1", actual, "Correct it there")
     used = np.bincount(mesh.material, minlength=len(mesh.materials))
     skins = [(one.name, n) for one, n in zip(mesh.materials, used, strict=True) if one.kind == "skin"]
     empty = [name for name, count in skins if count == 0]
     if not skins or empty:
         groups = ", ".join(material.name for material in mesh.materials)
         bare = f"none of its groups is skin ({groups})"
-        came = f"skin group {empty[0]!r} has no triangles" if empty else bare
-        remedy = "Assign the skin's faces to a material called skin, or name fewer groups opaque"
-        refuse(culprit, "a group of triangles that is skin", came, remedy)
+        actual = f"skin group {empty[0]!r} has no triangles" if empty else bare
+        advice = "Assign the skin's faces to a material called skin, or name fewer groups opaque"
+        refuse(culprit, "a group of triangles that is skin", actual, advice)
 
 
 def check_head_height(mesh: Mesh, culprit: object, unit_mm: float | None) -> None:
@@ -155,12 +155,14 @@ def check_head_height(mesh: Mesh, culprit: object, unit_mm: float | None) -> Non
     unit_mm : the unit the file was read with [mm]; None for that of its format
     """
     height = float(mesh.size_mm[1])
-    if HEAD_MM[0] <= height <= HEAD_MM[1]:
+    if HEAD_HEIGHT_MM[0] <= height <= HEAD_HEIGHT_MM[1]:
         return
     unit_mm = default_unit_mm(str(culprit)) if unit_mm is None else unit_mm
-    fitting = [u for u in UNITS_MM if LIKELY_HEAD_MM[0] <= height / unit_mm * u <= LIKELY_HEAD_MM[1]]
-    remedy = _UNIT
+    fitting = [
+        u for u in UNITS_MM if LIKELY_HEAD_HEIGHT_MM[0] <= height / unit_mm * u <= LIKELY_HEAD_HEIGHT_MM[1]
+    ]
+    advice = _UNIT_ADVICE
     if fitting:
-        remedy += f": {fitting[0]:g} would make it {height / unit_mm * fitting[0]:.4g} mm high"
-    came = f"it is {height:.4g} mm high at {unit_mm:g} mm per unit (a forgotten unit?)"
-    refuse(culprit, f"a head {HEAD_MM[0]:g} to {HEAD_MM[1]:g} mm high", came, remedy)
+        advice += f": {fitting[0]:g} would make it {height / unit_mm * fitting[0]:.4g} mm high"
+    actual = f"it is {height:.4g} mm high at {unit_mm:g} mm per unit (a forgotten unit?)"
+    refuse(culprit, f"a head {HEAD_HEIGHT_MM[0]:g} to {HEAD_HEIGHT_MM[1]:g} mm high", actual, advice)

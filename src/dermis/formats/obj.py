@@ -14,30 +14,38 @@ import numpy as np
 from dermis.base.arrays import Bytes, Floats, Index
 from dermis.base.errors import DermisError, refuse
 from dermis.base.reading import read_file
-from dermis.formats.maps import finite, load_maps
-from dermis.formats.named_files import beside
-from dermis.formats.parts import GREY, Group, Model, Part, colour_of, find_pairs, trimesh_parts
+from dermis.formats.maps import check_finite, load_maps
+from dermis.formats.parts import (
+    GREY,
+    MaterialGroup,
+    MeshFile,
+    MeshPart,
+    find_quads,
+    parse_colour,
+    trimesh_parts,
+)
+from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.size_limits import (
-    MOST_BYTES,
-    MOST_CORNERS,
-    MOST_GROUPS,
-    MOST_LIBRARIES,
-    MOST_MTL_BYTES,
-    MOST_TRIANGLES,
-    MOST_VERTICES,
+    MAX_CORNERS,
+    MAX_FILE_BYTES,
+    MAX_GROUPS,
+    MAX_LIBRARIES,
+    MAX_MTL_BYTES,
+    MAX_TRIANGLES,
+    MAX_VERTICES,
 )
 from dermis.images.io import read_image, read_size
-from dermis.images.sizes import MOST_TOGETHER
+from dermis.images.sizes import MAX_TOTAL_PIXELS
 from dermis.mesh.maps import Maps
 
-_COMMENTED = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILINE)
-_NAMED = re.compile(r"^[ \t]*(usemtl|g)(?:[ \t]([^\n]*))?$", re.MULTILINE)
+_TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILINE)
+_GROUP_LINE = re.compile(r"^[ \t]*(usemtl|g)(?:[ \t]([^\n]*))?$", re.MULTILINE)
 _FACE_OR_NUMBER = re.compile(r"^(?:usemtl (\d+)|f([ \t].*))$", re.MULTILINE)
-_LONGEST, _LONGEST_VERTEX = 1 << 17, 256  # characters of a line
+_MAX_LINE, _MAX_VERTEX_LINE = 1 << 17, 256  # characters of a line
 _ZERO = re.compile(r"(?<![^ \t/])0+(?![^ \t/])")
-_UNPARSED = re.compile(r"^[ \t]*(usemtl|g|f)(?:[ \t]([^\n]*))?$", re.MULTILINE)
-_RELIEF = ("normal", "height")
-_ENOUGH = 256  # texels a side
+_GROUP_OR_FACE = re.compile(r"^[ \t]*(usemtl|g|f)(?:[ \t]([^\n]*))?$", re.MULTILINE)
+_RELIEF_ROLES = ("normal", "height")
+_SAMPLES_PER_SIDE = 256  # texels a side
 _ROLES = {"map_kd": "colour", "map_ks": "specular", "map_pr": "roughness", "norm": "normal"}
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _OPTION = re.compile(
@@ -48,7 +56,7 @@ _OPTION = re.compile(
     re.IGNORECASE,
 )
 _WHOLE_NUMBER = re.compile(_NUMBER)
-_LONGEST_MTL_LINE = 4096  # characters of a line
+_MAX_MTL_LINE = 4096  # characters of a line
 _LIBRARY = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 
 
@@ -57,11 +65,11 @@ def read_obj_text(path: Path) -> str:
 
     Raises DermisError when it cannot be read or is too large.
     """
-    text = read_file(path, "an OBJ file", MOST_BYTES).decode("utf-8", errors="replace")
+    text = read_file(path, "an OBJ file", MAX_FILE_BYTES).decode("utf-8", errors="replace")
     return text.replace("\r\n", "\n")
 
 
-def joined_lines(path: Path, text: str) -> str:
+def join_continued_lines(path: Path, text: str) -> str:
     """The text with continued lines joined, and numbers without comments behind them.
 
     Raises DermisError for lines that are longer than any that means something, and for too many vertices.
@@ -69,7 +77,7 @@ def joined_lines(path: Path, text: str) -> str:
     text = text.replace("\\\n", " ")
     _check_lines(path, np.frombuffer(text.encode("utf-8", "replace"), np.uint8))
     commented = text.count("#") != text.count("\n#") + text.startswith("#")
-    return _COMMENTED.sub(r"\1", text) if commented else text
+    return _TRAILING_COMMENT.sub(r"\1", text) if commented else text
 
 
 def _check_lines(path: Path, data: Bytes) -> None:
@@ -77,26 +85,26 @@ def _check_lines(path: Path, data: Bytes) -> None:
     starts = np.concatenate([[0], ends + 1])
     long = np.diff(starts, append=len(data) + 1)
     vertex = data[np.minimum(starts, len(data) - 1)] == ord("v") if len(data) else np.zeros(1, bool)
-    if long.max() > _LONGEST or long[vertex].max(initial=0) > _LONGEST_VERTEX:
-        came, remedy = f"one has {long.max():,}", "The file is damaged: export it again"
-        expected = f"lines of at most {_LONGEST:,} characters, {_LONGEST_VERTEX} for vertices"
-        refuse(path, expected, came, remedy)
-    if int(vertex.sum()) > 3 * MOST_VERTICES:
-        came, remedy = f"it has {int(vertex.sum()):,}", "Decimate it (in Blender: Modifiers > Decimate)"
-        refuse(path, f"at most {3 * MOST_VERTICES:,} lines of vertices, uv and normals", came, remedy)
+    if long.max() > _MAX_LINE or long[vertex].max(initial=0) > _MAX_VERTEX_LINE:
+        actual, advice = f"one has {long.max():,}", "The file is damaged: export it again"
+        expected = f"lines of at most {_MAX_LINE:,} characters, {_MAX_VERTEX_LINE} for vertices"
+        refuse(path, expected, actual, advice)
+    if int(vertex.sum()) > 3 * MAX_VERTICES:
+        actual, advice = f"it has {int(vertex.sum()):,}", "Decimate it (in Blender: Modifiers > Decimate)"
+        refuse(path, f"at most {3 * MAX_VERTICES:,} lines of vertices, uv and normals", actual, advice)
 
 
-def groups_of_faces(text: str) -> Iterator[tuple[str, str]]:
+def face_groups(text: str) -> Iterator[tuple[str, str]]:
     """The names `usemtl` and `g` of each face."""
     current = {"usemtl": "", "g": ""}
-    for line in _UNPARSED.finditer(text):
+    for line in _GROUP_OR_FACE.finditer(text):
         if line[1] == "f":
             yield current["usemtl"], current["g"]
         else:
             current[line[1]] = (line[2] or "").strip()
 
 
-def numbered(path: Path, text: str) -> tuple[str, list[tuple[str, str]]]:
+def number_groups(path: Path, text: str) -> tuple[str, list[tuple[str, str]]]:
     """Each `usemtl` and `g` as `usemtl` of a number, one for each pair of names, and these pairs.
 
     Raises DermisError when they are too many.
@@ -109,14 +117,14 @@ def numbered(path: Path, text: str) -> tuple[str, list[tuple[str, str]]]:
         key = (current["usemtl"], current["g"])
         return f"usemtl {numbers.setdefault(key, len(numbers))}"
 
-    marked = _NAMED.sub(number, text)
-    if len(numbers) > MOST_GROUPS:
-        came, remedy = f"it has {len(numbers):,}", "Export it with fewer, or without groups"
-        refuse(path, f"at most {MOST_GROUPS:,} groups", came, remedy)
+    marked = _GROUP_LINE.sub(number, text)
+    if len(numbers) > MAX_GROUPS:
+        actual, advice = f"it has {len(numbers):,}", "Export it with fewer, or without groups"
+        refuse(path, f"at most {MAX_GROUPS:,} groups", actual, advice)
     return f"mtllib marked.mtl\nusemtl 0\n{marked}", list(numbers)
 
 
-def face_sides(path: Path, text: str, groups: int) -> list[Index]:
+def face_corner_counts(path: Path, text: str, groups: int) -> list[Index]:
     """How many corners each face of each group has; the text names groups by number, `usemtl 0` first.
 
     Raises DermisError for indices that are relative or 0, and for too many corners.
@@ -129,48 +137,50 @@ def face_sides(path: Path, text: str, groups: int) -> list[Index]:
             current = sides[int(number)]
             continue
         if "-" in face:
-            came = "it has relative (negative) ones"
-            refuse(path, "faces by absolute index", came, "Export it again, in Blender")
+            actual = "it has relative (negative) ones"
+            refuse(path, "faces by absolute index", actual, "Export it again, in Blender")
         if (" 0" in face or "/0" in face or "\t0" in face) and _ZERO.search(face):
             refuse(path, "faces by indices from 1", "it has a 0", "The file is damaged: export it again")
         count = len(face.split())
         current.append(count)
         triangles += max(count - 2, 0)
-        if count > MOST_CORNERS or triangles > MOST_TRIANGLES:
+        if count > MAX_CORNERS or triangles > MAX_TRIANGLES:
             _refuse_faces(path, count)
     return [np.array(one, dtype=np.int64) for one in sides]
 
 
 def _refuse_faces(path: Path, corners: int) -> None:
-    if corners > MOST_CORNERS:
-        came = f"one has {corners:,}"
-        refuse(path, f"faces of at most {MOST_CORNERS:,} corners", came, "Cut it into smaller ones")
-    came, remedy = "it has more", "Decimate it (in Blender: Modifiers > Decimate)"
-    refuse(path, f"a mesh of at most {MOST_TRIANGLES:,} triangles", came, remedy)
+    if corners > MAX_CORNERS:
+        actual = f"one has {corners:,}"
+        refuse(path, f"faces of at most {MAX_CORNERS:,} corners", actual, "Cut it into smaller ones")
+    actual, advice = "it has more", "Decimate it (in Blender: Modifiers > Decimate)"
+    refuse(path, f"a mesh of at most {MAX_TRIANGLES:,} triangles", actual, advice)
 
 
-def read_obj(path: Path) -> Model:
+def read_obj(path: Path) -> MeshFile:
     """Parts of a .obj file by `usemtl` and `g`; colours are Kd of its .mtl, taken as linear."""
-    return obj_model(path, read_obj_text(path))
+    return parse_obj(path, read_obj_text(path))
 
 
-def obj_model(path: Path, text: str) -> Model:
+def parse_obj(path: Path, text: str) -> MeshFile:
     """The same of a file's text."""
-    text = joined_lines(path, text)
+    text = join_continued_lines(path, text)
     materials = read_materials(path, text).materials
-    colours = {name: colour_of(one.kd) for name, one in materials.items() if len(one.kd) >= 3}
-    text, pairs = numbered(path, text)
-    sides = face_sides(path, text, len(pairs))
+    colours = {name: parse_colour(one.kd) for name, one in materials.items() if len(one.kd) >= 3}
+    text, pairs = number_groups(path, text)
+    sides = face_corner_counts(path, text, len(pairs))
     names = [tuple(dict.fromkeys(name for name in pair if name)) for pair in pairs]
-    groups = [Group(name, colours.get(pair[0], GREY)) for name, pair in zip(names, pairs, strict=True)]
+    groups = [
+        MaterialGroup(name, colours.get(pair[0], GREY)) for name, pair in zip(names, pairs, strict=True)
+    ]
     numbers = "\n".join(f"newmtl {k}" for k in range(len(groups)))
     # trimesh pops groups from the end: file order again
     parts = list(trimesh_parts(text.encode(), "obj", groups, resolver={"marked.mtl": numbers.encode()}))[::-1]
     faces = {id(group): each for group, each in zip(groups, sides, strict=True)}
-    parts = [replace(part, quads=find_pairs(faces[id(part.group)], part.triangles)) for part in parts]
+    parts = [replace(part, quads=find_quads(faces[id(part.group)], part.triangles)) for part in parts]
     full, none = [part.group for part in parts], np.empty((0, 3))
-    empty = [Part(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
-    return Model(parts + empty)
+    empty = [MeshPart(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
+    return MeshFile(parts + empty)
 
 
 def obj_maps(
@@ -194,44 +204,44 @@ def obj_maps(
     text = read_obj_text(path)
     library, faults = read_materials(path, text), list[str]()
     faults += [f"mtllib: {name} is not in its folder" for name in library.missing]
-    wanted = _skin(text, library.materials, opaque).textures
+    wanted = _skin_material(text, library.materials, opaque).textures
     maps, roles = Maps(), [role for role in ("colour", "specular", "roughness") if role not in given]
-    if not set(_RELIEF) & set(given):
+    if not set(_RELIEF_ROLES) & set(given):
         roles.append("normal" if "normal" in wanted else "bump")
-    left = MOST_TOGETHER
+    left = MAX_TOTAL_PIXELS
     for role in (one for one in roles if one in wanted):
         texture = wanted[role]
-        file = beside(path, texture.name)
+        file = find_referenced_file(path, texture.name)
         if file is None:
             faults.append(f"{texture.key}: {texture.name} is not in its folder")
             continue
         try:
-            left -= _texels(file, left)
-            maps = replace(maps, **_loaded(role, file, texture, height_mm, normal_y))
+            left -= _checked_texel_count(file, left)
+            maps = replace(maps, **_load_map(role, file, texture, height_mm, normal_y))
         except DermisError as fault:
             faults.append(f"{texture.key}: {fault}")
-        if texture.moved:
+        if texture.transformed:
             faults.append(f"{texture.key}: {texture.name} is taken without its -s, -o or -t")
-    return maps, _notice(path, faults)
+    return maps, _unused_files_note(path, faults)
 
 
-def _texels(file: Path, left: int) -> int:
+def _checked_texel_count(file: Path, left: int) -> int:
     """How many texels a picture has, of those that are left to a mesh file."""
     width, height = read_size(file)
     if width * height > left:
-        expected = f"pictures of at most {MOST_TOGETHER / 1e6:.0f} million texels together"
+        expected = f"pictures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"
         refuse(file, expected, "with this one there are more", "Resize them")
     return width * height
 
 
-def _notice(path: Path, faults: list[str]) -> str:
+def _unused_files_note(path: Path, faults: list[str]) -> str:
     if not faults:
         return ""
-    remedy = "Put the files beside it, or name maps yourself (--colour, --normal, ...)"
-    return "\n  ".join([f"{path}: not all that its .mtl names is used. {remedy}.", *faults])
+    advice = "Put the files beside it, or name maps yourself (--colour, --normal, ...)"
+    return "\n  ".join([f"{path}: not all that its .mtl names is used. {advice}.", *faults])
 
 
-def _loaded(
+def _load_map(
     role: str, file: Path, texture: Texture, height_mm: float | None, normal_y: Literal["up", "down"]
 ) -> dict[str, Any]:
     """The map in a file, by its role."""
@@ -240,31 +250,31 @@ def _loaded(
         return {} if made is None else {role: made * made}
     if role == "bump" and _is_grey(file):
         made = load_maps(height=file, height_mm=height_mm).height
-        return {} if made is None else {"height": _times(made, texture, file)}
+        return {} if made is None else {"height": _scaled(made, texture, file)}
     if role in ("bump", "normal"):
         made = load_maps(normal=file, normal_y=normal_y).normal
-        return {} if made is None else {"normal": _times(made, texture, file)}
+        return {} if made is None else {"normal": _scaled(made, texture, file)}
     return {role: getattr(load_maps(**{role: file}), role)}  # type: ignore[arg-type]
 
 
-def _times(made: Floats, texture: Texture, file: Path) -> Floats:
+def _scaled(made: Floats, texture: Texture, file: Path) -> Floats:
     """A relief multiplied as its material says."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return finite(file, made * np.float32(texture.factor))
+        return check_finite(file, made * np.float32(texture.factor))
 
 
 def _is_grey(file: Path) -> bool:
     """Whether a picture's channels agree, but for what JPEG does to them; of a large one few texels tell."""
     whole = read_image(file)
-    apart = max(min(whole.shape[:2]) // _ENOUGH, 1)
+    apart = max(min(whole.shape[:2]) // _SAMPLES_PER_SIDE, 1)
     image = whole[::apart, ::apart, :3].astype(float)
     most = float(image.max()) or 1.0
     return bool((abs(image - image[..., :1]) <= 0.02 * most).all())
 
 
-def _skin(text: str, materials: dict[str, MtlMaterial], opaque: Collection[str]) -> MtlMaterial:
+def _skin_material(text: str, materials: dict[str, MtlMaterial], opaque: Collection[str]) -> MtlMaterial:
     """The material of the skin: of groups called so, else of all, the one with the most faces."""
-    faces = Counter(groups_of_faces(text))
+    faces = Counter(face_groups(text))
     unwanted = {name.casefold() for name in opaque}
     left = {names: count for names, count in faces.items() if not unwanted & set(map(str.casefold, names))}
     named = {names: count for names, count in left.items() if "skin" in " ".join(names).casefold()}
@@ -284,13 +294,13 @@ class Texture:
 
     key : the statement that names it, such as map_Kd
     factor : by which its values are multiplied (-bm) [-]
-    moved : whether it is to be scaled, shifted or made turbulent (-s, -o, -t)
+    transformed : whether it is to be scaled, shifted or made turbulent (-s, -o, -t)
     """
 
     key: str
     name: str
     factor: float = 1.0
-    moved: bool = False
+    transformed: bool = False
 
 
 @dataclass
@@ -314,24 +324,24 @@ def read_materials(path: Path, text: str) -> Library:
 
     text : of the OBJ file
     """
-    found, left = Library(), MOST_MTL_BYTES
-    for told in libraries(text)[:MOST_LIBRARIES]:
-        for name in [told] if beside(path, told) else told.split(".mtl ")[:MOST_LIBRARIES]:
-            file = beside(path, name) or beside(path, f"{name}.mtl")
+    found, left = Library(), MAX_MTL_BYTES
+    for told in library_names(text)[:MAX_LIBRARIES]:
+        for name in [told] if find_referenced_file(path, told) else told.split(".mtl ")[:MAX_LIBRARIES]:
+            file = find_referenced_file(path, name) or find_referenced_file(path, f"{name}.mtl")
             if file is None:
                 found.missing.append(name)
             else:
                 data = read_file(file, "material libraries", left)
                 left -= len(data)
-                found.materials |= _materials(data.decode("utf-8", errors="replace"))
+                found.materials |= _parse_mtl(data.decode("utf-8", errors="replace"))
     return found
 
 
-def _materials(text: str) -> dict[str, MtlMaterial]:
+def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
     found: dict[str, MtlMaterial] = {}
     current = MtlMaterial()
     for line in text.splitlines():
-        if len(line) > _LONGEST_MTL_LINE:
+        if len(line) > _MAX_MTL_LINE:
             continue
         key, _, value = line.strip().replace("\t", " ").partition(" ")
         if key.lower() == "newmtl":
@@ -339,11 +349,11 @@ def _materials(text: str) -> dict[str, MtlMaterial]:
         elif key.lower() == "kd":
             current.kd = value.split()
         elif key.lower() in _ROLES and value.strip():
-            current.textures[_ROLES[key.lower()]] = _texture(key, value.strip())
+            current.textures[_ROLES[key.lower()]] = _parse_texture(key, value.strip())
     return found
 
 
-def _texture(key: str, rest: str) -> Texture:
+def _parse_texture(key: str, rest: str) -> Texture:
     """What a statement says; its name goes to the end of the line, with its spaces."""
     factor, moved, place = 1.0, False, 0
     while option := _OPTION.match(rest, place):
@@ -359,6 +369,6 @@ def _texture(key: str, rest: str) -> Texture:
     return Texture(key, rest, factor, moved)
 
 
-def libraries(text: str) -> list[str]:
+def library_names(text: str) -> list[str]:
     """What its lines `mtllib` say, each once."""
     return list(dict.fromkeys(line[1].strip() for line in _LIBRARY.finditer(text)))

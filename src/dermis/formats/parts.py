@@ -35,29 +35,29 @@ def default_unit_mm(path: str | Path) -> float:
 
 
 @dataclass(frozen=True)
-class Group:
+class MaterialGroup:
     """Name of the material (or mesh) first, then all other names; diffuse colour, linear [-]."""
 
     names: tuple[str, ...]
     colour: Colour = GREY
 
-    def has(self, word: str) -> bool:
+    def name_contains(self, word: str) -> bool:
         """Whether a word is part of one of its names."""
         return any(word in name.casefold() for name in self.names)
 
 
 @dataclass(frozen=True)
-class Part:
+class MeshPart:
     """One group's triangles in the file's units and the file's v direction, at rest.
 
     positions (v, 3), uv (v, 2) or None, normals (v, 3) or None, triangles (f, 3)
     targets : by name the vertices that a morph target moves (n,) and by how much at weight 1 (n, 3)
     bone, weight : (v, k) bones that each vertex follows, by shares that add up to 1; None for no bones
     quads : (q, 2) pairs of triangles that are the halves of one
-    alone : whether its points are no others' at the same places, as of a skin and of the lid on its cut
+    separate : whether its points are no others' at the same places, as of a skin and of the lid on its cut
     """
 
-    group: Group
+    group: MaterialGroup
     positions: Doubles
     uv: Doubles | None
     normals: Doubles | None
@@ -66,7 +66,7 @@ class Part:
     bone: Index | None = None
     weight: Doubles | None = None
     quads: Index = field(default_factory=lambda: np.empty((0, 2), np.int64))
-    alone: bool = False
+    separate: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,23 +83,25 @@ class Bones:
 
 
 @dataclass(frozen=True)
-class Model:
+class MeshFile:
     """All that a file says of a head's shape.
 
     weights : of morph targets at rest, by name, where they are not 0
     """
 
-    parts: list[Part]
+    parts: list[MeshPart]
     bones: Bones | None = None
     weights: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def moves(self) -> bool:
+    def is_deformable(self) -> bool:
         """Whether it has bones or targets."""
         return self.bones is not None or any(part.targets for part in self.parts)
 
 
-def trimesh_parts(data: bytes, kind: str, groups: list[Group], **options: object) -> Iterator[Part]:
+def trimesh_parts(
+    data: bytes, kind: str, groups: list[MaterialGroup], **options: object
+) -> Iterator[MeshPart]:
     """What trimesh reads from `data`, each under the group that its material numbers."""
     from io import BytesIO
 
@@ -117,7 +119,7 @@ def trimesh_parts(data: bytes, kind: str, groups: list[Group], **options: object
             yield _part(mesh, groups[int(tag or 0) if len(groups) > 1 else 0])
 
 
-def _part(mesh: Trimesh, group: Group) -> Part:
+def _part(mesh: Trimesh, group: MaterialGroup) -> MeshPart:
     """A trimesh's arrays."""
     uv = getattr(mesh.visual, "uv", None)
     normals = mesh.vertex_normals if "vertex_normals" in mesh._cache else None
@@ -125,29 +127,29 @@ def _part(mesh: Trimesh, group: Group) -> Part:
     places = np.asarray(mesh.vertices, dtype=np.float64) + 0.0  # without -0
     if places.ndim != 2 or places.shape[1] != 3:
         raise ValueError(f"its vertices have {places.shape[-1]} coordinates, not 3")
-    return Part(
+    return MeshPart(
         group,
         places,
-        None if uv is None else fractions(np.asarray(uv)),
-        None if normals is None else fractions(np.asarray(normals)) + 0.0,
+        None if uv is None else to_floats(np.asarray(uv)),
+        None if normals is None else to_floats(np.asarray(normals)) + 0.0,
         triangles,
-        quads=find_pairs(ply_sides(mesh.metadata), triangles),
+        quads=find_quads(ply_corner_counts(mesh.metadata), triangles),
     )
 
 
-def fractions(values: Numbers) -> Doubles:
+def to_floats(values: Numbers) -> Doubles:
     """Numbers of which integers stand for fractions of their type's largest."""
     scale = np.iinfo(values.dtype.str).max if values.dtype.kind in "iu" else 1
     return np.asarray(values / scale, dtype=np.float64)
 
 
-def colour_of(numbers: Sequence[float | str]) -> Colour:
+def parse_colour(numbers: Sequence[float | str]) -> Colour:
     """Three numbers in [0, 1]."""
     r, g, b = (min(max(float(x), 0.0), 1.0) for x in list(numbers)[:3])
     return (r, g, b)
 
 
-def find_pairs(sides: NDArray[np.integer], triangles: Index) -> Index:
+def find_quads(sides: NDArray[np.integer], triangles: Index) -> Index:
     """(q, 2) triangles that are the halves of each quad of a file; empty when they are in no known order.
 
     sides : (n,) how many corners each face of the file has
@@ -167,7 +169,7 @@ def find_pairs(sides: NDArray[np.integer], triangles: Index) -> Index:
     return none
 
 
-def ply_sides(metadata: Mapping[str, Any]) -> Index:
+def ply_corner_counts(metadata: Mapping[str, Any]) -> Index:
     """How many corners each face of a .ply file has, by what trimesh keeps of it; no numbers for others."""
     data = metadata.get("_ply_raw", {}).get("face", {}).get("data")
     known = data.dtype.names if isinstance(data, np.ndarray) else data

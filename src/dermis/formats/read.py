@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
-from dermis.base.reading import is_file, read_file, understood
+from dermis.base.reading import is_file, parsing, read_file
 from dermis.formats.gltf.triangles import read_gltf
-from dermis.formats.mesh_checks import check_amount, check_arrays
+from dermis.formats.mesh_checks import check_arrays, check_counts
 from dermis.formats.obj import read_obj
-from dermis.formats.parts import Group, Model, Part, trimesh_parts
-from dermis.formats.size_limits import MOST_BYTES, MOST_TRIANGLES, MOST_VERTICES
+from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, trimesh_parts
+from dermis.formats.size_limits import MAX_FILE_BYTES, MAX_TRIANGLES, MAX_VERTICES
 
-_MOST_HEADER = 1 << 16  # bytes
-_MOST = {"vertex": MOST_VERTICES, "face": MOST_TRIANGLES}
-_MOST_PROPERTIES = 256
+_MAX_HEADER = 1 << 16  # bytes
+_MAX_ELEMENTS = {"vertex": MAX_VERTICES, "face": MAX_TRIANGLES}
+_MAX_PROPERTIES = 256
 _DAMAGED = "The file is damaged: export it again"
-FARTHEST_UV = 1e4
+MAX_UV = 1e4
 """Beyond this uv are damage, not tiles."""
 S = TypeVar("S", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
@@ -37,14 +37,14 @@ def check_ply(path: Path, data: bytes) -> bytes:
 
     Raises DermisError for others.
     """
-    end = data.find(b"end_header", 0, _MOST_HEADER)
+    end = data.find(b"end_header", 0, _MAX_HEADER)
     if not data.startswith(b"ply") or end < 0:
         refuse(path, "a PLY file", "it cannot be read (its header does not begin or end as one)", _DAMAGED)
     header = data[:end]
     lines = [line.split() for line in header.splitlines()]
     properties = sum(line[:1] == [b"property"] for line in lines)
-    if properties > _MOST_PROPERTIES:
-        refuse(path, f"a PLY file of at most {_MOST_PROPERTIES} properties", f"it has {properties}", _DAMAGED)
+    if properties > _MAX_PROPERTIES:
+        refuse(path, f"a PLY file of at most {_MAX_PROPERTIES} properties", f"it has {properties}", _DAMAGED)
     for line in lines:
         if line[:1] == [b"element"]:
             _check_element(path, line, len(data) - end)
@@ -55,27 +55,27 @@ def _check_element(path: Path, line: list[bytes], left: int) -> None:
     """Refuse an element of which there are more than may be, or than bytes are left for."""
     name, count = (line[1].decode("latin-1"), line[2]) if len(line) == 3 else ("", b"")
     if not (count.isdigit() and len(count) < 12):
-        refuse(path, "elements with a name and a number", f"{b' '.join(line)[:80]!r} came", _DAMAGED)
-    most = min(_MOST.get(name, MOST_TRIANGLES), left)
+        refuse(path, "elements with a name and a number", f"got {b' '.join(line)[:80]!r}", _DAMAGED)
+    most = min(_MAX_ELEMENTS.get(name, MAX_TRIANGLES), left)
     if int(count) > most:
-        came, remedy = f"its header says {int(count):,}", "Decimate it (in Blender: Modifiers > Decimate)"
-        refuse(path, f"at most {most:,} elements called {name!r}", came, remedy)
+        actual, advice = f"its header says {int(count):,}", "Decimate it (in Blender: Modifiers > Decimate)"
+        refuse(path, f"at most {most:,} elements called {name!r}", actual, advice)
 
 
-def read_ply(path: Path) -> Model:
+def read_ply(path: Path) -> MeshFile:
     """The one part of a .ply file; uv from the vertex properties s, t or u, v or texture_u, texture_v."""
-    data = read_file(path, "a PLY file", MOST_BYTES)
+    data = read_file(path, "a PLY file", MAX_FILE_BYTES)
     header = check_ply(path, data)
     # uv by face corner need vertices split, after which normals need not fit them any more; uv by vertex
     # do not, and splitting would drop the normals as soon as one vertex is unused
     by_corner = b"texcoord" in header
     parts = list(
-        trimesh_parts(data, "ply", [Group((path.stem,))], fix_texture=by_corner, skip_materials=True)
+        trimesh_parts(data, "ply", [MaterialGroup((path.stem,))], fix_texture=by_corner, skip_materials=True)
     )
-    return Model([replace(part, normals=None) for part in parts] if by_corner else parts)
+    return MeshFile([replace(part, normals=None) for part in parts] if by_corner else parts)
 
 
-READERS: dict[str, Callable[[Path], Model]] = {
+READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".glb": read_gltf,
     ".gltf": read_gltf,
     ".obj": read_obj,
@@ -83,7 +83,7 @@ READERS: dict[str, Callable[[Path], Model]] = {
 }
 
 
-def joined(parts: list[Part], source: Path) -> Part:
+def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
     """All parts together as one; its normals are NaN where the file has none."""
     uv = [_part_uv(part, source) for part in parts]
     for part, given in zip(parts, uv, strict=True):
@@ -94,20 +94,20 @@ def joined(parts: list[Part], source: Path) -> Part:
     for part, offset in zip(parts, start, strict=False):
         for name, (vertex, delta) in part.targets.items():
             targets.setdefault(name, []).append((vertex + offset, delta))
-    return Part(
+    return MeshPart(
         parts[0].group,
         np.vstack([part.positions for part in parts]),
         np.vstack(uv),
         np.vstack([_part_normals(part) for part in parts]),
         np.vstack([part.triangles + offset for part, offset in zip(parts, start, strict=False)]),
-        {name: (np.concatenate(i), np.concatenate(d)) for name, (i, d) in _columns(targets).items()},
-        _side_by_side([part.bone for part in parts]),
-        _side_by_side([part.weight for part in parts]),
+        {name: (np.concatenate(i), np.concatenate(d)) for name, (i, d) in _transposed(targets).items()},
+        _stack_padded([part.bone for part in parts]),
+        _stack_padded([part.weight for part in parts]),
         np.vstack([part.quads + begin for part, begin in zip(parts, faces, strict=False)]),
     )
 
 
-def taken(part: Part, used: Index) -> Part:
+def select_vertices(part: MeshPart, used: Index) -> MeshPart:
     """Some of a part's vertices, and what moves them."""
     number = np.full(len(part.positions), -1)
     number[used] = np.arange(len(used))
@@ -120,19 +120,19 @@ def taken(part: Part, used: Index) -> Part:
     return replace(part, positions=part.positions[used], targets=targets, bone=bone, weight=weight)
 
 
-def _columns(
+def _transposed(
     rows: dict[str, list[tuple[Index, Doubles]]],
 ) -> dict[str, tuple[list[Index], list[Doubles]]]:
     return {name: ([one for one, _ in pairs], [two for _, two in pairs]) for name, pairs in rows.items()}
 
 
-def _part_normals(part: Part) -> Doubles:
+def _part_normals(part: MeshPart) -> Doubles:
     if part.normals is not None and len(part.normals) == len(part.positions):
         return part.normals
     return np.full(part.positions.shape, np.nan)
 
 
-def _side_by_side(arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
+def _stack_padded(arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
     """Arrays of any width one under the other, filled up with 0; None if they are None."""
     given = [array for array in arrays if array is not None]
     if len(given) < len(arrays):
@@ -141,39 +141,39 @@ def _side_by_side(arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
     return np.vstack([np.pad(array, ((0, 0), (0, width - array.shape[1]))) for array in given])
 
 
-def _part_uv(part: Part, source: Path) -> Doubles:
+def _part_uv(part: MeshPart, source: Path) -> Doubles:
     name = part.group.names[0] if part.group.names else "the mesh"
     if part.uv is None or part.uv.shape != (len(part.positions), 2):
-        remedy = "Unwrap it (in Blender: Edit Mode, U > Unwrap) and export with uv"
-        refuse(source, "uv at every vertex", f"{name!r} has none", remedy)
-    if not np.abs(part.uv).max() <= FARTHEST_UV:
-        came = f"{name!r} has some that are NaN, infinite or beyond {FARTHEST_UV:g}"
-        refuse(source, "finite uv", came, "The file is damaged: export it again")
+        advice = "Unwrap it (in Blender: Edit Mode, U > Unwrap) and export with uv"
+        refuse(source, "uv at every vertex", f"{name!r} has none", advice)
+    if not np.abs(part.uv).max() <= MAX_UV:
+        actual = f"{name!r} has some that are NaN, infinite or beyond {MAX_UV:g}"
+        refuse(source, "finite uv", actual, "The file is damaged: export it again")
     return part.uv
 
 
-def read_model(source: Path) -> Model:
+def read_mesh_file(source: Path) -> MeshFile:
     """The file as it is; whatever its reader raises on a damaged file becomes a refusal."""
     reader = READERS.get(source.suffix.lower())
     if reader is None:
-        came = f"the suffix is {source.suffix!r}"
-        refuse(source, f"a mesh file ({', '.join(READERS)})", came, "Export it as one of these")
+        actual = f"the suffix is {source.suffix!r}"
+        refuse(source, f"a mesh file ({', '.join(READERS)})", actual, "Export it as one of these")
     if not is_file(source):
         refuse(source, "a mesh file", "there is no such file", "Check the path")
     # a damaged file makes trimesh fail anywhere, with any exception
-    with understood(source, f"a sound {source.suffix} mesh", Exception):
+    with parsing(source, f"a sound {source.suffix} mesh", Exception):
         model = reader(source)
     full = [part for part in model.parts if len(part.triangles)]
     if not full:
         refuse(source, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
-    skins = [part for part in model.parts if part.group.has("skin")]
+    skins = [part for part in model.parts if part.group.name_contains("skin")]
     if skins and not any(len(part.triangles) for part in skins):
-        came = f"skin group {skins[0].group.names[0]!r} has no triangles"
-        refuse(source, "a group of triangles that is skin", came, "Assign its faces to it, or rename it")
-    check_amount(full, source)
+        actual = f"skin group {skins[0].group.names[0]!r} has no triangles"
+        refuse(source, "a group of triangles that is skin", actual, "Assign its faces to it, or rename it")
+    check_counts(full, source)
     return replace(model, parts=full)
 
 
-def upright(vectors: Doubles, up: Up) -> Doubles:
+def to_y_up(vectors: Doubles, up: Up) -> Doubles:
     """`vectors` (v, 3) with Y up: z-up turns about X, so that -Y, Blender's front, becomes +Z."""
     return vectors if up == "y" else np.column_stack((vectors[:, 0], vectors[:, 2], -vectors[:, 1]))

@@ -8,17 +8,17 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 from dermis.base.errors import refuse
-from dermis.formats.parts import Bones, Part
+from dermis.formats.parts import Bones, MeshPart
 from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
 
-PARTED_MM = 0.01
+SPLIT_TOLERANCE_MM = 0.01
 """Vertices at one place that a target moves this far apart are two points, as of lips that touch."""
-_MOST_AT_ONE_PLACE = 64
-_SAME_SHARE = 0.004  # a step of weights in 8 bits
-_LEAST_MM = 1e-4  # what rounding leaves of vertices that do not move
+_MAX_COINCIDENT = 64
+_WEIGHT_TOLERANCE = 0.004  # a step of weights in 8 bits
+_MIN_DISPLACEMENT_MM = 1e-4  # what rounding leaves of vertices that do not move
 
 
-def part_points(point: Ints, part: Part, linear: Doubles, culprit: object) -> Ints:
+def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) -> Ints:
     """(v,) points of which vertices that move differently are no longer one; in the order they were in.
 
     point : (v,) welded by their places
@@ -29,42 +29,42 @@ def part_points(point: Ints, part: Part, linear: Doubles, culprit: object) -> In
     left = np.flatnonzero(np.bincount(point)[point] > 1)
     copy, number = np.zeros(len(point), np.int64), 0
     while len(left):
-        if number > _MOST_AT_ONE_PLACE:
-            came = f"{number} of them move apart"
-            refuse(culprit, "a few vertices at one place", came, "The file is damaged: export it again")
+        if number > _MAX_COINCIDENT:
+            actual = f"{number} of them move apart"
+            refuse(culprit, "a few vertices at one place", actual, "The file is damaged: export it again")
         groups, first = np.unique(point[left], return_index=True)
         other = left[first[np.searchsorted(groups, point[left])]]
-        apart = _targets_part(part, left, other, linear) | _bones_part(part, left, other)
+        apart = _targets_differ(part, left, other, linear) | _weights_differ(part, left, other)
         copy[left[~apart]] = number
         left, number = left[apart], number + 1
     _, parted = np.unique(point * np.int64(number + 1) + copy, return_inverse=True)
     return np.asarray(parted.reshape(-1), np.int32)
 
 
-def _targets_part(part: Part, one: Index, other: Index, linear: Doubles) -> Mask:
+def _targets_differ(part: MeshPart, one: Index, other: Index, linear: Doubles) -> Mask:
     """Whether some target moves vertices (n,) and others (n,) apart."""
     apart, delta = np.zeros(len(one), bool), np.zeros((len(part.positions), 3))
     for vertex, moved in part.targets.values():
         delta[vertex] = moved @ linear.T
-        apart |= np.linalg.norm(delta[one] - delta[other], axis=1) > PARTED_MM
+        apart |= np.linalg.norm(delta[one] - delta[other], axis=1) > SPLIT_TOLERANCE_MM
         delta[vertex] = 0
     return apart
 
 
-def _bones_part(part: Part, one: Index, other: Index) -> Mask:
+def _weights_differ(part: MeshPart, one: Index, other: Index) -> Mask:
     """Whether vertices (n,) and others (n,) follow bones by different shares."""
     if part.bone is None or part.weight is None:
         return np.zeros(len(one), bool)
     both = np.concatenate([part.bone[one], part.bone[other]], axis=1)
     share = np.concatenate([part.weight[one], -part.weight[other]], axis=1)
     same = both[:, :, None] == both[:, None, :]
-    return np.asarray((np.abs((same * share[:, None, :]).sum(axis=2)) > _SAME_SHARE).any(axis=1))
+    return np.asarray((np.abs((same * share[:, None, :]).sum(axis=2)) > _WEIGHT_TOLERANCE).any(axis=1))
 
 
 def build_rig(
     positions_mm: Floats,
     point: Ints,
-    part: Part,
+    part: MeshPart,
     bones: Bones | None,
     weights: Mapping[str, float],
     to_head: Doubles,
@@ -88,7 +88,7 @@ def build_rig(
 
 
 def _targets(
-    part: Part, point: Ints, first: Index, weights: Mapping[str, float], to_head: Doubles
+    part: MeshPart, point: Ints, first: Index, weights: Mapping[str, float], to_head: Doubles
 ) -> MorphTargets:
     """The targets of points that move as the `first` of their vertices does."""
     if not part.targets:
@@ -98,7 +98,7 @@ def _targets(
     moved, deltas = [], []
     for vertex, delta in part.targets.values():
         delta_mm = (delta @ to_head[:3, :3].T).astype(np.float32)
-        kept = np.flatnonzero(stands[vertex] & (np.abs(delta_mm) > _LEAST_MM).any(axis=1))
+        kept = np.flatnonzero(stands[vertex] & (np.abs(delta_mm) > _MIN_DISPLACEMENT_MM).any(axis=1))
         kept = kept[np.argsort(point[vertex[kept]])]
         moved.append(point[vertex[kept]])
         deltas.append(delta_mm[kept])
@@ -113,7 +113,7 @@ def _targets(
     )
 
 
-def _skeleton(part: Part, bones: Bones, first: Index, to_head: Doubles, culprit: object) -> Skeleton:
+def _skeleton(part: MeshPart, bones: Bones, first: Index, to_head: Doubles, culprit: object) -> Skeleton:
     """The bones of points that follow them as the `first` of their vertices does."""
     assert part.bone is not None and part.weight is not None
     bone = np.zeros((len(first), INFLUENCES), np.int32)
@@ -123,8 +123,8 @@ def _skeleton(part: Part, bones: Bones, first: Index, to_head: Doubles, culprit:
     flat = np.abs(np.linalg.det(bones.world[:, :3, :3])) <= 1e-9 * size**3
     followed = np.flatnonzero(flat & np.isin(np.arange(len(flat)), bone[weight > 0]))
     if len(followed):
-        came = f"{bones.names[followed[0]]!r} is scaled to nothing at rest"
-        refuse(culprit, "bones with an extent", came, "Export it with another scale")
+        actual = f"{bones.names[followed[0]]!r} is scaled to nothing at rest"
+        refuse(culprit, "bones with an extent", actual, "Export it with another scale")
     inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(4), bones.world))
     return Skeleton(
         bones.names, bones.parent, bones.local, np.asarray(inverse, np.float64), to_head, bone, weight

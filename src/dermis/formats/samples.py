@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import Any, Literal, NoReturn
 
 from dermis.base.errors import DermisError, refuse
-from dermis.base.private import cache_folder, make_private
+from dermis.base.private import cache_folder, make_private_folder
 
 DATA_VARIABLE = "DERMIS_DATA"
 
@@ -76,7 +76,7 @@ def fetch(name: str) -> dict[str, Path]:
     """
     sample = _find(name)
     paths = {role: _folder(sample) / file.name for role, file in sample.files.items()}
-    missing = [role for role, file in sample.files.items() if not _is_right(paths[role], file)]
+    missing = [role for role, file in sample.files.items() if not _has_known_hash(paths[role], file)]
     if missing and _data_folder():
         _refuse_data(paths[missing[0]])
     if missing:
@@ -84,13 +84,13 @@ def fetch(name: str) -> dict[str, Path]:
     return paths
 
 
-def cached(name: str) -> bool:
+def is_available(name: str) -> bool:
     """Whether `fetch` would find every file of a sample without the network.
 
     name : a key of `SAMPLES`
     """
     sample = _find(name)
-    return all(_is_right(_folder(sample) / file.name, file) for file in sample.files.values())
+    return all(_has_known_hash(_folder(sample) / file.name, file) for file in sample.files.values())
 
 
 def _find(name: str) -> Sample:
@@ -108,7 +108,7 @@ def _folder(sample: Sample) -> Path:
     return Path(base) / sample.folder
 
 
-def _is_right(path: Path, file: SampleFile) -> bool:
+def _has_known_hash(path: Path, file: SampleFile) -> bool:
     """Whether the file is there with the known hash."""
     try:
         status = path.stat()
@@ -133,7 +133,7 @@ def _download(sample: Sample, roles: list[str]) -> None:
         file, progress = sample.files[role], _Progress(sample.files[role].name)
         downloader = pooch.HTTPDownloader(progressbar=progress, timeout=30)
         try:
-            make_private(_folder(sample))
+            make_private_folder(_folder(sample))
             if not (place := _folder(sample) / file.name).is_file():
                 place.unlink(missing_ok=True)  # pooch would read from a pipe
             pooch.retrieve(
@@ -173,9 +173,9 @@ class _Progress:
 
 
 def _refuse_data(path: Path) -> NoReturn:
-    came = "it is another file (its sha256 differs)" if path.is_file() else "it is not there"
-    remedy = f"Put it there, or unset {DATA_VARIABLE} so that the samples are downloaded"
-    refuse(path, f"a file of the sample data below {DATA_VARIABLE}", came, remedy)
+    actual = "it is another file (its sha256 differs)" if path.is_file() else "it is not there"
+    advice = f"Put it there, or unset {DATA_VARIABLE} so that the samples are downloaded"
+    refuse(path, f"a file of the sample data below {DATA_VARIABLE}", actual, advice)
 
 
 def _refuse_download(sample: Sample, roles: list[str], fault: Exception) -> NoReturn:

@@ -1,4 +1,4 @@
-"""The skin as maps: what a frame knows of it, at the texels of its own uv layout."""
+"""Maps of the skin, computed by the frame at the texels of the uv layout."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.raster import cross, rasterise, texel_corners
+from dermis.atlas.raster import cross_2d, rasterise, texel_corners
 from dermis.base.errors import DermisError
 from dermis.frame.features.shading import bake as baking_pass
 from dermis.frame.features.shading.bake import CHANNELS, COUNT
 from dermis.frame.features.shape import curvature
 from dermis.frame.features.shape.curvature import make_curvature
-from dermis.frame.inputs import Inputs
+from dermis.frame.inputs import FrameInputs
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, MutableBindings
 from dermis.mesh.geometry import uv_cross
@@ -25,22 +25,22 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float32]
 LOGGER = logging.getLogger("dermis")
-_AT_ONCE = 1 << 20  # places; their numbers fit a buffer of WebGPU's default limits
-_PICTURE = (64, 64)  # of the frame that lights the atlas, which nobody looks at
-_COLOURS_ATLAS, _COLOURS_SIDE = 512, 2048  # of colours alone: the light's map, texels that they are means of
+_BATCH = 1 << 20  # surface points per pass; their results fit a buffer of the default limits of WebGPU
+_PICTURE = (64, 64)  # size of the frame that lights the atlas, which is not used
+_ALBEDO_ATLAS, _ALBEDO_SIDE = 512, 2048  # for albedo alone: side of the atlas, and of the texels that are filtered
 _CONDITIONAL = {
-    ("thickness",): "light passes no thin parts: transmission none, or no blurred light",
+    ("thickness",): "no light crosses thin parts: transmission is none, or no light is blurred",
     ("melanin", "blood"): "the skin is not made of pigments",
-}  # outputs that not every scene has, and why
+}  # outputs that only some scenes have, and the reason why others do not
 
 
 @dataclass(frozen=True, eq=False)
-class Baked:
-    """Maps of a head's skin, row 0 at the top.
+class BakedMaps:
+    """Maps of the skin of a head, row 0 at the top.
 
-    covered : (n, n) whether a texel's centre lies on skin; the others continue what is beside them
-    maps : (n, n) or (n, n, c) of each name of `baked_numbers.CHANNELS` that the scene has
-    absent : of those that it has not, why, in words
+    covered : (n, n) whether the centre of a texel is on skin; other texels copy the nearest one that is
+    maps : (n, n) or (n, n, c) maps by the names of `features.shading.bake.CHANNELS`
+    absent : reasons for missing maps, by name
     """
 
     covered: NDArray[np.bool_]
@@ -48,71 +48,73 @@ class Baked:
     absent: dict[str, str]
 
 
-def bake(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> Baked:
-    """Maps of the skin in the layout of its uv, with the light of the scene before and after it spreads.
+def bake(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> BakedMaps:
+    """Compute maps of the skin in its uv layout, with light before and after scattering.
 
-    settings : of the light's way; size, samples, technique and strands' picture do not count
-    side : of the maps, a power of two [texel]
+    settings : settings of the light; size, samples, technique and `strands` are ignored
+    side : side of the maps, a power of two [texels]
 
-    Texels hold what the frame has at their centres, filtered over a texel's side.
+    Texels hold values at their centres, filtered over the side of a texel.
 
-    Raises DermisError for sizes over the device's limits and when the device fails.
+    Raises DermisError for sizes over the limits of the device, and when the device fails.
     """
-    asked = {"size": _PICTURE, "samples": 1, "technique": "texture-space", "parts": "all"}
-    settings = settings.model_copy(update=asked)
+    changes = {"size": _PICTURE, "samples": 1, "technique": "texture-space", "parts": "all"}
+    settings = settings.model_copy(update=changes)
     absent: dict[str, str] = {}
     outputs = tuple(
-        name for names in _CONDITIONAL for name in _there(renderer, scene, settings, names, absent)
+        name for names in _CONDITIONAL for name in _available(renderer, scene, settings, names, absent)
     )
-    texel, places = layout_places(scene.head.mesh, side)
-    numbers = renderer.kept_open.run(partial(_baked, renderer, scene, settings, outputs, places, side))
-    return _filled(side, texel, numbers, absent)
+    texel, points = layout_points(scene.head.mesh, side)
+    job = partial(_bake_points, renderer, scene, settings, outputs, points, side)
+    return _to_maps(side, texel, renderer.reopening_device.run(job), absent)
 
 
-def baked_colours(
+def bake_albedo(
     renderer: Renderer, scene: Scene, triangle: NDArray[np.integer], weights: NDArray[np.floating]
 ) -> Floats:
-    """(n, 3) albedo at places of triangles, those of eyes and mouths included; linear Rec. 709 [-].
+    """Return the (n, 3) linear Rec. 709 albedo at surface points, eyes and mouths included [-].
 
-    weights : (n, 2) of the triangles' second and third corner
+    weights : (n, 2) barycentric weights of the second and third corner
     """
-    settings = Settings(size=_PICTURE, samples=1, atlas=_COLOURS_ATLAS, strands=False)
-    places = baking_pass.places_of(triangle, weights)
-    found = renderer.kept_open.run(partial(_baked, renderer, scene, settings, (), places, _COLOURS_SIDE))
-    return np.ascontiguousarray(found[:, : CHANNELS["albedo"]])
+    settings = Settings(size=_PICTURE, samples=1, atlas=_ALBEDO_ATLAS, strands=False)
+    points = baking_pass.point_words(triangle, weights)
+    job = partial(_bake_points, renderer, scene, settings, (), points, _ALBEDO_SIDE)
+    values = renderer.reopening_device.run(job)
+    return np.ascontiguousarray(values[:, : CHANNELS["albedo"]])
 
 
-def layout_places(mesh: Mesh, side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-    """Texels of a layout whose centres lie on skin, and their places as bake.wgsl reads them.
+def layout_points(mesh: Mesh, side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+    """Return the texels of a uv layout whose centres are on skin, and their surface points for bake.wgsl.
 
-    Where two parts overlap, what is not mirrored in uv wins, and of that the last.
+    Where triangles overlap, those that are not mirrored in uv take precedence, and then the last one.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     texel, triangle = rasterise(mesh, side, np.flatnonzero(skin))
     order = np.argsort(uv_cross(mesh.uv[mesh.triangles])[triangle] > 0, kind="stable")
     owner = np.full(side * side, -1, np.int64)
     owner[texel[order]] = triangle[order]
-    found = np.flatnonzero(owner >= 0)
-    return found, baking_pass.places_of(owner[found], _weights(mesh, side, found, owner[found]))
+    covered = np.flatnonzero(owner >= 0)
+    return covered, baking_pass.point_words(owner[covered], _weights(mesh, side, covered, owner[covered]))
 
 
 def _weights(
     mesh: Mesh, side: int, texel: NDArray[np.int64], triangle: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """(n, 2) of the second and the third corner."""
+    """Return the (n, 2) barycentric weights of texel centres for the second and third corner."""
     corners = texel_corners(mesh, side, triangle)
-    at = np.stack([texel % side, texel // side], axis=1) - corners[:, 0]
+    offset = np.stack([texel % side, texel // side], axis=1) - corners[:, 0]
     second, third = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = cross(second, third)
+    area = cross_2d(second, third)
     area = np.where(area == 0.0, 1.0, area)
-    found = np.clip(np.stack([cross(at, third) / area, cross(second, at) / area], axis=1), 0.0, 1.0)
-    return np.asarray(found / np.maximum(found.sum(axis=1, keepdims=True), 1.0))
+    weights = np.stack([cross_2d(offset, third) / area, cross_2d(second, offset) / area], axis=1)
+    weights = np.clip(weights, 0.0, 1.0)
+    return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1.0))
 
 
-def _there(
+def _available(
     renderer: Renderer, scene: Scene, settings: Settings, names: tuple[str, ...], absent: dict[str, str]
 ) -> tuple[str, ...]:
-    """The names of outputs, if the scene has them; why not goes into `absent`."""
+    """Return the names of outputs if the scene has them, else none; `absent` receives the reason."""
     try:
         renderer.draw(scene, settings, timed=False, outputs=names)
     except DermisError:
@@ -121,61 +123,61 @@ def _there(
     return names
 
 
-def _baked(
+def _bake_points(
     renderer: Renderer,
     scene: Scene,
     settings: Settings,
     outputs: tuple[str, ...],
-    places: NDArray[np.uint32],
+    points: NDArray[np.uint32],
     side: int,
 ) -> Floats:
-    """(n, COUNT) numbers of the places, in the light of a frame that is drawn for it."""
+    """Return the (n, COUNT) channels of surface points, in the light of a frame that is drawn for them."""
     renderer.draw(scene, settings, timed=False, outputs=outputs)
     inputs = renderer.prepare(scene, settings, "", outputs)
-    bound, made = _bound(renderer, inputs, scene), inputs.resources.outputs
-    pigments = made.light.pigments if made is not None and "melanin" in outputs else (0.0, 0.0)
-    found = np.empty((len(places), COUNT), np.float32)
-    for start in range(0, len(places), _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
-        how = bound, places[part], 1.0 / side, pigments
-        found[part] = baking_pass.bake(renderer.device, inputs.constants, *how)
-        LOGGER.info("baking maps: %d of %d texels", min(part.stop, len(places)), len(places))
-    return found
+    bindings, output_resources = _bindings(renderer, inputs, scene), inputs.resources.outputs
+    pigments = output_resources.light.pigments if output_resources and "melanin" in outputs else (0.0, 0.0)
+    values = np.empty((len(points), COUNT), np.float32)
+    for start in range(0, len(points), _BATCH):
+        part = slice(start, start + _BATCH)
+        options = bindings, points[part], 1.0 / side, pigments
+        values[part] = baking_pass.bake(renderer.device, inputs.constants, *options)
+        LOGGER.info("baking maps: %d of %d texels", min(part.stop, len(points)), len(points))
+    return values
 
 
-def _bound(renderer: Renderer, inputs: Inputs, scene: Scene) -> MutableBindings:
-    """What the shader reads of the frame."""
-    made, device = inputs.resources, renderer.device
-    space = make_curvature(device, scene.head.topology.mesh)
+def _bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> MutableBindings:
+    """Return the resources of the frame that bake.wgsl reads."""
+    resources, device = inputs.resources, renderer.device
+    skin_curvature = make_curvature(device, scene.head.topology.mesh)
     frame = CommandList(device, timed=False)
-    curvature.draw(frame, made.head, space)
+    curvature.draw(frame, resources.head, skin_curvature)
     frame.submit()
-    measured = made.outputs.light.thickness if made.outputs else None
+    measured = resources.outputs.light.thickness if resources.outputs else None
     thickness = baking_pass.no_thickness(device) if measured is None else measured
-    own: MutableBindings = {"curvatures": space.smoothed, "thickness_map": thickness}
-    return {**inputs.lit, "shade": inputs.view, "scattered": made.scattered, **own}
+    own: MutableBindings = {"curvatures": skin_curvature.smoothed, "thickness_map": thickness}
+    return {**inputs.bindings, "shade": inputs.view, "scattered": resources.scattered, **own}
 
 
-def _filled(side: int, texel: NDArray[np.int64], numbers: Floats, absent: dict[str, str]) -> Baked:
-    """The maps, continued over what no skin covers."""
+def _to_maps(side: int, texel: NDArray[np.int64], values: Floats, absent: dict[str, str]) -> BakedMaps:
+    """Return maps of the values at texels; other texels copy the nearest of them."""
     covered = np.zeros(side * side, np.bool_)
     covered[texel] = True
-    beside, nearest = np.flatnonzero(~covered), _nearest(covered.reshape(side, side))
+    uncovered, nearest = np.flatnonzero(~covered), _nearest(covered.reshape(side, side))
     maps, first = {}, 0
     for name, count in CHANNELS.items():
-        values = numbers[:, first : first + count]
+        channels = values[:, first : first + count]
         first += count
         if name in absent:
             continue
-        whole = np.zeros((side * side, count), np.float32)
-        whole[texel] = values
-        whole[beside] = whole[nearest]
-        maps[name] = whole.reshape((side, side) if count == 1 else (side, side, count))
-    return Baked(covered.reshape(side, side), maps, absent)
+        image = np.zeros((side * side, count), np.float32)
+        image[texel] = channels
+        image[uncovered] = image[nearest]
+        maps[name] = image.reshape((side, side) if count == 1 else (side, side, count))
+    return BakedMaps(covered.reshape(side, side), maps, absent)
 
 
 def _nearest(covered: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """For each texel that is not covered, in order, the nearest that is."""
+    """Return the index of the nearest covered texel of each texel that is not covered, in order."""
     from scipy.ndimage import distance_transform_edt
 
     y, x = distance_transform_edt(~covered, return_distances=False, return_indices=True)

@@ -1,4 +1,4 @@
-"""Frames of scenes captured for players elsewhere."""
+"""Capture of the passes of frames, for players in other programs."""
 
 from __future__ import annotations
 
@@ -9,56 +9,59 @@ from numpy.typing import NDArray
 
 from dermis.frame.features.surface import mips as map_mips
 from dermis.frame.frame import draw_frame
-from dermis.frame.inputs import Inputs
+from dermis.frame.inputs import FrameInputs
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, Texture, upload
 from dermis.gpu.capture import CapturedFrame, FrameCapture
 from dermis.scene.techniques import TECHNIQUES
 
-_KEPT = 32  # of each resource: for all nodes of dials
-FORMS = {"gpu": "DiscreteGPU", "software": "CPU"}
-"""Kinds of adapters that frames are laid out for."""
+_CACHE_SIZE = 32  # variants per resource, for all combinations of the player's controls
+ADAPTER_KINDS = {"gpu": "DiscreteGPU", "software": "CPU"}
+"""Kind of adapter for which frames are captured, by its name."""
 
 
-def renderer_for(form: str, adapter: str) -> Renderer:
-    """A renderer whose frames are laid out for GPUs or for software, whatever its adapter is."""
-    made = Renderer(adapter, depth=_KEPT, rounds=1000)
-    if made.device.adapter.kind != FORMS[form]:
-        device = made.device
+def capture_renderer(device_kind: str, adapter: str) -> Renderer:
+    """Return a renderer whose frames suit GPUs or software adapters, whatever its own adapter is.
+
+    device_kind : "gpu" or "software"
+    """
+    renderer = Renderer(adapter, cache_size=_CACHE_SIZE, cache_ttl=1000)
+    if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:
+        device = renderer.device
         device.programs.clear()
-        device.adapter = replace(device.adapter, kind=FORMS[form])
-    return made
+        device.adapter = replace(device.adapter, kind=ADAPTER_KINDS[device_kind])
+    return renderer
 
 
-def taken(tape: FrameCapture, inputs: Inputs) -> CapturedFrame:
-    """The passes of a frame; none of them runs."""
+def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
+    """Return the passes of a frame without running them."""
     technique = TECHNIQUES[inputs.settings.technique]
-    return tape.take(lambda graph: draw_frame(graph, inputs, technique))
+    return capture.capture(lambda graph: draw_frame(graph, inputs, technique))
 
 
-def sparser(take: CapturedFrame, times: int) -> CapturedFrame:
-    """The same frame with one coarse hair for so many, as much wider; with all for 0."""
-    for _, record in (one for one in take.records if one[0] == "StrandView" and times > 1):
-        kept = int(record["coarse"]) // times
-        record["wider"] *= record["coarse"] / max(1, kept)
-        record["coarse"] = kept
-    return take
+def reduce_hair(frame: CapturedFrame, factor: int) -> CapturedFrame:
+    """Return a captured frame with one of `factor` coarse hairs, as much wider; 0 keeps all hairs."""
+    for _, record in (one for one in frame.records if one[0] == "StrandView" and factor > 1):
+        count = int(record["coarse"]) // factor
+        record["wider"] *= record["coarse"] / max(1, count)
+        record["coarse"] = count
+    return frame
 
 
-def halving(tape: FrameCapture, texture: Texture) -> CapturedFrame:
-    """The passes that fill a map's mips from its first."""
-    return tape.take(lambda graph: map_mips.halve(graph, map_mips.mipped(texture)))
+def capture_mips(capture: FrameCapture, texture: Texture) -> CapturedFrame:
+    """Return the passes that compute the mip levels of a map from the first one."""
+    return capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
 
 
-def refill(renderer: Renderer, texture: Texture, levels: list[NDArray[np.float16]]) -> None:
-    """Put other texels into a map; its mips follow where only the first is given.
+def update_map(renderer: Renderer, texture: Texture, levels: list[NDArray[np.float16]]) -> None:
+    """Replace the texels of a map; if only the first mip level is given, the others are computed.
 
-    levels : (l, h, w, c) of each mip
+    levels : (l, h, w, c) texels of each mip level
     """
     for mip, layers in enumerate(levels):
         for layer, texels in enumerate(layers):
             upload(renderer.device, texture, texels, mip=mip, layer=layer)
     if len(levels) < texture.mip_level_count:
         frame = CommandList(renderer.device, timed=False)
-        map_mips.halve(frame, map_mips.mipped(texture))
+        map_mips.fill_mips(frame, map_mips.with_mip_views(texture))
         frame.submit()

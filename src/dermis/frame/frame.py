@@ -1,4 +1,4 @@
-"""One frame, read from top to bottom."""
+"""Passes of one frame, in order."""
 
 from __future__ import annotations
 
@@ -15,67 +15,67 @@ from dermis.frame.features import (
     shape,
     visibility,
 )
-from dermis.frame.features.outputs.stage_inputs import SeenFrame, SpreadLight
+from dermis.frame.features.outputs.stage_inputs import StageInputs, SpreadLight
 from dermis.frame.features.surface.painting.paint import draw_expression
-from dermis.frame.inputs import Inputs
+from dermis.frame.inputs import FrameInputs
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Graph, Texture
 
 
-def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
-    """Light the skin, scatter the light below it, shade the image; only stale passes run."""
-    made, lit, view = inputs.resources, inputs.lit, inputs.view
-    shape.draw(graph, made.shape.shape, inputs.motion)
-    if made.shape.person:
-        shape.draw(graph, made.shape.person, inputs.motion.at_rest)
-    if made.face and inputs.movements is not None:
-        draw_expression(graph, made.face, inputs.movements)
+def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
+    """Declare the passes that light the skin, scatter the light and shade the picture; stale ones run."""
+    resources, bindings, view = inputs.resources, inputs.bindings, inputs.view
+    shape.draw(graph, resources.shape.shape, inputs.motion)
+    if resources.shape.rest_shape:
+        shape.draw(graph, resources.shape.rest_shape, inputs.motion.at_rest)
+    if resources.expression_maps and inputs.face_movements is not None:
+        draw_expression(graph, resources.expression_maps, inputs.face_movements)
     area_lights = ("SHAPES", 1) in inputs.light_constants
-    shadows.draw(graph, made.shadow_maps, inputs.shadow_views, made.head, area_lights)
-    if made.hair:
-        hair.draw_shadows(graph, made.hair, made.shape.shape, inputs.shadow_views, lit)
-    if made.sky and inputs.around:
+    shadows.draw(graph, resources.shadow_maps, inputs.shadow_views, resources.head, area_lights)
+    if resources.hair:
+        hair.draw_shadows(graph, resources.hair, resources.shape.shape, inputs.shadow_views, bindings)
+    if resources.sky and inputs.sky_view:
         maps = [(layout, layout.occlusion) for layout in inputs.layouts]
-        occlusion.draw(graph, made.sky, *inputs.around, maps)
+        occlusion.draw(graph, resources.sky, *inputs.sky_view, maps)
     for layout in inputs.layouts:
         if layout.interreflection:
-            interreflection.draw(graph, layout.lit, layout.interreflection, inputs.light_constants)
-    below = technique.scatter(graph, inputs)
-    visibility.draw(graph, made.visibility, inputs.camera, made.head)
-    image, apart = made.post.picture.radiance, technique.apart(made.technique)
+            interreflection.draw(graph, layout.bindings, layout.interreflection, inputs.light_constants)
+    scattered = technique.scatter(graph, inputs)
+    visibility.draw(graph, resources.visibility, inputs.camera_views, resources.head)
+    image, layers = resources.post.picture.radiance, technique.subsurface_layers(resources.technique)
     radiance = shading.draw(
-        graph, lit, view, inputs.constants, made.visibility, below, image, inputs.settings.size, apart
+        graph, bindings, view, inputs.constants, resources.visibility, scattered, image, inputs.settings.size, layers
     )
     radiance = technique.finish(graph, inputs, radiance)
-    seen = _seen(graph, inputs, technique, below)
-    look = lit, view, inputs.light_constants
-    if made.hair:
-        over, labels = (made.visibility.texture, radiance), outputs.hair_labels(graph, made.outputs, seen)
-        radiance = hair.draw(graph, made.hair, look, made.head, *over, labels)
-    post.draw(graph, made.post, inputs.settings, radiance, *look, made.visibility.texture)
-    outputs.draw(graph, made.outputs, seen)
+    stage_inputs = _stage_inputs(graph, inputs, technique, scattered)
+    shared = bindings, view, inputs.light_constants
+    if resources.hair:
+        over, labels = (resources.visibility.texture, radiance), outputs.hair_labels(graph, resources.outputs, stage_inputs)
+        radiance = hair.draw(graph, resources.hair, shared, resources.head, *over, labels)
+    post.draw(graph, resources.post, inputs.settings, radiance, *shared, resources.visibility.texture)
+    outputs.draw(graph, resources.outputs, stage_inputs)
 
 
-def _seen(graph: Graph, inputs: Inputs, technique: Technique, below: Texture) -> SeenFrame:
-    """Return what the outputs read of the frame."""
-    made, spread = inputs.resources, None
-    layers = technique.apart(made.spread)
+def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scattered: Texture) -> StageInputs:
+    """Return the inputs of the outputs' passes."""
+    resources, diffused = inputs.resources, None
+    layers = technique.subsurface_layers(resources.output_layers)
     if layers is not None:
-        spread = SpreadLight(layers, partial(technique.spread, graph, inputs))
-    return SeenFrame(
-        lit=inputs.lit,
+        diffused = SpreadLight(layers, partial(technique.blur_subsurface_layers, graph, inputs))
+    return StageInputs(
+        lit=inputs.bindings,
         view=inputs.view,
         centre_mm=inputs.centre_mm,
         constants=inputs.constants,
-        scattered=below,
-        camera=inputs.camera,
-        head=made.head,
-        visibility=made.visibility,
-        shape=made.shape.shape,
-        picture=made.post.picture,
-        hair=made.hair is not None,
+        scattered=scattered,
+        camera=inputs.camera_views,
+        head=resources.head,
+        visibility=resources.visibility,
+        shape=resources.shape.shape,
+        picture=resources.post.picture,
+        hair=resources.hair is not None,
         previous=inputs.previous,
         thin=inputs.layouts[0].translucency,
-        spread=spread,
-        through=partial(technique.leave_through, graph, inputs),
+        spread=diffused,
+        through=partial(technique.sum_translucency, graph, inputs),
     )

@@ -1,4 +1,4 @@
-"""Everything a frame reads: resources that persist, and what cameras and lights change."""
+"""Inputs of a frame: persistent resources, and records of the camera, the lights and the pose."""
 
 from __future__ import annotations
 
@@ -8,50 +8,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.diffusion.pyramid import Blur
-from dermis.frame.features.occlusion.moving import Look
+from dermis.frame.features.occlusion.moving import SkyViews
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shape.shape import MotionBytes
 from dermis.frame.projection import Triple, Views
 from dermis.frame.resources import AtlasLayout, Resources
-from dermis.gpu import Bindings, Constants, Record
+from dermis.gpu import Bindings, Constants, UniformRecord
 from dermis.scene.camera import Window
 from dermis.scene.settings import Settings
 
 
 @dataclass(frozen=True, eq=False)
-class Inputs:
-    """Everything that a frame reads.
+class FrameInputs:
+    """Inputs of a frame.
 
-    motion : what moves the head's shape
-    movements : what changes the painted face, None where nothing does
-    layouts, blurs : those of the resources, in the frame's light
-    shadow_views : how the shadow maps see the head
-    light_constants : pipeline constants of what is lit
-    camera : how the picture's samples see the head
-    window : what the picture shows of a plane before the eye
-    around : how the sky sees the head, and the shader's record of it; None where occlusion does not move
-    view, constants : record of the shading pass, and its pipeline constants
-    centre_mm : the head's, from which places of the scene are counted
-    previous : the scene before, None where nothing reads it
+    motion : pose of the head, as bytes for the shaders
+    face_movements : (9,) amounts of the expressions that change the painted maps, None for none
+    layouts, blurs : layouts and blurs of the resources, with the lights and the light scale of this frame
+    shadow_views : view of each shadow map
+    light_constants : pipeline constants of the lights in use
+    camera_views : view of each sample of a pixel
+    window : part of the image plane that the picture shows
+    sky_view : views of the head from the sky, and their record; None where occlusion does not follow the shape
+    view, constants : record of the camera for the shading pass, and its pipeline constants
+    centre_mm : centre of the head, the origin of positions in the scene [mm]
+    previous : previous scene for motion vectors, None unless requested
     """
 
     resources: Resources
     settings: Settings
     motion: MotionBytes
-    movements: NDArray[np.float32] | None
+    face_movements: NDArray[np.float32] | None
     layouts: tuple[AtlasLayout, ...]
     blurs: tuple[Blur, ...]
     shadow_views: Views
     light_constants: Constants
-    camera: Views
+    camera_views: Views
     window: Window
-    around: tuple[Look, Record] | None
-    view: Record
+    sky_view: tuple[SkyViews, UniformRecord] | None
+    view: UniformRecord
     constants: Constants
     centre_mm: Triple
     previous: PreviousScene | None = None
 
     @property
-    def lit(self) -> Bindings:
-        """Resources of the layout that is looked at."""
-        return self.layouts[0].lit
+    def bindings(self) -> Bindings:
+        """Return the resources of the first layout, by their names in the shaders."""
+        return self.layouts[0].bindings

@@ -1,4 +1,4 @@
-"""Limits of a device: frames that exceed them are refused, with settings that would fit."""
+"""Memory and size limits of a device: larger frames are refused, with settings that would fit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dermis.base.errors import refuse
-from dermis.frame.features.diffusion.mixture import sums_of
+from dermis.frame.features.diffusion.mixture import sum_count
 from dermis.frame.features.shadows.shadows import SHADOW_BYTES
 from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.request import FrameRequest
@@ -19,69 +19,72 @@ from dermis.gpu import Device
 from dermis.gpu.memory import OutOfMemoryError, allocated_bytes, check_memory, format_bytes, probe_memory
 from dermis.scene.settings import Settings
 
-_DISTANCE = 4  # bytes of a texel: distance to the edge of its chart
-_FLOATS = 16  # bytes of a texel: four floats
-_GEOMETRY = 8 + 8 + 8  # bytes of an atlas texel: place on the mesh, stretch, reach
-_PICTURE = 36  # bytes of a pixel
-_SAMPLE = 8
-_NUMBER = 2 * 4  # bytes of a pixel for each number of an output, and those of its copy for reading
-_FEW_SAMPLES = 4  # of a pixel, below which edges are rough
-_SHARE = 0.75  # of the room that was found: the head, its maps and programs take some
-_LEAST = 64  # of a side, below which nothing is won
+_DISTANCE = 4  # bytes per texel: distance to the edge of the chart
+_FLOATS = 16  # bytes per texel: four floats
+_GEOMETRY = 8 + 8 + 8  # bytes per atlas texel: surface point, stretch, reach
+_PICTURE = 36  # bytes per pixel
+_SAMPLE = 8  # bytes per sample
+_CHANNEL = 2 * 4  # bytes per pixel and channel of an output, its readback buffer included
+_FEW_SAMPLES = 4  # per pixel; with fewer, edges alias
+_FRACTION = 0.75  # of the available memory; the head, its maps and programs need the rest
+_MIN_SIDE = 64  # smaller sides save nothing
 
 
 def check_limits(device: Device, request: FrameRequest) -> None:
-    """Raises DermisError for sizes over the device's limits."""
+    """Raise DermisError for sizes over the limits of the device."""
     limit, name, settings = device.max_texture_size, device.adapter.name, request.settings
-    sides = {"size": max(settings.size), "atlas": request.atlases.side, "shadow_size": settings.shadow_size}
+    sides = {"size": max(settings.size), "atlas": request.atlas_plan.side, "shadow_size": settings.shadow_size}
     for option, side in sides.items():
         if side > limit:
             name_limit = f"at most {limit} (the limit of {name})"
             refuse(option, name_limit, f"it is {side}", "Choose a smaller one")
     needed = frame_bytes(request)
     width, height = settings.size
-    sizes = f"{request.atlases.side} texels and {width}x{height} pixels"
-    of_both = needed["atlas"] + needed["size"]
-    check_memory(device, of_both, "atlas and size", sizes, partial(fitting, request))
+    sizes = f"{request.atlas_plan.side} texels and {width}x{height} pixels"
+    total = needed["atlas"] + needed["size"]
+    check_memory(device, total, "atlas and size", sizes, partial(suggest_settings, request))
 
 
-def no_room(error: OutOfMemoryError, device: Device, request: FrameRequest) -> OutOfMemoryError:
-    """The same error, with what would fit in place of what did not; what was made of that is released."""
-    for one in filter(None, (error, error.__cause__)):
-        traceback.clear_frames(one.__traceback__)
+def out_of_memory_error(error: OutOfMemoryError, device: Device, request: FrameRequest) -> OutOfMemoryError:
+    """Return an error that suggests settings that fit, and release the memory of the failed frame."""
+    for raised in filter(None, (error, error.__cause__)):
+        traceback.clear_frames(raised.__traceback__)
     needed = sum(frame_bytes(request).values())
-    found = probe_memory(device, needed)
-    most = _SHARE * (allocated_bytes() + found)
-    if needed <= most:  # and yet it did not fit: others of this process hold the rest
-        most = _SHARE * found
-    return OutOfMemoryError(error.expected, error.came, error.size, fitting(request, most))
+    free = probe_memory(device, needed)
+    budget = _FRACTION * (allocated_bytes() + free)
+    if needed <= budget:  # the estimate fits, so the process holds memory that cannot be counted
+        budget = _FRACTION * free
+    return OutOfMemoryError(error.expected, error.actual, error.size, suggest_settings(request, budget))
 
 
-def fitting(request: FrameRequest, most: float) -> str:
-    """What to write for a frame to take no more than a number of bytes: halves of what takes most of it."""
+def suggest_settings(request: FrameRequest, budget: float) -> str:
+    """Return advice on settings whose frame fits into a number of bytes.
+
+    The options that need most memory are halved.
+    """
     smaller, changed = request, dict[str, str]()
     needed = frame_bytes(request)
-    while sum(needed.values()) > most:
+    while sum(needed.values()) > budget:
         option = max(needed, key=lambda name: needed[name])
         halved = _halved(smaller.settings, option)
         if halved is None:
             break
         smaller = replace(smaller, settings=halved)
-        needed, changed = frame_bytes(smaller), changed | _written(halved, option)
-    if not changed or sum(needed.values()) > most:
+        needed, changed = frame_bytes(smaller), changed | _command_line_options(halved, option)
+    if not changed or sum(needed.values()) > budget:
         return "Close other programs that use the memory, or try --adapter cpu"
     return f"With {' '.join(changed.values())} it takes about {format_bytes(sum(needed.values()))}"
 
 
 def frame_bytes(request: FrameRequest) -> dict[str, float]:
-    """Bytes that a frame takes, by the option that they follow from; the head and its maps aside."""
-    technique, settings, atlases = request.technique, request.settings, request.atlases
+    """Return the memory of a frame by option, without the head and its maps [bytes]."""
+    technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
     pixel = _PICTURE + _SAMPLE * settings.samples + technique.pixel_bytes
-    pixel += _NUMBER * sum(request.output_channels.values())
-    pixel += technique.apart_bytes * ("diffuse" in request.outputs)
-    texel = atlas_texel_bytes(technique, request.count, len(atlases.layouts))
-    texel += _mixing_bytes(request) if request.count else 0.0
+    pixel += _CHANNEL * sum(request.output_channels.values())
+    pixel += technique.subsurface_layer_bytes * ("diffuse" in request.outputs)
+    texel = atlas_texel_bytes(technique, request.blur_count, len(atlases.layouts))
+    texel += _mixing_bytes(request) if request.blur_count else 0.0
     if "translucent" in request.outputs:
         texel += _FLOATS * (2 * len(atlases.layouts) - 1)
     return {
@@ -92,22 +95,22 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
 
 
 def _mixing_bytes(request: FrameRequest) -> float:
-    """Of a texel of the atlas, where a map mixes profiles: levels of each other, shares and sums."""
-    others = len(request.others)
-    shares = len(request.atlases.layouts) + sums_of(others)
-    return others * request.technique.texel_bytes(request.count) + _FLOATS * shares if others else 0.0
+    """Return the memory per atlas texel that blending profiles needs [bytes]."""
+    others = len(request.other_profiles)
+    maps = len(request.atlas_plan.layouts) + sum_count(others)
+    return others * request.technique.texel_bytes(request.blur_count) + _FLOATS * maps if others else 0.0
 
 
 def _halved(settings: Settings, option: str) -> Settings | None:
-    """Settings with half of an option, None where that is too little: of the size, samples first."""
+    """Return settings with half of an option, None when that is too small; samples go before the size."""
     if option == "size" and settings.samples > _FEW_SAMPLES:
         return settings.model_copy(update={"samples": settings.samples // 2})
     value: Any = getattr(settings, option)
     half: Any = tuple(side // 2 for side in value) if option == "size" else value // 2
-    return settings.model_copy(update={option: half}) if np.min(half) >= _LEAST else None
+    return settings.model_copy(update={option: half}) if np.min(half) >= _MIN_SIDE else None
 
 
-def _written(settings: Settings, option: str) -> dict[str, str]:
+def _command_line_options(settings: Settings, option: str) -> dict[str, str]:
     """Options of the command line, by their names."""
     if option != "size":
         return {option: f"--{option.replace('_', '-')} {getattr(settings, option)}"}
@@ -115,14 +118,16 @@ def _written(settings: Settings, option: str) -> dict[str, str]:
     return {"size": f"--size {width}x{height} --samples {settings.samples}"}
 
 
-def atlas_texel_bytes(technique: TechniqueTraits, levels: int, layouts: int) -> float:
-    """Bytes of an atlas texel on a software adapter: geometry, levels, light between passes, their sum.
+def atlas_texel_bytes(technique: TechniqueTraits, blur_count: int, layouts: int) -> float:
+    """Return the memory per atlas texel on a software adapter [bytes].
 
-    levels : number of Gaussians that blur light
+    It covers geometry, pyramid levels, temporary light and the sum of the levels.
+
+    blur_count : number of Gaussians that blur light
     layouts : number of atlases of that size
     """
-    if not levels:
+    if not blur_count:
         return layouts * _GEOMETRY
-    blurs = technique.texel_bytes(levels)
+    blurs = technique.texel_bytes(blur_count)
     blended = _FLOATS + layouts * _DISTANCE if layouts > 1 else 0
     return blurs + blended + layouts * (_GEOMETRY + SURFACE_BYTES + _FLOATS)

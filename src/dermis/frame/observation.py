@@ -1,4 +1,4 @@
-"""A picture with what is known of what it shows."""
+"""Picture of a scene with its ground truth."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 from dermis.frame.features.outputs.planes import PlaneArray
 from dermis.frame.features.outputs.readback import Readback
-from dermis.gpu.memo import same
-from dermis.scene.head_pose import gaze, head_pose
+from dermis.gpu.memo import are_equal
+from dermis.scene.head_pose import gaze_directions, head_pose
 from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.settings import Settings
@@ -25,12 +25,12 @@ _MISSING: Any = object()
 
 
 class Landmarks(NamedTuple):
-    """Landmarks of a set in a picture.
+    """Landmarks of one set in a picture.
 
-    names : as the set has them, in order
-    positions_mm : (n, 3) in the world, from the head's centre [mm]
-    pixels : (n, 2) x to the right, y down; the middle of the upper left pixel is at (0, 0)
-    visible : (n,) whether the mesh leaves them free; hairs hide none
+    names : names in the order of the set
+    positions_mm : (n, 3) world positions relative to the centre of the head [mm]
+    pixels : (n, 2) image coordinates, x to the right and y down, (0, 0) at the centre of the upper left pixel
+    visible : (n,) whether the mesh does not occlude the landmark; hair is ignored
     """
 
     names: tuple[str, ...]
@@ -40,16 +40,33 @@ class Landmarks(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class Observation(Summarised):
-    """A picture with what is known of what it shows.
+class Observation(ShortRepr):
+    """Picture of a scene with its ground truth.
 
-    picture : (h, w, 3), or with alpha (h, w, 4): sRGB bytes, or linear floats where these are asked
-    outputs : by name, (h, w) or (h, w, c) with row 0 at the top; see `dermis.scene.outputs`
-    camera : K, R and t; places of the scene are in mm from the head's centre
-    landmarks : by the name of their set
-    head_pose : (3, 4) rotation and shift [mm] from the head at rest to the camera, see `scene.head_pose`
-    gaze : (2, 3) unit vectors along which the left and the right eye look, in the camera's axes: x right,
-        y down, z forward; None for a head without eyes of true shape
+    Attributes
+    ----------
+    picture : ndarray
+        (h, w, 3), or with alpha (h, w, 4), sRGB bytes or linear floats.
+    outputs : mapping
+        Outputs by name, (h, w) or (h, w, c) with row 0 at the top, see `dermis.scene.outputs`.
+    camera : OpenCvCamera
+        K, R and t for positions relative to the centre of the head [mm].
+    landmarks : mapping
+        Landmarks by the name of their set.
+    head_pose : ndarray
+        (3, 4) rotation and translation [mm] from the head at rest to the camera.
+    gaze : ndarray or None
+        (2, 3) unit vectors of the left and the right eye in the axes of the camera (x right, y down, z forward);
+        None for heads without modelled eyes.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> import numpy as np
+    >>> camera = dermis.Camera(position=(0, 0, 600), target=(0, 0, 0)).to_opencv((4, 2))
+    >>> observation = dermis.Observation(np.zeros((2, 4, 3), np.uint8), {}, camera, {}, np.eye(3, 4), None)
+    >>> observation.picture.shape
+    (2, 4, 3)
     """
 
     picture: NDArray[np.uint8 | np.float32]
@@ -60,53 +77,54 @@ class Observation(Summarised):
     gaze: NDArray[np.float64] | None
 
 
-def observed_frames(
-    send: Callable[..., Readback],
+def observation_jobs(
+    submit: Callable[..., Readback],
     scenes: Iterable[Scene],
     previous: Scene | Iterable[Scene | None] | None,
     settings: Iterable[Settings],
 ) -> Iterator[tuple[Callable[[], Readback], Callable[[Readback], Observation]]]:
-    """What submits the frame of each scene, and what takes what has arrived of it, for `arriving`.
+    """Yield a function that submits each scene, and one that returns the observation from its readback.
 
-    send : submits the frame of a scene after another, with `settings`
-    previous : as of `with_previous`
-    settings : of each
+    submit : function that submits a scene, given the previous scene and `settings`
+    previous : as for `pair_with_previous`
+    settings : settings of each scene
     """
-    for (scene, before), chosen in zip(with_previous(scenes, previous), settings, strict=False):
-        yield partial(send, scene, before, settings=chosen), partial(_observed, scene, chosen)
+    for (scene, before), chosen in zip(pair_with_previous(scenes, previous), settings, strict=False):
+        yield partial(submit, scene, before, settings=chosen), partial(_observation, scene, chosen)
 
 
-def _observed(scene: Scene, settings: Settings, readback: Readback) -> Observation:
-    picture, outputs, found = readback.all()
+def _observation(scene: Scene, settings: Settings, readback: Readback) -> Observation:
+    picture, outputs, landmark_sets = readback.all()
     camera = scene.camera.to_opencv(settings.size)
-    landmarks = {name: _landmarks(camera, *one) for name, one in found.items()}
-    return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze(scene))
+    landmarks = {name: _landmarks(camera, *rows) for name, rows in landmark_sets.items()}
+    return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze_directions(scene))
 
 
 def _landmarks(camera: OpenCvCamera, names: tuple[str, ...], rows: NDArray[np.float32]) -> Landmarks:
-    seen = (rows[:, :3].astype(np.float64) @ camera.R.T + camera.t) @ camera.K.T
-    with np.errstate(divide="ignore", invalid="ignore"):  # in the plane of the eye
-        pixels = seen[:, :2] / seen[:, 2:]
+    projected = (rows[:, :3].astype(np.float64) @ camera.R.T + camera.t) @ camera.K.T
+    with np.errstate(divide="ignore", invalid="ignore"):  # points in the plane of the pinhole
+        pixels = projected[:, :2] / projected[:, 2:]
     return Landmarks(names, rows[:, :3].copy(), pixels, rows[:, 3] > 0)
 
 
-def with_previous(
+def pair_with_previous(
     scenes: Iterable[Scene], previous: Scene | Iterable[Scene | None] | None
 ) -> Iterator[tuple[Scene, Scene | None]]:
-    """Each scene with the one that its motion is counted from, None for none.
+    """Yield each scene with the previous scene from which its motion is computed, None for none.
 
-    previous : that of the first scene, where each follows the one before it unless the head is another; or
-        those of all scenes
+    previous : scene before the first one, where each scene follows the one before it unless the head changes;
+        or the previous scenes of all scenes
     """
     if isinstance(previous, Iterable):
-        for given, told in zip_longest(scenes, previous, fillvalue=_MISSING):
-            if given is _MISSING or told is _MISSING:
-                refuse("previous", "one for each scene", "there are fewer or more", "Write None for none")
-            yield Scene.of(given), told and Scene.of(told)
+        for one, before in zip_longest(scenes, previous, fillvalue=_MISSING):
+            if one is _MISSING or before is _MISSING:
+                expected, actual = "one scene or None per scene", "their number is different"
+                refuse("previous", expected, actual, "Write None for scenes without a previous one")
+            yield Scene.coerce(one), before and Scene.coerce(before)
         return
-    before = previous
-    for given in scenes:
-        scene = Scene.of(given)
-        follows = before is not None and same(before.head.bare, scene.head.bare)
-        yield scene, before if follows else None
-        before = scene
+    latest = previous
+    for one in scenes:
+        scene = Scene.coerce(one)
+        same_head = latest is not None and are_equal(latest.head.bare, scene.head.bare)
+        yield scene, latest if same_head else None
+        latest = scene

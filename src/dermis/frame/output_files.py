@@ -1,4 +1,4 @@
-"""Outputs as files: OpenEXR, PNG and NumPy."""
+"""Outputs as OpenEXR, PNG and NumPy files."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from dermis.images.io import encode_exr_parts
 from dermis.scene.outputs import OUTPUTS, Output
 
 Format = Literal["exr", "png", "npy"]
-_MOST_LEVEL = 65535
-_PICTURE = "rgba"  # of a file's first part, as compositing programs call it
+_PNG_MAX = 65535
+_PICTURE = "rgba"  # name of the first part, a convention of compositing programs
 
 
 def check_formats(names: Iterable[str], kind: Format) -> None:
-    """Raises DermisError for an output that a format cannot hold."""
+    """Raise DermisError for an output that a format cannot store."""
     for name in names:
-        if kind == "png" and OUTPUTS[name].levels is None and OUTPUTS[name].kind != "uint8":
-            refuse(f"output {name}", "exr or npy", "png came, which cannot hold it", "Choose one of these")
+        if kind == "png" and OUTPUTS[name].quantisation is None and OUTPUTS[name].kind != "uint8":
+            refuse(f"output {name}", "exr or npy", "got png, which cannot hold it", "Choose one of these")
 
 
-def beside(path: Path, name: str, kind: Format) -> Path:
-    """Where an output is written beside a picture: face.depth.exr."""
+def output_path(path: Path, name: str, kind: Format) -> Path:
+    """Return the path of an output's file beside a picture, such as face.depth.exr."""
     return path.with_name(f"{path.stem}.{name}.{kind}")
 
 
-def encoded(name: str, values: PlaneArray, kind: Format) -> bytes:
-    """An output as a file, the same to the byte each time.
+def encode_output(name: str, values: PlaneArray, kind: Format) -> bytes:
+    """Return an output as the bytes of a file, identical in each run.
 
     values : (h, w) or (h, w, c)
     """
@@ -43,37 +43,43 @@ def encoded(name: str, values: PlaneArray, kind: Format) -> bytes:
 
 
 def write_output(path: Path, name: str, values: PlaneArray) -> None:
-    """Write an output as .exr, .png or .npy, whole or not at all; values as of `encoded`."""
+    """Write an output as .exr, .png or .npy, atomically.
+
+    values : (h, w) or (h, w, c)
+    """
     kinds: dict[str, Format] = {".exr": "exr", ".png": "png", ".npy": "npy"}
-    _write(path, encoded(name, values, kinds[path.suffix.lower()]))
+    _write(path, encode_output(name, values, kinds[path.suffix.lower()]))
 
 
-def write_together(path: Path, picture: PlaneArray, values: Mapping[str, PlaneArray]) -> None:
+def write_multipart(path: Path, picture: PlaneArray, values: Mapping[str, PlaneArray]) -> None:
     """Write a linear picture and outputs as the parts of one OpenEXR file.
 
     picture : (h, w, 3 or 4)
-    values : of the outputs by name
+    values : outputs by name
     """
     parts = {_PICTURE: dict(zip("RGBA", np.moveaxis(picture, -1, 0), strict=False))}
     parts |= {name: _channels(OUTPUTS[name], one) for name, one in values.items()}
     _write(path, encode_exr_parts(parts))
 
 
-def png_levels(name: str, values: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
-    """(h, w) or (h, w, 3) of an output as a PNG holds it; of two channels the third is 0."""
+def quantise(name: str, values: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
+    """Return an output as the (h, w) or (h, w, 3) integers of a PNG file.
+
+    Outputs of two channels get a third one of 0.
+    """
     if values.dtype == np.uint8:
         return values
-    levels = OUTPUTS[name].levels
-    assert levels is not None, "checked before"
-    found = np.clip(np.rint(values / levels.step + levels.zero), 0, _MOST_LEVEL).astype(np.uint16)
-    return found if found.ndim == 2 or found.shape[2] > 2 else np.pad(found, ((0, 0), (0, 0), (0, 1)))
+    quantisation = OUTPUTS[name].quantisation
+    assert quantisation is not None, "check_formats accepts only quantised outputs"
+    words = np.clip(np.rint(values / quantisation.step + quantisation.zero), 0, _PNG_MAX).astype(np.uint16)
+    return words if words.ndim == 2 or words.shape[2] > 2 else np.pad(words, ((0, 0), (0, 0), (0, 1)))
 
 
 def _channels(output: Output, values: PlaneArray) -> dict[str, PlaneArray]:
-    """By their names in a file: depth.Z, normal.X, ..."""
-    each = np.atleast_3d(values)
-    letters = output.letters or [str(k) for k in range(each.shape[2])]
-    return {f"{output.name}.{letter}": each[..., k] for k, letter in enumerate(letters)}
+    """Return the channels of an output by their names in a file: depth.Z, normal.X, ..."""
+    channels = np.atleast_3d(values)
+    names = output.channel_names or [str(k) for k in range(channels.shape[2])]
+    return {f"{output.name}.{name}": channels[..., k] for k, name in enumerate(names)}
 
 
 def _as_exr(name: str, values: PlaneArray) -> bytes:
@@ -81,14 +87,14 @@ def _as_exr(name: str, values: PlaneArray) -> bytes:
 
 
 def _as_png(name: str, values: PlaneArray) -> bytes:
-    levels = png_levels(name, values)
-    return encode_png(levels[..., None] if levels.ndim == 2 else levels, 6)
+    words = quantise(name, values)
+    return encode_png(words[..., None] if words.ndim == 2 else words, 6)
 
 
 def _as_npy(name: str, values: PlaneArray) -> bytes:
-    into = io.BytesIO()
-    np.save(into, values, allow_pickle=False)
-    return into.getvalue()
+    stream = io.BytesIO()
+    np.save(stream, values, allow_pickle=False)
+    return stream.getvalue()
 
 
 _ENCODERS: Mapping[Format, Callable[[str, PlaneArray], bytes]] = {
@@ -99,5 +105,5 @@ _ENCODERS: Mapping[Format, Callable[[str, PlaneArray], bytes]] = {
 
 
 def _write(path: Path, data: bytes) -> None:
-    with files.replacing(path) as temporary:
+    with files.atomic_file(path) as temporary:
         temporary.write_bytes(data)

@@ -1,4 +1,4 @@
-"""Compute programs of a frame: where their shaders, includes, lists and shared numbers are found."""
+"""Compute programs of a frame, and the places where their includes, lists and constants are found."""
 
 from __future__ import annotations
 
@@ -10,31 +10,32 @@ from pathlib import Path
 from types import ModuleType
 
 from dermis import specular
-from dermis.environment.mirrors import mirror_numbers
-from dermis.environment.prefilter import reflection_numbers
-from dermis.frame.lights import light_numbers
+from dermis.environment.isotropic_lobes import isotropic_lobe_constants
+from dermis.environment.prefilter import reflection_constants
+from dermis.frame.lights import light_shader_constants
 from dermis.frame.lights.kind import KINDS, light_shaders
-from dermis.gpu import ComputeProgram, Constants, Device, compiled
-from dermis.gpu.program import declared
+from dermis.gpu import ComputeProgram, Constants, Device, cached_program
+from dermis.gpu.program import used_constants
 from dermis.gpu.wgsl_source import Folder, Member, ShaderFolder
 from dermis.scene.outputs import OUTPUTS
 from dermis.specular.models import MODELS
 
 FLOATS = "rgba32float"
-"""Format of light in full precision."""
+"""Texture format of light in full precision."""
 HALVES = "rgba16float"
+"""Texture format of light in half precision."""
 FRAME = Path(__file__).parent
 FEATURES = FRAME / "features"
-"""Shaders are named by their feature's folder and their own name: "shading/shade.wgsl"."""
+"""Root of shader paths such as "shading/shade.wgsl"."""
 SPECULAR = Path(str(specular.__file__)).parent
 TILE = 16
-"""Side of workgroups that do little: smaller ones finish before the H200 has started the next."""
-EACH = 64
-"""Invocations of a workgroup, as in each.wgsl."""
-_ROW = 32768  # workgroups in a row, at most 65535
-_STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
-_SPLAT_STEP = 2.0  # of hairs' shadows on software adapters [texel], see docs/performance.md
-_SAMPLES = 64  # that an invocation may meet: drivers end what goes round loops 65,535 times
+"""Side of the workgroups of short shaders; smaller ones end before a GPU has started the next."""
+WORKGROUP_SIZE = 64
+"""Invocations per workgroup, EACH of each.wgsl."""
+_ROW = 32768  # workgroups along x, at most 65535
+_STRIP = 16  # pixels per invocation of shade.wgsl on software adapters
+_SPLAT_STEP = 2.0  # step along hairs in shadow maps on software adapters [texels]
+_MAX_SAMPLES = 64  # per invocation: a driver ends loops after 65,535 iterations
 
 
 _ALWAYS = (
@@ -47,17 +48,17 @@ _ALWAYS = (
 
 
 def shader_folders(*options: str) -> tuple[Folder, ...]:
-    """Return the folders in which includes are looked up, with the lists and numbers of all features.
+    """Return the folders of includes, with the lists and constants that all features add.
 
-    A feature is a package in `features`; its `shader_numbers()` and `shader_lists()`, where it has them, are
-    found here, so that a feature is registered nowhere.
+    A feature is a package in `features`. Its functions `shader_constants` and `shader_lists` are discovered
+    here, so that features need no registration.
 
     options : names for which `//#if` holds
     """
-    numbers: dict[str, float] = {**light_numbers(), **mirror_numbers(), **reflection_numbers()}
+    numbers: dict[str, float] = {**light_shader_constants(), **isotropic_lobe_constants(), **reflection_constants()}
     lists: dict[str, Callable[[], Sequence[Member]]] = {"lights": light_shaders}
     for feature in _features():
-        numbers |= getattr(feature, "shader_numbers", dict)()
+        numbers |= getattr(feature, "shader_constants", dict)()
         lists |= getattr(feature, "shader_lists", dict)()
     shared = ShaderFolder(FEATURES, lists, lambda: numbers, frozenset(options))
     return (shared, FRAME / "wgsl", FRAME / "techniques", SPECULAR)
@@ -77,78 +78,83 @@ def program(
     store: str = FLOATS,
     labels: bool = False,
 ) -> ComputeProgram:
-    """Return the program of a shader, compiled once, with pipeline constants.
+    """Return the compiled program of a shader; programs are cached per device.
 
-    The device's own constants are added to them.
+    The device's own constants are added to `constants`.
 
     path : "FEATURE/NAME.wgsl", or the path of any other file
-    source, store : formats in which the shader reads and stores blurred light, if it does
-    labels : whether a pass of hairs stores labels besides the picture
+    constants : pipeline constants
+    source, store : formats of the textures from which the shader reads and to which it stores light
+    labels : whether a hair pass stores labels besides the picture
     """
-    chosen = options(source, store, labels)
+    active = shader_options(source, store, labels)
 
-    def make() -> ComputeProgram:
-        file, folders = FEATURES / path, shader_folders(*chosen)
-        return ComputeProgram(device, file, folders, suited(device, file, folders, constants))
+    def compile_program() -> ComputeProgram:
+        file, folders = FEATURES / path, shader_folders(*active)
+        return ComputeProgram(device, file, folders, program_constants(device, file, folders, constants))
 
-    return compiled(device, (path, chosen, registered()), constants, make)
+    return cached_program(device, (path, active, registry_version()), constants, compile_program)
 
 
-def options(source: str, store: str, labels: bool) -> tuple[str, ...]:
+def shader_options(source: str, store: str, labels: bool) -> tuple[str, ...]:
     """Return the names for which `//#if` holds in a shader, see `program`."""
-    chosen = {"FILTERED_SOURCE": source == HALVES, "STORED_HALVES": store == HALVES, "HAIR_LABELS": labels}
-    return tuple(name for name, holds in chosen.items() if holds)
+    values = {"FILTERED_SOURCE": source == HALVES, "STORED_HALVES": store == HALVES, "HAIR_LABELS": labels}
+    return tuple(name for name, value in values.items() if value)
 
 
-def suited(
+def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Pipeline constants, with the device's own that the shader declares."""
-    return declared(path, folders, device_constants(device)) | dict(constants)
+    """Return pipeline constants together with those device constants that a shader declares."""
+    return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 
-def each(count: int, workgroup: int = EACH) -> tuple[int, int, int]:
-    """Workgroups of shaders that have an invocation for each of a list, see each.wgsl.
+def workgroup_grid(count: int, workgroup: int = WORKGROUP_SIZE) -> tuple[int, int, int]:
+    """Return the numbers of workgroups for shaders with one invocation per list entry, see each.wgsl.
 
-    workgroup : how many of the list a workgroup does
+    count : number of entries
+    workgroup : entries per workgroup
     """
     groups = max(1, -(-count // workgroup))
     return min(groups, _ROW), -(-groups // _ROW), 1
 
 
-def registered() -> int:
+def registry_version() -> int:
     """Return a number that changes whenever a light, a lobe or an output is registered or removed."""
     return KINDS.changes + MODELS.changes + OUTPUTS.changes
 
 
 def device_constants(device: Device) -> Constants:
-    """Pipeline constants that suit the device, for shaders that declare them.
+    """Return the pipeline constants that suit the device, for shaders that declare them.
 
     GPUs read buffers faster. Software adapters read textures faster, skip lights behind each point's surface,
     shade columns of pixels and take longer steps along hairs that cast shadows; see geometry.wgsl,
     lighting.wgsl, shade.wgsl and strands_shadow.wgsl.
     """
     if device.adapter.kind == "CPU":
-        return (("PASSES_DARK", 1), ("STRIP", _STRIP), ("SPLAT_STEP", _SPLAT_STEP))
+        return (("SKIPS_UNLIT", 1), ("STRIP", _STRIP), ("SPLAT_STEP", _SPLAT_STEP))
     return (("MESH_IN_BUFFERS", 1),)
 
 
-def strip_for(device: Device, samples: int) -> Constants:
-    """What another number of samples than usual makes of the strips of `device_constants`."""
-    fewer = max(1, _SAMPLES // samples)
-    return (("STRIP", fewer),) if device.adapter.kind == "CPU" and fewer < _STRIP else ()
+def strip_constants(device: Device, samples: int) -> Constants:
+    """Return the constants that shorten the strips of `device_constants` for many samples per pixel."""
+    strip = max(1, _MAX_SAMPLES // samples)
+    return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _STRIP else ()
 
 
-def usual_texel(device: Device) -> str:
-    """Return the format of levels: halves on GPUs, which read them faster; floats where software converts."""
+def level_format(device: Device) -> str:
+    """Return the texture format of pyramid levels: half floats on GPUs, floats on software adapters.
+
+    Each is the faster format there.
+    """
     return FLOATS if device.adapter.kind == "CPU" else HALVES
 
 
 def warm_up(device: Device) -> None:
-    """Start compiling what most frames need, while other threads load the scene."""
+    """Start compiling the programs that most frames need, while other threads load the scene."""
     for name in _ALWAYS:
         program(device, name)
-    texel = usual_texel(device)
+    texel = level_format(device)
     program(device, "atlas/stitch_gather.wgsl", source=texel)
     program(device, "diffusion/diffuse_halve.wgsl", source=texel, store=texel)
     for name in ("atlas/stitch_place.wgsl", "irradiance/irradiance.wgsl"):

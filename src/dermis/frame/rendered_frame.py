@@ -1,4 +1,4 @@
-"""The result of a frame: an image on the device, and its timings."""
+"""Rendered frame: a picture on the device, and its timings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 from dermis.frame.features import outputs as output_features
 from dermis.frame.features.outputs.planes import PlaneArray
 from dermis.frame.features.outputs.readback import Readback
@@ -21,15 +21,15 @@ from dermis.scene.outputs import OUTPUTS
 from dermis.scene.settings import Settings
 
 T = TypeVar("T")
-_MOST = 255
+_WHITE = 255  # largest byte of a picture
 
 
 @dataclass(eq=False)
-class Shown:
-    """Where a frame is; it moves when its device is lost and the frame drawn again.
+class FrameTextures:
+    """Textures of a frame; they are replaced when the device is lost and the frame is drawn again.
 
-    meter : what metered the exposure, None where it was given
-    outputs : what was asked besides the picture, None for nothing
+    meter : exposure meter, None for a given exposure
+    outputs : outputs besides the picture, None for none
     """
 
     device: Device
@@ -39,21 +39,21 @@ class Shown:
 
 
 @dataclass(frozen=True, repr=False)
-class Rendered(Summarised):
-    """An image on the device, valid until its renderer draws the next one.
+class RenderedFrame(ShortRepr):
+    """Picture on the device, valid until its renderer draws the next frame.
 
-    gpu_ms : device time of each stage that was timed, and "total" [ms]; None without timestamps
-    frame_ms : from recording the frame to its end [ms]
-    setup_ms : what the scene needed before its frame: loading to the device, atlas, shaders [ms]
-    gaussians : levels of the profile
-    unscattered : share of the skin's triangles that the atlas cannot hold; they are lit directly
-    suns : sun-like peaks of the environment that shine as lights of their own
-    settings : what it was drawn with
-    leave : starts reading the picture back, as `pack.draw` does
-    kept : does a job for which the frame has to be on a device, and returns what that returns
+    gpu_ms : device time of each timed stage, and "total" [ms]; None without timestamps
+    frame_ms : time from recording the frame to its completion [ms]
+    setup_ms : time before the frame for uploads, the atlas and shaders [ms]
+    gaussians : number of Gaussians of the profile
+    unscattered : fraction of the skin's triangles without a place in the atlas; light does not scatter there
+    suns : number of lights that the environment adds
+    settings : settings of the frame
+    start_readback : function that starts the readback of the picture, with the options of `start_readback`
+    run_on_device : function that returns the result of a job for which the frame must be on the device
     """
 
-    shown: Shown
+    textures: FrameTextures
     gpu_ms: dict[str, float] | None
     frame_ms: float
     setup_ms: float
@@ -61,78 +61,75 @@ class Rendered(Summarised):
     unscattered: float
     suns: int
     settings: Settings
-    leave: Callable[..., Readback]
-    kept: Callable[[Callable[[], Any]], Any]
+    start_readback: Callable[..., Readback]
+    run_on_device: Callable[[Callable[[], Any]], Any]
     is_current: Callable[[], bool]
 
     @property
     def picture(self) -> Picture:
-        """Its textures."""
-        return self.shown.picture
+        """Return the textures of the picture."""
+        return self.textures.picture
 
     @property
     def exposure(self) -> float:
-        """Factor from radiance to the picture, metered or given."""
+        """Return the factor from radiance to the picture, given or metered [-]."""
         if self.settings.exposure != "auto":
             return float(self.settings.exposure)
-        return self._read(lambda at: read_meter(at.device, at.meter) if at.meter else 1.0)
+        return self._read(lambda frame: read_meter(frame.device, frame.meter) if frame.meter else 1.0)
 
     def linear(self) -> NDArray[np.float32]:
-        """(h, w, 3) linear Rec. 709 after bloom and exposure, float32."""
+        """Return the (h, w, 3) linear Rec. 709 picture after bloom and exposure [-]."""
         return np.ascontiguousarray(self._exposed()[..., :3])
 
     def srgb8(self) -> NDArray[np.uint8]:
-        """(h, w, 3) sRGB bytes, with the tone curve, encoded on the device."""
-        return self._leave()
+        """Return the (h, w, 3) sRGB bytes of the picture after the tone curve."""
+        return self._read_back()
 
     def rgba8(self) -> NDArray[np.uint8]:
-        """(h, w, 4) sRGB bytes over the background "none": alpha is what the head covers of each pixel.
+        """Return (h, w, 4) sRGB bytes over the background "none", where alpha is the coverage by the head.
 
-        Colours are not multiplied by it, as PNG has it.
+        Colours are not multiplied by alpha, as in PNG files.
         """
-        return self._leave(alpha=self.settings)
+        return self._read_back(alpha=self.settings)
 
     def linear_rgba(self) -> NDArray[np.float32]:
-        """(h, w, 4) float32 over the background "none", multiplied by alpha as OpenEXR has it."""
+        """Return (h, w, 4) linear floats over the background "none", multiplied by alpha as in OpenEXR."""
         return self._exposed()
 
     def output(self, name: str) -> PlaneArray:
-        """(h, w) or (h, w, channels) of an output that was asked of the frame, row 0 at the top.
+        """Return an output of the frame, (h, w) or (h, w, channels) with row 0 at the top.
 
-        Raises DermisError for one that was not asked.
+        Raises DermisError for an output that was not requested.
         """
         OUTPUTS[name]
-        asked = self.shown.outputs.names if self.shown.outputs else ()
-        if name not in asked:
-            came = f"the frame was drawn with {', '.join(asked) or 'none'}"
-            refuse(f"output {name}", "one that was asked", came, f'Pass outputs=("{name}",) to draw')
-        return self._read(lambda at: _read_output(at, name))
+        requested = self.textures.outputs.names if self.textures.outputs else ()
+        if name not in requested:
+            actual = f"the frame was drawn with {', '.join(requested) or 'none'}"
+            refuse(f"output {name}", "a requested output", actual, f'Pass outputs=("{name}",) to draw')
+        return self._read(lambda frame: _read_output(frame, name))
 
     def clipped(self) -> float:
-        """Share of the head's pixels with a part that is brighter than the picture's bytes can show."""
-        levels = self._read(lambda at: download(at.device, at.picture.bytes))
-        head = levels[levels[..., 3] == _MOST]
-        return float((head[:, :3].max(axis=1) == _MOST).mean()) if len(head) else 0.0
+        """Return the fraction of the head's pixels that are overexposed in any channel [-]."""
+        levels = self._read(lambda frame: download(frame.device, frame.picture.bytes))
+        head = levels[levels[..., 3] == _WHITE]
+        return float((head[:, :3].max(axis=1) == _WHITE).mean()) if len(head) else 0.0
 
     def _exposed(self) -> NDArray[np.float32]:
-        return self._read(lambda at: download(at.device, at.picture.exposed))
+        return self._read(lambda frame: download(frame.device, frame.picture.exposed))
 
-    def _leave(self, **how: Any) -> NDArray[Any]:
-        return self._read(lambda at: self.leave(at.picture, **how).image())
+    def _read_back(self, **options: Any) -> NDArray[Any]:
+        return self._read(lambda frame: self.start_readback(frame.picture, **options).image())
 
-    def _read(self, read: Callable[[Shown], T]) -> T:
+    def _read(self, read: Callable[[FrameTextures], T]) -> T:
         if not self.is_current():
-            raise RuntimeError(
-                "a newer frame has taken this image's place: read each before drawing the next"
-            )
-        found: T = self.kept(lambda: read(self.shown))
-        return found
+            raise RuntimeError("a newer frame has replaced this picture: read it before drawing the next frame")
+        result: T = self.run_on_device(lambda: read(self.textures))
+        return result
 
 
-def _read_output(at: Shown, name: str) -> PlaneArray:
-    """One of the outputs of a frame; waits for it."""
-    assert at.outputs is not None
-    planes = at.outputs.planes_of(name)
+def _read_output(frame: FrameTextures, name: str) -> PlaneArray:
+    assert frame.outputs is not None
+    planes = frame.outputs.planes_of(name)
     start, size = planes.place(name)
-    raw = at.device.handle.queue.read_buffer(planes.buffer, start, size)
+    raw = frame.device.handle.queue.read_buffer(planes.buffer, start, size)
     return planes.array(name, np.frombuffer(raw, np.uint8).copy())

@@ -1,4 +1,4 @@
-"""The renderer: a device with all that it keeps from frame to frame, and the submission of frames."""
+"""Renderer: a device with cached resources, and the submission of frames."""
 
 from __future__ import annotations
 
@@ -12,105 +12,163 @@ from typing import Any, Literal, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.errors import refuse, shown_value
-from dermis.base.quantities import whole_number
+from dermis.base.errors import format_value, refuse
+from dermis.base.quantities import checked_integer
+from dermis.base.renamed import renamed_keywords
 from dermis.frame.features.outputs.landmarks import checked_landmarks
 from dermis.frame.features.outputs.readback import Readback, start_readback
 from dermis.frame.features.post.picture import Picture
 from dermis.frame.frame import draw_frame
-from dermis.frame.inputs import Inputs
-from dermis.frame.observation import Observation, observed_frames
+from dermis.frame.inputs import FrameInputs
+from dermis.frame.observation import Observation, observation_jobs
 from dermis.frame.preparation import Preparation
 from dermis.frame.programs import warm_up
-from dermis.frame.rendered import Rendered, Shown
+from dermis.frame.rendered_frame import FrameTextures, RenderedFrame
 from dermis.gpu import CommandList, Device, Graph, open_device
 from dermis.gpu.command_list import Timing
 from dermis.gpu.failures import ReopeningDevice
 from dermis.mesh.head import Head
-from dermis.scene.given import given_plain
+from dermis.scene.conversions import as_model
 from dermis.scene.model import Scene
-from dermis.scene.outputs import checked_outputs
+from dermis.scene.outputs import check_outputs
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
 T = TypeVar("T")
-IN_FLIGHT = 3
-"""Frames submitted and not done: Python and the device overlap, with little latency."""
+FRAMES_IN_FLIGHT = 3
+"""Limit of submitted frames that are not complete: Python and the device overlap, with little latency."""
 
-Send = Callable[[], Readback]
-Take = Callable[[Readback], T]
-_DEEPEST = 1000
-_WARMING_FRAMES = 100
+Submit = Callable[[], Readback]
+Receive = Callable[[Readback], T]
+_MAX_CACHE = 1000
+_WARM_UP_FRAMES = 100
 
 
-def arriving(
-    kept_open: ReopeningDevice, device: Callable[[], Device], frames: Iterable[tuple[Send, Take[T]]]
+def pipeline_frames(
+    reopening_device: ReopeningDevice,
+    device: Callable[[], Device],
+    frames: Iterable[tuple[Submit, Receive[T]]],
 ) -> Iterator[T]:
-    """What is taken of each frame in turn; it is sent again where its device was lost meanwhile.
+    """Yield the result of each frame in order, while the next frames are already submitted.
 
-    device : the one of now
-    frames : what submits each of them, and what takes what has arrived of it
+    A frame whose device is lost is submitted again.
+
+    device : function that returns the current device
+    frames : pairs of a function that submits a frame, and one that returns the result of its readback
     """
-    sent: deque[tuple[Readback, Send, Take[T]]] = deque()
+    pending: deque[tuple[Readback, Submit, Receive[T]]] = deque()
 
-    def arrived() -> T:
-        readback, send, take = sent.popleft()
-        return kept_open.run(lambda: take(readback if readback.fetched.device is device() else send()))
+    def oldest_result() -> T:
+        readback, submit, receive = pending.popleft()
+        return reopening_device.run(
+            lambda: receive(readback if readback.fetched.device is device() else submit())
+        )
 
-    for send, take in frames:
-        sent.append((kept_open.run(send), send, take))
-        if len(sent) >= IN_FLIGHT:
-            yield arrived()
-    while sent:
-        yield arrived()
+    for submit, receive in frames:
+        pending.append((reopening_device.run(submit), submit, receive))
+        if len(pending) >= FRAMES_IN_FLIGHT:
+            yield oldest_result()
+    while pending:
+        yield oldest_result()
 
 
-class Submitter:
-    """Declares frames on a device, and submits what of them is stale."""
+class Renderer:
+    """Renderer of scenes on one device; it computes again only what changed since the previous frame.
+
+    When the driver loses the device, it is opened again and the frame is rendered again.
+
+    Parameters
+    ----------
+    adapter : str
+        "auto", "cpu" or part of the name of an adapter.
+    cache_size : int
+        Number of variants of each resource that are cached, for callers that alternate between a few.
+    cache_ttl : int
+        Number of frames after which unused resources are released.
+    reopens : bool
+        False raises DeviceLostError when the device is lost, for callers with resources of their own on it.
+
+    Raises
+    ------
+    DermisError
+        For an unknown adapter, or cache sizes out of range.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> scene = dermis.Scene(dermis.Human().head(subdivide=0))
+    >>> renderer = dermis.Renderer("cpu")  # doctest: +SKIP
+    >>> renderer.draw(scene, dermis.Settings(size=64)).srgb8().shape  # doctest: +SKIP
+    (64, 64, 3)
+    """
 
     device: Device
     graph: Graph
 
-    def __init__(self) -> None:
-        self._last: Shown | None = None
+    @renamed_keywords(depth="cache_size", rounds="cache_ttl")
+    def __init__(
+        self, adapter: str = "auto", cache_size: int = 1, *, cache_ttl: int = 1, reopens: bool = True
+    ) -> None:
+        if not isinstance(adapter, str):
+            actual = f"got {format_value(adapter)}"
+            refuse("adapter", "the name of an adapter", actual, "Write auto, cpu or a part of its name")
+        self._cache_size = checked_integer("cache_size", cache_size, 1, _MAX_CACHE)
+        self._cache_ttl = checked_integer("cache_ttl", cache_ttl, 1, _MAX_CACHE)
+        self._adapter, self._opening_ms = adapter, 0.0
+        self._latest: FrameTextures | None = None
         self._in_flight: deque[int] = deque()
+        self.reopening_device = ReopeningDevice(self._open, self._use_device, reopens=reopens)
 
-    def on(self, device: Device, depth: int, rounds: int) -> None:
-        """Make what is kept from frame to frame on a device."""
+    def _open(self) -> Device:
+        self._opening_began = time.perf_counter()
+        return open_device(self._adapter)
+
+    def _use_device(self, device: Device) -> None:
+        """Create the caches of a device that was just opened."""
+        warm_up(device)
         self.device, self.graph = device, Graph(device)
-        preparation = Preparation(device, depth, rounds)
+        preparation = Preparation(device, self._cache_size, self._cache_ttl)
         self.memo, self.prepare = preparation.memo, preparation.inputs
-        self.profile_of = preparation.profiles.of
+        self.skin_profile = preparation.profiles.profile
         self._in_flight.clear()
+        self._opening_ms = 1e3 * (time.perf_counter() - self._opening_began)
+
+    def clear_cache(self) -> None:
+        """Release all cached resources; the next frame creates them again."""
+        self.memo.clear()
+        self.graph.invalidate()
 
     def _submit(
-        self, inputs: Inputs, timed: Timing, anew: bool, leave: Callable[[Graph, Picture], T] | None = None
+        self,
+        inputs: FrameInputs,
+        timed: Timing,
+        force: bool,
+        read_back: Callable[[Graph, Picture], T] | None = None,
     ) -> tuple[CommandList, T | None]:
         """Declare a frame and run its stale passes.
 
-        leave : starts reading the picture back in the same submission
+        read_back : function that starts the readback of the picture in the same submission
         """
-        if anew:
-            self.graph.forget()
+        if force:
+            self.graph.invalidate()
         self.graph.begin()
         draw_frame(self.graph, inputs, TECHNIQUES[inputs.settings.technique])
-        readback = leave(self.graph, inputs.resources.post.picture) if leave else None
-        frame, self._last = self.graph.submit(timed), None
+        readback = read_back(self.graph, inputs.resources.post.picture) if read_back else None
+        frame, self._latest = self.graph.submit(timed), None
         return frame, readback
 
-    def _keep_pace(self, frame: CommandList) -> None:
-        """Wait until no more frames than allowed are in flight."""
+    def _limit_frames_in_flight(self, frame: CommandList) -> None:
         self._in_flight.append(frame.submitted)
-        while len(self._in_flight) > IN_FLIGHT:
+        while len(self._in_flight) > FRAMES_IN_FLIGHT:
             self.device.wait(self._in_flight.popleft())
 
-    def _leave(self, picture: Picture, **how: Any) -> Readback:
+    def _start_readback(self, picture: Picture, **options: Any) -> Readback:
         self.graph.begin()
-        readback = start_readback(self.graph, picture, **how)
+        readback = start_readback(self.graph, picture, **options)
         self.graph.submit()
         return readback
 
-    def _send(
+    def _submit_with_readback(
         self,
         scene: Scene,
         previous: Scene | None = None,
@@ -121,136 +179,151 @@ class Submitter:
         outputs: tuple[str, ...] = (),
         landmarks: tuple[str, ...] = (),
     ) -> Readback:
-        """Submit a frame and start reading it back."""
+        """Submit a frame and the readback of its picture and outputs."""
         inputs = self.prepare(scene, settings, "", outputs, previous, landmarks)
-        coverage, more = settings if alpha else None, inputs.resources.outputs
-        leave = partial(start_readback, linear=linear, alpha=coverage, outputs=more)
-        _, readback = self._submit(inputs, False, False, leave)
+        coverage, extra = settings if alpha else None, inputs.resources.outputs
+        read_back = partial(start_readback, linear=linear, alpha=coverage, outputs=extra)
+        _, readback = self._submit(inputs, False, False, read_back)
         assert readback is not None
         return readback
 
-
-class Renderer(Submitter):
-    """Renders scenes on one device; what does not change between two frames is not computed again.
-
-    A device that its driver loses is opened again, and the frame drawn anew.
-
-    adapter : "auto", "cpu" or part of an adapter's name
-    depth : how many variants of each resource are kept, for callers that alternate between a few
-    rounds : frames for which resources are kept that none of them needs
-    reopens : False raises DeviceLostError instead, for callers that keep resources of their own on the device
-    """
-
-    def __init__(
-        self, adapter: str = "auto", depth: int = 1, *, rounds: int = 1, reopens: bool = True
-    ) -> None:
-        if not isinstance(adapter, str):
-            refuse("adapter", "its name", f"{shown_value(adapter)} came", "Write auto, cpu or a part of it")
-        super().__init__()
-        self._depth = whole_number("depth", depth, 1, _DEEPEST)
-        self._rounds = whole_number("rounds", rounds, 1, _DEEPEST)
-        self._adapter, self._opening_ms = adapter, 0.0
-        self.kept_open = ReopeningDevice(self._open, self._adopt, reopens=reopens)
-
-    def _open(self) -> Device:
-        self._opening_began = time.perf_counter()
-        return open_device(self._adapter)
-
-    def _adopt(self, device: Device) -> None:
-        """Make what is kept from frame to frame on a device that was just opened."""
-        warm_up(device)
-        self.on(device, self._depth, self._rounds)
-        self._opening_ms = 1e3 * (time.perf_counter() - self._opening_began)
-
-    def forget(self) -> None:
-        """Forget all that is kept; the next frame makes it again."""
-        self.memo.forget()
-        self.graph.forget()
-
+    @renamed_keywords(anew="force")
     def draw(
         self,
         scene: Scene,
         settings: Settings | None = None,
         *,
-        anew: bool = False,
+        force: bool = False,
         timed: Timing = True,
         view: str = "",
         outputs: Iterable[str] = (),
         previous: Scene | None = None,
-    ) -> Rendered:
-        """Render one frame and leave the image on the device.
+    ) -> RenderedFrame:
+        """Render one frame and leave the picture on the device.
 
-        anew : True runs all passes, not only stale ones
-        timed : True times each stage in a pass of its own, which takes longer than the frame otherwise does;
-            "whole" times only the frame, with its stages in one pass; False returns as soon as the frame is
-            submitted, and waits only for a device that is three frames behind
-        view : name of a scene among several drawn in turn: each keeps light and shadows of its own
-        outputs : names of what else is wanted of the frame, for `Rendered.output`
-        previous : scene of the same head that motion is counted from; without it there is none
+        Parameters
+        ----------
+        scene : Scene or Head
+            Scene, or a head alone with default light and camera.
+        settings : Settings, optional
+            Size, technique and other settings.
+        force : bool
+            True runs all passes instead of only stale ones.
+        timed : bool or "whole"
+            True times each stage in a pass of its own, which makes the frame slower. "whole" times the frame as
+            one pass. False returns when the frame is submitted, and waits only if three frames are in flight.
+        view : str
+            Name of the scene, for callers that draw several scenes in turn: each name caches its own light and
+            shadows.
+        outputs : iterable of str
+            Names of outputs for `RenderedFrame.output`.
+        previous : Scene, optional
+            Scene of the same head for motion vectors. Without it, motion is 0.
 
-        Raises DermisError for sizes over the device's limits and when the device fails.
+        Returns
+        -------
+        RenderedFrame
+            Picture on the device, valid until the next frame.
+
+        Raises
+        ------
+        DermisError
+            For sizes over the limits of the device, and when the device fails.
+
+        Examples
+        --------
+        >>> import dermis
+        >>> scene = dermis.Scene(dermis.Human().head(subdivide=0))
+        >>> frame = dermis.Renderer("cpu").draw(scene, outputs=["depth"])  # doctest: +SKIP
+        >>> frame.output("depth").shape  # doctest: +SKIP
+        (512, 512)
         """
-        settings = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        what = Scene.of(scene), settings, view, checked_outputs(outputs), previous and Scene.of(previous)
-        return self.kept_open.run(partial(self._draw, anew, timed, *what))
+        settings = as_model(Settings, settings or {}, "settings", "size=(512, 512)")
+        previous = previous and Scene.coerce(previous)
+        prepared = Scene.coerce(scene), settings, view, check_outputs(outputs), previous
+        return self.reopening_device.run(partial(self._draw, force, timed, *prepared))
 
-    def _draw(self, anew: bool, timed: Timing, *what: Any) -> Rendered:
-        """what : that is prepared"""
+    def _draw(self, force: bool, timed: Timing, *prepared: Any) -> RenderedFrame:
+        """Render one frame.
+
+        prepared : arguments of `Preparation.inputs`
+        """
         started = time.perf_counter()
-        inputs = self.prepare(*what)
+        inputs = self.prepare(*prepared)
         ready = time.perf_counter()
-        frame, _ = self._submit(inputs, timed, anew)
+        frame, _ = self._submit(inputs, timed, force)
         if timed:
             frame.wait()
         else:
-            self._keep_pace(frame)
+            self._limit_frames_in_flight(frame)
         done = time.perf_counter()
         times = frame.stage_ms() if timed else None
-        setup_ms, made = 1e3 * (ready - started) + self._opening_ms, inputs.resources
+        setup_ms, resources = 1e3 * (ready - started) + self._opening_ms, inputs.resources
         self._opening_ms = 0.0
-        shown = self._last = Shown(self.device, made.post.picture, made.post.meter, made.outputs)
+        post = resources.post
+        textures = FrameTextures(self.device, post.picture, post.meter, resources.outputs)
+        self._latest = textures
 
-        def again() -> None:
-            vars(shown).update(vars(self._draw(anew, timed, *what).shown))
-            self._last = shown
+        def redraw() -> None:
+            vars(textures).update(vars(self._draw(force, timed, *prepared).textures))
+            self._latest = textures
 
-        return Rendered(
-            shown,
+        return RenderedFrame(
+            textures,
             times,
             1e3 * (done - ready),
             setup_ms,
-            made.gaussians,
-            made.unscattered,
-            made.suns,
+            resources.gaussians,
+            resources.unscattered,
+            resources.suns,
             inputs.settings,
-            self._leave,
-            partial(self._on_device, shown, again),
-            is_current=lambda: self._last is shown,
+            self._start_readback,
+            partial(self._run_on_device, textures, redraw),
+            is_current=lambda: self._latest is textures,
         )
 
-    def _on_device(self, shown: Shown, again: Callable[[], None], job: Callable[[], T]) -> T:
-        """Do a job for which a frame has to be on the device, where it is drawn again after a loss."""
+    def _run_on_device(self, textures: FrameTextures, redraw: Callable[[], None], job: Callable[[], T]) -> T:
+        """Return `job()`, after the frame is drawn again if its device was lost."""
 
-        def do() -> T:
-            if shown.device is not self.device:
-                again()
+        def run() -> T:
+            if textures.device is not self.device:
+                redraw()
             return job()
 
-        return self.kept_open.run(do)
+        return self.reopening_device.run(run)
 
-    def draw_warm(self, scene: Scene, settings: Settings | None = None) -> Rendered:
-        """A frame timed on a device at work: a GPU that was idle runs at a fraction of its clock rate."""
-        rendered = self.draw(scene, settings, anew=True)
+    def draw_warm(self, scene: Scene, settings: Settings | None = None) -> RenderedFrame:
+        """Render one frame with times of a busy device; an idle GPU runs at a fraction of its clock rate.
+
+        Parameters
+        ----------
+        scene, settings
+            As for `draw`.
+        """
+        rendered = self.draw(scene, settings, force=True)
         if self.device.adapter.kind == "CPU":
             return rendered
-        for _ in range(_WARMING_FRAMES):
-            self.draw(scene, settings, anew=True, timed=False)
+        for _ in range(_WARM_UP_FRAMES):
+            self.draw(scene, settings, force=True, timed=False)
         self.device.wait()
-        return self.draw(scene, settings, anew=True)
+        return self.draw(scene, settings, force=True)
 
     def render(self, scene: Scene | Head, **settings: Any) -> NDArray[np.float32]:
-        """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
-        return self.draw(Scene.of(scene), Settings(**settings)).linear()
+        """Return the picture of a scene.
+
+        Parameters
+        ----------
+        scene : Scene or Head
+            As for `draw`.
+        **settings
+            Fields of `Settings`.
+
+        Returns
+        -------
+        ndarray
+            (h, w, 3) float32 linear Rec. 709 [-].
+        """
+        return self.draw(Scene.coerce(scene), Settings(**settings)).linear()
 
     @overload
     def render_many(
@@ -265,17 +338,34 @@ class Renderer(Submitter):
     def render_many(
         self, scenes: Iterable[Scene], *, linear: bool = False, alpha: bool = False, **settings: Any
     ) -> Iterator[NDArray[Any]]:
-        """(h, w, 3) sRGB bytes of each scene in turn, each yielded while the next ones are drawn.
+        """Yield the picture of each scene, while the next scenes are rendered.
 
-        linear : float32 linear Rec. 709 instead, as of `render`
-        alpha : (h, w, 4) as of `Rendered.rgba8` and `linear_rgba`
-        settings : those of `Settings`, for all of them; heads and textures that scenes share are loaded once
+        Parameters
+        ----------
+        scenes : iterable of Scene
+            Heads and textures that scenes share are loaded once.
+        linear : bool
+            True yields float32 linear Rec. 709 instead of sRGB bytes.
+        alpha : bool
+            True adds alpha, as `RenderedFrame.rgba8` and `RenderedFrame.linear_rgba` do.
+        **settings
+            Fields of `Settings`, for all scenes.
 
-        Raises DermisError as `draw` does.
+        Yields
+        ------
+        ndarray
+            (h, w, 3) or, with alpha, (h, w, 4).
+
+        Raises
+        ------
+        DermisError
+            As `draw` does.
         """
-        send = partial(self._send, settings=Settings(**settings), linear=linear, alpha=alpha)
-        frames = ((partial(send, Scene.of(scene)), Readback.image) for scene in scenes)
-        yield from arriving(self.kept_open, lambda: self.device, frames)
+        submit = partial(
+            self._submit_with_readback, settings=Settings(**settings), linear=linear, alpha=alpha
+        )
+        frames = ((partial(submit, Scene.coerce(scene)), Readback.image) for scene in scenes)
+        yield from pipeline_frames(self.reopening_device, lambda: self.device, frames)
 
     def observe(
         self,
@@ -288,32 +378,77 @@ class Renderer(Submitter):
         previous: Scene | Iterable[Scene | None] | None = None,
         landmarks: Iterable[str] = (),
     ) -> Iterator[Observation]:
-        """What is seen of each scene in turn, each yielded while the next ones are drawn.
+        """Yield the picture and the ground truth of each scene, while the next scenes are rendered.
 
-        settings : for all of them, or those of each
-        outputs : names of what is wanted besides the picture
-        alpha, linear : as of `render_many`
-        previous : the scene before the first, as motion is counted from one to the next of the same head; or
-            those before each
-        landmarks : names of sets (`dermis.human.landmarks.sets.SETS`), or files of rows name,vertex
+        Parameters
+        ----------
+        scenes : iterable of Scene
+            As for `render_many`.
+        settings : Settings or iterable of Settings, optional
+            Settings of all scenes, or of each scene.
+        outputs : iterable of str
+            Names of outputs besides the picture.
+        alpha, linear : bool
+            As for `render_many`.
+        previous : Scene or iterable of Scene, optional
+            Scene before the first one, for motion vectors between consecutive scenes of the same head; or the
+            previous scene of each scene.
+        landmarks : iterable of str
+            Names of landmark sets (`dermis.human.landmarks.sets.SETS`), or files with rows name,vertex.
 
-        Raises DermisError as `draw` does.
+        Yields
+        ------
+        Observation
+            Picture, outputs, camera, landmarks, head pose and gaze.
+
+        Raises
+        ------
+        DermisError
+            As `draw` does.
         """
         if settings is None or isinstance(settings, Settings | Mapping):
-            settings = repeat(given_plain(Settings, settings or {}, "settings", "size=(512, 512)"))
-        asked = partial(self._send, outputs=checked_outputs(outputs), landmarks=checked_landmarks(landmarks))
-        send = partial(asked, linear=linear, alpha=alpha)
-        frames = observed_frames(send, scenes, previous, settings)
-        return arriving(self.kept_open, lambda: self.device, frames)
+            settings = repeat(as_model(Settings, settings or {}, "settings", "size=(512, 512)"))
+        requested = {"outputs": check_outputs(outputs), "landmarks": checked_landmarks(landmarks)}
+        submit = partial(self._submit_with_readback, linear=linear, alpha=alpha, **requested)
+        jobs = observation_jobs(submit, scenes, previous, settings)
+        return pipeline_frames(self.reopening_device, lambda: self.device, jobs)
 
 
 def render(scene: Scene | Head, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:
-    """(h, w, 3) float32 linear Rec. 709 image of a scene; for many images keep a `Renderer`.
+    """Return the picture of a scene; for many pictures, keep a `Renderer`.
 
-    scene : or a head alone, which gets studio light and the camera of a portrait
-    settings : those of `Settings`: size, atlas, samples, technique, exposure, ...
+    Parameters
+    ----------
+    scene : Scene or Head
+        Scene, or a head alone with studio light and the camera of a portrait.
+    adapter : str
+        "auto", "cpu" or part of the name of an adapter.
+    **settings
+        Fields of `Settings`: size, atlas, samples, technique, exposure, ...
+
+    Returns
+    -------
+    ndarray
+        (h, w, 3) float32 linear Rec. 709 [-].
+
+    Raises
+    ------
+    DermisError
+        For invalid settings, an unknown adapter, sizes over the limits of the device, and when the device fails.
+
+    References
+    ----------
+    [dEonLuebke2007] for the technique, `docs/pipeline.md` for all stages.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> scene = dermis.Scene(dermis.Human().head(subdivide=0))
+    >>> dermis.render(scene, adapter="cpu", size=64).shape  # doctest: +SKIP
+    (64, 64, 3)
     """
     if not isinstance(adapter, str):
-        remedy = "Write dermis.Renderer().draw(scene, settings).linear() for a Settings object"
-        refuse("adapter", "its name, and settings by name", f"{shown_value(adapter)} came", remedy)
-    return Renderer(adapter).render(Scene.of(scene), **settings)
+        advice = "Write dermis.Renderer().draw(scene, settings).linear() for a Settings object"
+        expected = "the name of an adapter, and settings by keyword"
+        refuse("adapter", expected, f"got {format_value(adapter)}", advice)
+    return Renderer(adapter).render(Scene.coerce(scene), **settings)

@@ -1,4 +1,4 @@
-"""Request from which the resources of a frame are made."""
+"""Request from which the resources of a frame are created."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.lights.environment import Surroundings
-from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
+from dermis.frame.lights.environment import EnvironmentMap
+from dermis.frame.seams import AtlasPlan, SeamMethod, plan_atlases, seam_method
 from dermis.frame.technique import ProfileSplit, TechniqueTraits
-from dermis.human.skin.painted import LEAST_SIDE, MOST_SIDE, PaintedMaps
+from dermis.human.skin.painted import MIN_SIDE, MAX_SIDE, PaintedMaps
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.environment import Environment
@@ -22,126 +22,128 @@ from dermis.scene.skin import Skin
 
 @dataclass(frozen=True)
 class FrameRequest:
-    """Everything that the resources of a frame follow from.
+    """Everything that the resources of a frame depend on.
 
-    person : (p, 3) places of the control points where the person rests, None for those of the head's topology
-    parts : how many parts each light is shaded as, those of the environment last
-    shadow_layers : how many parts of lights cast shadows
+    rest_positions_mm : (p, 3) control points of the person at rest [mm], None where they equal the topology's
+    environment_map : prefiltered map of `environment`
+    light_part_counts : number of parts that each light is divided into, suns of the environment last
+    shadow_layers : number of shadow maps
     posed : whether the scene has a pose
-    view : name of a scene among several that are drawn in turn
-    others : profiles that a map mixes into the first one, of the same Gaussians
-    share_map : (h, w, 2) their shares, None without any
-    outputs, landmarks : names of what is asked of the frame besides its picture
+    view_name : cache key of the scene, for callers that draw several scenes in turn
+    other_profiles : profiles that a map blends with `profile`; they have the same Gaussians
+    blend_weights : (h, w, 2) map of their weights [-], None without other profiles
+    outputs, landmarks : names of the outputs and landmark sets that are requested besides the picture
     """
 
     head: Head
     skin: Skin
     profile: GaussianSum
-    person: NDArray[np.float32] | None
+    rest_positions_mm: NDArray[np.float32] | None
     settings: Settings
     environment: Environment | None
-    surroundings: Surroundings
+    environment_map: EnvironmentMap
     technique: TechniqueTraits
-    parts: tuple[int, ...]
+    light_part_counts: tuple[int, ...]
     shadow_layers: int
     posed: bool
-    view: str
-    others: tuple[GaussianSum, ...] = ()
-    share_map: NDArray[np.float32] | None = None
+    view_name: str
+    other_profiles: tuple[GaussianSum, ...] = ()
+    blend_weights: NDArray[np.float32] | None = None
     outputs: tuple[str, ...] = ()
     landmarks: tuple[str, ...] = ()
 
     @property
     def topology(self) -> Head:
-        """The bare head that atlas and tables are made for."""
+        """Return the head without maps and hair from which atlas and tables are computed."""
         return self.head.topology
 
     @property
-    def shares(self) -> bool:
-        """Whether these are made for other people too."""
+    def is_shared(self) -> bool:
+        """Return whether several people share the topology, and with it the resources."""
         return self.topology is not self.head.bare
 
     @property
-    def searched(self) -> NDArray[np.float32] | None:
-        """Where control points rest as thin parts are looked for, None for those of the head's topology.
+    def pair_positions_mm(self) -> NDArray[np.float32] | None:
+        """Return the rest positions in which translucency pairs are searched, None for the topology's [mm].
 
-        All people of a template share its own: what passes through these is weighed for each.
+        People of one template share the pairs of the template; only the weights of the pairs differ.
         """
-        return None if self.shares else self.person
+        return None if self.is_shared else self.rest_positions_mm
 
     @property
-    def white(self) -> bool:
-        """Whether the colour map alone gives the colour."""
+    def albedo_from_map(self) -> bool:
+        """Return whether the colour map alone determines the albedo."""
         return self.skin.albedo == "map"
 
     @property
-    def light_of(self) -> str:
-        """Whose light it is: each view and each size of shadow maps keeps its own."""
-        return f"{self.view} {self.settings.shadow_size}"
+    def light_key(self) -> str:
+        """Return the cache key of light: each view and each size of shadow maps has its own."""
+        return f"{self.view_name} {self.settings.shadow_size}"
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """The profiles as the technique uses them."""
-        first, *others = (self.technique.split(one, self.white) for one in (self.profile, *self.others))
+        """Return the profiles, divided by the technique into relit and blurred Gaussians."""
+        profiles = self.profile, *self.other_profiles
+        first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
         fine = {} if others else first.fine  # where widths vary, a stripe is as fine as texels
         return replace(first, others=tuple(others), fine=fine)
 
     @property
-    def mixed(self) -> bool:
-        """Whether a map mixes profiles."""
-        return bool(self.others)
+    def mixes_profiles(self) -> bool:
+        """Return whether a map blends several profiles."""
+        return bool(self.other_profiles)
 
     @cached_property
-    def occluded(self) -> bool:
-        """Whether the head hides some of its environment from itself."""
+    def has_occlusion(self) -> bool:
+        """Return whether the head occludes its environment."""
         return self.environment is not None and self.settings.occlusion != "none"
 
     @property
-    def interreflects(self) -> bool:
-        """Whether skin sends light to skin; not where an environment shines through the head."""
-        return self.settings.interreflection and (self.occluded or self.environment is None)
+    def has_interreflection(self) -> bool:
+        """Return whether interreflection is computed; an environment without occlusion excludes it."""
+        return self.settings.interreflection and (self.has_occlusion or self.environment is None)
 
     @property
-    def occlusion_moves(self) -> bool:
-        """Whether that follows the head's shape."""
-        elsewhere = self.posed or self.person is not None
-        return self.occluded and elsewhere and self.settings.occlusion == "baked"
+    def occlusion_follows_shape(self) -> bool:
+        """Return whether occlusion is recomputed when the shape of the head changes."""
+        changes = self.posed or self.rest_positions_mm is not None
+        return self.has_occlusion and changes and self.settings.occlusion == "baked"
 
     @cached_property
-    def remedy(self) -> Remedy:
-        """What is done at the seams."""
-        return remedy_of(self.settings.seams, self.technique.stitches)
+    def seam_method(self) -> SeamMethod:
+        """Return the treatment of seams."""
+        return seam_method(self.settings.seams, self.technique.stitches_seams)
 
     @property
     def painted_side(self) -> int:
-        """Of maps that the device paints [texels]; 0 for a head that has all of its own."""
+        """Return the side of the maps that the device paints, 0 for heads with maps of their own [texels]."""
         if not isinstance(self.head.maps, PaintedMaps):
             return 0
         side = 1 << (self.settings.atlas - 1).bit_length()
-        return min(max(side, LEAST_SIDE), MOST_SIDE)
+        return min(max(side, MIN_SIDE), MAX_SIDE)
 
     @property
-    def finely_painted(self) -> bool:
-        """Whether there is relief finer than maps: painted maps of gloss say how much of it is where."""
+    def has_fine_relief(self) -> bool:
+        """Return whether there is relief finer than maps; painted gloss maps hold its local strength."""
         maps = self.head.maps
         return self.painted_side > 0 and maps.specular is None and maps.roughness is None
 
     @property
-    def moving(self) -> bool:
-        """Whether expressions change the maps."""
+    def has_animated_maps(self) -> bool:
+        """Return whether expressions change the maps."""
         return self.posed and self.painted_side > 0 and bool(self.head.targets)
 
     @property
-    def count(self) -> int:
-        """Gaussians that light is blurred by over the atlas."""
+    def blur_count(self) -> int:
+        """Return the number of Gaussians that blur light over the atlas."""
         return len(self.split.blurred_mm2)
 
     @property
     def output_channels(self) -> dict[str, int]:
-        """How many numbers each output that is asked has in a pixel."""
-        return {name: OUTPUTS[name].channels or len(self.parts) for name in self.outputs}
+        """Return the number of channels of each requested output."""
+        return {name: OUTPUTS[name].channels or len(self.light_part_counts) for name in self.outputs}
 
     @cached_property
-    def atlases(self) -> LaidOut:
-        """Names and size of the atlases."""
-        return laid_out(self.remedy, self.settings, self.count, self.occluded)
+    def atlas_plan(self) -> AtlasPlan:
+        """Return the layouts and the size of the atlases."""
+        return plan_atlases(self.seam_method, self.settings, self.blur_count, self.has_occlusion)

@@ -1,4 +1,4 @@
-"""The resources of a frame: a collection of what its features made, and its atlas layouts."""
+"""Resources of a frame: those of all features, and its atlas layouts."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from dataclasses import dataclass
 from dermis.frame.features import diffusion, hair, outputs, post, shape
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.features.interreflection.interreflection import Interreflection
-from dermis.frame.features.occlusion.moving import MovingOcclusion, Sky
+from dermis.frame.features.occlusion.moving import MovingOcclusion, VertexSky
 from dermis.frame.features.shadows.shadows import ShadowMaps
-from dermis.frame.features.shape.mesh import HeadResources
-from dermis.frame.features.surface.painting.paint import Face
+from dermis.frame.features.shape.mesh import HeadGeometry
+from dermis.frame.features.surface.painting.paint import ExpressionMaps
 from dermis.frame.features.translucency.resources import Translucency
-from dermis.frame.features.visibility.layers import Layers
+from dermis.frame.features.visibility.layers import ViewLayers
 from dermis.frame.technique import TechniqueResources
-from dermis.gpu import Constants, Record, Texture
+from dermis.gpu import Constants, Texture, UniformRecord
 
 
 @dataclass(frozen=True, eq=False)
 class AtlasLayout(LitAtlas):
-    """An atlas of the head that light is spread on.
+    """Atlas of the head in which light is diffused.
 
-    translucency : light through thin parts, None without any
-    occlusion : what updates the map of occlusion as the shape moves, None where it does not move
-    interreflection : light from skin to skin, None for none
+    translucency : resources of the light through thin parts, None without it
+    occlusion : resources that update the occlusion map, None where occlusion does not follow the shape
+    interreflection : resources of interreflection, None without it
     """
 
     translucency: Translucency | None = None
@@ -33,34 +33,34 @@ class AtlasLayout(LitAtlas):
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """The resources of all features.
+    """Resources of all features.
 
-    face : the painted maps as far as expressions change them, None where nothing does
-    layouts : atlases that light is spread on; the first is the one that is looked at
-    scattered : texture of the light that leaves below the surface
-    technique : what the technique made for itself, None for nothing
-    spread : what it made to spread outputs over the picture, None for nothing
-    sky : the open sky at the head's vertices, None where occlusion does not follow its shape
-    hair : None for none
+    expression_maps : painted maps that expressions change, None for none
+    layouts : atlases in which light is diffused; the picture is shaded from the first
+    scattered : texture of the exitance of light that scattered below the surface
+    technique : tables and textures of the technique, None for none
+    output_layers : textures in which the technique diffuses the light of outputs, None for none
+    sky : visibility of the sky at the vertices, None where occlusion does not follow the shape
+    hair : resources of the hair, None without it
     view, constants : record of the shading pass without the camera, and its pipeline constants
-    outputs : space for what is requested besides the picture, None for nothing
+    outputs : resources of the outputs besides the picture, None without any
     suns : number of lights that the environment adds
-    gaussians : number of terms of the profile
-    unscattered : share of the skin's triangles that the atlas cannot hold
+    gaussians : number of Gaussians of the profile
+    unscattered : fraction of the skin's triangles without a place in the atlas; light does not scatter there
     """
 
     shape: shape.Resources
-    face: Face | None
+    expression_maps: ExpressionMaps | None
     layouts: tuple[AtlasLayout, ...]
     shadow_maps: ShadowMaps
     diffusion: diffusion.Resources
     scattered: Texture
     technique: TechniqueResources | None
-    spread: TechniqueResources | None
-    sky: Sky | None
+    output_layers: TechniqueResources | None
+    sky: VertexSky | None
     hair: hair.Resources | None
-    visibility: Layers
-    view: Record
+    visibility: ViewLayers
+    view: UniformRecord
     constants: Constants
     post: post.Resources
     outputs: outputs.Resources | None
@@ -69,6 +69,6 @@ class Resources:
     unscattered: float
 
     @property
-    def head(self) -> HeadResources:
-        """The head's triangles, as the layout that is looked at has them."""
+    def head(self) -> HeadGeometry:
+        """Return the triangles of the head with their coordinates in the first layout."""
         return self.layouts[0].head

@@ -1,24 +1,24 @@
-"""Remedies for seams: the stitched atlas, and those of the 2007 talk [Dudash2007]."""
+"""Treatments of seams: the stitched atlas, and those of the 2007 talk [Dudash2007]."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dermis.atlas.build import SMALLEST
+from dermis.atlas.build import MIN_SIZE
 from dermis.scene.settings import Settings
 
 FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towards an edge
 
 
 @dataclass(frozen=True)
-class Remedy:
-    """How an atlas is laid out, and what blurs read beyond a chart's edge.
+class SeamMethod:
+    """Treatment of seams: the layouts of the atlases, and the texels that blurs read beyond a chart.
 
-    layouts : of the atlas: "stitched", "mesh" for the mesh's own uv, "unwrapped" for one with other seams
-    edge : one of `diffuse.EDGES`
+    layouts : names of layouts: "stitched", "mesh" for the uv of the mesh, "unwrapped" for one with other seams
+    edge : filter mode at the edges of charts, one of `features.diffusion.blur.EDGES`
     feathered : whether the stretch map is edited so that blurs narrow towards the edges
-    coloured : whether empty texels show `Settings.seam_colour` rather than black
+    coloured : whether empty texels have the colour `Settings.seam_colour` instead of black
     """
 
     layouts: tuple[str, ...] = ("mesh",)
@@ -27,38 +27,35 @@ class Remedy:
     coloured: bool = False
 
 
-REMEDIES = {
-    "stitch": Remedy(("stitched",), "repeated"),
-    "none": Remedy(),
-    "clear-colour": Remedy(coloured=True),
-    "stretch-map": Remedy(feathered=True),
-    "alpha": Remedy(edge="skipped"),
-    "multi-uv": Remedy(("mesh", "unwrapped"), edge="skipped"),
+SEAM_METHODS = {
+    "stitch": SeamMethod(("stitched",), "repeated"),
+    "none": SeamMethod(),
+    "clear-colour": SeamMethod(coloured=True),
+    "stretch-map": SeamMethod(feathered=True),
+    "alpha": SeamMethod(edge="skipped"),
+    "multi-uv": SeamMethod(("mesh", "unwrapped"), edge="skipped"),
 }
 
 
-def remedy_of(seams: str, stitches: bool) -> Remedy:
-    """The remedy by its name.
-
-    stitches : whether the technique can stitch; others clear the colour instead
-    """
-    return REMEDIES["clear-colour" if seams == "stitch" and not stitches else seams]
+def seam_method(name: str, can_stitch: bool) -> SeamMethod:
+    """Return the treatment of seams by its name; techniques that cannot stitch clear the colour instead."""
+    return SEAM_METHODS["clear-colour" if name == "stitch" and not can_stitch else name]
 
 
-class LaidOut(NamedTuple):
-    """Atlases of a frame: the names of their layouts, and texels along the side of each."""
+class AtlasPlan(NamedTuple):
+    """Atlases of a frame: the names of their layouts, and the side of each [texels]."""
 
     layouts: tuple[str, ...]
     side: int
 
 
-def laid_out(remedy: Remedy, settings: Settings, levels: int, occluded: bool) -> LaidOut:
-    """The atlases that a frame needs: of the least size where neither light nor occlusion lies on them.
+def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_occlusion: bool) -> AtlasPlan:
+    """Return the atlases of a frame; an atlas that stores neither light nor occlusion has the least size.
 
-    levels : number of Gaussians that blur light over the atlas
-    occluded : whether an environment's occlusion lies on it
+    blur_count : number of Gaussians that blur light over the atlas
+    has_occlusion : whether the atlas stores occlusion of the environment
     """
-    layouts = remedy.layouts
-    if levels:
-        return LaidOut(layouts, settings.atlas)
-    return LaidOut(layouts[:1], settings.atlas) if occluded else LaidOut(("mesh",), SMALLEST)
+    layouts = method.layouts
+    if blur_count:
+        return AtlasPlan(layouts, settings.atlas)
+    return AtlasPlan(layouts[:1], settings.atlas) if has_occlusion else AtlasPlan(("mesh",), MIN_SIZE)

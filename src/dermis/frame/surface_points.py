@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.lit import LitAtlas
-from dermis.frame.features.atlas.textures import AtlasTextures, packed_texels
+from dermis.frame.features.atlas.textures import AtlasTextures, pack_surface_points
 from dermis.frame.features.irradiance import irradiance
 from dermis.frame.features.shadows import shadows
 from dermis.frame.features.shape import shape
 from dermis.frame.features.surface import texels as surface_texels
-from dermis.frame.features.surface.texels import make_surfaces
+from dermis.frame.features.surface.texels import make_surface_texture
 from dermis.frame.features.visibility import layers as visibility_buffer
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download, make_texture
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -28,10 +28,10 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Points of the head under the centres of pixels.
+    """Surface points of the head under the centres of pixels.
 
-    mask : (h, w) pixels that see it
-    triangle, barycentric : (n,) and (n, 3) of those pixels, row by row
+    mask : (h, w) pixels that show the head
+    triangle, barycentric : (n,) triangles and (n, 3) weights of these pixels, row by row
     """
 
     mask: NDArray[np.bool_]
@@ -40,30 +40,30 @@ class SurfacePoints:
 
 
 def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
-    """The points that an image of one sample for each pixel shows.
+    """Return the surface points that a picture with one sample per pixel shows.
 
-    settings : technique and samples do not matter
+    settings : settings of the picture; technique and samples are ignored
     """
-    return renderer.kept_open.run(partial(_surface_points, renderer, scene, settings))
+    return renderer.reopening_device.run(partial(_surface_points, renderer, scene, settings))
 
 
 def _surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
     single = settings.model_copy(update={"samples": 1, "technique": "none"})
     inputs = renderer.prepare(scene, single)
     frame = CommandList(renderer.device)
-    made = inputs.resources
-    shape.draw(frame, made.shape.shape, inputs.motion)
-    visibility_buffer.draw(frame, made.visibility, inputs.camera, made.head)
+    resources = inputs.resources
+    shape.draw(frame, resources.shape.shape, inputs.motion)
+    visibility_buffer.draw(frame, resources.visibility, inputs.camera_views, resources.head)
     frame.submit()
-    renderer.graph.forget()  # it does not know of this frame
-    seen = download(renderer.device, made.visibility.texture).astype(np.int64)
-    mask = seen > 0
-    triangle = seen[mask] - 1
+    renderer.graph.invalidate()  # this frame bypassed the graph
+    visible = download(renderer.device, resources.visibility.texture).astype(np.int64)
+    mask = visible > 0
+    triangle = visible[mask] - 1
     return SurfacePoints(mask, triangle, _barycentric(scene, inputs.view, triangle, mask))
 
 
 def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: NDArray[np.bool_]) -> Floats:
-    """Weights of where rays through the middles of pixels meet their triangles, as in shade.wgsl."""
+    """Return the (n, 3) weights of the intersections of rays with their triangles, as in shade.wgsl."""
     height, width = mask.shape
     rows, columns = np.nonzero(mask)
     x, y = 2.0 * (columns + 0.5) / width - 1.0, 1.0 - 2.0 * (rows + 0.5) / height
@@ -72,11 +72,11 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
     x, y = x + shift[0], y + shift[1]
     ray = forward + x[:, None] * right + y[:, None] * up
     mesh, motion = scene.head.mesh, scene.motion
-    places = mesh.positions if motion is None else scene.head.control.points_mm(motion)[mesh.point]
-    a, b, c = (places[mesh.triangles[triangle, k]].astype(np.float64) - eye for k in range(3))
+    points = mesh.positions if motion is None else scene.head.control.points_mm(motion)[mesh.point]
+    a, b, c = (points[mesh.triangles[triangle, k]].astype(np.float64) - eye for k in range(3))
     sides = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
     weights = np.stack([(side * ray).sum(axis=1) for side in sides], axis=-1)
-    weights *= np.sign(weights.sum(axis=1, keepdims=True))  # triangles seen from behind
+    weights *= np.sign(weights.sum(axis=1, keepdims=True))  # of back faces
     weights = np.clip(weights, 0.0, None)
     return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-300))
 
@@ -84,35 +84,35 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
 def irradiance_at(
     renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
 ) -> Floats:
-    """(n, 3) light that enters the skin at points, times the colour's share before scattering.
+    """Return the (n, 3) irradiance that enters the skin at points, times albedo^mix.
 
-    scene : without maps and environment, whose texels and occlusion are looked up by place in the atlas, as
-        light from other skin is, which is therefore left out
-    triangle, barycentric : (n,) and (n, 3)
+    scene : scene without maps and environment, because these need atlas positions; interreflection is left
+        out
+    triangle, barycentric : (n,) triangles and (n, 3) weights
     """
     side = max(1, int(np.ceil(np.sqrt(len(triangle)))))
-    places = np.full(side * side, -1, np.int64)
-    places[: len(triangle)] = triangle
+    triangles = np.full(side * side, -1, np.int64)
+    triangles[: len(triangle)] = triangle
     weights = np.zeros((side * side, 2))
     weights[: len(triangle)] = barycentric[:, 1:]
-    records = packed_texels(places.reshape(side, side), np.rint(65535 * weights).reshape(side, side, 2))
-    return renderer.kept_open.run(partial(_lit, renderer, scene, settings, records))[: len(triangle)]
+    records = pack_surface_points(triangles.reshape(side, side), np.rint(65535 * weights).reshape(side, side, 2))
+    return renderer.reopening_device.run(partial(_irradiance, renderer, scene, settings, records))[: len(triangle)]
 
 
-def _lit(renderer: Renderer, scene: Scene, settings: Settings, records: NDArray[np.uint32]) -> Floats:
-    """(n * n, 3) light at the (n, n) places of an atlas."""
+def _irradiance(renderer: Renderer, scene: Scene, settings: Settings, records: NDArray[np.uint32]) -> Floats:
+    """Return the (n * n, 3) irradiance at the (n, n) points of an atlas."""
     device, side = renderer.device, len(records)
     inputs = renderer.prepare(scene, settings.model_copy(update={"interreflection": False}))
     first = inputs.layouts[0]
-    listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")})
-    lit = make_texture(device, (side, side), "rgba32float")
+    point_atlas = AtlasTextures({"atlas": texture_from_array(device, records, "rg32uint")})
+    entering = make_texture(device, (side, side), "rgba32float")
     frame = CommandList(device)
-    made = inputs.resources
-    shape.draw(frame, made.shape.shape, inputs.motion)
-    shadows.draw(frame, made.shadow_maps, inputs.shadow_views, made.head)
-    layout = LitAtlas(listed, first.head, first.lit, make_surfaces(device, side), lit)
+    resources = inputs.resources
+    shape.draw(frame, resources.shape.shape, inputs.motion)
+    shadows.draw(frame, resources.shadow_maps, inputs.shadow_views, resources.head)
+    layout = LitAtlas(point_atlas, first.head, first.bindings, make_surface_texture(device, side), entering)
     surface_texels.draw(frame, layout)
-    irradiance.draw(frame, layout, inputs.light_constants, lit, side)
+    irradiance.draw(frame, layout, inputs.light_constants, entering, side)
     frame.submit()
-    renderer.graph.forget()  # it does not know of this frame
-    return download(device, lit).reshape(-1, 4)[:, :3].astype(np.float64)
+    renderer.graph.invalidate()  # this frame bypassed the graph
+    return download(device, entering).reshape(-1, 4)[:, :3].astype(np.float64)

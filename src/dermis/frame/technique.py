@@ -1,4 +1,4 @@
-"""Traits of a scattering technique, which a request needs before any resources exist."""
+"""Properties of a scattering technique that are known before its resources exist."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProfileSplit:
-    """A profile divided into the level that is lit again in the image and those that are blurred.
+    """Profile divided into a narrow Gaussian that is relit in the picture, and Gaussians that blur.
 
-    relit, total : (3,) weight of the level that is not blurred, and of all
-    blurred_mm2, weight : (k,) and (k, 3) of the blurred levels
-    others : the same of profiles that a map mixes into this one, of the same Gaussians
-    fine : members of the shader's struct Fine, none where the picture shows what texels hold
+    relit, total : (3,) weights of the relit Gaussian, and sums over all Gaussians [-]
+    blurred_mm2, weight : (k,) variances [mm2] and (k, 3) weights [-] of the Gaussians that blur
+    others : splits of the profiles that a map blends with this one; they have the same Gaussians
+    fine : members of the shader's struct Fine for light finer than texels, empty without it
     """
 
     relit: Floats
@@ -34,60 +34,63 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """(o, 3) by which the others' weights of the level that is not blurred differ."""
+        """Return the (o, 3) differences of the other profiles' relit weights from this one's [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
-    def changes(self) -> tuple[Floats, ...]:
-        """(k, 3) by which each other's weights of the blurred levels differ."""
+    def weight_changes(self) -> tuple[Floats, ...]:
+        """Return the (k, 3) difference of each other profile's blurred weights from this one's [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
 class TechniqueResources:
-    """Base class of what a technique makes for itself: tables, and space beside the atlas."""
+    """Base class for the tables and textures of a technique."""
 
 
 class TechniqueTraits:
-    """What a technique states of itself; `techniques.technique.Technique` adds resources and passes.
+    """Properties of a technique; `techniques.technique.Technique` adds its resources and passes.
 
     sources : keys of the bibliography
-    on_atlas : whether light spreads over the atlas
-    mixes : whether it can mix profiles by a map
-    stitches : whether it can carry light across the map's seams
-    transmits : whether light comes through thin parts
-    curved : whether the shading reads the surface's curvature
+    uses_atlas : whether light is diffused over the atlas
+    mixes_profiles : whether a map can blend several profiles
+    stitches_seams : whether light can cross the seams of the atlas
+    supports_translucency : whether light can cross thin parts
+    needs_curvature : whether the shading pass reads the curvature of the surface
     shade_constants : pipeline constants of the shading pass
-    pixel_bytes : of memory for each pixel, besides the picture
-    apart_bytes : of memory for each pixel for `make_apart`
+    pixel_bytes : memory per pixel besides the picture [bytes]
+    subsurface_layer_bytes : memory per pixel of `Technique.make_subsurface_layers` [bytes]
     """
 
     sources: ClassVar[tuple[str, ...]] = ()
-    on_atlas: ClassVar[bool] = False
-    mixes: ClassVar[bool] = False
-    stitches: ClassVar[bool] = True
-    transmits: ClassVar[bool] = False
-    curved: ClassVar[bool] = False
+    uses_atlas: ClassVar[bool] = False
+    mixes_profiles: ClassVar[bool] = False
+    stitches_seams: ClassVar[bool] = True
+    supports_translucency: ClassVar[bool] = False
+    needs_curvature: ClassVar[bool] = False
     shade_constants: ClassVar[Constants] = ()
     pixel_bytes: ClassVar[int] = 0
-    apart_bytes: ClassVar[int] = 0
+    subsurface_layer_bytes: ClassVar[int] = 0
 
-    def split(self, profile: GaussianSum, white: bool) -> ProfileSplit:
-        """Return the profile as the technique uses it; here no light is blurred.
+    def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
+        """Return the Gaussians that the technique relights and blurs; this base class blurs none.
 
-        white : renormalise each channel's weights to 1, so that the colour map alone gives the colour
+        normalise : whether the weights of each channel sum to 1, so that the colour map alone gives the albedo
         """
-        total = channel_weights(profile, white).sum(axis=0)
+        total = channel_weights(profile, normalise).sum(axis=0)
         return ProfileSplit(total, total, np.empty(0), np.empty((0, 3)))
 
     def stretch(self, settings: Settings) -> str:
-        """Return how blurs follow the map's stretch, one of `Settings.stretch`."""
+        """Return the stretch correction of the blurs, one of the values of `Settings.stretch`."""
         return settings.stretch
 
     def texel_bytes(self, levels: int) -> float:
-        """Return bytes for each texel of the atlas on a software adapter, with the space between passes."""
+        """Return the memory per atlas texel on a software adapter, temporary textures included [bytes].
+
+        levels : number of Gaussians that blur light
+        """
         return 0.0
 
 
-def channel_weights(profile: GaussianSum, white: bool) -> Floats:
-    """Return the (k, 3) weights of a profile's Gaussians, divided by its albedo for `white` skin."""
-    return profile.weight / profile.albedo if white else profile.weight
+def channel_weights(profile: GaussianSum, normalise: bool) -> Floats:
+    """Return the (k, 3) weights of the Gaussians of a profile, divided by its albedo to normalise them [-]."""
+    return profile.weight / profile.albedo if normalise else profile.weight

@@ -1,1 +1,1 @@
-"""The parametric person: shape, expressions, skin, hair and teeth from numbers, regions and landmarks."""
+"""Parametric human: shape, expressions, skin, hair, teeth, face regions and landmarks."""

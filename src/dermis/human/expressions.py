@@ -1,4 +1,4 @@
-"""Expressions by name: weights of the human's targets, or of pairs of them."""
+"""Registry of named expressions: weights of the human's morph targets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SIDES = "Left", "Right"
 EXPRESSIONS: Registry[Weights] = Registry(
     "expression", tomllib.loads(resources.files(__package__).joinpath("expressions.toml").read_text("utf-8"))
 )
-"""Those of expressions.toml; another package registers its own."""
+"""Weights by name of the expression, from expressions.toml; other packages may register their own."""
 
 
 def expression(name: str) -> dict[str, float]:
@@ -27,12 +27,12 @@ def expression(name: str) -> dict[str, float]:
 
 
 def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
-    """Return targets by name; "mouthSmile" is two of them, left and right."""
+    """Return the names of targets without duplicates; "mouthSmile" is expanded to left and right."""
     return tuple(dict.fromkeys(target for name in names for target in expand_sides(name)))
 
 
 def expand_sides(name: str) -> tuple[str, ...]:
-    """Return both targets of a pair, or the target itself."""
+    """Return the left and the right target of a pair, or the target itself."""
     return tuple(f"{name}{side}" for side in SIDES) if f"{name}Left" in _arkit_names() else (name,)
 
 

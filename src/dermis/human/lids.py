@@ -1,4 +1,4 @@
-"""Eyelids on eyes of true size: published lids fitted to smaller balls, and the targets that close them."""
+"""Eyelids fitted to eyeballs of anatomical size, and the morph targets that close them."""
 
 from __future__ import annotations
 
@@ -11,56 +11,58 @@ from numpy.typing import NDArray
 from dermis.human.makehuman import EXPRESSION_PREFIX, Points, model_data, target_deltas
 from dermis.human.movement import expression_targets, gaze_turns
 from dermis.human.skin.surface import average_surface, lid_rings
-from dermis.mesh.eyeball import SCLERA_MM, Contact, clearance_mm
-from dermis.mesh.eyeball import eyeball_mesh as eyeball_globe
+from dermis.mesh.eyeball import SCLERA_MM, Contact, clearance_mm, globe
 
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 PUBLISHED_EYE_RADIUS_MM = 15.4
-"""Mean radius of the published ball, which the published lids lie on, where the eye is of usual size [mm]."""
+"""Mean radius of the published eyeball of an average eye, which the published lids touch [mm]."""
 EYE_OFFSET_MM = 2.2
-"""How far the true ball's centre lies before the published one's, so that corneas stand as far out [mm]."""
+"""Forward offset of the anatomical from the published eyeball, for equal positions of the cornea [mm]."""
 CONTROL_SCALE = 1.0045
-"""How much larger an eyeball's control points are than its smooth surface."""
-_SKIN_REACH_MM = 15.0  # of the skin around the lids that goes with them
-_FALLOFF_MM = 1.0  # mm over which neighbours share what they follow
-_MIN_HEIGHT_MM = -1.5  # below the surface of the ball; what lies deeper is never seen
-_LINEAR_RADIUS, _MAX_RADIUS = 0.75, 0.95  # shares of the radius across the axis, see `_compress_radius`
+"""Size of an eyeball's control mesh relative to its smooth surface."""
+_SKIN_REACH_MM = 15.0  # of the skin around the lids that follows them
+_FALLOFF_MM = 1.0  # blend distance between the lid points that skin follows
+_MIN_HEIGHT_MM = -1.5  # relative to the eyeball; deeper points are never visible
+_LINEAR_RADIUS, _MAX_RADIUS = 0.75, 0.95  # fractions of the radius, see `_compress_radius`
 _CLEARANCES_MM = -0.3, 0.25, 0.75, 1.0  # of wall, edge, crest and skin
-_EDGE_HEIGHT_MM = 0.2  # of the edge: the smooth surface lies a little within its control points
+_EDGE_HEIGHT_MM = 0.2  # the smooth surface lies slightly inside its control points
 _ROW_CONTACT = np.array([0, 0.2, 0.6, *21 * [1.0], 0.6, 0.2, 0, 0])
-"""How far each row of lid_rings.csv lies on the ball: not around the caruncle."""
+"""Contact of each row of lid_rings.csv with the eyeball, 0 to 1; none around the caruncle."""
 _CARUNCLE_RISE_MM = np.array([[0.3, 0.7, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0], *23 * [4 * [0.0]],
                          [0.0, 0.3, 0.0, 0.0], [0.5, 1.0, 0.0, 0.0], [0.6, 1.1, 0.0, 0.0]])  # fmt: skip
-"""How far the floor of the inner corner rises, row by row, while the eye is open."""
+"""Rise of the floor of the inner corner for each row while the eye is open."""
 _UPPER, _LOWER = slice(1, 12), slice(13, 28)  # rows of lid_rings.csv
-_OVERLAP_MM = 1.6 * np.array(
-    [0.4, 0.8, *7 * [1.0], 0.8, 0.4]
-)  # by which closed upper lids reach beyond lower ones
-_SLIDING_ROWS = 6  # of quads, of skin that may slide
-_BLINK_DISPLACEMENT_MM = 2.0  # by a blink: skin that slides over the eye
+_OVERLAP_MM = 1.6 * np.array([0.4, 0.8, *7 * [1.0], 0.8, 0.4])
+"""Overlap of closed upper lids over the lower lids."""
+_SLIDING_ROWS = 6  # rows of quads around the lids that may slide over the eye
+_BLINK_DISPLACEMENT_MM = 2.0  # minimum displacement of sliding skin by a blink
 _RINGS, _EDGE, _CREST = 4, 1, 2  # columns of lid_rings.csv
 FORWARD = np.array([0.0, 0.0, 1.0])
-"""Where eyes look at rest."""
+"""Viewing direction of the eyes in rest pose."""
 _LID_TARGET_PREFIXES = "eyeBlink", "eyeLook", "eyeSquint", "eyeWide"
 Doubles = NDArray[np.float64]
 
 
 class EyeSocket(NamedTuple):
-    """A person's eye as published: the middle of the ball (3,), and its size, 1 for a usual one."""
+    """Eye of a person in the published data.
 
-    middle: Points
+    centre : (3,) of the published eyeball [mm]
+    size : relative to the average eye
+    """
+
+    centre: Points
     size: float
 
 
 class LidSide(NamedTuple):
-    """What follows the lids of one eye.
+    """Points of the eyelids of one eye and the skin around them.
 
-    rings : (r,) points of lids, see lid_rings.csv
-    point : (n,) these, and the skin around them
-    share : (n, r) of the ways of `rings` that each goes
-    contact, clear_mm : (c,) points that slide over the eye, and least distances from it
+    rings : (r,) points of the lids, see lid_rings.csv
+    point : (n,) points of the lids and of the skin around them
+    weights : (n, r) by which each point follows the displacements of `rings`
+    contact, clearances_mm : (c,) points that slide over the eye, and their minimum distances from it
     """
 
     rings: Index
@@ -70,25 +72,25 @@ class LidSide(NamedTuple):
     clearances_mm: Points
 
     def reindexed(self, point: Index) -> LidSide:
-        """The same by numbers of sorted points, among which all these are."""
+        """Return the same with indices into sorted points, which must include all of these."""
         rings, own, contact = (np.searchsorted(point, one) for one in (self.rings, self.point, self.contact))
         return self._replace(rings=rings, point=own, contact=contact)
 
 
 def fit_socket(balls: Points) -> EyeSocket:
-    """The eye whose published ball has points (b, 3)."""
-    middle = (balls.min(axis=0) + balls.max(axis=0)) / 2
-    return EyeSocket(middle, float(np.linalg.norm(balls - middle, axis=1).mean()) / PUBLISHED_EYE_RADIUS_MM)
+    """Return the socket of a published eyeball with points (b, 3) [mm]."""
+    centre = (balls.min(axis=0) + balls.max(axis=0)) / 2
+    return EyeSocket(centre, float(np.linalg.norm(balls - centre, axis=1).mean()) / PUBLISHED_EYE_RADIUS_MM)
 
 
 def fit_lids(
     points_mm: Points, sockets: tuple[EyeSocket, EyeSocket], closed: bool = False, axis: Points = FORWARD
 ) -> Points:
-    """(n, 3) a person's published points with the lids on eyes of true size [mm].
+    """Return a person's published points (n, 3) with the lids on eyeballs of anatomical size [mm].
 
     sockets : of the left and of the right eye
-    closed : whether upper lids end at the lower ones, however far they are published to go
-    axis : (3,) along which the eyes look, unit
+    closed : whether the upper lids are moved to end at the lower lids
+    axis : (3,) unit viewing direction of the eyes
     """
     found = points_mm.copy()
     for side, eye in zip(lid_sides(), sockets, strict=True):
@@ -99,14 +101,14 @@ def fit_lids(
 def _project_lids(
     points_mm: Points, side: LidSide, eye: EyeSocket, closed: bool | Flags, axis: Points
 ) -> None:
-    """Draw the lids of one eye onto it, see `fit_lids`; of one person, or in several movements (m, n, 3).
+    """Move the lids of one eye onto its eyeball in place, for one person or for several poses (m, n, 3).
 
-    closed, axis : (m,) and (m, 1, 3) of those
+    closed, axis : as for `fit_lids`; (m,) and (m, 1, 3) for several poses
     """
     points_mm[..., side.point, :] += side.weights @ _lid_displacements(
         points_mm[..., side.rings, :], eye, closed
     )
-    centre = eye.middle + eye.size * EYE_OFFSET_MM * FORWARD
+    centre = eye.centre + eye.size * EYE_OFFSET_MM * FORWARD
     size = CONTROL_SCALE * eye.size
     off = (points_mm[..., side.contact, :] - centre) / size
     far, surface = clearance_mm(off, axis)
@@ -115,10 +117,10 @@ def _project_lids(
 
 
 def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> Contact:
-    """What slides over the eyes.
+    """Return the points that slide over the eyes, with their distances from the eyeballs.
 
-    first, eyeball_size : number of the left eyeball's first point, and how many points an eyeball has
-    apex, back : of an eyeball's points
+    first, eyeball_size : index of the first point of the left eyeball, and the number of points of an eyeball
+    apex, back : indices of points of an eyeball
     """
     both = lid_sides()
     return Contact(
@@ -132,12 +134,12 @@ def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> Contact:
 
 
 def _lid_displacements(rings: Points, eye: EyeSocket, closed: bool | Flags) -> Points:
-    """(..., r, 3) from where points of the lids are published to where they lie on the true ball [mm].
+    """Return the displacements (..., r, 3) of lid points from the published to the anatomical eyeball [mm].
 
-    Seen from the front they stay where they are, but near the ball's outline. Edges touch the ball; lids stay
-    as thick.
+    In a view from the front the points stay where they are, except near the outline of the eyeball. Edges
+    touch the eyeball; the thickness of the lids is kept.
     """
-    published = (rings - eye.middle) / eye.size
+    published = (rings - eye.centre) / eye.size
     off, shut = published.copy(), np.asarray(closed)
     lids = off.reshape(-1, len(_ROW_CONTACT), _RINGS, 3)
     for one in np.flatnonzero(shut):
@@ -154,7 +156,7 @@ def _lid_displacements(rings: Points, eye: EyeSocket, closed: bool | Flags) -> P
 
 
 def _close_upper_lid(rings: Points) -> None:
-    """Move the rows of an upper lid (rows, 4, 3) so that its crest ends a little below the lower one's."""
+    """Move rows of an upper lid (rows, 4, 3) in place until its crest is below that of the lower lid."""
     crest = rings[:, _CREST]
     lower = crest[_LOWER][np.argsort(crest[_LOWER, 0])]
     ends = np.interp(crest[_UPPER, 0], lower[:, 0], lower[:, 1]) - _OVERLAP_MM
@@ -162,7 +164,7 @@ def _close_upper_lid(rings: Points) -> None:
 
 
 def _compress_radius(across: Points) -> Points:
-    """Distances from the axis in radii: as they are near it, short of the outline farther out."""
+    """Return distances from the axis, in eyeball radii, compressed near the outline."""
     room = _MAX_RADIUS - _LINEAR_RADIUS
     return np.where(
         across < _LINEAR_RADIUS, across, _LINEAR_RADIUS + room * np.tanh((across - _LINEAR_RADIUS) / room)
@@ -171,7 +173,10 @@ def _compress_radius(across: Points) -> Points:
 
 @cache
 def lid_sides() -> tuple[LidSide, LidSide]:
-    """Of the left and of the right eye; told on the average person, so the same for all people."""
+    """Return the lid points of the left and the right eye.
+
+    They are computed on the average person and are equal for all people.
+    """
     points_mm, (left, right) = average_surface()[0].astype(np.float64), lid_rings()
     body = np.unique(model_data()["quads"][model_data()["group"] == 0]).astype(np.int64)
     return _lid_side(left, points_mm, body, "Left"), _lid_side(right, points_mm, body, "Right")
@@ -194,43 +199,45 @@ def _lid_side(rings: Index, points_mm: Points, body: Index, name: str) -> LidSid
 
 
 def _sliding_points(rings: Index, point: Index, name: str) -> Index:
-    """(c,) points of the lids' skin beyond the rings that a blink moves."""
+    """Return the skin points beyond the rings that a blink moves (c,)."""
     index = target_deltas().names.index(f"{EXPRESSION_PREFIX}eyeBlink{name}")
     part = slice(*target_deltas().first[index : index + 2])
     far = np.linalg.norm(target_deltas().delta_mm[part], axis=1) > _BLINK_DISPLACEMENT_MM
     moved = np.intersect1d(target_deltas().point[part][far], point)
     quads, skin = model_data()["quads"].astype(np.int64), rings[:, -1]
     quads = quads[np.isin(quads, moved).any(axis=1) & ~np.isin(quads, rings[:, :-1]).any(axis=1)]
-    for _ in range(_SLIDING_ROWS):  # from the lids outwards, never over their edges
+    for _ in range(_SLIDING_ROWS):  # from the lids outwards
         skin = np.union1d(skin, quads[np.isin(quads, skin).any(axis=1)])
     return np.setdiff1d(np.intersect1d(skin, moved), rings)
 
 
 def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> NDArray[np.float32]:
-    """(m, 3) what `expression_targets` move points by, corrected where they move a person's lids [mm].
+    """Return the displacements (m, 3) of `expression_targets`, corrected at a person's lids [mm].
 
-    places : (n, 3) the person's published points
+    points_mm : (n, 3) published points of the person
     """
-    moved, found = _lid_targets(), expression_targets().delta_mm.copy()
-    rest_points = points_mm[moved.point]
-    posed = np.tile(rest_points, (len(moved.closed), 1, 1))
-    posed[moved.target, moved.number] += found[moved.row]
-    for side, eye, target_index in zip(moved.lid_sides, sockets, moved.target_index, strict=True):
+    lids, found = _lid_targets(), expression_targets().delta_mm.copy()
+    rest_points = points_mm[lids.point]
+    posed = np.tile(rest_points, (len(lids.closed), 1, 1))
+    posed[lids.target, lids.point_index] += found[lids.row]
+    for side, eye, target_index in zip(lids.lid_sides, sockets, lids.target_index, strict=True):
         _project_lids(rest_points, side, eye, False, FORWARD)
         near = posed[target_index]
-        _project_lids(near, side, eye, moved.closed[target_index], moved.axis[target_index])
+        _project_lids(near, side, eye, lids.closed[target_index], lids.axis[target_index])
         posed[target_index] = near
-    found[moved.row] = posed[moved.target, moved.number] - rest_points[moved.number]
+    found[lids.row] = posed[lids.target, lids.point_index] - rest_points[lids.point_index]
     return found
 
 
 class _LidTargets(NamedTuple):
-    """Expressions that move lids.
+    """Morph targets that move the lids.
 
-    closed, axis : (t,) whether lids close, and (t, 1, 3) along which eyes look
+    closed, axis : (t,) whether the lids close, and (t, 1, 3) the viewing direction of the eyes
     point : (n,) points around both eyes
-    sides, which : of the left and of the right eye, by numbers of these points; and what moves its lids
-    row, target, number : (m,) displacements of these points, whose they are, and of which point
+    lid_sides, target_index : of the left and the right eye: lid points as indices into `point`, and targets
+        that move them
+    row, target, point_index : (m,) rows of displacements of these points, their targets, and indices into
+        `point`
     """
 
     closed: Flags
@@ -240,7 +247,7 @@ class _LidTargets(NamedTuple):
     target_index: tuple[Index, ...]
     row: Index
     target: Index
-    number: Index
+    point_index: Index
 
 
 @cache
@@ -266,7 +273,7 @@ def _lid_targets() -> _LidTargets:
 
 @cache
 def gaze_axes() -> dict[str, Points]:
-    """Along which an eye looks by each target of gaze."""
+    """Return the viewing direction (3,) of an eye for each gaze target."""
     turns = {turn.target: np.radians(turn.degrees) for turn in gaze_turns()}
     found = {
         name: np.array([np.sin(y), -np.sin(x), np.cos(x) * np.cos(y)]) for name, (x, y, _) in turns.items()
@@ -275,11 +282,14 @@ def gaze_axes() -> dict[str, Points]:
 
 
 def eyeball_mesh() -> tuple[Doubles, Index]:
-    """(n, 3) control points of an eyeball around its centre, looking along +Z [mm], and (q, 4) quads."""
-    return eyeball_globe(swell=CONTROL_SCALE)
+    """Return the control points (n, 3) [mm] and the quads (q, 4) of an eyeball at the origin.
+
+    It looks along +Z.
+    """
+    return globe(swell=CONTROL_SCALE)
 
 
 def place_eyeball(eye: EyeSocket) -> tuple[Doubles, Doubles]:
-    """(n, 3) points of a person's eyeball, and its centre (3,) [mm]."""
-    centre = eye.middle + eye.size * EYE_OFFSET_MM * np.array([0.0, 0.0, 1.0])
+    """Return the control points (n, 3) of a person's eyeball, and its centre (3,) [mm]."""
+    centre = eye.centre + eye.size * EYE_OFFSET_MM * FORWARD
     return centre + eye.size * eyeball_mesh()[0], centre

@@ -1,4 +1,4 @@
-"""The published data of the parametric human: points, targets, layouts, bones."""
+"""MakeHuman's data of the parametric human: points, morph targets, uv layouts and bones."""
 
 from __future__ import annotations
 
@@ -15,17 +15,20 @@ from dermis.base.errors import format_value, refuse
 Points = NDArray[np.float64]
 
 YOUNG, OLD = 25.0, 90.0
-"""Ages of the published people [years]."""
+"""Ages of the published young and old people [years]."""
 
 DELTA_UNIT_MM = 0.01
-"""Of a unit of displacements, here as in the published files."""
+"""Length of a unit of displacements in the published files [mm]."""
 
 EXPRESSION_PREFIX = "faceunits/"
-"""How the names of the ARKit blend shapes begin."""
+"""Prefix of the names of the ARKit blend shapes."""
 
 
 class TargetDeltas(NamedTuple):
-    """What published targets move, one after the other: points, displacements [mm], and where each begins."""
+    """Displacements of all published targets, concatenated.
+
+    first : start of each target in `point` and `delta_mm`, and the end of the last
+    """
 
     names: tuple[str, ...]
     first: NDArray[np.int64]
@@ -34,11 +37,13 @@ class TargetDeltas(NamedTuple):
 
 
 def morphed_points_mm(weights: Mapping[str, float]) -> Points:
-    """(n, 3) the points of a person, then the joints, from the middle between the eyes [mm].
+    """Return the mesh points of a person, followed by the joints (n, 3) [mm].
+
+    The origin is the midpoint between the eyes.
 
     weights : of published targets
 
-    Raises DermisError for targets that nobody knows.
+    Raises DermisError for unknown targets.
     """
     found, moved = model_data(), target_deltas()
     points = [np.arange(len(found["positions_mm"]))]
@@ -57,24 +62,36 @@ def morphed_points_mm(weights: Mapping[str, float]) -> Points:
 
 @cache
 def _target_indices() -> Mapping[str, int]:
-    """By names of targets which they are."""
+    """Return the index of each target by name."""
     return {name: number for number, name in enumerate(target_deltas().names)}
 
 
 def check_targets(names: Iterable[str]) -> None:
-    """Raises DermisError for a target that is not published."""
+    """Raise DermisError for an unknown target."""
     for name in names:
         if name not in _target_indices():
             known = target_deltas().names
             close = [one for one in known if name.split("/")[-1] in one][:3]
             hint = f"Did you mean {' or '.join(close)}?" if close else "List: dermis head --list-targets"
-            actual = "there is none of this name"
+            actual = "this name is unknown"
             refuse(f"target {format_value(name)}", "a published target", actual, hint)
 
 
 @cache
 def human_targets() -> tuple[str, ...]:
-    """Names of the published targets by which people differ, for `Human(targets=...)`."""
+    """Return the names of the morph targets that change the shape of a person.
+
+    Returns
+    -------
+    tuple of str
+        Names for `Human(targets=...)`.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> "nose/nose-hump-incr" in dermis.human_targets()
+    True
+    """
     return tuple(
         name for name in target_deltas().names if not name.startswith((EXPRESSION_PREFIX, "expression/"))
     )
@@ -82,21 +99,29 @@ def human_targets() -> tuple[str, ...]:
 
 @cache
 def model_data() -> Mapping[str, NDArray[Any]]:
-    """The package's file."""
+    """Return the arrays of human.npz by name."""
     file = resources.files(__package__).joinpath("data", "human.npz")
     with resources.as_file(file) as path, np.load(path) as stored:
         return {name: stored[name] for name in stored}
 
 
+@cache
+def group_points(name: str) -> NDArray[np.int64]:
+    """Return the sorted points of a group of quads, such as "helper-l-eye"."""
+    found = model_data()
+    group = list(map(str, found["group_names"])).index(name)
+    return np.unique(found["quads"][found["group"] == group]).astype(np.int64)
+
+
 def mesh_point_count() -> int:
-    """Of the points of the mesh, which joints come after."""
+    """Return the number of mesh points, which precede the joints."""
     found = model_data()
     return len(found["positions_mm"]) - len(found["joint_names"])
 
 
 @cache
 def target_deltas() -> TargetDeltas:
-    """What all targets move."""
+    """Return the displacements of all targets."""
     found = model_data()
     delta = DELTA_UNIT_MM * found["target_delta"].astype(np.float32)
     first, point = (found[name].astype(np.int64) for name in ("target_first", "target_point"))

@@ -1,4 +1,4 @@
-"""The parametric human: heads of people with expressions, neck, jaw and moving eyes, and their template."""
+"""Head models of the parametric human with expressions and bones, and their shared template."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dermis.human import lids, teeth
 from dermis.human.hair.root_finder import RootFinder, eye_centres
 from dermis.human.lids import fit_lid_targets
-from dermis.human.makehuman import Points, mesh_point_count, model_data, morphed_points_mm
+from dermis.human.makehuman import Points, group_points, mesh_point_count, model_data, morphed_points_mm
 from dermis.human.movement import expression_targets, gaze_turns, skeleton
 from dermis.mesh import eyeball
 from dermis.mesh.eye_look import EyeLook
@@ -40,20 +40,20 @@ MATERIALS = {
     "helper-tongue": Material("tongue", "opaque", _TONGUE_COLOUR, "tongue"),
     "cap": Material("cut", "opaque", (0.02, 0.02, 0.02)),
 }
-"""Groups of quads, and what they are."""
+"""Materials by group of quads."""
 _EQUAL_WEIGHT = 1 / 6
 MEAN_WEIGHTS = {
     f"macrodetails/{people}-{sex}-young": _EQUAL_WEIGHT
     for people in ("african", "asian", "caucasian")
     for sex in ("female", "male")
 }
-"""Weights of the person whom atlas and tables are made for, and whose brows are where the artist has them."""
+"""Weights of the mean person, for whom atlas, tables and brows are defined."""
 
 
 class _LayoutFaces(NamedTuple):
-    """The faces of a layout, the same for all people.
+    """Faces of the mesh with one uv layout, equal for all people.
 
-    point : (v,) of each vertex
+    point : (v,) control point of each vertex
     uv : (v, 2)
     quads : (q, 4) vertices
     material : (q,) index into `MATERIALS`
@@ -66,7 +66,7 @@ class _LayoutFaces(NamedTuple):
 
 
 def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: EyeLook) -> Head:
-    """The head of a person, see `Human.head`.
+    """Return the bare head of a person, without hair.
 
     weights : of published targets
     """
@@ -84,35 +84,26 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
         quads=np.arange(2 * len(faces.quads)).reshape(-1, 2),
     )
     bones = skeleton(points_mm[mesh_point_count() :], (left_centre, right_centre), len(left))
-    moved = replace(expression_targets(), delta_mm=fit_lid_targets(points_mm, sockets))
+    targets = replace(expression_targets(), delta_mm=fit_lid_targets(points_mm, sockets))
     apex, back, _ = eyeball.marks()
     contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
-    rig = Rig(points.astype(np.float32), moved, bones, turns=gaze_turns(), contact=contact)
+    rig = Rig(points.astype(np.float32), targets, bones, turns=gaze_turns(), contact=contact)
     return Head("human", mesh, maps, CREDIT, rig, _eyes(eyes))
 
 
 def control_points_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
-    """(p, 3) where the control points of a person lie, see `Human.positions_mm` [mm]."""
+    """Return the control points (p, 3) of a person in rest pose, see `Human.positions_mm` [mm]."""
     points_mm = morphed_points_mm(weights)
     sockets = _sockets(points_mm)
     balls = [lids.place_eyeball(eye)[0] for eye in sockets]
-    return np.concatenate([lids.fit_lids(points_mm, sockets)[: mesh_point_count()], *balls]).astype(
-        np.float32
-    )
+    skin = lids.fit_lids(points_mm, sockets)[: mesh_point_count()]
+    return np.concatenate([skin, *balls]).astype(np.float32)
 
 
 def _sockets(points_mm: Points) -> tuple[lids.EyeSocket, lids.EyeSocket]:
-    """The left and the right eye."""
-    left, right = (lids.fit_socket(points_mm[_published_eyeball(name)]) for name in (LEFT_EYE, RIGHT_EYE))
+    """Return the sockets of the left and the right eye."""
+    left, right = (lids.fit_socket(points_mm[group_points(name)]) for name in (LEFT_EYE, RIGHT_EYE))
     return left, right
-
-
-@cache
-def _published_eyeball(name: str) -> Index:
-    """Points of a published ball."""
-    found = model_data()
-    group = list(map(str, found["group_names"])).index(name)
-    return np.unique(found["quads"][found["group"] == group]).astype(np.int64)
 
 
 def _eyes(look: EyeLook) -> Eyes:
@@ -134,14 +125,14 @@ def _layout_faces(layout: Layout) -> _LayoutFaces:
 
 
 def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
-    """All quads, with eyeballs of true shape instead of the published ones.
+    """Return all quads, with anatomical eyeballs instead of the published ones.
 
-    uv (u, 2), points of quads (q, 4), their corners in uv (q, 4), and what they are made of (q,).
+    Arrays: uv (u, 2), points of the quads (q, 4), their uv indices (q, 4), and their materials (q,).
     """
     found = model_data()
     if layout == "own":
         uv, corner = found["uv"].astype(np.float64), found["quads_uv"].astype(np.int64)
-    else:  # which has no cut
+    else:  # without the cut surface of the neck
         uv, corner = found["uv1"] * [1.0, -1.0] + [0.0, 1.0], found["quads_uv1"].astype(np.int64)
     names = [str(found["group_names"][group]) for group in found["group"][: len(corner)]]
     stays = np.array([name not in (LEFT_EYE, RIGHT_EYE) for name in names])
@@ -149,10 +140,10 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
     ball, quads = lids.eyeball_mesh()
     size, points = len(ball), found["quads"][: len(corner)].astype(np.int64)
     for upper, name in ((True, "helper-upper-teeth"), (False, "helper-lower-teeth")):
-        own, points_mm = teeth.layout(upper)
-        those = np.array(names) == name
-        corner[those] = len(uv) + np.searchsorted(own, points[those])
-        uv = np.concatenate([uv, points_mm])
+        tooth_points, tooth_uv = teeth.layout(upper)
+        is_tooth = np.array(names) == name
+        corner[is_tooth] = len(uv) + np.searchsorted(tooth_points, points[is_tooth])
+        uv = np.concatenate([uv, tooth_uv])
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return (
         np.concatenate([uv, eyeball.layout()]),
@@ -164,33 +155,32 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
 
 @dataclass(frozen=True, eq=False)
 class Template:
-    """What all people with a layout and a level have in common.
+    """Data that all people with the same uv layout and level of subdivision share.
 
-    head : the mean person, bare
-    rooting : where brows and lashes grow on it
-    refinement : how meshes are refined; None at level 0
+    head : bare head of the mean person
+    root_finder : roots of brows and lashes on it
+    refinement : subdivision of the meshes; None at level 0
     """
 
     head: Head
     root_finder: RootFinder
     refinement: Refinement | None
 
-    def refine_head(self, plain: Head) -> Head:
-        """A person's head on the finer mesh, drawn by the template's atlas and tables.
+    def refine_head(self, control_head: Head) -> Head:
+        """Return a person's head on the subdivided mesh, with the template for atlas and tables.
 
-        plain : before any subdivision, of the same layout
+        control_head : the head before subdivision, of the same layout
         """
-        rig = replace(plain.control, stencils=self.head.control.stencils, template=self.head.control)
-        mesh = plain.mesh if self.refinement is None else self.refinement.mesh(plain.mesh)
-        return replace(plain, mesh=mesh, rig=rig, levels=self.head.levels, template=self.head)
+        rig = replace(control_head.control, stencils=self.head.control.stencils, template=self.head.control)
+        mesh = control_head.mesh
+        if self.refinement is not None:
+            mesh = self.refinement.mesh(mesh)
+        return replace(control_head, mesh=mesh, rig=rig, levels=self.head.levels, template=self.head)
 
 
 @cache
 def template(layout: Layout, levels: int) -> Template:
-    """The template of a layout.
-
-    levels : of subdivision
-    """
+    """Return the template of a uv layout and a level of subdivision."""
     head = plain = build_head(MEAN_WEIGHTS, Maps(), layout, EyeLook())
     found = refinement(plain.mesh, levels) if levels else None
     if found is not None:

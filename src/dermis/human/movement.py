@@ -1,4 +1,4 @@
-"""What moves the parametric human: expressions, bones, and targets that turn the eyes."""
+"""Morph targets, skeleton and gaze of the parametric human."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dermis.human.makehuman import EXPRESSION_PREFIX, Points, model_data, target_deltas
 from dermis.mesh.rig import MorphTargets, Skeleton, Turn
 
-_BONE_ORIGINS: dict[str, tuple[str, str, float]] = {  # a joint, or how far on the way between two
+_BONE_ORIGINS: dict[str, tuple[str, str, float]] = {  # two joints, and the position between them, 0 to 1
     "spine": ("neck", "neck", 0.0),
     "clavicle.L": ("l-clavicle", "l-clavicle", 0.0),
     "clavicle.R": ("r-clavicle", "r-clavicle", 0.0),
@@ -25,22 +25,18 @@ _BONE_ORIGINS: dict[str, tuple[str, str, float]] = {  # a joint, or how far on t
 _PARENTS = {"neck02": "neck01", "neck03": "neck02", "head": "neck03"}
 _PARENTS |= dict.fromkeys(("jaw", "eye.L", "eye.R"), "head")
 _PARENTS |= dict.fromkeys(("neck01", "clavicle.L", "clavicle.R"), "spine")
-_SIDEWAYS_DEGREES, _UP_DEGREES, _DOWN_DEGREES = (
-    28.0,
-    20.0,
-    22.0,
-)  # degrees that an eye turns by at a weight of 1
+_SIDEWAYS_DEGREES, _UP_DEGREES, _DOWN_DEGREES = 28.0, 20.0, 22.0  # rotation of an eye at a weight of 1
 _GAZE_ANGLES = {
     "In": (0.0, -_SIDEWAYS_DEGREES, 0.0),
     "Out": (0.0, _SIDEWAYS_DEGREES, 0.0),
     "Up": (-_UP_DEGREES, 0.0, 0.0),
     "Down": (_DOWN_DEGREES, 0.0, 0.0),
 }
-"""Of the left eye, which is on the side of +X; the right one turns across the other way."""
+"""Angles of the left eye, at +X, about x, y and z [degrees]; of the right eye with the opposite sign of y."""
 
 
 def gaze_turns() -> tuple[Turn, ...]:
-    """The turns of the eyes that ARKit's eyeLook targets make."""
+    """Return the rotations of the eyes that belong to the eyeLook targets of ARKit."""
     return tuple(
         Turn(f"eyeLook{direction}{name}", f"eye.{name[0]}", (x, side * y, z))
         for name, side in (("Left", 1.0), ("Right", -1.0))
@@ -50,7 +46,7 @@ def gaze_turns() -> tuple[Turn, ...]:
 
 @cache
 def expression_targets() -> MorphTargets:
-    """The ARKit blend shapes of the skin, the teeth and the tongue; eyeballs turn by `gaze_turns` instead."""
+    """Return the ARKit blend shapes of skin, teeth and tongue; eyeballs rotate by `gaze_turns` instead."""
     moved, names, rows = target_deltas(), list[str](), list[NDArray[np.intp]]()
     for index, name in enumerate(moved.names):
         if name.startswith(EXPRESSION_PREFIX):
@@ -64,7 +60,7 @@ def expression_targets() -> MorphTargets:
 
 @cache
 def _moved_points() -> NDArray[np.bool_]:
-    """(n,) whether expressions move a point: not joints and not eyeballs."""
+    """Return the mask (n,) of points that expressions move: neither joints nor eyeballs."""
     found = model_data()
     balls = [index for index, name in enumerate(found["group_names"]) if str(name).endswith("-eye")]
     moving = np.ones(len(found["positions_mm"]), bool)
@@ -74,11 +70,12 @@ def _moved_points() -> NDArray[np.bool_]:
 
 
 def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int) -> Skeleton:
-    """Spine, clavicles, a neck of three bones, head, jaw and eyes.
+    """Return the skeleton: spine, clavicles, neck of three bones, head, jaw and eyes.
 
     joint_mm : (j, 3) the person's joints [mm]
-    centres : (3,) of the left and the right eyeball, which turn about them [mm]
-    globe : points of an eyeball; those of the left one come after the published ones, then those of the right
+    centres : (3,) of the left and the right eyeball, about which they rotate [mm]
+    eyeball_size : number of points of an eyeball; the left eyeball follows the published points, then the
+        right
     """
     found = model_data()
     names = tuple(map(str, found["bone_names"]))
@@ -97,7 +94,7 @@ def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int
 
 @cache
 def _skin_weights(eyes: tuple[int, ...], eyeball_size: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """(p, 4) bones of all points and their weights: an eyeball follows its own alone."""
+    """Return the bones (p, 4) of all points and their weights; an eyeball follows only its own bone."""
     found = model_data()
     weights = found["weight"].astype(np.float32)
     own = np.zeros((2 * eyeball_size, weights.shape[1]), np.float32)

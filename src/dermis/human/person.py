@@ -1,4 +1,4 @@
-"""People of the parametric human, given by numbers or drawn at random."""
+"""People of the parametric human, from numbers or sampled at random."""
 
 from __future__ import annotations
 
@@ -33,17 +33,11 @@ from dermis.mesh.subdivide import levels_of
 
 _MAX_SEED = 2**32 - 1
 _MIN_BEARD_SHADOW = 0.6  # shadow of shaved hair below a beard
-_ANCESTRY_CONCENTRATION = 0.35  # of the Dirichlet distribution of ancestries: most people have mostly one
-_SEX_DEVIATION = 0.08  # standard deviation of the sex from its ends
-_OPPOSITE_SUFFIXES = (
-    ("decr", "incr"),
-    ("down", "up"),
-    ("in", "out"),
-    ("backward", "forward"),
-    ("concave", "convex"),
-)
-"""Ends of the names of two targets that are each other's opposite."""
-_FOLDER_DEVIATIONS = {  # standard deviation of the weights of a folder's targets
+_ANCESTRY_CONCENTRATION = 0.35  # of the Dirichlet distribution of ancestries: mostly one for most people
+_SEX_DEVIATION = 0.08  # standard deviation from 0 or 1
+_OPPOSITES = {"decr": "incr", "down": "up", "in": "out", "backward": "forward", "concave": "convex"}
+"""Suffixes of the names of targets with opposite effects."""
+_FOLDER_DEVIATIONS = {  # standard deviation of the weights of targets by folder
     "head": 0.1,
     "forehead": 0.25,
     "eyebrows": 0.25,
@@ -55,8 +49,14 @@ _FOLDER_DEVIATIONS = {  # standard deviation of the weights of a folder's target
     "ears": 0.25,
     "neck": 0.12,
 }
-_EXCLUDED = ("trans", "age", "fat", "measure", "push")  # what macro weights say, and what moves a whole part
-_SIDE_DEVIATION = 0.2  # of the spread, by which left and right differ
+_EXCLUDED = (
+    "trans",
+    "age",
+    "fat",
+    "measure",
+    "push",
+)  # covered by macro targets, or translations of whole parts
+_SIDE_DEVIATION = 0.2  # difference between left and right, as a fraction of the deviation
 _ASYMMETRY_DEVIATION = 0.1
 _SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
 _MAX_SHAPE_WEIGHT = 0.3
@@ -74,100 +74,100 @@ _RANGES = {
     "hair_pheomelanin": (0.0, 10.0),
 }
 _MIN_HAIR_FRACTION = 0.05
-_MAX_TARGET_WEIGHT = 2.0  # of a published target
+_MAX_TARGET_WEIGHT = 2.0
 _NO_TARGETS: Mapping[str, float] = MappingProxyType({})
 Levels = int | Callable[[Head], int]
 
 
 def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of `Human`, see `Human.drawn`."""
+    """Return the fields of a random `Human`, see `Human.drawn`."""
     macro = {name: float(value) for name, value in given.items() if name not in _LOOK_FIELDS}
     rng = np.random.default_rng(checked_integer("seed", seed, 0, _MAX_SEED))
-    shares = _ancestry(macro, rng.dirichlet((_ANCESTRY_CONCENTRATION,) * 3))
+    ancestry = _ancestry_fractions(macro, rng.dirichlet((_ANCESTRY_CONCENTRATION,) * 3))
     sex = min(abs(rng.normal(0.0, _SEX_DEVIATION)), 0.3)
     sex = macro.get("sex", 1.0 - sex if rng.random() < 0.5 else sex)
-    share = rng.beta(1.2, 2.2)
-    share = (macro["age"] - YOUNG) / (OLD - YOUNG) if "age" in macro else share
-    weight = rng.normal(0.3 * share - 0.1, 0.25)
-    muscle = rng.normal(0.2 * sex - 0.1 - 0.3 * share, 0.2)
-    found: dict[str, Any] = {
+    old = rng.beta(1.2, 2.2)
+    old = (macro["age"] - YOUNG) / (OLD - YOUNG) if "age" in macro else old
+    weight = rng.normal(0.3 * old - 0.1, 0.25)
+    muscle = rng.normal(0.2 * sex - 0.1 - 0.3 * old, 0.2)
+    fields: dict[str, Any] = {
         "sex": float(sex),
-        "age": float(YOUNG + (OLD - YOUNG) * share),
+        "age": float(YOUNG + (OLD - YOUNG) * old),
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
         "targets": {**dict(_sample_targets(rng)), **given.get("targets", {})},
     }
-    found |= dict(zip(_ANCESTRY, map(float, shares), strict=True)) | macro
-    african, asian, caucasian = shares
-    demographics = Demographics(african, asian, caucasian, found["sex"], found["age"])
+    fields |= dict(zip(_ANCESTRY, map(float, ancestry), strict=True)) | macro
+    demographics = Demographics(*ancestry, fields["sex"], fields["age"])
     skin, eyes = sample_skin(rng, demographics), sample_eyes(rng, demographics)
-    brown, red = _sample_hair_pigments(np.random.default_rng((int(seed), 1)), shares)
+    brown, red = _sample_hair_pigments(np.random.default_rng((int(seed), 1)), ancestry)
     colour = {"hair_eumelanin": brown, "hair_pheomelanin": red} | macro
-    found |= colour | {"eyes": replace(eyes, **given.get("eyes", {}))}
-    usual = typical_hair(demographics, colour["hair_eumelanin"], colour["hair_pheomelanin"])
-    return found | _sample_hair_and_skin(
-        np.random.default_rng((int(seed), 2)), demographics, usual, skin, given
-    )
+    fields |= colour | {"eyes": replace(eyes, **given.get("eyes", {}))}
+    typical = typical_hair(demographics, colour["hair_eumelanin"], colour["hair_pheomelanin"])
+    hair_rng = np.random.default_rng((int(seed), 2))
+    return fields | _sample_hair_and_skin(hair_rng, demographics, typical, skin, given)
 
 
-def _ancestry(given: Mapping[str, float], own: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3,) shares of the ancestries that are given, which need not add up to 1; else the person's own."""
+def _ancestry_fractions(given: Mapping[str, float], sampled: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the given ancestries (3,), normalised to a sum of 1, or the sampled ones if none is given."""
     if not any(name in given for name in _ANCESTRY):
-        return own
-    shares = np.array([given.get(name, 0.0) for name in _ANCESTRY])
-    if not shares.sum() > 0:
-        refuse("ancestry", "a share of african, asian or caucasian", "all that are given are 0", "Raise one")
-    return np.asarray(shares / shares.sum())
+        return sampled
+    weights = np.array([given.get(name, 0.0) for name in _ANCESTRY])
+    if not weights.sum() > 0:
+        refuse(
+            "ancestry", "a weight of african, asian or caucasian above 0", "all given ones are 0", "Raise one"
+        )
+    return np.asarray(weights / weights.sum())
 
 
 def _sample_hair_and_skin(
     rng: np.random.Generator,
     demographics: Demographics,
-    usual: HairLook,
+    typical: HairLook,
     skin: SkinLook,
     given: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Hair, and the skin with what shows of it there."""
-    hair, recession = sample_hair(rng, demographics, usual), sample_recession(rng, demographics)
+    """Return random hair, and the skin with the stubble and recession that match it."""
+    hair, recession = sample_hair(rng, demographics, typical), sample_recession(rng, demographics)
     hair = replace(hair, **given.get("hair", {}))
-    shown = stubble_visibility(hair)
-    beard = shown * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
-    seen = replace(skin, stubble=shown * skin.stubble, beard=beard, recession=recession)
-    return {"hair": hair, "skin": replace(seen, **given.get("skin", {}))}
+    visibility = stubble_visibility(hair)
+    beard = visibility * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
+    skin = replace(skin, stubble=visibility * skin.stubble, beard=beard, recession=recession)
+    return {"hair": hair, "skin": replace(skin, **given.get("skin", {}))}
 
 
-def _sample_hair_pigments(rng: np.random.Generator, shares: NDArray[np.float64]) -> tuple[float, float]:
-    """Eumelanin and pheomelanin of the hair: near to black but for people of mostly European descent.
+def _sample_hair_pigments(rng: np.random.Generator, ancestry: NDArray[np.float64]) -> tuple[float, float]:
+    """Return random eumelanin and pheomelanin of hair: nearly black except for mostly European ancestry.
 
-    shares : (3,) of the ancestries
+    ancestry : (3,) fractions
     """
     fair = np.exp(rng.uniform(np.log(0.4), np.log(5.0)))
-    brown = float(np.exp(shares @ np.log([8.0, 7.0, fair])) * rng.lognormal(0.0, 0.1))
-    red = float(shares[2] * rng.exponential(0.35) + 0.1)
+    brown = float(np.exp(ancestry @ np.log([8.0, 7.0, fair])) * rng.lognormal(0.0, 0.1))
+    red = float(ancestry[2] * rng.exponential(0.35) + 0.1)
     return min(brown, 10.0), min(red, 4.0)
 
 
 def _sample_targets(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
-    """Weights of targets, always drawn in the same order."""
+    """Yield random weights of targets, always in the same order."""
     common: dict[str, float] = {}
-    chance = iter(rng.standard_normal(sum(1 + bool(one.mirrored) for one in _opposite_targets())).tolist())
+    samples = iter(rng.standard_normal(sum(1 + bool(one.mirrored) for one in _opposite_targets())).tolist())
     for one in _opposite_targets():
-        value = one.spread * next(chance)
+        value = one.spread * next(samples)
         if one.truncated:
             value = min(max(value, -2 * one.spread), 2 * one.spread)
         if one.mirrored:  # left and right are nearly alike
-            value = common.setdefault(one.mirrored, value) + _SIDE_DEVIATION * one.spread * next(chance)
+            value = common.setdefault(one.mirrored, value) + _SIDE_DEVIATION * one.spread * next(samples)
         yield (one.more if value > 0 else one.less), abs(value)
     yield f"head/head-{rng.choice(_SHAPES)}", float(rng.uniform(0.0, _MAX_SHAPE_WEIGHT))
 
 
 class _OppositeTargets(NamedTuple):
-    """What people differ by: two targets that are each other's opposite.
+    """Two targets with opposite effects, and the distribution of their weight.
 
-    less, more : their names
+    less, more : names of the targets
     spread : standard deviation of the weight
-    limited : whether it lies within two of these
-    shared : what the other side of the face has too, or ""
+    truncated : whether the weight is limited to two standard deviations
+    mirrored : name shared with the target of the other side of the face, or ""
     """
 
     less: str
@@ -179,19 +179,19 @@ class _OppositeTargets(NamedTuple):
 
 @cache
 def _opposite_targets() -> tuple[_OppositeTargets, ...]:
-    """All that details are drawn for, in their order."""
+    """Return all pairs of targets that are sampled, in the order of sampling."""
     known, found = human_targets(), list[_OppositeTargets]()
     for name in known:
-        folder, rest = name.split("/")
+        folder, local_name = name.split("/")
         if folder == "asym" and name.endswith("-l"):
             found.append(_OppositeTargets(f"{name[:-1]}r", name, _ASYMMETRY_DEVIATION, False, ""))
-        if folder not in _FOLDER_DEVIATIONS or any(word in rest for word in _EXCLUDED):
+        if folder not in _FOLDER_DEVIATIONS or any(word in local_name for word in _EXCLUDED):
             continue
-        sided = rest[:2] in ("l-", "r-")
-        for low, high in _OPPOSITE_SUFFIXES:
+        sided = local_name[:2] in ("l-", "r-")
+        for low, high in _OPPOSITES.items():
             stem = name.removesuffix(low)
             if stem != name and f"{stem}{high}" in known:
-                mirrored = f"{folder}/{rest[2:].removesuffix(low)}" if sided else ""
+                mirrored = f"{folder}/{local_name[2:].removesuffix(low)}" if sided else ""
                 found.append(
                     _OppositeTargets(name, f"{stem}{high}", _FOLDER_DEVIATIONS[folder], True, mirrored)
                 )
@@ -200,18 +200,41 @@ def _opposite_targets() -> tuple[_OppositeTargets, ...]:
 
 @dataclass(frozen=True)
 class Human:
-    """A person: macro targets by ancestry, sex, age, weight and muscle, and any published target by name.
+    """Person of the parametric human: ancestry, sex, age, weight, muscle, and any published morph target.
 
-    african, asian, caucasian : shares of the ancestries, 0 to 1; their ratios count
-    sex : from 0, female, to 1, male [-]
-    age : 25 to 90 [years]
-    weight, muscle : from -1, least, to 1, most; 0 is the average [-]
-    hair_eumelanin, hair_pheomelanin : of hair as it usually is: 0.3 of the first is blond, 1.3 brown,
-        4 dark, 8 black; red has 0.3 and 2
-    targets : weights of published targets, such as {"nose/nose-hump-incr": 0.5}; mostly 0 to 1
-    skin, eyes, hair : what they look like; what usually goes with the person when left out
+    Parameters
+    ----------
+    african, asian, caucasian : float
+        Weights of the ancestries, 0 to 1; only their ratios count.
+    sex : float
+        From 0, female, to 1, male [-].
+    age : float
+        Age, 25 to 90 [years].
+    weight, muscle : float
+        From -1, least, to 1, most; 0 is average [-].
+    hair_eumelanin, hair_pheomelanin : float
+        Pigments of hair that is not set by `hair`, 0 to 10 [-]: eumelanin of 0.3 is blond, 1.3 brown, 4 dark,
+        8 black; red hair has 0.3 and a pheomelanin of 2.
+    targets : mapping
+        Weights of published morph targets, such as {"nose/nose-hump-incr": 0.5}, normally 0 to 1.
+    skin : SkinLook, optional
+        Look of the skin; by default typical for the person.
+    eyes : EyeLook, optional
+        Look of the eyes; by default typical for the person.
+    hair : HairLook, optional
+        Look of the hair; by default typical for the person.
 
-    Raises DermisError for values out of range; names of targets are checked when the head is made.
+    Raises
+    ------
+    DermisError
+        For values out of range; names of targets are checked when the head is built.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> person = dermis.Human(age=60, sex=1, targets={"nose/nose-hump-incr": 0.5})
+    >>> person.positions_mm.shape[1], person.weights()["nose/nose-hump-incr"]
+    (3, 0.5)
     """
 
     african: float = 1 / 3
@@ -231,7 +254,7 @@ class Human:
     def __post_init__(self) -> None:
         check_fields(self, _RANGES)
         if not self.african + self.asian + self.caucasian > 0:
-            refuse("ancestry", "a share of african, asian or caucasian", "all are 0", "Raise one")
+            refuse("ancestry", "a weight of african, asian or caucasian above 0", "all are 0", "Raise one")
         if not isinstance(self.targets, Mapping):
             expected, actual = "weights of targets by name", f"got {format_value(self.targets)}"
             refuse("targets", expected, actual, 'Write targets={"nose/nose-hump-incr": 0.5}')
@@ -243,7 +266,7 @@ class Human:
                 weight,
                 -_MAX_TARGET_WEIGHT,
                 _MAX_TARGET_WEIGHT,
-                "what lies beyond is no face",
+                "beyond it is no face",
             )
         for name, kind in (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook)):
             if not isinstance(look := getattr(self, name), kind | None):
@@ -251,13 +274,31 @@ class Human:
 
     @classmethod
     def drawn(cls, seed: int, **given: Any) -> Human:
-        """A plausible adult, the same for the same seed: mostly of one ancestry, a little asymmetric.
+        """Return a random plausible adult, mostly of one ancestry and slightly asymmetric.
 
-        seed : 0 to 2**32 - 1
-        given : fields that are not drawn, such as `age=70`; some of targets, skin, eyes and hair by name, as
-            `skin={"melanin": 0.1}`. Skin and hair go with the age, the sex and the ancestry that are given
+        Parameters
+        ----------
+        seed : int
+            0 to 2**32 - 1; the same seed gives the same person.
+        **given
+            Fields that are not sampled, such as `age=70`, or some values of targets, skin, eyes and hair,
+            such as `skin={"melanin": 0.1}`. Skin and hair are sampled for the given age, sex and ancestry.
 
-        Raises DermisError for other seeds and for values out of range.
+        Returns
+        -------
+        Human
+            The sampled person.
+
+        Raises
+        ------
+        DermisError
+            For invalid seeds and for values out of range.
+
+        Examples
+        --------
+        >>> import dermis
+        >>> dermis.Human.drawn(7, age=70).age
+        70.0
         """
         for name in given.keys() & _RANGES.keys():
             checked_number(name, given[name], *_RANGES[name])
@@ -266,54 +307,81 @@ class Human:
     def head(
         self, maps: Maps | None = None, layout: Layout = "own", subdivide: Levels = 1, hairs: float = 1.0
     ) -> Head:
-        """The person at rest, with expressions and bones to move by.
+        """Return the head in rest pose, with morph targets of expressions and bones.
 
-        maps : those of the skin; painted as `look` says when left out
-        layout : "own" has most room for the face; "hm08" is the published one, which MakeHuman's skins fit
-        subdivide : levels of Catmull and Clark's subdivision, 0 to 3, or what finds them for the head
-        hairs : share of the usual number on head and chin that grows, each as much wider; 0.05 to 1
+        Parameters
+        ----------
+        maps : Maps, optional
+            Maps of the skin; by default painted according to the look of the skin.
+        layout : {"own", "hm08"}
+            Uv layout: "own" has most space for the face; "hm08" is that of MakeHuman, for its skins.
+        subdivide : int or callable
+            Levels of Catmull-Clark subdivision, 0 to 3, or a function of the head that returns them.
+        hairs : float
+            Fraction of the hairs on head and chin that grow, each wider by the inverse, 0.05 to 1.
 
-        Raises DermisError for targets that nobody knows, and for other shares.
+        Returns
+        -------
+        Head
+            The head with eyes, hair and rig.
+
+        Raises
+        ------
+        DermisError
+            For unknown targets and for values out of range.
         """
         if layout not in get_args(Layout):
             actual = f"got {format_value(layout)}"
             refuse("layout", f"one of {', '.join(get_args(Layout))}", actual, "Choose one")
         checked_number("hairs", hairs, _MIN_HAIR_FRACTION, 1.0)
         painted = maps or PaintedMaps(look=self.look)
-        plain = build_head(self.weights(), painted, layout, self.iris)
-        shared_template = template(layout, levels_of(plain, subdivide))
-        head = shared_template.refine_head(plain)
-        return add_hair(head, plain, shared_template.rooting, self.hairdo, self.look.recession, hairs)
+        control_head = build_head(self.weights(), painted, layout, self.iris)
+        shared = template(layout, levels_of(control_head, subdivide))
+        head = shared.refine_head(control_head)
+        return add_hair(head, control_head, shared.root_finder, self.hairdo, self.look.recession, hairs)
 
     def on(self, head: Head) -> Head:
-        """The head of another person with this one's skin and eyes.
+        """Return the head of another person with the skin and the eyes of this one.
 
-        With `Pose(positions_mm=person.positions_mm)` it has this person's shape too, and only the skin is
-        painted anew. Places where bones turn stay the other's, and so does the hair.
+        With `Pose(positions_mm=person.positions_mm)` it also has the shape of this person, and only the skin
+        is painted again. Hair and joint positions are still those of the other person.
 
-        Raises DermisError for heads that are no painted people.
+        Parameters
+        ----------
+        head : Head
+            Head of the parametric human with painted skin.
+
+        Returns
+        -------
+        Head
+            The head with other maps and eyes.
+
+        Raises
+        ------
+        DermisError
+            For other heads.
         """
         if not isinstance(head.maps, PaintedMaps) or head.eyes is None:
-            refuse(head.name, "a head of the parametric human with painted skin", "it is none", "Load human")
+            refuse(head.name, "a head of the parametric human with painted skin", "it is another head", "Load human")
         eyes = head.eyes.with_look(self.iris)
         return replace(head, maps=replace(head.maps, look=self.look), eyes=eyes)
 
     @property
     def look(self) -> SkinLook:
-        """The person's skin: its own, or what usually goes with such a person."""
+        """Return the look of the skin, given or typical for the person."""
         if self.skin is not None:
             return self.skin
-        usual, shown = typical_skin(self._demographics), stubble_visibility(self.hairdo)
-        return replace(usual, stubble=shown * usual.stubble, beard=shown * usual.beard)
+        typical, visibility = typical_skin(self._demographics), stubble_visibility(self.hairdo)
+        return replace(typical, stubble=visibility * typical.stubble, beard=visibility * typical.beard)
 
     @property
     def iris(self) -> EyeLook:
-        """The person's eyes: its own, or what usually goes with such a person."""
+        """Return the look of the eyes, given or typical for the person."""
         return typical_eyes(self._demographics) if self.eyes is None else self.eyes
 
     @property
     def hairdo(self) -> HairLook:
-        """The person's hair: its own, or what usually goes with such a person."""
+        """Return the look of the hair, given or typical for the person."""
         if self.hair is not None:
             return self.hair
         return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)
@@ -321,58 +389,55 @@ class Human:
     @property
     def _demographics(self) -> Demographics:
         total = self.african + self.asian + self.caucasian
-        shares = self.african / total, self.asian / total, self.caucasian / total
-        return Demographics(*shares, self.sex, self.age)
+        fractions = self.african / total, self.asian / total, self.caucasian / total
+        return Demographics(*fractions, self.sex, self.age)
 
     @property
     def positions_mm(self) -> NDArray[np.float32]:
-        """(p, 3) where the person's control points rest, from the middle between the eyes [mm].
+        """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
-        Any head of the parametric human, which all have these points, is this person by
-        `Pose(positions_mm=...)`.
+        `Pose(positions_mm=...)` gives any head of the parametric human this shape, as all have these points.
 
-        Raises DermisError for targets that nobody knows.
+        Raises DermisError for unknown targets.
         """
         return control_points_mm(self.weights())
 
     def weights(self) -> dict[str, float]:
-        """Weights of published targets by name, those of 0 left out."""
-        found = {**self._ancestry(), **self._build()}
+        """Return the non-zero weights of published targets by name."""
+        found = {**self._ancestry_weights(), **self._build_weights()}
         for name, weight in self.targets.items():
-            if not isinstance(name, str):
-                refuse("targets", "names", f"got {format_value(name)}", "See human_targets()")
             found[name] = found.get(name, 0.0) + weight
         return {name: weight for name, weight in found.items() if weight}
 
-    def _ancestry(self) -> dict[str, float]:
+    def _ancestry_weights(self) -> dict[str, float]:
         total = self.african + self.asian + self.caucasian
         return {
-            f"macrodetails/{people}-{kind}": getattr(self, people) / total * share
-            for people in ("african", "asian", "caucasian")
-            for kind, share in self._adult_fractions().items()
+            f"macrodetails/{people}-{kind}": getattr(self, people) / total * fraction
+            for people in _ANCESTRY
+            for kind, fraction in self._adult_fractions().items()
         }
 
-    def _build(self) -> dict[str, float]:
-        """Of weight and muscle; the average of both needs no target."""
+    def _build_weights(self) -> dict[str, float]:
+        """Return the weights of targets for weight and muscle; the average of both needs no target."""
         found = {}
-        for kind, share in self._adult_fractions().items():
-            for muscle, much in _blend_steps(self.muscle).items():
-                for weight, more in _blend_steps(self.weight).items():
+        for kind, fraction in self._adult_fractions().items():
+            for muscle, muscle_fraction in _blend_steps(self.muscle).items():
+                for weight, weight_fraction in _blend_steps(self.weight).items():
                     if (muscle, weight) != ("average", "average"):
                         name = f"macrodetails/universal-{kind}-{muscle}muscle-{weight}weight"
-                        found[name] = share * much * more
+                        found[name] = fraction * muscle_fraction * weight_fraction
         return found
 
     def _adult_fractions(self) -> dict[str, float]:
-        """Shares of the four published kinds of adults."""
+        """Return the fractions of the four published kinds of adults."""
         old = (self.age - YOUNG) / (OLD - YOUNG)
         return {
-            f"{sex}-{age}": share * part
-            for sex, share in (("female", 1.0 - self.sex), ("male", self.sex))
-            for age, part in (("young", 1.0 - old), ("old", old))
+            f"{sex}-{age}": sex_fraction * age_fraction
+            for sex, sex_fraction in (("female", 1.0 - self.sex), ("male", self.sex))
+            for age, age_fraction in (("young", 1.0 - old), ("old", old))
         }
 
 
 def _blend_steps(value: float) -> dict[str, float]:
-    """Shares of the least, the average and the most, for a value from -1 to 1."""
+    """Return the fractions of minimum, average and maximum for a value from -1 to 1."""
     return {"min": max(-value, 0.0), "average": 1.0 - abs(value), "max": max(value, 0.0)}

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.build import SMALLEST, build_atlas
+from dermis.atlas.build import MIN_SIZE, build_atlas
 from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import DermisError, error_context, format_value, refuse
 from dermis.base.reading import parse_json, read_text
@@ -30,14 +30,14 @@ _STRETCH_ATLAS_SIDE = 1024
 
 
 def person_numbers(person: Human) -> dict[str, Any]:
-    """All that a person is made from, by name; skin, eyes and hair too that only usually go with it."""
+    """Return all numbers of a person by name, including typical looks of skin, eyes and hair."""
     found = {one.name: getattr(person, one.name) for one in fields(person)}
     found |= {"targets": dict(person.targets), "skin": asdict(person.look)}
     return found | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
 
 
 def write_person_json(path: Path, person: Human) -> int:
-    """Write a person as JSON, whole or not at all; its length [byte]."""
+    """Write a person as JSON in an atomic write, and return the size of the file [byte]."""
     data = (json.dumps({"person": person_numbers(person)}, indent=2, default=float) + "\n").encode()
     with atomic_file(path) as temporary:
         temporary.write_bytes(data)
@@ -45,9 +45,9 @@ def write_person_json(path: Path, person: Human) -> int:
 
 
 def read_person(path: Path) -> Human:
-    """The person of a file as `write_person_json` makes it; what it leaves out is as usual.
+    """Return the person of a file written by `write_person_json`; missing values have their defaults.
 
-    Raises DermisError for files that are none, and for numbers that cannot be.
+    Raises DermisError for other files and for invalid values.
     """
     expected = 'JSON with the numbers of a person under "person"'
     document = parse_json(read_text(path, expected), path, expected)
@@ -63,7 +63,7 @@ def read_person(path: Path) -> Human:
 
 
 def _build(path: Path, kind: type[T], numbers: Any) -> T:
-    """A dataclass of plain numbers."""
+    """Return a dataclass built from numbers by name."""
     known = [one.name for one in fields(kind)]
     if not isinstance(numbers, Mapping):
         actual = f"got {format_value(numbers)}"
@@ -86,11 +86,11 @@ def write_person_glb(
     weights: Mapping[str, float] | None = None,
     eyes: EyePictures | None = None,
 ) -> int:
-    """Write a person's head as a .glb file, whole or not at all; its length [byte].
+    """Write a person's head as a .glb file in an atomic write, and return the size of the file [byte].
 
-    roughness : Beckmann's m of skin without a map of it [-]
-    weights : of expressions with which the file rests
-    eyes : what its eyes look like; of one colour where None
+    roughness : Beckmann roughness m of skin without a roughness map [-]
+    weights : of expressions in the file's rest pose
+    eyes : textures of the eyes; one colour if None
     """
     notes = {"person": person_numbers(person)}
     data = encode_head(
@@ -102,18 +102,18 @@ def write_person_glb(
 
 
 def relief_slopes(head: Head) -> NDArray[np.float32] | None:
-    """(n, n, 2) rise of a head's height map to the right and upwards, if other programs need it [-].
+    """Return the slopes (n, n, 2) of a head's height map to the right and upwards [-].
 
-    None where it has a map of normals, or no square height map: they need none.
+    None for heads with a normal map or without a square height map, for which other programs need no slopes.
     """
     height = head.maps.height
     if head.maps.normal is not None or height is None:
         return None
     side = len(height)
-    if side != height.shape[1] or side < SMALLEST:
+    if side != height.shape[1] or side < MIN_SIZE:
         return None
     down, right = np.gradient(height)
-    coarse = max(SMALLEST, min(side, _STRETCH_ATLAS_SIDE))
+    coarse = max(MIN_SIZE, min(side, _STRETCH_ATLAS_SIDE))
     stretch = build_atlas(head.mesh, coarse).stretch.astype(np.float32)
     if side > coarse:
         places = np.arange(side) * coarse // side

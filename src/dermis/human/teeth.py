@@ -1,4 +1,4 @@
-"""Layout of the human's teeth, along the arch and up from where they bite, for what is shown on them."""
+"""Uv layout of the human's teeth: along the dental arch and up from the biting edge."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.makehuman import model_data
+from dermis.human.makehuman import group_points
 from dermis.human.skin.surface import average_surface
 
 Doubles = NDArray[np.float64]
@@ -15,26 +15,27 @@ Doubles = NDArray[np.float64]
 ARCH_MM, CROWN_MM = 160.0, 40.0
 """Lengths of a unit of u and of v [mm]."""
 MIDDLE, BITE = 0.5, 0.02
-"""u between the first teeth, and v of the edge that bites."""
+"""u between the first teeth, and v of the biting edge."""
 _SAMPLES = 2000
 
 
 @cache
 def layout(upper: bool) -> tuple[NDArray[np.int64], Doubles]:
-    """Points of the upper or lower teeth, and their uv (n, 2), on the average person."""
-    found = model_data()
-    name = "helper-upper-teeth" if upper else "helper-lower-teeth"
-    group = list(map(str, found["group_names"])).index(name)
-    points = np.unique(found["quads"][found["group"] == group]).astype(np.int64)
+    """Return the points of the upper or lower teeth, and their uv (n, 2) on the average person."""
+    points = group_points("helper-upper-teeth" if upper else "helper-lower-teeth")
     x, y, z = average_surface()[0][points].astype(np.float64).T
     across, deep = float(np.abs(x).max()), float(np.ptp(z))
-    turn = np.arctan2(x / across, (z - z.min()) / deep)
+    angle = np.arctan2(x / across, (z - z.min()) / deep)
     v = BITE + (y - y.min() if upper else y.max() - y) / CROWN_MM
-    return points, np.stack([MIDDLE + _arc_length(turn, across, deep) / ARCH_MM, v], axis=-1)
+    return points, np.stack([MIDDLE + _arc_length(angle, across, deep) / ARCH_MM, v], axis=-1)
 
 
-def _arc_length(turn: Doubles, across: float, deep: float) -> Doubles:
-    """(n,) along an elliptic arch from its middle [mm]; turn : of the ellipse [rad]."""
+def _arc_length(angle: Doubles, across: float, deep: float) -> Doubles:
+    """Return the length (n,) along an elliptic arch from its middle [mm].
+
+    angle : parameter of the ellipse [rad]
+    across, deep : half axes of the ellipse [mm]
+    """
     t = np.linspace(0.0, np.pi / 2, _SAMPLES)
     step = np.hypot(across * np.cos(t), deep * np.sin(t)) * (t[1] - t[0])
-    return np.asarray(np.sign(turn) * np.interp(np.abs(turn), t, np.cumsum(step) - step[0]))
+    return np.asarray(np.sign(angle) * np.interp(np.abs(angle), t, np.cumsum(step) - step[0]))

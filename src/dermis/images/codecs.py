@@ -13,23 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Bytes, Floats, Numbers
-from dermis.base.extras import needed
-from dermis.images.sizes import MOST_PIXELS, check_size
+from dermis.base.extras import import_extra
+from dermis.images.sizes import MAX_PIXELS, check_size
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
 Pixels = Bytes | NDArray[np.uint16] | Floats
 
-PNG_START = b"\x89PNG\r\n\x1a\n"
-PILLOW_STARTS = (PNG_START, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+PILLOW_SIGNATURES = (PNG_SIGNATURE, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _PNG_KINDS = {1: 0, 3: 2, 4: 6}  # by channels
-_UP = 2  # PNG's number for differences from the row above
+_UP_FILTER = 2  # PNG's number for differences from the row above
 
 _PILLOW_LOCK = threading.Lock()
-_STRIP = 1 << 20  # pixels converted at a time
+_STRIP_PIXELS = 1 << 20  # pixels converted at a time
 _JPEG_SCAN = b"\xff\xda"
-_MOST_SCANNED = 1 << 30  # pixels in all scans of a progressive JPEG: sixteen scans of the largest
+_MAX_SCANNED_PIXELS = 1 << 30  # pixels in all scans of a progressive JPEG: sixteen scans of the largest
 _CHANNELS_OF_16_BIT = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}
 _MODES: dict[str, tuple[str, type[np.generic]]] = {
     "1": ("L", np.uint8),
@@ -54,10 +54,10 @@ def decode_with_pillow(data: bytes) -> Pixels:
     data : the whole file
     ValueError, OSError and others : the data are damaged, too large, or hold pixels of another kind
     """
-    picture = _open(data)
+    picture = _open_checked(data)
     deep = _format_of_16_bit(data, picture)
     if deep:
-        plain = decode_rows(data)
+        plain = decode_up_filtered_png(data)
         return _decode_16_bit(data, deep, picture) if plain is None else plain
     if picture.mode not in _MODES:
         raise ValueError(f"its pixels are of kind {picture.mode}, not 8 or 16 bit grey, RGB or RGBA")
@@ -82,18 +82,21 @@ def pillow_size(data: bytes) -> tuple[int, int]:
 
 def strips(image: Numbers) -> Iterator[slice]:
     """Rows of a picture, some at a time: enough for whole arrays to be fast, too few to fill the memory."""
-    rows = max(1, _STRIP // max(1, image.shape[1]))
+    rows = max(1, _STRIP_PIXELS // max(1, image.shape[1]))
     for top in range(0, len(image), rows):
         yield slice(top, min(top + rows, len(image)))
 
 
-def _open(data: bytes) -> Image:
+def _open_checked(data: bytes) -> Image:
     """The picture opened by Pillow: its header is read and its size accepted."""
     picture = _open_header(data)
     check_size(picture.width, picture.height)
     if picture.format == "PNG":
         _open_header(data).verify()  # the checksums, which Pillow leaves out when it decodes
-    if picture.format == "JPEG" and data.count(_JPEG_SCAN) * picture.width * picture.height > _MOST_SCANNED:
+    if (
+        picture.format == "JPEG"
+        and data.count(_JPEG_SCAN) * picture.width * picture.height > _MAX_SCANNED_PIXELS
+    ):
         raise ValueError("it was stored in too many scans")
     return picture
 
@@ -113,7 +116,7 @@ def _open_header(data: bytes) -> Image:
 
 def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
     """FFmpeg's name of the pixel format where Pillow would drop the lower 8 of 16 bits, else None."""
-    if data.startswith(PNG_START):
+    if data.startswith(PNG_SIGNATURE):
         depth, kind = data[24], data[25]
         return {0: "gray16", 2: "rgb48", 4: "ya16", 6: "rgba64"}[kind] if depth == 16 else None
     bits = getattr(picture, "tag_v2", {}).get(258, ())
@@ -121,11 +124,11 @@ def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
 
 
 def _decode_16_bit(data: bytes, pixel_format: str, picture: Image) -> NDArray[np.uint16]:
-    av = needed("av", "a picture with 16 bits of colour")
+    av = import_extra("av", "a picture with 16 bits of colour")
     # bytes, not the path: FFmpeg would take a percent sign in a name for a numbered sequence; and one format,
     # not what it guesses from them, as some of its formats open other files
     with av.open(io.BytesIO(data), format=f"{picture.format}_pipe".lower()) as container:
-        container.streams.video[0].codec_context.options = {"max_pixels": str(MOST_PIXELS)}
+        container.streams.video[0].codec_context.options = {"max_pixels": str(MAX_PIXELS)}
         frame = next(container.decode(video=0))
     if (frame.width, frame.height) != picture.size:
         raise ValueError("its header is damaged")
@@ -153,13 +156,13 @@ def encode_png(levels: Numbers, effort: int = 6, quick: bool = False) -> bytes:
     height, width, channels = levels.shape
     bits = 8 * levels.itemsize
     rows = levels.astype(levels.dtype.newbyteorder(">")).reshape(height, -1).view(np.uint8)
-    filtered = np.full((height, 1 + rows.shape[1]), _UP, np.uint8)
+    filtered = np.full((height, 1 + rows.shape[1]), _UP_FILTER, np.uint8)
     filtered[0, 1:] = rows[0]
     np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
     header = struct.pack(">IIBBBBB", width, height, bits, _PNG_KINDS[channels], 0, 0, 0)
-    packer, strength = (needed("isal.isal_zlib", "a data set"), 1) if quick else (zlib, effort)
+    packer, strength = (import_extra("isal.isal_zlib", "a data set"), 1) if quick else (zlib, effort)
     pixels = packer.compress(filtered.data, strength)  # releases the GIL
-    return PNG_START + _chunk(b"IHDR", header) + _chunk(b"IDAT", pixels) + _chunk(b"IEND", b"")
+    return PNG_SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", pixels) + _chunk(b"IEND", b"")
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:
@@ -171,21 +174,21 @@ def png_size(data: bytes) -> tuple[int, int]:
 
     ValueError : it is another file, cut off or damaged
     """
-    if not data.startswith(PNG_START):
+    if not data.startswith(PNG_SIGNATURE):
         raise ValueError("its first bytes are not those of PNG")
-    for _ in png_parts(data):
+    for _ in png_chunks(data):
         pass
     width, height = struct.unpack_from(">II", data, 16)
     return width, height
 
 
-def decode_rows(data: bytes) -> Bytes | NDArray[np.uint16] | None:
+def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
     """(H, W, 1, 3 or 4) uint8 or uint16; None for PNG files of other forms, and for other files.
 
     data : of which the checksums are tested
     ValueError : it is damaged, or too large
     """
-    if not data.startswith(PNG_START) or len(data) < 33:
+    if not data.startswith(PNG_SIGNATURE) or len(data) < 33:
         return None
     width, height, bits, colour, *how = struct.unpack_from(">IIBBBBB", data, 16)
     if bits not in (8, 16) or colour not in _CHANNELS or how != [0, 0, 0]:
@@ -193,7 +196,7 @@ def decode_rows(data: bytes) -> Bytes | NDArray[np.uint16] | None:
     check_size(width, height)
     channels = _CHANNELS[colour]
     step = 1 + width * channels * bits // 8
-    packed = _packed(data)
+    packed = _compressed_pixels(data)
     if packed is None:
         return None
     unpacker = zlib.decompressobj()
@@ -204,17 +207,17 @@ def decode_rows(data: bytes) -> Bytes | NDArray[np.uint16] | None:
     if len(stored) != height * step:
         raise ValueError("its pixels are cut off, or more than it says")
     rows = np.frombuffer(stored, np.uint8).reshape(height, step)
-    if (rows[:, 0] != _UP).any():
+    if (rows[:, 0] != _UP_FILTER).any():
         return None
     pixels = np.add.accumulate(rows[:, 1:], axis=0, dtype=np.uint8)
     levels = pixels.view(">u2").astype(np.uint16) if bits == 16 else pixels
     return levels.reshape(height, width, channels)
 
 
-def _packed(data: bytes) -> bytes | None:
+def _compressed_pixels(data: bytes) -> bytes | None:
     """The compressed pixels; None where other parts that change them are there."""
     packed = list[memoryview]()
-    for kind, part in png_parts(data):
+    for kind, part in png_chunks(data):
         if kind == b"tRNS":
             return None
         if kind == b"IDAT":
@@ -222,12 +225,12 @@ def _packed(data: bytes) -> bytes | None:
     return b"".join(packed)
 
 
-def png_parts(data: bytes) -> Iterator[tuple[bytes, memoryview]]:
+def png_chunks(data: bytes) -> Iterator[tuple[bytes, memoryview]]:
     """Kind and content of each part of a PNG file up to its end, by their checksums.
 
     ValueError : it is cut off or damaged
     """
-    view, place, kind = memoryview(data), len(PNG_START), b""
+    view, place, kind = memoryview(data), len(PNG_SIGNATURE), b""
     while kind != b"IEND":
         if place + 12 > len(data):
             raise ValueError("it is cut off")

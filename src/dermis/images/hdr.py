@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Bytes, Floats, Index
-from dermis.images.sizes import MOST_PIXELS, TooLargeError, check_size
+from dermis.images.sizes import MAX_PIXELS, TooLargeError, check_size
 
-EXR_START = b"\x76\x2f\x31\x01"
+EXR_SIGNATURE = b"\x76\x2f\x31\x01"
 _CHANNELS = ("RGBA", "RGB", "Y")
 _NAMES = {1: "Y", 3: "RGB"}  # by channels
-_MOST_NUMBERS = 3 * MOST_PIXELS  # in all channels of all parts: the library decodes all of them
-_MOST_CHANNELS = 1024
-RADIANCE_START = b"#?"
-_MOST_HEADER = 1 << 16
+_MAX_SAMPLES = 3 * MAX_PIXELS  # in all channels of all parts: the library decodes all of them
+_MAX_CHANNELS = 1024
+RADIANCE_SIGNATURE = b"#?"
+_MAX_HEADER = 1 << 16
 _STRIP = 1 << 18  # pixels decoded at a time
-_LONGEST = 128  # bytes that are not repeated; a larger number is that of a run
-_COUNT = [k if k <= _LONGEST else k - _LONGEST for k in range(256)]
-_STEP = [k + 1 if k <= _LONGEST else 2 for k in range(256)]
+_MAX_LITERAL = 128  # bytes that are not repeated; a larger number is that of a run
+_COUNT = [k if k <= _MAX_LITERAL else k - _MAX_LITERAL for k in range(256)]
+_STEP = [k + 1 if k <= _MAX_LITERAL else 2 for k in range(256)]
 
 
 def decode_exr(data: bytes) -> Floats:
@@ -34,7 +34,7 @@ def decode_exr(data: bytes) -> Floats:
     """
     import OpenEXR
 
-    names = _judged(_exr_header(data))
+    names = _check_exr_header(_exr_header(data))
     file = OpenEXR.File(io.BytesIO(data), separate_channels=True)
     if not file.parts:
         raise ValueError("its pixels are cut off or damaged")
@@ -48,7 +48,7 @@ def decode_exr(data: bytes) -> Floats:
 def exr_size(data: bytes) -> tuple[int, int]:
     """Width and height of an OpenEXR file whose header is judged; pixels are not decoded."""
     file = _exr_header(data)
-    _judged(file)
+    _check_exr_header(file)
     return _window_size(file.parts[0].header["dataWindow"])
 
 
@@ -58,7 +58,7 @@ def _exr_header(data: bytes) -> Any:
     return OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True)
 
 
-def _judged(file: Any) -> str:
+def _check_exr_header(file: Any) -> str:
     """The names of the channels to take, where all that the library decodes with them is no more than may be.
 
     file : opened for its header alone
@@ -75,11 +75,11 @@ def _judged(file: Any) -> str:
         numbers += width * height * len(part.header["channels"])
     if not file.parts:
         raise ValueError("its header is cut off or damaged")
-    if numbers > _MOST_NUMBERS:
+    if numbers > _MAX_SAMPLES:
         raise TooLargeError(f"all its channels have {numbers / 1e6:.0f} million numbers")
     channels = {channel.name: channel for channel in file.parts[0].header["channels"]}
     names = next((names for names in _CHANNELS if set(names) <= channels.keys()), None)
-    if names is None or len(channels) > _MOST_CHANNELS:
+    if names is None or len(channels) > _MAX_CHANNELS:
         told = ", ".join(sorted(channels)[:20])
         raise ValueError(f"it has channels {told}, not R, G, B or Y")
     if any((channels[name].xSampling, channels[name].ySampling) != (1, 1) for name in names):
@@ -117,14 +117,14 @@ def decode_radiance(data: bytes) -> Floats:
     Ours rather than FFmpeg's, which accepts a file that lacks its last bytes.
     """
     height, width, exposure, at = _radiance_header(data)
-    coded = data[at : at + 4] == _mark(width) and 8 <= width < 32768
+    coded = data[at : at + 4] == _scanline_marker(width) and 8 <= width < 32768
     if len(data) - at < height * (4 if coded else 4 * width):
         raise ValueError("it ends in the middle")
     radiance = np.empty((height, width, 3), np.float32)
     rows = max(1, _STRIP // width)
     for top in range(0, height, rows):
         strip = radiance[top : top + rows]
-        rgbe, at = (_coded if coded else _plain)(data, at, len(strip), width)
+        rgbe, at = (_decode_runs if coded else _decode_flat)(data, at, len(strip), width)
         # A mantissa byte counts 1/256 of 2^(E - 128); E = 0 means black, and 2^-136 is black in any case.
         scale = np.ldexp(np.float32(1 / exposure), rgbe[..., 3].astype(np.int32) - 136)
         np.multiply(rgbe[..., :3], scale[..., None], out=strip)
@@ -139,7 +139,7 @@ def radiance_size(data: bytes) -> tuple[int, int]:
 
 def _radiance_header(data: bytes) -> tuple[int, int, float, int]:
     """(height, width, exposure, where the pixels begin)."""
-    found = re.search(rb"\n\n-Y (\d{1,9}) \+X (\d{1,9})\n", data[:_MOST_HEADER])
+    found = re.search(rb"\n\n-Y (\d{1,9}) \+X (\d{1,9})\n", data[:_MAX_HEADER])
     if not found:
         raise ValueError("its header has no size of the form -Y height +X width")
     lines = data[: found.start()].splitlines()
@@ -153,15 +153,15 @@ def _radiance_header(data: bytes) -> tuple[int, int, float, int]:
     return height, width, exposure, found.end()
 
 
-def _mark(width: int) -> bytes:
+def _scanline_marker(width: int) -> bytes:
     """What a coded scanline begins with."""
     return bytes((2, 2, width >> 8 & 255, width & 255))
 
 
-def _coded(data: bytes, at: int, height: int, width: int) -> tuple[Bytes, int]:
+def _decode_runs(data: bytes, at: int, height: int, width: int) -> tuple[Bytes, int]:
     """(H, W, 4) bytes of scanlines, and where the next begins: runs are found one by one, filled at once."""
     starts: list[int] = []
-    mark, add = _mark(width), starts.append
+    mark, add = _scanline_marker(width), starts.append
     for _ in range(height):
         if data[at : at + 4] != mark:
             raise ValueError("a scanline does not begin as it should")
@@ -180,11 +180,11 @@ def _coded(data: bytes, at: int, height: int, width: int) -> tuple[Bytes, int]:
                 raise ValueError("a run is longer than its scanline")
     if at > len(data):
         raise ValueError("it ends in the middle")
-    planes = _filled(np.frombuffer(data, np.uint8), np.array(starts)).reshape(height, 4, width)
+    planes = _expand_runs(np.frombuffer(data, np.uint8), np.array(starts)).reshape(height, 4, width)
     return planes.transpose(0, 2, 1), at
 
 
-def _filled(data: Bytes, starts: Index) -> Bytes:
+def _expand_runs(data: Bytes, starts: Index) -> Bytes:
     """The bytes that runs stand for; starts : (n,) where each begins in the data."""
     code = data[starts]
     count = np.array(_COUNT)[code]
@@ -192,10 +192,10 @@ def _filled(data: Bytes, starts: Index) -> Bytes:
         raise ValueError("a run is empty")
     first = np.repeat(starts + 1, count)
     within = np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)
-    return np.asarray(data[first + within * np.repeat(code <= _LONGEST, count)])
+    return np.asarray(data[first + within * np.repeat(code <= _MAX_LITERAL, count)])
 
 
-def _plain(data: bytes, at: int, height: int, width: int) -> tuple[Bytes, int]:
+def _decode_flat(data: bytes, at: int, height: int, width: int) -> tuple[Bytes, int]:
     pixels = np.frombuffer(data, np.uint8, height * width * 4, at).reshape(height, width, 4)
     # (1, 1, 1, n) repeats a pixel in files from before 1991; no program of today writes it.
     if np.any(np.all(pixels[..., :3] == 1, axis=-1)):

@@ -16,10 +16,17 @@ from dermis.base import atomic_write as outputs
 from dermis.base.arrays import Numbers
 from dermis.base.errors import DermisError, refuse
 from dermis.base.reading import read_file
-from dermis.images.codecs import PILLOW_STARTS, Pixels, decode_with_pillow, encode_png, pillow_size
+from dermis.images.codecs import PILLOW_SIGNATURES, Pixels, decode_with_pillow, encode_png, pillow_size
 from dermis.images.colour import encode_srgb8
-from dermis.images.hdr import EXR_START, RADIANCE_START, decode_exr, decode_radiance, exr_size, radiance_size
-from dermis.images.sizes import MOST_BYTES, TooLargeError
+from dermis.images.hdr import (
+    EXR_SIGNATURE,
+    RADIANCE_SIGNATURE,
+    decode_exr,
+    decode_radiance,
+    exr_size,
+    radiance_size,
+)
+from dermis.images.sizes import MAX_FILE_BYTES, TooLargeError
 
 OUTPUT_SUFFIXES = (".png", ".exr")
 T = TypeVar("T")
@@ -27,7 +34,7 @@ _READABLE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
 
 
 @dataclass(frozen=True)
-class Picture:
+class EmbeddedPicture:
     """A picture file that lies inside another file.
 
     name : for messages
@@ -41,7 +48,7 @@ class Picture:
         return self.name
 
 
-def read_image(path: str | Path | Picture) -> Pixels:
+def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
     """The picture (H, W, C) as it is stored, row 0 at the top; C is 1 (grey), 3 (RGB) or 4 (RGBA).
 
     path : PNG, JPEG or TIFF, which give uint8 or uint16 (a float TIFF float32), or EXR or HDR, which
@@ -50,30 +57,30 @@ def read_image(path: str | Path | Picture) -> Pixels:
 
     Grey with alpha becomes RGBA. Colour profiles and camera orientation are ignored, as for any texture.
     """
-    image: Pixels = _by_kind(path, read_bytes(path), decode_exr, decode_radiance, decode_with_pillow)
+    image: Pixels = _apply_codec(path, read_bytes(path), decode_exr, decode_radiance, decode_with_pillow)
     return image[..., None] if image.ndim == 2 else image
 
 
-def read_size(path: str | Path | Picture) -> tuple[int, int]:
+def read_size(path: str | Path | EmbeddedPicture) -> tuple[int, int]:
     """Width and height of a picture by its header; its pixels may be damaged all the same.
 
     DermisError : the file is missing, is no picture, or is larger than one may be
     """
-    size: tuple[int, int] = _by_kind(path, read_bytes(path), exr_size, radiance_size, pillow_size)
+    size: tuple[int, int] = _apply_codec(path, read_bytes(path), exr_size, radiance_size, pillow_size)
     return size
 
 
-def _by_kind(
-    path: str | Path | Picture,
+def _apply_codec(
+    path: str | Path | EmbeddedPicture,
     data: bytes,
     exr: Callable[[bytes], T],
     radiance: Callable[[bytes], T],
     pillow: Callable[[bytes], T],
 ) -> T:
     """What the codec of the kind that the bytes begin as says of them."""
-    kinds = {EXR_START: exr, RADIANCE_START: radiance} | dict.fromkeys(PILLOW_STARTS, pillow)
+    kinds = {EXR_SIGNATURE: exr, RADIANCE_SIGNATURE: radiance} | dict.fromkeys(PILLOW_SIGNATURES, pillow)
     codec = next((codec for start, codec in kinds.items() if data.startswith(start)), None)
-    if codec is None or (codec is exr and isinstance(path, Picture)):
+    if codec is None or (codec is exr and isinstance(path, EmbeddedPicture)):
         refuse(path, _READABLE, "its first bytes match none of these", "Convert it to PNG")
     try:
         return codec(data)
@@ -104,19 +111,19 @@ def write_image(path: str | Path, linear: NDArray[np.floating]) -> None:
     DermisError : as for `check_output`, or the disk is full; nothing half-written stays behind
     """
     if not isinstance(path, str | os.PathLike):
-        came = f"a {type(path).__name__} came first"
+        actual = f"got a {type(path).__name__} first"
         refuse(
-            "write_image", "the file's name, then the picture", came, 'Write write_image("face.png", image)'
+            "write_image", "the file's name, then the picture", actual, 'Write write_image("face.png", image)'
         )
     linear = np.asarray(linear)
     if linear.ndim not in (2, 3) or linear.dtype.kind not in "fu":
-        came = f"shape {linear.shape} and type {linear.dtype} came"
-        refuse(path, "a picture (H, W, 3 or 4) of floats", came, "Check what is to be written")
+        actual = f"got shape {linear.shape} and type {linear.dtype}"
+        refuse(path, "a picture (H, W, 3 or 4) of floats", actual, "Check what is to be written")
     if linear.dtype.kind == "u":
         if linear.dtype != np.uint8 or check_output(path).suffix.lower() == ".exr":
-            came = f"{linear.dtype} came, which is encoded already"
+            actual = f"got {linear.dtype}, which is encoded already"
             refuse(
-                path, "linear floats", came, "Take render_many(..., linear=True), or write a .png of bytes"
+                path, "linear floats", actual, "Take render_many(..., linear=True), or write a .png of bytes"
             )
         write_png(path, linear)
         return
@@ -137,10 +144,10 @@ def write_png(path: str | Path, levels: Numbers, effort: int = 6) -> None:
     """
     image = levels[..., None] if levels.ndim == 2 else levels
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.dtype not in (np.uint8, np.uint16):
-        came = f"they have shape {levels.shape} and type {levels.dtype}"
-        refuse(path, "pixels (H, W, 1, 3 or 4) of uint8 or uint16", came, "Convert them first")
+        actual = f"they have shape {levels.shape} and type {levels.dtype}"
+        refuse(path, "pixels (H, W, 1, 3 or 4) of uint8 or uint16", actual, "Convert them first")
     data = encode_png(image, effort)
-    with outputs.replacing(path) as temporary:
+    with outputs.atomic_file(path) as temporary:
         temporary.write_bytes(data)
 
 
@@ -164,7 +171,7 @@ def write_exr(
     channels = {name: np.ascontiguousarray(picture, np.float32) for name, picture in pictures.items()}
     compression = OpenEXR.RLE_COMPRESSION if swift else OpenEXR.ZIP_COMPRESSION
     header = {"compression": compression, "type": OpenEXR.scanlineimage}
-    with outputs.replacing(path) as temporary:
+    with outputs.atomic_file(path) as temporary:
         OpenEXR.File(header, channels).write(str(temporary))
 
 
@@ -189,11 +196,11 @@ def encode_exr_parts(parts: Mapping[str, Mapping[str, Numbers]], swift: bool = F
     return into.getvalue()
 
 
-def read_bytes(path: str | Path | Picture) -> bytes:
+def read_bytes(path: str | Path | EmbeddedPicture) -> bytes:
     """The picture file as it is.
 
     DermisError : it cannot be read
     """
-    if isinstance(path, Picture):
+    if isinstance(path, EmbeddedPicture):
         return path.data
-    return read_file(path, _READABLE, MOST_BYTES)
+    return read_file(path, _READABLE, MAX_FILE_BYTES)

@@ -16,41 +16,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base import atomic_write as outputs
-from dermis.base.errors import refuse, shown_value
-from dermis.base.extras import needed
-from dermis.base.quantities import numbers, whole_number
+from dermis.base.errors import format_value, refuse
+from dermis.base.extras import import_extra
+from dermis.base.quantities import checked_array, checked_integer
 
-SUFFIX = ".mp4"
+MOVIE_SUFFIX = ".mp4"
 DEFAULT_CRF = 18
 """Constant rate factor at which rendered skin shows no blocks."""
-_WORST_CRF, _ENCODER, _EFFORT = 51, "libx264", "medium"
-_BT709, _LIMITED = 1, 1  # H.264's numbers for primaries, transfer and matrix; for levels from 16 to 235
-_WAITING = 8
-_MOST_PIXELS = 1 << 14  # along a side, as of H.264
+_MAX_CRF, _ENCODER, _PRESET = 51, "libx264", "medium"
+_BT709, _LIMITED_RANGE = 1, 1  # H.264's numbers for primaries, transfer and matrix; for levels from 16 to 235
+_QUEUE_LENGTH = 8
+_MAX_SIDE = 1 << 14  # along a side, as of H.264
 _NTSC = tuple(Fraction(1000 * whole, 1001) for whole in (24, 30, 48, 60, 120))
-_NEAR_NTSC = Fraction(5, 1000)
+_NTSC_TOLERANCE = Fraction(5, 1000)
 _RATE = re.compile(r"\d{1,9}(\.\d{1,20})?(/\d{1,9}|e[-+]?\d{1,2})?")  # of a few digits: exponents are powers
-_FASTEST, _FINEST = 1000, 1001
+_MAX_RATE, _MAX_DENOMINATOR = 1000, 1001
 
 
-def exact_rate(given: str | float | Fraction, culprit: object = "rate") -> Fraction:
+def parse_frame_rate(given: str | float | Fraction, culprit: object = "rate") -> Fraction:
     """Frames a second as a ratio, since sums of rounded steps would drift.
 
     given : 30, 12.5, "24000/1001"; 23.976, 29.97, 59.94 and the like mean 24000/1001 and so on
 
     Raises DermisError for what is no rate up to 1000.
     """
-    text = str(given).strip() if isinstance(given, str | float | Fraction) else shown_value(given)
+    text = str(given).strip() if isinstance(given, str | float | Fraction) else format_value(given)
     try:
         rate = Fraction(text if _RATE.fullmatch(text) else 0)
     except (ValueError, ZeroDivisionError):
         rate = Fraction(0)
-    if not 0 < rate <= _FASTEST:
-        expected = f"frames a second up to {_FASTEST}, such as 30, 23.976 or 24000/1001"
-        refuse(culprit, expected, f"{shown_value(text)} came", "Correct it")
+    if not 0 < rate <= _MAX_RATE:
+        expected = f"frames a second up to {_MAX_RATE}, such as 30, 23.976 or 24000/1001"
+        refuse(culprit, expected, f"got {format_value(text)}", "Correct it")
     near = min(_NTSC, key=lambda ntsc: abs(ntsc - rate))
-    rate = near if abs(near - rate) < _NEAR_NTSC else rate.limit_denominator(_FINEST)
-    return max(rate, Fraction(1, _FINEST))
+    rate = near if abs(near - rate) < _NTSC_TOLERANCE else rate.limit_denominator(_MAX_DENOMINATOR)
+    return max(rate, Fraction(1, _MAX_DENOMINATOR))
 
 
 def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF) -> Path:
@@ -58,24 +58,29 @@ def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF)
 
     DermisError : the path cannot be written to, a side is odd, the factor is none, or there is no encoder
     """
-    target = outputs.check_output(path, (SUFFIX,), f"Give it the suffix {SUFFIX}")
-    numbers("--size", size, (2,), 1, _MOST_PIXELS, "pixels")
+    target = outputs.check_output(path, (MOVIE_SUFFIX,), f"Give it the suffix {MOVIE_SUFFIX}")
+    checked_array("--size", size, (2,), 1, _MAX_SIDE, "pixels")
     if size[0] % 2 or size[1] % 2:
         even = f"{size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
-        came = f"{size[0]}x{size[1]} came"
-        refuse("--size", f"even sides, which {SUFFIX} needs", came, f"Take {even}, or write frames/%05d.png")
-    whole_number("--crf", crf, 0, _WORST_CRF, f"0 without loss, {DEFAULT_CRF} as usual")
+        actual = f"got {size[0]}x{size[1]}"
+        refuse(
+            "--size",
+            f"even sides, which {MOVIE_SUFFIX} needs",
+            actual,
+            f"Take {even}, or write frames/%05d.png",
+        )
+    checked_integer("--crf", crf, 0, _MAX_CRF, f"0 without loss, {DEFAULT_CRF} as usual")
     _check_encoder(path)
     return target
 
 
 def _check_encoder(path: str | Path) -> None:
-    av = needed("av", "movies")
+    av = import_extra("av", "movies")
     try:
         av.codec.Codec(_ENCODER, "w")
     except ValueError:
-        remedy = "Install av from PyPI (pip install av), or write frames/%05d.png"
-        refuse(path, f"FFmpeg with the encoder {_ENCODER}", "PyAV's here has none", remedy)
+        advice = "Install av from PyPI (pip install av), or write frames/%05d.png"
+        refuse(path, f"FFmpeg with the encoder {_ENCODER}", "PyAV's here has none", advice)
 
 
 class MovieWriter:
@@ -85,7 +90,7 @@ class MovieWriter:
 
     path : to write, .mp4
     size : width and height of the pictures [pixel], even
-    rate : frames a second, see `exact_rate`
+    rate : frames a second, see `parse_frame_rate`
     crf : constant rate factor, 0 without loss to 51
 
     with MovieWriter("smile.mp4", (1024, 1024)) as movie:
@@ -102,7 +107,7 @@ class MovieWriter:
         rate: str | float | Fraction = 30,
         crf: int = DEFAULT_CRF,
     ) -> None:
-        self.path, self.size, self.rate = check_movie(path, size, crf), size, exact_rate(rate)
+        self.path, self.size, self.rate = check_movie(path, size, crf), size, parse_frame_rate(rate)
         self._crf, self._count = crf, 0
         self._waiting: deque[Future[None]] = deque()
         self._context = self._writing()
@@ -118,7 +123,7 @@ class MovieWriter:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        with outputs.replacing(self.path) as temporary:
+        with outputs.atomic_file(self.path) as temporary:
             self._open(temporary)
             try:
                 yield
@@ -132,12 +137,12 @@ class MovieWriter:
         from av.video.reformatter import VideoReformatter
 
         self._container = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
-        options = {"crf": str(self._crf), "preset": _EFFORT}
+        options = {"crf": str(self._crf), "preset": _PRESET}
         self._stream = self._container.add_stream(_ENCODER, rate=self.rate, options=options)
         self._stream.width, self._stream.height = self.size
         self._stream.pix_fmt = "yuv420p"
         codec = self._stream.codec_context
-        codec.time_base, codec.color_range = 1 / self.rate, _LIMITED
+        codec.time_base, codec.color_range = 1 / self.rate, _LIMITED_RANGE
         codec.colorspace = codec.color_primaries = codec.color_trc = _BT709
         self._reformatter = VideoReformatter()
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="dermis-movie")
@@ -151,11 +156,11 @@ class MovieWriter:
         """
         width, height = self.size
         if picture.shape != (height, width, 3) or picture.dtype != np.uint8:
-            came = f"they have shape {picture.shape} and type {picture.dtype}"
-            refuse(self.path, f"pixels ({height}, {width}, 3) of uint8", came, "Take the renderer's bytes")
+            actual = f"they have shape {picture.shape} and type {picture.dtype}"
+            refuse(self.path, f"pixels ({height}, {width}, 3) of uint8", actual, "Take the renderer's bytes")
         self._waiting.append(self._pool.submit(self._encode, self._count, picture))
         self._count += 1
-        while len(self._waiting) > _WAITING or (self._waiting and self._waiting[0].done()):
+        while len(self._waiting) > _QUEUE_LENGTH or (self._waiting and self._waiting[0].done()):
             self._waiting.popleft().result()
 
     def _encode(self, number: int, picture: NDArray[np.generic]) -> None:
@@ -177,5 +182,5 @@ class MovieWriter:
         while self._waiting:
             self._waiting.popleft().result()
         if self._count == 0:
-            refuse(self.path, "a movie of at least one frame", "none came", "Write one")
+            refuse(self.path, "a movie of at least one frame", "got none", "Write one")
         self._container.mux(self._stream.encode(None))

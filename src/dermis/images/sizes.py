@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-MOST_BYTES = 256 << 20
+MAX_FILE_BYTES = 256 << 20
 """Of a picture's file."""
-MOST_PIXELS = 8192**2
+MAX_PIXELS = 8192**2
 """Of a picture: a map of the largest side that a device must take, or a panorama of 11585 columns."""
-MOST_TOGETHER = 2 * MOST_PIXELS
+MAX_TOTAL_PIXELS = 2 * MAX_PIXELS
 """Of all pictures that a mesh file names."""
 
 
@@ -21,6 +21,6 @@ def check_size(width: int, height: int) -> tuple[int, int]:
     """
     if width < 1 or height < 1:
         raise ValueError(f"it has {width} x {height} pixels")
-    if width * height > MOST_PIXELS:
+    if width * height > MAX_PIXELS:
         raise TooLargeError(f"it has {width} x {height}")
     return width, height

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dermis.base.quantities import number
-from dermis.base.summary import Summarised
+from dermis.base.quantities import checked_number
+from dermis.base.summary import ShortRepr
 from dermis.mesh.pose import Pose
 
 _SHOWN = 8  # names in a note
@@ -19,11 +19,11 @@ _EARLY = 1e-6  # of a frame: how far a frame that rounding lost may lie before t
 
 def check_rate(culprit: object, rate: object) -> float:
     """Frames a second; raises DermisError for what are none."""
-    return number(culprit, rate, _SLOWEST, _FASTEST, "frames a second")
+    return checked_number(culprit, rate, _SLOWEST, _FASTEST, "frames a second")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Clip(Summarised):
+class Clip(ShortRepr):
     """A motion that a file holds, for one head: `pose_at` gives its pose at any time.
 
     name : of the clip, else of its file
@@ -47,7 +47,7 @@ class Clip(Summarised):
 
         Raises DermisError for a time that is none, and for a frame that cannot be read.
         """
-        time_s = number(f"{self.name}: time", seconds, -_LATEST_S, _LATEST_S, "s")
+        time_s = checked_number(f"{self.name}: time", seconds, -_LATEST_S, _LATEST_S, "s")
         return self.sample(min(max(time_s, 0.0), self.duration_s))
 
     def frame_count(self, rate: float) -> int:
@@ -55,7 +55,7 @@ class Clip(Summarised):
         return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _EARLY) + 1
 
     def __post_init__(self) -> None:
-        number(
+        checked_number(
             f"{self.name}: duration", self.duration_s, 0.0, LONGEST_S, "s: no motion lasts longer than a day"
         )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dermis.base.quantities import check_numbers
+from dermis.base.quantities import check_fields
 
 LIMITS = {
     "eumelanin": (0.0, 1.0),
@@ -31,4 +31,4 @@ class EyeLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_numbers(self, LIMITS, "eyes: ")
+        check_fields(self, LIMITS, "eyes: ")

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from dermis.base.arrays import Doubles, Floats, Index, Ints
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 
 SCLERA_MM, CORNEA_MM, LIMBUS_MM = 12.0, 7.8, 5.85
 """Radii of the ball, of the cornea's front, and of the circle where they meet, of an adult [mm]."""
@@ -65,7 +65,7 @@ def clearance_mm(places: Doubles, axis: Doubles) -> tuple[Doubles, Doubles]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Contact(Summarised):
+class Contact(ShortRepr):
     """Control points that stay off the eyeballs of a head, cornea included, wherever these look.
 
     point : (n,) control points of lids

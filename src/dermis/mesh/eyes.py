@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dermis.base.arrays import Doubles, Ints
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm
 from dermis.mesh.rig import Motion, Rig
 
 
 @dataclass(frozen=True, repr=False)
-class Eyes(Summarised):
+class Eyes(ShortRepr):
     """The eyeballs of a head, in their true shape: a ball with a cornea, see mesh/eyeball.py.
 
     apex, back, side : (k,) control points of each: the cornea's apex, the one opposite, one of the equator to

@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Floats
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 
 _MEAN_TEXELS, _MOST_APART = 64, 16  # for means: fewest samples a side, largest stride
 
 
 @dataclass(frozen=True, repr=False)
-class Maps(Summarised):
+class Maps(ShortRepr):
     """Maps of the skin, None where there is none. Row 0 is the top; sizes may differ from map to map.
 
     colour : (H, W, 3) linear Rec. 709 [-]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.base.arrays import Doubles, Floats, Ints
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 from dermis.mesh.geometry import tangents, vertex_normals, weld
 from dermis.mesh.outline import Outline, hull
 
@@ -40,7 +40,7 @@ class Material:
 
 
 @dataclass(frozen=True, repr=False)
-class Mesh(Summarised):
+class Mesh(ShortRepr):
     """Triangles with attributes at corner vertices; Y up, face towards +Z, counter-clockwise is outside.
 
     A point on a uv seam has one corner vertex for each of its uvs; `point` is the same for all of them.

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from dermis.base.arrays import Floats, Intp, Ints
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MorphTargets(Summarised):
+class MorphTargets(ShortRepr):
     """Displacements of some of the points by name, target after target.
 
     names : (t,)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Floats, Intp, Mask, Numbers
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.morph_targets import MorphTargets
 from dermis.mesh.skeleton import Skeleton
@@ -34,7 +34,7 @@ _FOLLOWS = 0.02  # least weight
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Outline(Summarised):
+class Outline(ShortRepr):
     """Places of a shape beyond which, seen from wherever, none of it lies.
 
     places_mm : (n, 3)
@@ -76,7 +76,7 @@ def hull_points(positions: NDArray[np.floating]) -> Intp:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RigOutline(Summarised):
+class RigOutline(ShortRepr):
     """Some of a rig's points, with all that moves them, dense; points are columns.
 
     rest_mm : (4, s) with a 1 below each

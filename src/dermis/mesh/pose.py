@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.base.arrays import Doubles, Floats
-from dermis.base.errors import DermisError, refuse, shown_value
-from dermis.base.quantities import number, numbers
-from dermis.base.summary import Summarised
+from dermis.base.errors import DermisError, format_value, refuse
+from dermis.base.quantities import checked_array, checked_number
+from dermis.base.summary import ShortRepr
 from dermis.mesh.rig import Motion, Rig
 from dermis.mesh.skeleton import Skeleton
 
@@ -27,7 +27,7 @@ _FLAT = 1e-9  # determinant over size cubed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pose(Summarised):
+class Pose(ShortRepr):
     """Weights of morph targets, turns of bones, or places of all points.
 
     weights : of targets by name, mostly 0 to 1; those that are left out keep the weight that they rest with
@@ -45,7 +45,7 @@ class Pose(Summarised):
     def __post_init__(self) -> None:
         for part in ("weights", "bones"):
             if not isinstance(given := getattr(self, part), Mapping):
-                refuse(f"pose: {part}", "a mapping by name", f"{shown_value(given)} came", "Correct it")
+                refuse(f"pose: {part}", "a mapping by name", f"got {format_value(given)}", "Correct it")
 
     @classmethod
     def of(cls, given: object) -> Pose | None:
@@ -54,7 +54,7 @@ class Pose(Summarised):
             return given
         if not isinstance(given, Mapping):
             refuse(
-                "pose", "a Pose or a mapping of weights by name", f"{shown_value(given)} came", "Correct it"
+                "pose", "a Pose or a mapping of weights by name", f"got {format_value(given)}", "Correct it"
             )
         return cls(weights=given)
 
@@ -76,7 +76,7 @@ class Pose(Summarised):
         try:
             index = rig.target_index
             places = [index[name] for name in self.weights]
-            given = numbers(culprit, list(self.weights.values()), (0,), -MOST_WEIGHT, MOST_WEIGHT)
+            given = checked_array(culprit, list(self.weights.values()), (0,), -MOST_WEIGHT, MOST_WEIGHT)
         except (KeyError, TypeError, DermisError):
             _refuse_weights(self.weights, rig.targets.names, culprit)
         weights[places] = given if rig.targets.rest is None else given - rig.targets.rest[places]
@@ -118,15 +118,15 @@ class Pose(Summarised):
             places = np.zeros(0, np.float32)
         expected = (rig.of_file, 3)
         if places.shape != expected:
-            came = f"{places.shape if places.size else shown_value(self.positions_mm)} came"
-            remedy = "Give as many points as Head.positions_mm lists, in its order"
-            refuse(f"{culprit}: positions_mm", f"an array of {expected}", came, remedy)
+            actual = f"got {places.shape if places.size else format_value(self.positions_mm)}"
+            advice = "Give as many points as Head.positions_mm lists, in its order"
+            refuse(f"{culprit}: positions_mm", f"an array of {expected}", actual, advice)
         with np.errstate(invalid="ignore"):
             if not np.abs(places).max(initial=0) <= FARTHEST_MM:
                 lost = np.flatnonzero(~(np.abs(places) <= FARTHEST_MM).all(axis=1))
-                came = f"{len(lost)} are NaN, infinite or farther, first {lost[0]}"
+                actual = f"{len(lost)} are NaN, infinite or farther, first {lost[0]}"
                 expected_mm = f"points within {FARTHEST_MM:g} mm"
-                refuse(f"{culprit}: positions_mm", expected_mm, came, "Correct them")
+                refuse(f"{culprit}: positions_mm", expected_mm, actual, "Correct them")
         return rig.completed(places) if rig.carried else places
 
 
@@ -148,11 +148,11 @@ def _changes(
     for place, (bone, name) in enumerate(ordered):
         try:
             if len(given[name]) == 3:
-                angles = numbers(culprit, given[name], (3,), -MOST_DEGREES, MOST_DEGREES)
+                angles = checked_array(culprit, given[name], (3,), -MOST_DEGREES, MOST_DEGREES)
                 rows.append(skeleton.turned(bone, angles.tolist()))
                 turned.append(place)
             else:
-                changes[place] = numbers(culprit, given[name], (4, 4), -FARTHEST_MM, FARTHEST_MM)
+                changes[place] = checked_array(culprit, given[name], (4, 4), -FARTHEST_MM, FARTHEST_MM)
                 own.append(place)
         except (TypeError, DermisError):
             _refuse_form(f"{culprit}: bones.{name}", given[name])
@@ -176,7 +176,7 @@ def _check_matrices(matrices: Doubles, names: list[str], culprit: object) -> Non
 
 def _refuse_form(culprit: str, given: object) -> NoReturn:
     expected = f"{_FORMS}, no angle beyond {MOST_DEGREES:g}, nothing beyond {FARTHEST_MM:g}"
-    refuse(culprit, expected, f"{shown_value(given, 80)} came", "Correct it")
+    refuse(culprit, expected, f"got {format_value(given, 80)}", "Correct it")
 
 
 def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culprit: object) -> NoReturn:
@@ -184,20 +184,20 @@ def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culpr
     for name, weight in weights.items():
         if name not in names:
             _refuse_name(f"{culprit}: weights", name, names, "morph target")
-        number(f"{culprit}: weights.{name}", weight, -MOST_WEIGHT, MOST_WEIGHT)
-    refuse(f"{culprit}: weights", "a number for each target", "something else came", "Correct it")
+        checked_number(f"{culprit}: weights.{name}", weight, -MOST_WEIGHT, MOST_WEIGHT)
+    refuse(f"{culprit}: weights", "a number for each target", "got something else", "Correct it")
 
 
 def _refuse_name(culprit: str, name: object, known: Iterable[str], kind: str) -> NoReturn:
     """Raise the error of a name that the head lacks, with those that are nearest to it."""
     names = list(known)
     if not names:
-        came = f"{shown_value(name)} came and it has none"
-        refuse(culprit, f"a {kind} of the head", came, f"Load a glTF file with {kind}s, or leave it out")
+        actual = f"got {format_value(name)} and it has none"
+        refuse(culprit, f"a {kind} of the head", actual, f"Load a glTF file with {kind}s, or leave it out")
     plain = {one.casefold(): one for one in names}
     near = difflib.get_close_matches(str(name)[:_LONGEST_NAME].casefold(), plain, _NEAR, 0.5)
     meant = f"Nearest: {', '.join(plain[one] for one in near)}" if near else f"It has {_some(names)}"
-    refuse(culprit, f"a {kind} of the head", f"there is no {shown_value(name)}", meant)
+    refuse(culprit, f"a {kind} of the head", f"there is no {format_value(name)}", meant)
 
 
 def _some(names: list[str]) -> str:

@@ -42,8 +42,8 @@ def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
     uv_scale : uv covers [0, uv_scale] along both sides, at most 1
     """
     if not (size_mm > 0 and segments >= 1 and 0 < uv_scale <= 1):
-        came = f"{size_mm} mm, {segments} and {uv_scale} came"
-        refuse("plane", "a size above 0, a segment and a uv_scale in (0, 1]", came, "Correct the arguments")
+        actual = f"got {size_mm} mm, {segments} and {uv_scale}"
+        refuse("plane", "a size above 0, a segment and a uv_scale in (0, 1]", actual, "Correct the arguments")
     along = np.linspace(0, 1, segments + 1)
     v, u = (axis.ravel() for axis in np.meshgrid(along, along, indexing="ij"))
     positions = size_mm * np.column_stack((u - 0.5, 0.5 - v, np.zeros_like(u)))
@@ -62,8 +62,8 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
     segments, rings : cells around and from pole to pole, at least 3 and 2
     """
     if not (radius_mm > 0 and segments >= 3 and rings >= 2):
-        came = f"{radius_mm} mm, {segments} and {rings} came"
-        refuse("uv_sphere", "a radius above 0, 3 segments and 2 rings", came, "Correct the arguments")
+        actual = f"got {radius_mm} mm, {segments} and {rings}"
+        refuse("uv_sphere", "a radius above 0, 3 segments and 2 rings", actual, "Correct the arguments")
     row, column = (axis.ravel() for axis in np.mgrid[: rings + 1, : segments + 1])
     # the last column is the first: exactly the same numbers, so that it welds
     phi, theta = 2 * np.pi * (column % segments) / segments, np.pi * row / rings
@@ -88,8 +88,8 @@ def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Me
     cells : along a side
     """
     if not (side_mm > 0 and min(thin_mm, thick_mm) > 0 and cells >= 1):
-        came = f"{side_mm}, {thin_mm} and {thick_mm} mm and {cells} came"
-        refuse("wedge", "sides above 0 and a cell", came, "Correct the arguments")
+        actual = f"got {side_mm}, {thin_mm} and {thick_mm} mm and {cells}"
+        refuse("wedge", "sides above 0 and a cell", actual, "Correct the arguments")
     v, u = (axis.ravel() for axis in np.mgrid[: cells + 1, : cells + 1] / cells)
     row, column = (axis.ravel() for axis in np.mgrid[:cells, :cells])
     a = row * (cells + 1) + column

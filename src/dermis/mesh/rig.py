@@ -10,7 +10,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Floats, Intp, Ints, Mask, Numbers
 from dermis.base.disk import cached_array
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 from dermis.mesh.eyeball import Contact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.outline import RigOutline, corners_of, outline_of, outline_points
@@ -46,7 +46,7 @@ class Motion(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stencils(Summarised):
+class Stencils(ShortRepr):
     """Points of a subdivided mesh, each as a mean of some control points.
 
     first : (q + 1,) where the control points of each begin
@@ -87,7 +87,7 @@ class Carried(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rig(Summarised):
+class Rig(ShortRepr):
     """The control points of a head and what moves them: morph targets first, then bones.
 
     positions_mm : (p, 3) the points at rest, before any subdivision, in the head's space

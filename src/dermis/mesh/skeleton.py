@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from dermis.base.arrays import Doubles, Floats, Intp, Ints
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 from dermis.mesh.rotations import angles_matrix
 
 INFLUENCES = 4
@@ -19,7 +19,7 @@ _FEW = 12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Skeleton(Summarised):
+class Skeleton(ShortRepr):
     """Bones, parents before children, and the points that follow them.
 
     names : (b,)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Ints
-from dermis.base.summary import Summarised
+from dermis.base.summary import ShortRepr
 from dermis.mesh.geometry import crosses, dots
 from dermis.mesh.mesh import Mesh
 
@@ -28,7 +28,7 @@ class Roots(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Strands(Summarised):
+class Strands(ShortRepr):
     """Hairs, thin round fibres through knots.
 
     roots : where each begins

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Floats, Index, Ints
 from dermis.base.disk import Arrays, cached_arrays
-from dermis.base.errors import refuse, shown_value
-from dermis.base.progress import preparing
+from dermis.base.errors import format_value, refuse
+from dermis.base.progress import logged_step
 from dermis.mesh.geometry import halves
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh, build_mesh
@@ -86,8 +86,8 @@ def levels_of(head: Head, levels: int | Callable[[Head], int]) -> int:
 
 def _checked(levels: int) -> int:
     if not isinstance(levels, int | np.integer) or levels not in range(MAX_LEVELS + 1):
-        came = f"{shown_value(levels)} came"
-        refuse("subdivide", f"0 to {MAX_LEVELS} levels", came, "Each level takes 4x the memory")
+        actual = f"got {format_value(levels)}"
+        refuse("subdivide", f"0 to {MAX_LEVELS} levels", actual, "Each level takes 4x the memory")
     return int(levels)
 
 
@@ -139,7 +139,7 @@ def _kept(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     return cached_arrays(sources, f"{_FORM} {levels}", names, lambda: _refined(mesh, levels, by_quads))
 
 
-@preparing("subdividing the mesh")
+@logged_step("subdividing the mesh")
 def _refined(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     """Corners of the finer faces, and weights of control points, row after row as `Stencils` have them."""
     alone = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material

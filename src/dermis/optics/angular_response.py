@@ -1,4 +1,4 @@
-"""Directions in a scattering medium: tables over the cosine, and light by direction."""
+"""Reflectance of scattering half-spaces by the directions of incident and emerging light."""
 
 from __future__ import annotations
 
@@ -10,159 +10,165 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
-STEPS = 64
-"""Between tables at 0 and at 1."""
-ROWS = 32
-"""Of the table over directions."""
+TABLE_STEPS = 64
+"""Intervals from 0 to 1 between which tables are interpolated."""
+DIRECTION_ROWS = 32
+"""Rows of tables over directions."""
 _NODES = 32
-_MOST_ALBEDO = 1.0 - 1e-8
-KEPT = 256
-"""Shares of light, or albedos, whose numbers are remembered."""
+_MAX_ALBEDO = 1.0 - 1e-8
+CACHE_SIZE = 256
+"""Columns of tables that are kept in memory."""
 
 
-def interpolated(made: Callable[[float], Floats], at: float) -> Floats:
-    """The table at a number in 0..1.
+def interpolate_table(column: Callable[[float], Floats], position: float) -> Floats:
+    """Return a table column at a position in [0, 1] by linear interpolation between cached columns.
 
-    made : the same at a multiple of 1 / STEPS; to be remembered by the caller
+    column : function that returns the column at a multiple of 1 / TABLE_STEPS; it should be cached
     """
-    place = min(max(at, 0.0), 1.0) * STEPS
-    low = min(int(place), STEPS - 1)
-    share = place - low
-    return np.asarray((1.0 - share) * made(low / STEPS) + share * made((low + 1) / STEPS))
+    scaled = min(max(position, 0.0), 1.0) * TABLE_STEPS
+    low = min(int(scaled), TABLE_STEPS - 1)
+    weight = scaled - low
+    return np.asarray((1.0 - weight) * column(low / TABLE_STEPS) + weight * column((low + 1) / TABLE_STEPS))
 
 
 @dataclass(frozen=True)
-class Directions:
-    """How a half-space differs from a diffuse surface, for each of c channels.
+class AngularResponse:
+    """Angular dependence of the reflectance of a half-space, relative to a diffuse surface.
 
-    Of light from a direction, `returned` times the profile's share comes back. It leaves evenly in all
-    directions, except for light that scattered only once: `once` times (1/(a + b) - its mean over exit
-    directions), with a and b the cosines of both directions below the surface.
+    Light from a direction returns `relative_reflectance` times the total of the profile. It emerges uniformly
+    in all directions, except for light that scattered once, which adds `single_scattering` times (1/(a + b)
+    minus its mean over exit directions), with the cosines a and b of both directions below the surface.
 
-    eta : index of refraction against the air [-]
-    returned : (ROWS, c) by evenly spaced roots of the cosine, 1 from straight above [-]
-    from_everywhere : (c,) the same for uniform light from all directions [-]
-    once : (c,) [-]
-    mean_once : mean of 1/(a + b) over both directions [-]
+    eta : index of refraction relative to air [-]
+    relative_reflectance : (DIRECTION_ROWS, c) by evenly spaced square roots of the incident cosine; 1 at
+        normal incidence [-]
+    relative_diffuse_reflectance : (c,) for uniform light from all directions [-]
+    single_scattering : (c,) strength of the single-scattering term [-]
+    mean_kernel : mean of 1/(a + b) over both directions [-]
     """
 
     eta: float
-    returned: Floats
-    from_everywhere: Floats
-    once: Floats
-    mean_once: float
+    relative_reflectance: Floats
+    relative_diffuse_reflectance: Floats
+    single_scattering: Floats
+    mean_kernel: float
 
 
-def directions(total: ArrayLike, eta: float) -> Directions:
-    """The directions of half-spaces that return given shares of the light that enters perpendicularly.
+def angular_response(total: ArrayLike, eta: float) -> AngularResponse:
+    """Return the angular response of half-spaces with given reflectances at normal incidence.
 
-    total : (c,) [-]
-    eta : index of refraction against the air, at least 1 [-]
+    total : (c,) reflectance of light that enters perpendicularly [-]
+    eta : index of refraction relative to air, at least 1 [-]
 
-    Sources: [Chandrasekhar1960] for the half-space, which scatters isotropically; [Jensen2001] for taking
-    single scattering apart.
+    Sources: [Chandrasekhar1960] for the half-space, which scatters isotropically; [Jensen2001] for the
+    separation of single scattering.
     """
-    shares = np.atleast_1d(np.asarray(total, np.float64))
-    found = np.stack([interpolated(partial(_numbers, eta), float(one)) for one in shares], axis=-1)
-    return Directions(eta, found[:ROWS], found[ROWS], found[ROWS + 1], _mean_once(eta))
+    totals = np.atleast_1d(np.asarray(total, np.float64))
+    found = np.stack(
+        [interpolate_table(partial(_response_column, eta), float(value)) for value in totals], axis=-1
+    )
+    return AngularResponse(
+        eta, found[:DIRECTION_ROWS], found[DIRECTION_ROWS], found[DIRECTION_ROWS + 1], _mean_kernel(eta)
+    )
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
-    """Chandrasekhar's H at cosines from the normal, of their shape [-].
+    """Return Chandrasekhar's H function at cosines from the normal, in their shape [-].
 
     Source: [Chandrasekhar1960] section 39, the integral over the imaginary axis.
     """
-    root, weight = gaussian_nodes(0.0, 1.0)
-    angle = 0.5 * np.pi * root**2  # the integrand's logarithm is smooth in its root
+    root, weight = gauss_legendre(0.0, 1.0)
+    angle = 0.5 * np.pi * root**2  # substituted because the integrand's logarithm is smooth in its root
     slope = np.pi * root * weight * np.log1p(-albedo * angle / np.tan(angle))
     mu = np.asarray(cosine, np.float64)[..., None]
     integral = (slope * mu / (np.cos(angle) ** 2 + (mu * np.sin(angle)) ** 2)).sum(axis=-1)
     return np.asarray(np.exp(-integral / np.pi))
 
 
-def directional_albedo(cosine: ArrayLike, albedo: float, eta: float) -> Floats:
-    """Share of light that leaves again, by the cosine of its direction in the air [-]."""
-    return _Matched(albedo, eta).returned(refracted(cosine, eta))
+def directional_reflectance(cosine: ArrayLike, albedo: float, eta: float) -> Floats:
+    """Return the reflectance of a half-space by the cosine of the incident direction in air [-]."""
+    return _HalfSpace(albedo, eta).reflectance(refracted_cosine(cosine, eta))
 
 
-def mean_of_once(cosine: ArrayLike, eta: float) -> Floats:
-    """Mean of 1/(a + b) over exit directions, by the cosine of entry [-]."""
-    a, critical = np.maximum(refracted(cosine, eta), 1e-4), critical_cosine(eta)
+def mean_single_scattering_kernel(cosine: ArrayLike, eta: float) -> Floats:
+    """Return the mean of 1/(a + b) over exit directions b, by the incident cosine in air [-]."""
+    a, critical = np.maximum(refracted_cosine(cosine, eta), 1e-4), critical_cosine(eta)
     return np.asarray(2.0 * eta**2 * (1.0 - critical - a * np.log((a + 1.0) / (a + critical))))
 
 
-def refracted(cosine: ArrayLike, eta: float) -> Floats:
-    """Cosine below the surface [-]."""
+def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
+    """Return the cosine below the surface of light with a given cosine in air [-]."""
     return np.asarray(np.sqrt(1.0 - (1.0 - np.asarray(cosine, np.float64) ** 2) / eta**2))
 
 
-class _Matched:
-    """An index-matched half-space, and a smooth surface above it that reflects light back into it.
+class _HalfSpace:
+    """Isotropically scattering half-space below a smooth surface, discretised by direction.
 
-    Inside, R reflects light and the surface returns r of it: R + R r R + ... is solved for at once.
+    Light is reflected back and forth between medium R and surface r: the series R + R r R + ... is solved
+    directly.
     """
 
     def __init__(self, albedo: float, eta: float) -> None:
         critical = critical_cosine(eta)
-        escaping, caught = gaussian_nodes(critical, 1.0), gaussian_nodes(0.0, critical)
-        self._mu, weight = (np.concatenate(both) for both in zip(escaping, caught, strict=True))
+        escaping, reflected = gauss_legendre(critical, 1.0), gauss_legendre(0.0, critical)
+        self._mu, weight = (np.concatenate(both) for both in zip(escaping, reflected, strict=True))
         self._albedo, self._H = albedo, h_function(self._mu, albedo)
-        back = internal_reflectance(self._mu, eta)
+        internal = internal_reflectance(self._mu, eta)
         flux = 2.0 * weight * self._mu
-        self.leaving = flux * (1.0 - back)
-        self._within = np.eye(len(self._mu)) - self._reflected(self._mu, self._H) * flux * back
+        self.leaving = flux * (1.0 - internal)
+        self._transport = np.eye(len(self._mu)) - self._reflected(self._mu, self._H) * flux * internal
 
     def _reflected(self, mu: Floats, H: Floats) -> Floats:
-        """(nodes, n) radiance over pi by nodes, for light from cosines."""
+        """Return radiance over pi at the nodes, (nodes, n), for light from n cosines."""
         return 0.25 * self._albedo * np.outer(self._H, H) / np.maximum(self._mu[:, None] + mu, 1e-12)
 
-    def returned(self, inside: ArrayLike) -> Floats:
-        """Share of the light from cosines below the surface that leaves."""
-        mu = np.atleast_1d(np.asarray(inside, np.float64))
+    def reflectance(self, cosine: ArrayLike) -> Floats:
+        """Return the fraction of light from cosines below the surface that leaves the medium."""
+        mu = np.atleast_1d(np.asarray(cosine, np.float64))
         source = self._reflected(mu, h_function(mu, self._albedo))
-        leaving = self.leaving @ np.linalg.solve(self._within, source)
-        return np.asarray(leaving.reshape(np.shape(inside)))
+        leaving = self.leaving @ np.linalg.solve(self._transport, source)
+        return np.asarray(leaving.reshape(np.shape(cosine)))
 
-    def from_everywhere(self) -> float:
-        """Share of uniform light that leaves again."""
-        return float((self.leaving * self.returned(self._mu)).sum() / self.leaving.sum())
-
-
-@lru_cache(maxsize=KEPT)
-def _numbers(eta: float, total: float) -> Floats:
-    """(ROWS + 2,) what is returned, the same from everywhere, and the strength of what scattered once."""
-    albedo = albedo_returning(total, eta)
-    space = _Matched(albedo, eta)
-    above = float(space.returned(1.0))
-    if above <= 0.0:
-        return np.append(np.ones(ROWS + 1), 0.0)
-    table = space.returned(refracted(np.linspace(0.0, 1.0, ROWS) ** 2, eta))
-    once = 0.25 * albedo * float(space.leaving.sum())
-    return np.concatenate([table, [space.from_everywhere(), once]]) / above
+    def diffuse_reflectance(self) -> float:
+        """Return the fraction of uniform light that leaves the medium again."""
+        return float((self.leaving * self.reflectance(self._mu)).sum() / self.leaving.sum())
 
 
-@lru_cache(maxsize=KEPT)
-def _mean_once(eta: float) -> float:
-    """Mean of 1/(a + b) over both directions."""
-    mu, weight = gaussian_nodes(0.0, 1.0)
-    return float((2.0 * weight * mu * mean_of_once(mu, eta)).sum())
+@lru_cache(maxsize=CACHE_SIZE)
+def _response_column(eta: float, total: float) -> Floats:
+    """Return relative and relative diffuse reflectance and single scattering, (DIRECTION_ROWS + 2,)."""
+    albedo = albedo_for_reflectance(total, eta)
+    space = _HalfSpace(albedo, eta)
+    normal = float(space.reflectance(1.0))
+    if normal <= 0.0:
+        return np.append(np.ones(DIRECTION_ROWS + 1), 0.0)
+    table = space.reflectance(refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta))
+    single_scattering = 0.25 * albedo * float(space.leaving.sum())
+    return np.concatenate([table, [space.diffuse_reflectance(), single_scattering]]) / normal
 
 
-def albedo_returning(total: float, eta: float) -> float:
-    """Single-scattering albedo of the half-space that returns this share of what enters from above."""
+@lru_cache(maxsize=CACHE_SIZE)
+def _mean_kernel(eta: float) -> float:
+    """Return the mean of 1/(a + b) over both directions."""
+    mu, weight = gauss_legendre(0.0, 1.0)
+    return float((2.0 * weight * mu * mean_single_scattering_kernel(mu, eta)).sum())
+
+
+def albedo_for_reflectance(total: float, eta: float) -> float:
+    """Return the single-scattering albedo of the half-space with a given reflectance at normal incidence."""
     from scipy.optimize import brentq
 
-    def beyond(albedo: float) -> float:
-        return float(_Matched(albedo, eta).returned(1.0)) - total
+    def excess(albedo: float) -> float:
+        return float(_HalfSpace(albedo, eta).reflectance(1.0)) - total
 
-    least = 1e-6
-    if total <= 0.0 or beyond(least) >= 0.0:
-        return least
-    return float(brentq(beyond, least, _MOST_ALBEDO)) if beyond(_MOST_ALBEDO) > 0.0 else _MOST_ALBEDO
+    min_albedo = 1e-6
+    if total <= 0.0 or excess(min_albedo) >= 0.0:
+        return min_albedo
+    return float(brentq(excess, min_albedo, _MAX_ALBEDO)) if excess(_MAX_ALBEDO) > 0.0 else _MAX_ALBEDO
 
 
 def internal_reflectance(cosine: Floats, eta: float) -> Floats:
-    """Share of unpolarised light from inside that the surface reflects back."""
+    """Return the Fresnel reflectance of the surface for unpolarised light from inside [-]."""
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
     across = (eta * cosine - outside) / np.maximum(eta * cosine + outside, 1e-12)
     along = (cosine - eta * outside) / np.maximum(cosine + eta * outside, 1e-12)
@@ -170,16 +176,16 @@ def internal_reflectance(cosine: Floats, eta: float) -> Floats:
 
 
 def critical_cosine(eta: float) -> float:
-    """Least cosine below the surface at which light leaves."""
+    """Return the cosine of the critical angle of total internal reflection."""
     return float(np.sqrt(1.0 - 1.0 / eta**2))
 
 
-def gaussian_nodes(low: float, high: float, count: int = _NODES) -> tuple[Floats, Floats]:
-    """Gaussian nodes and weights of an interval."""
-    nodes, weights = _gaussian(count)
+def gauss_legendre(low: float, high: float, count: int = _NODES) -> tuple[Floats, Floats]:
+    """Return nodes and weights of Gauss-Legendre quadrature on an interval."""
+    nodes, weights = _unit_gauss_legendre(count)
     return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights
 
 
 @lru_cache(maxsize=4)
-def _gaussian(count: int) -> tuple[Floats, Floats]:
+def _unit_gauss_legendre(count: int) -> tuple[Floats, Floats]:
     return np.polynomial.legendre.leggauss(count)

@@ -1,4 +1,4 @@
-"""The medium that a profile stands for, and its lateral offset of oblique light."""
+"""Homogeneous medium that is equivalent to a diffusion profile, and its lateral offset of oblique light."""
 
 from __future__ import annotations
 
@@ -9,111 +9,121 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.optics.curve import Curve
+from dermis.optics.angular_response import CACHE_SIZE, interpolate_table
+from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.diffusion import hankel, layered_diffusion
-from dermis.optics.diffusion.boundary import mismatch
-from dermis.optics.directions import KEPT, interpolated
+from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.half_space import Kind, albedo_of, half_space, kind_under
+from dermis.optics.half_space import half_space, kind_for_index, tabulated_albedo
 from dermis.optics.media import Layer, Medium
 
 Floats = NDArray[np.float64]
-MOST_ALBEDO, LEAST_ALBEDO = 1.0 - 1e-6, 1e-3
-_LOGS = (-14.0, 14.0)  # of frequencies that are searched [1/mm]
-_ABSORBED = 0.35  # of absorption in the published length
+MAX_ALBEDO, MIN_ALBEDO = 1.0 - 1e-6, 1e-3
+_LOG_FREQUENCY_RANGE = (-14.0, 14.0)  # natural logarithms of frequencies [1/mm]
+_ABSORPTION_WEIGHT = 0.35  # of absorption in the published formula of the offset
 
 
-def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
-    """The half-space that returns a share of light, and half of it within the profile's own distance.
+def equivalent_medium(profile: GaussianSum, total: Floats, eta: float) -> Medium:
+    """Return the half-space with a given reflectance whose Hankel transform is as wide as a profile's.
 
-    total : (c,) that it returns of what enters perpendicularly [-]
-    eta : index of refraction against the air [-]
+    Widths are compared by the frequency at which the transform has fallen to half of its total.
+
+    total : (c,) reflectance of light that enters perpendicularly [-]
+    eta : index of refraction relative to air [-]
     """
     albedo, extinction = np.empty(len(total)), np.empty(len(total))
-    for c, share in enumerate(total):
-        root, half = interpolated(partial(_returning, eta, profile.counted), float(share))
-        one = tuple(zip(profile.variance_mm2.tolist(), profile.weight[:, c].tolist(), strict=True))
-        albedo[c], extinction[c] = 1.0 - root**2, _half(partial(_spread, one)) / half
+    for c, reflectance in enumerate(total):
+        column = partial(_half_space_column, eta, profile.from_photons)
+        root, half = interpolate_table(column, float(reflectance))
+        gaussians = tuple(zip(profile.variance_mm2.tolist(), profile.weight[:, c].tolist(), strict=True))
+        albedo[c] = 1.0 - root**2
+        extinction[c] = _half_frequency(partial(_gaussian_transform, gaussians)) / half
     layer = Layer((1.0 - albedo) * extinction, albedo * extinction)
-    return Medium("flesh", (layer,), eta)
+    return Medium("half-space", (layer,), eta)
 
 
-@lru_cache(maxsize=KEPT)
-def _returning(eta: float, counted: bool, total: float) -> Floats:
-    """(2,) of the half-space that returns this share: the root of what a scattering absorbs [-], and the
-    frequency at which what it returns has fallen to half [1/mean free path]; by photons or by diffusion, as
-    the profile is: that of photons is narrower."""
-    albedo, kind = albedo_of_total(total, eta, counted), _tables(eta, counted)
+@lru_cache(maxsize=CACHE_SIZE)
+def _half_space_column(eta: float, from_photons: bool, total: float) -> Floats:
+    """Return properties of the half-space with a given reflectance, (2,).
+
+    The first is the square root of 1 minus the single-scattering albedo [-], the second the frequency at
+    which the Hankel transform of R(r) has fallen to half of its total [1/mean free path]. Tables of photon
+    counts, which are narrower, or layered diffusion are used as for the profile.
+    """
+    albedo = albedo_for_total(total, eta, from_photons)
+    kind = kind_for_index(eta) if from_photons else None
     if kind is None:
-        return np.array([np.sqrt(1.0 - albedo), _half(partial(_returned, _unit(albedo, eta)))])
-    curve = half_space(kind, np.full(3, albedo), np.ones(3))
-    return np.array([np.sqrt(1.0 - albedo), _half(partial(_transform, curve))])
+        half = _half_frequency(partial(_reflectance_transform, _unit_medium(albedo, eta)))
+    else:
+        curve = half_space(kind, np.full(3, albedo), np.ones(3))
+        half = _half_frequency(partial(_curve_transform, curve))
+    return np.array([np.sqrt(1.0 - albedo), half])
 
 
-def _tables(eta: float, counted: bool) -> Kind | None:
-    return kind_under(eta) if counted else None
+def albedo_for_total(total: float, eta: float, from_photons: bool = False) -> float:
+    """Return the single-scattering albedo of the half-space with a given total reflectance [-].
 
-
-def albedo_of_total(total: float, eta: float, counted: bool = False) -> float:
-    """Albedo of single scattering of the half-space that returns a share of what enters perpendicularly [-].
-
-    counted : by photons where tables have them, else by layered diffusion
+    total : reflectance of light that enters perpendicularly [-]
+    from_photons : use tables of photon counts where they exist, not layered diffusion
     """
     from scipy.optimize import brentq
 
-    kind = _tables(eta, counted)
+    kind = kind_for_index(eta) if from_photons else None
     if kind is not None:
-        return float(albedo_of(kind, total))
+        return float(tabulated_albedo(kind, total))
 
-    def beyond(albedo: float) -> float:
-        return _returned(_unit(albedo, eta), float(hankel.STILL[0])) - total
+    def excess(albedo: float) -> float:
+        return _reflectance_transform(_unit_medium(albedo, eta), float(hankel.ZERO_FREQUENCY[0])) - total
 
-    if beyond(LEAST_ALBEDO) >= 0.0:
-        return LEAST_ALBEDO
-    return float(brentq(beyond, LEAST_ALBEDO, MOST_ALBEDO)) if beyond(MOST_ALBEDO) > 0.0 else MOST_ALBEDO
-
-
-def _unit(albedo: float, eta: float) -> Medium:
-    """A half-space whose mean free path is 1 mm."""
-    return Medium("flesh", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), eta)
+    if excess(MIN_ALBEDO) >= 0.0:
+        return MIN_ALBEDO
+    return float(brentq(excess, MIN_ALBEDO, MAX_ALBEDO)) if excess(MAX_ALBEDO) > 0.0 else MAX_ALBEDO
 
 
-def _spread(gaussians: tuple[tuple[float, float], ...], frequency: float) -> float:
-    """`GaussianSum.hankel` of one channel, by its variances and weights; in plain floats, as they are few."""
+def _unit_medium(albedo: float, eta: float) -> Medium:
+    """Return a half-space whose mean free path is 1 mm."""
+    return Medium("half-space", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), eta)
+
+
+def _gaussian_transform(gaussians: tuple[tuple[float, float], ...], frequency: float) -> float:
+    """Return the Hankel transform of one channel of a sum of Gaussians (variance, weight)."""
     return sum(weight * math.exp(-0.5 * variance * frequency**2) for variance, weight in gaussians)
 
 
-def _transform(curve: Curve, frequency: float) -> float:
-    """Hankel transform of a curve's first channel, over its total."""
+def _curve_transform(curve: CumulativeProfile, frequency: float) -> float:
+    """Return the Hankel transform of the first channel of a cumulative profile, divided by its total."""
     from scipy.special import j0
 
     edges = curve.radii_mm
-    middle = np.append(0.5 * edges[1], np.sqrt(edges[1:-1] * edges[2:]))
-    return float(j0(frequency * middle) @ np.diff(curve.share[:, 0]))
+    ring_radius = np.append(0.5 * edges[1], np.sqrt(edges[1:-1] * edges[2:]))
+    return float(j0(frequency * ring_radius) @ np.diff(curve.fraction[:, 0]))
 
 
-def _returned(body: Medium, frequency: float) -> float:
-    """Hankel transform of what it returns."""
-    A = mismatch(body.eta, "exact")
-    return float(layered_diffusion.reflect(np.array([frequency]), body, A)[0, 0])
+def _reflectance_transform(medium: Medium, frequency: float) -> float:
+    """Return the Hankel transform of R(r) of a half-space."""
+    A = boundary_mismatch(medium.eta, "exact")
+    return float(layered_diffusion.solve_reflectance(np.array([frequency]), medium, A)[0, 0])
 
 
-def _half(transform: Callable[[float], float]) -> float:
-    """The frequency at which a transform has fallen to half of its total [1/mm]."""
+def _half_frequency(transform: Callable[[float], float]) -> float:
+    """Return the frequency at which a transform has fallen to half of its total [1/mm]."""
     from scipy.optimize import brentq
 
-    total = transform(float(hankel.STILL[0]))
-    return float(np.exp(brentq(lambda log: transform(float(np.exp(log))) - 0.5 * total, *_LOGS)))
+    total = transform(float(hankel.ZERO_FREQUENCY[0]))
+    return float(
+        np.exp(brentq(lambda log: transform(float(np.exp(log))) - 0.5 * total, *_LOG_FREQUENCY_RANGE))
+    )
 
 
-def aside_mm(body: Medium) -> float:
-    """How far from where it entered the middle of light lies that came along the surface, the channels' mean.
+def oblique_offset_mm(medium: Medium) -> float:
+    """Return the lateral offset of the mean exit point at grazing incidence, as channel mean [mm].
 
-    body : of one layer
+    medium : one layer
 
-    Light from an angle lies its sine times that far from there, on along its way.
+    At other angles of incidence, the offset is the sine of the angle times this length, in the direction of
+    propagation.
 
     Source: [WangJacques1995].
     """
-    layer = body.layers[0]
-    return float(np.mean(1.0 / (layer.sigma_s_prime + _ABSORBED * layer.sigma_a)) / body.eta)
+    layer = medium.layers[0]
+    return float(np.mean(1.0 / (layer.sigma_s_prime + _ABSORPTION_WEIGHT * layer.sigma_a)) / medium.eta)

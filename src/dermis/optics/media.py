@@ -1,4 +1,4 @@
-"""Turbid media: layers that absorb and scatter, in channels or in wavelengths, by name and from files."""
+"""Turbid media: layers that absorb and scatter, in colour channels or wavelengths, by name and from files."""
 
 from __future__ import annotations
 
@@ -12,33 +12,36 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.base.errors import refuse
-from dermis.base.quantities import number, numbers
+from dermis.base.quantities import checked_array, checked_number
 from dermis.base.tables import read_rows
 
 Floats = NDArray[np.float64]
 
 SKIN_ETA = 1.4
-"""Index of refraction of skin, as most of the works cited here take it [-]."""
+"""Index of refraction of skin, as in most of the cited works [-]."""
 _SOURCES = {"jensen2001": ("Jensen2001",), "donner-jensen-2005": ("DonnerJensen2005",)}
 _DJ3_NOTE = (
     "the printed coefficients are read in 1/cm. Read in 1/mm, as the 2007 deck does, red light would "
     "travel 0.02083 mm between events in the epidermis and nearly all of it would leave within 0.1 mm. The "
     "published sum of six Gaussians follows from neither reading: it is the preset gpu-gems-3"
 )
-_ETA = 1.0, 2.5  # indices of refraction, from a matched surface to more than diamond
-_CLEAREST, _DENSEST = 1e-6, 1e6  # from clear water to ten times a metal's absorption [1/mm]
-_THINNEST_MM, _THICKEST_MM = 1e-9, 1e4  # from less than an atom to more than a body
+_ETA_RANGE = 1.0, 2.5  # from an index-matched surface to more than diamond
+_MIN_SCATTERING, _MAX_COEFFICIENT = (
+    1e-6,
+    1e6,
+)  # from clear water to ten times the absorption of a metal [1/mm]
+_MIN_THICKNESS_MM, _MAX_THICKNESS_MM = 1e-9, 1e4  # from less than an atom to more than a human body
 _KEYS = ("absorption_per_mm", "scattering_per_mm")
 
 
 @dataclass(frozen=True)
 class Layer:
-    """One homogeneous layer; the arrays hold a number for each of c channels or wavelengths.
+    """Homogeneous layer with coefficients for c channels or wavelengths.
 
     sigma_a : (c,) absorption [1/mm]
     sigma_s_prime : (c,) reduced scattering [1/mm]
     thickness_mm : infinity for a half-space [mm]
-    name : what it is, for tables and messages
+    name : of the layer, for tables and messages
 
     Source: names after [Jensen2001] section 2.
     """
@@ -50,38 +53,38 @@ class Layer:
 
     @property
     def sigma_t_prime(self) -> Floats:
-        """Reduced extinction [1/mm]."""
+        """Return the reduced extinction coefficient, (c,) [1/mm]."""
         return self.sigma_a + self.sigma_s_prime
 
     @property
     def alpha_prime(self) -> Floats:
-        """Reduced albedo [-]."""
+        """Return the reduced albedo, (c,) [-]."""
         return self.sigma_s_prime / self.sigma_t_prime
 
     @property
     def mean_free_path_mm(self) -> Floats:
-        """Reduced mean free path [mm]."""
+        """Return the reduced mean free path, (c,) [mm]."""
         return 1.0 / self.sigma_t_prime
 
     @property
     def D(self) -> Floats:
-        """Diffusion coefficient [mm]."""
+        """Return the diffusion coefficient, (c,) [mm]."""
         return 1.0 / (3.0 * self.sigma_t_prime)
 
     @property
     def sigma_tr(self) -> Floats:
-        """Effective transport coefficient [1/mm]."""
+        """Return the effective transport coefficient, (c,) [1/mm]."""
         return np.sqrt(3.0 * self.sigma_a * self.sigma_t_prime)
 
 
 @dataclass(frozen=True)
 class Medium:
-    """A stack of layers under a smooth surface, topmost first. Below the last one there is air.
+    """Stack of layers below a smooth surface, topmost first; below the last layer there is air.
 
     name : preset or file
     layers : at least one; only the last may be semi-infinite
-    eta : index of refraction of all layers against the air; 1 is an index-matched surface [-]
-    notes : what a reader must know of the numbers
+    eta : index of refraction of all layers relative to air; 1 for an index-matched surface [-]
+    notes : remarks on the numbers, for the user
     sources : citation keys
     """
 
@@ -92,102 +95,110 @@ class Medium:
     sources: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        """Check the layers."""
         if not self.layers:
-            refuse(self.name, "at least one layer", "none came", "Add one")
-        number(f"{self.name}: index of refraction", self.eta, *_ETA)
+            refuse(self.name, "at least one layer", "got none", "Add one")
+        checked_number(f"{self.name}: index of refraction", self.eta, *_ETA_RANGE)
         for count, layer in enumerate(self.layers, 1):
-            _check(f"{self.name}, layer {count} ({layer.name})", layer, count == len(self.layers))
+            _check_layer(f"{self.name}, layer {count} ({layer.name})", layer, count == len(self.layers))
         if len({len(layer.sigma_a) for layer in self.layers}) > 1:
-            refuse(self.name, "as many channels in each layer", "they differ", "Correct the lists")
+            refuse(self.name, "the same number of channels in each layer", "they differ", "Correct the lists")
 
     @property
     def channels(self) -> int:
-        """How many channels or wavelengths the layers have."""
+        """Return the number of channels or wavelengths of the layers."""
         return len(self.layers[0].sigma_a)
 
     @property
     def semi_infinite(self) -> bool:
-        """Whether the last layer goes on without end below."""
+        """Return whether the last layer is semi-infinite."""
         return bool(np.isinf(self.layers[-1].thickness_mm))
 
     def with_eta(self, eta: float) -> Medium:
-        """The same layers under another surface."""
+        """Return the same layers with another index of refraction."""
         return replace(self, eta=eta)
 
     def channel(self, index: int) -> Medium:
-        """The stack as one channel or wavelength sees it."""
-        keep = slice(index, index + 1)
+        """Return the medium of one channel or wavelength."""
+        channel = slice(index, index + 1)
         layers = tuple(
-            replace(layer, sigma_a=layer.sigma_a[keep], sigma_s_prime=layer.sigma_s_prime[keep])
+            replace(layer, sigma_a=layer.sigma_a[channel], sigma_s_prime=layer.sigma_s_prime[channel])
             for layer in self.layers
         )
         return replace(self, layers=layers)
 
 
-def _check(place: str, layer: Layer, last: bool) -> None:
+def _check_layer(culprit: str, layer: Layer, last: bool) -> None:
     a, s = layer.sigma_a, layer.sigma_s_prime
     if a.ndim != 1 or a.shape != s.shape or len(a) == 0:
-        came = f"shapes {a.shape} and {s.shape} came"
-        refuse(place, "as many absorption as scattering coefficients", came, "Correct the lists")
-    if not ((a >= 0) & (a <= _DENSEST) & (s >= _CLEAREST) & (s <= _DENSEST)).all():
-        came = f"absorption {a.tolist()} and scattering {s.tolist()} came"
-        expected = f"absorption from 0 and scattering from {_CLEAREST:g} to {_DENSEST:g} /mm"
-        refuse(place, expected, came, "Correct them")
-    endless = np.isinf(layer.thickness_mm) and layer.thickness_mm > 0 and last
-    if not endless and not _THINNEST_MM <= layer.thickness_mm <= _THICKEST_MM:
-        expected = (
-            f"a thickness from {_THINNEST_MM:g} to {_THICKEST_MM:g} mm, infinite in the last layer only"
+        actual = f"got shapes {a.shape} and {s.shape}"
+        refuse(
+            culprit, "one absorption and one scattering coefficient per channel", actual, "Correct the lists"
         )
-        refuse(place, expected, f"{layer.thickness_mm} mm came", "Correct it")
+    if not ((a >= 0) & (a <= _MAX_COEFFICIENT) & (s >= _MIN_SCATTERING) & (s <= _MAX_COEFFICIENT)).all():
+        actual = f"got absorption {a.tolist()} and scattering {s.tolist()}"
+        expected = f"absorption from 0 and scattering from {_MIN_SCATTERING:g} to {_MAX_COEFFICIENT:g} /mm"
+        refuse(culprit, expected, actual, "Correct them")
+    semi_infinite = np.isinf(layer.thickness_mm) and layer.thickness_mm > 0 and last
+    if not semi_infinite and not _MIN_THICKNESS_MM <= layer.thickness_mm <= _MAX_THICKNESS_MM:
+        limits = f"{_MIN_THICKNESS_MM:g} to {_MAX_THICKNESS_MM:g} mm"
+        expected = f"a thickness from {limits}, infinite in the last layer only"
+        refuse(culprit, expected, f"got {layer.thickness_mm} mm", "Correct it")
 
 
 @cache
 def media() -> Mapping[str, Medium]:
-    """The named media, with skin's index of refraction."""
-    found: dict[str, Medium] = {}
+    """Return the named media, with the index of refraction of skin."""
+    named: dict[str, Medium] = {}
     for table, sources in _SOURCES.items():
-        for name, layers in _read(table).items():
+        for name, layers in _read_media(table).items():
             notes = (_DJ3_NOTE,) if name == "dj3" else ()
-            found[name] = Medium(name, tuple(layers), SKIN_ETA, notes, sources)
-    return found
+            named[name] = Medium(name, tuple(layers), SKIN_ETA, notes, sources)
+    return named
 
 
 def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
-    """The medium that a parsed TOML file describes.
+    """Return the medium described by a parsed TOML file.
 
     document : `eta` and, topmost first, `[[layers]]` with `absorption_per_mm` and `scattering_per_mm` (lists
-        of 3), and `thickness_mm` in all but the last
+        of 3), and `thickness_mm` in all layers but the last
 
     Raises DermisError for any other content.
     """
     tables = document.get("layers")
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         refuse(path, "[[layers]] with absorption_per_mm and scattering_per_mm", "it has none", "Add them")
-    layers = tuple(_layer(f"{path}, layer {count}", table) for count, table in enumerate(tables, 1))
+    layers = tuple(
+        _layer_from_table(f"{path}, layer {count}", table) for count, table in enumerate(tables, 1)
+    )
     unknown = sorted(set(document) - {"name", "eta", "layers"})
     if unknown:
-        refuse(path, "name, eta and [[layers]]", f"{', '.join(unknown)} came", "Take them out")
-    eta = number(f"{path}: eta", document.get("eta", SKIN_ETA), *_ETA)
+        refuse(path, "name, eta and [[layers]]", f"got {', '.join(unknown)}", "Take them out")
+    eta = checked_number(f"{path}: eta", document.get("eta", SKIN_ETA), *_ETA_RANGE)
     return Medium(str(document.get("name", path.stem)), layers, eta)
 
 
-def _layer(place: str, table: Mapping[str, Any]) -> Layer:
+def _layer_from_table(culprit: str, table: Mapping[str, Any]) -> Layer:
     unknown = sorted(set(table) - {"name", "thickness_mm", *_KEYS})
     if unknown:
         known = ", ".join(("name", "thickness_mm", *_KEYS))
-        refuse(place, known, f"{', '.join(unknown)} came", "Take it out or correct its name")
-    absorption, scattering = (_three(place, table, key) for key in _KEYS)
+        refuse(culprit, known, f"got {', '.join(unknown)}", "Take it out or correct its name")
+    absorption, scattering = (_rgb_coefficients(culprit, table, key) for key in _KEYS)
     thickness = table.get("thickness_mm", np.inf)
     if thickness != np.inf:
-        thickness = number(f"{place}: thickness_mm", thickness, _THINNEST_MM, _THICKEST_MM)
+        thickness = checked_number(
+            f"{culprit}: thickness_mm", thickness, _MIN_THICKNESS_MM, _MAX_THICKNESS_MM
+        )
     return Layer(absorption, scattering, thickness, str(table.get("name", "layer")))
 
 
-def _three(place: str, table: Mapping[str, Any], key: str) -> Floats:
-    return numbers(f"{place}: {key}", table.get(key), (3,), 0.0, _DENSEST, "1/mm in red, green and blue")
+def _rgb_coefficients(culprit: str, table: Mapping[str, Any], key: str) -> Floats:
+    return checked_array(
+        f"{culprit}: {key}", table.get(key), (3,), 0.0, _MAX_COEFFICIENT, "1/mm in red, green and blue"
+    )
 
 
-def _read(table: str) -> dict[str, list[Layer]]:
+def _read_media(table: str) -> dict[str, list[Layer]]:
     found: dict[str, list[Layer]] = {}
     for row in read_rows("dermis.optics", f"data/media/{table}"):
         medium, layer, thickness, *coefficients = row.values()
@@ -196,10 +207,10 @@ def _read(table: str) -> dict[str, list[Layer]]:
     return found
 
 
-def albedo_of_colour(colour: ArrayLike, g: float = 0.0) -> Floats:
-    """Albedo of single scattering with which a half-space returns a colour, of its shape [-].
+def albedo_from_colour(colour: ArrayLike, g: float = 0.0) -> Floats:
+    """Return the single-scattering albedo of the half-space with a given colour, in the colour's shape [-].
 
-    g : mean cosine of the deflection [-]
+    g : mean cosine of the scattering angle [-]
 
     Source: van de Hulst's formula inverted, [dEon2016] eq. 53.7.
     """
@@ -209,10 +220,10 @@ def albedo_of_colour(colour: ArrayLike, g: float = 0.0) -> Floats:
     return np.asarray((1.0 - s**2) / (1.0 - g * s**2))
 
 
-def colour_of_albedo(albedo: ArrayLike, g: float = 0.0) -> Floats:
-    """Share of diffuse light that a half-space returns, of the albedo's shape [-].
+def colour_from_albedo(albedo: ArrayLike, g: float = 0.0) -> Floats:
+    """Return the diffuse reflectance of a half-space by its single-scattering albedo, in its shape [-].
 
-    g : mean cosine of the deflection [-]
+    g : mean cosine of the scattering angle [-]
 
     Source: van de Hulst's formula, [dEon2016].
     """

@@ -1,4 +1,4 @@
-"""Colours of many skins at once: a table over melanin and blood, and how to read it."""
+"""Colours of many skins at once, from a table over melanin and blood."""
 
 from __future__ import annotations
 
@@ -8,68 +8,69 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.diffusion.hankel import STILL
-from dermis.optics.diffusion.models import transform
+from dermis.optics.diffusion.hankel import ZERO_FREQUENCY
+from dermis.optics.diffusion.models import hankel_transform
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import mixed_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _NODES = 65
-_TOGETHER = 5  # rows of a table, small enough for a processor's cache
+_ROWS_PER_BATCH = 5  # rows of the table that are computed together and fit into the processor's cache
 _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 
 
 @dataclass(frozen=True)
 class ColourTable:
-    """Colours of skins that differ in melanin and blood alone.
+    """Colours of skins that differ only in melanin and blood.
 
-    colours : (n, n, 3) diffuse reflectance per incident light, linear Rec. 709, at the squares of evenly
-        spaced numbers from 0 to 1, melanin first [-]
+    colours : (n, n, 3) diffuse reflectance per incident light, linear Rec. 709, by melanin, then blood, both
+        at squares of evenly spaced numbers from 0 to 1 [-]
     """
 
     colours: Floats
 
-    def read(self, melanin: Floats, blood: Floats) -> Floats:
-        """Colours (k, 3) of skins with these shares (k,) of melanin and blood, 0 to 1 [-].
+    def lookup(self, melanin: Floats, blood: Floats) -> Floats:
+        """Return colours (k, 3) of skins with given fractions (k,) of melanin and blood, 0 to 1 [-].
 
-        Bilinear in the square roots, along which reflectance falls almost straight: 0.004 off at worst, where
-        there is next to no blood, and 0.0015 where there is 0.001 of both.
+        Interpolation is bilinear in the square roots, in which reflectance is nearly linear: the largest
+        error is 0.004, for very little blood, and 0.0015 for fractions of 0.001 and more.
         """
         n = len(self.colours)
-        (i, u), (j, v) = (_split(share, n) for share in (melanin, blood))
+        (i, u), (j, v) = (_cell_and_offset(fraction, n) for fraction in (melanin, blood))
         flat = self.colours.reshape(n * n, 3)
-        at = i * n + j
-        near = flat[at] + v * (flat[at + 1] - flat[at])
-        far = flat[at + n] + v * (flat[at + n + 1] - flat[at + n])
-        return np.asarray(near + u * (far - near))
+        index = i * n + j
+        low = flat[index] + v * (flat[index + 1] - flat[index])
+        high = flat[index + n] + v * (flat[index + n + 1] - flat[index + n])
+        return np.asarray(low + u * (high - low))
 
 
-def _split(share: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
-    """The node before each share, and how far (k, 1) it is to the next."""
-    place = np.sqrt(np.clip(share, 0.0, 1.0)) * (nodes - 1)
-    before = np.minimum(place.astype(np.int64), nodes - 2)
-    return before, (place - before)[:, None]
+def _cell_and_offset(fraction: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
+    """Return the table cell of each fraction, and the position within it from 0 to 1, (k, 1)."""
+    position = np.sqrt(np.clip(fraction, 0.0, 1.0)) * (nodes - 1)
+    cell = np.minimum(position.astype(np.int64), nodes - 2)
+    return cell, (position - cell)[:, None]
 
 
 def colour_table(parameters: SkinParameters, nodes: int = _NODES) -> ColourTable:
-    """The colours of all skins like this one, by layered diffusion; its own melanin and blood are ignored.
+    """Return the colours of skins by melanin and blood, from layered diffusion.
 
+    parameters : of the skin; its own melanin and blood are ignored
     nodes : along each side of the table
     """
     epidermis, dermis = mixed_layers(parameters, np.linspace(0.0, 1.0, nodes) ** 2)
-    bloods = np.arange(nodes)
+    blood = np.arange(nodes)
     spectra = []
-    for melanins in np.array_split(np.arange(nodes), -(-nodes // _TOGETHER)):
-        rows, columns = np.repeat(melanins, nodes), np.tile(bloods, len(melanins))
-        medium = Medium("skins", (_picked(epidermis, rows), _picked(dermis, columns)), SKIN_ETA)
-        total = transform(medium, "layered", "layer", STILL)[0]
+    for melanin in np.array_split(np.arange(nodes), -(-nodes // _ROWS_PER_BATCH)):
+        rows, columns = np.repeat(melanin, nodes), np.tile(blood, len(melanin))
+        medium = Medium("skins", (_select_rows(epidermis, rows), _select_rows(dermis, columns)), SKIN_ETA)
+        total = hankel_transform(medium, "layered", "layer", ZERO_FREQUENCY)[0]
         spectra.append(total.reshape(-1, len(WAVELENGTHS_NM)))
     entering = 1.0 - normal_reflectance(SKIN_ETA)
     colours = entering * np.concatenate(spectra) @ rgb_weights(WAVELENGTHS_NM).T
     return ColourTable(np.maximum(colours, 0.0).reshape(nodes, nodes, 3))
 
 
-def _picked(layer: Layer, rows: NDArray[np.int64]) -> Layer:
-    """Rows of a stacked layer, their channels in one line."""
+def _select_rows(layer: Layer, rows: NDArray[np.int64]) -> Layer:
+    """Return some rows of a stacked layer with their channels concatenated."""
     return replace(layer, **{name: getattr(layer, name)[rows].ravel() for name in _COEFFICIENTS})

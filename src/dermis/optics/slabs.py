@@ -1,4 +1,4 @@
-"""Slabs of anisotropic media by adding and doubling, and half-spaces that scatter forward."""
+"""Slabs of anisotropically scattering media by adding and doubling."""
 
 from __future__ import annotations
 
@@ -9,69 +9,71 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.optics.directions import (
-    KEPT,
-    ROWS,
-    Directions,
-    albedo_returning,
+from dermis.optics.angular_response import (
+    CACHE_SIZE,
+    DIRECTION_ROWS,
+    AngularResponse,
+    albedo_for_reflectance,
+    angular_response,
     critical_cosine,
-    directions,
-    gaussian_nodes,
+    gauss_legendre,
     internal_reflectance,
-    interpolated,
-    mean_of_once,
-    refracted,
+    interpolate_table,
+    mean_single_scattering_kernel,
+    refracted_cosine,
 )
 
 Floats = NDArray[np.float64]
 NODES = 16
-"""Cosines of those directions that leave a slab, and as many of those that are held back."""
-DEEP = 1e4
-"""Mean free paths that are as good as a half-space."""
-_THINNEST = 1e-6  # optical thickness in which light scatters once at most
-_NEAR = 3  # cosines by which those beyond the last one are told
-_LEAST = 1e-12
+"""Quadrature nodes of directions that leave a slab, and as many of directions that are totally reflected."""
+DEEP_OPTICAL_DEPTH = 1e4
+"""Thickness at which a slab equals a half-space [mean free paths]."""
+_MIN_OPTICAL_DEPTH = 1e-6  # optical depth in which light scatters at most once
+_EXTRAPOLATION_POINTS = 3  # cosines from which values beyond the last one are extrapolated
+_MIN_REFLECTANCE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Phase:
-    """How a medium scatters, all azimuths together.
+class PhaseMatrices:
+    """Phase function of a medium averaged over azimuth, at discrete directions.
 
-    What is scattered straight on counts as not: a medium that scatters less stands for the true one.
+    The forward peak is treated as unscattered light, so that the scaled medium scatters less than the true
+    one.
 
-    albedo : of single scattering of that medium [-]
-    extinction, whole_extinction : of that medium and of the true one, over the reduced extinction [-]
-    backward, forward : (m, m) from cosines to cosines, to the other side of the horizon and to the same; 1
-        where light scatters alike in all directions [-]
+    albedo : single-scattering albedo of the scaled medium [-]
+    extinction : extinction coefficient of the scaled medium over the reduced extinction [-]
+    unscaled_extinction : the same of the true medium [-]
+    backward, forward : (m, m) from cosines to cosines, into the opposite hemisphere and into the same; 1 for
+        isotropic scattering [-]
     """
 
     albedo: float
     extinction: float
-    whole_extinction: float
+    unscaled_extinction: float
     backward: Floats
     forward: Floats
 
 
-def phase(albedo: float, g: float, cosine: Floats, terms: int) -> Phase:
-    """The scattering of Henyey and Greenstein, by polynomials of Legendre.
+def phase_matrices(albedo: float, g: float, cosine: Floats, terms: int) -> PhaseMatrices:
+    """Return the Henyey-Greenstein phase function expanded in Legendre polynomials.
 
     albedo : reduced [-]
-    g : mean cosine, 0 or more, under 1 [-]
-    cosine : (m,) of directions
-    terms : of the series; the rest goes straight on
+    g : mean cosine, at least 0 and less than 1 [-]
+    cosine : (m,) of the directions
+    terms : of the series; the remainder is treated as unscattered
 
-    Sources: [HenyeyGreenstein1941]; [Wiscombe1977] for what goes straight on.
+    Sources: [HenyeyGreenstein1941]; [Wiscombe1977] for the truncated forward peak.
     """
-    whole = 1.0 + albedo * g / (1.0 - g)
-    single, straight = albedo / ((1.0 - g) * whole), g**terms
+    unscaled = 1.0 + albedo * g / (1.0 - g)
+    single, peak = albedo / ((1.0 - g) * unscaled), g**terms
     order = np.arange(terms)
-    moment = (2.0 * order + 1.0) * (g**order - straight) / (1.0 - straight)
+    moment = (2.0 * order + 1.0) * (g**order - peak) / (1.0 - peak)
     P = np.polynomial.legendre.legvander(cosine, terms - 1)
-    left = 1.0 - straight * single
-    return Phase(
-        albedo=(1.0 - straight) * single / left,
-        extinction=left * whole,
-        whole_extinction=whole,
+    remaining = 1.0 - peak * single
+    return PhaseMatrices(
+        albedo=(1.0 - peak) * single / remaining,
+        extinction=remaining * unscaled,
+        unscaled_extinction=unscaled,
         backward=(P * moment * (-1.0) ** order) @ P.T,
         forward=(P * moment) @ P.T,
     )
@@ -79,204 +81,241 @@ def phase(albedo: float, g: float, cosine: Floats, terms: int) -> Phase:
 
 @dataclass(frozen=True, eq=False)
 class Slabs:
-    """What becomes of the power that enters slabs of several thicknesses, from each of m directions.
+    """Reflected and transmitted power of slabs of n thicknesses for m incident directions.
 
-    cosine : (m,) of entry, below the surface, that light from the air has [-]
-    flux : (m,) share of uniform light from the air that enters there; they sum to 1
-    back, through : (n, m) share that leaves after it scattered, on the side of entry and on the far one [-]
+    cosine : (m,) incident cosines below the surface, of directions that light from air has [-]
+    flux : (m,) fraction of uniform light from air at each cosine; sums to 1
+    reflected, transmitted : (n, m) fraction that scattered and leaves on the side of entry or on the far side
+        [-]
     """
 
     cosine: Floats
     flux: Floats
-    back: Floats
-    through: Floats
+    reflected: Floats
+    transmitted: Floats
 
 
-def slabs(albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = NODES, g: float = 0.0) -> Slabs:
-    """Slabs by adding and doubling; exact but for the number of directions.
+def solve_slabs(
+    albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = NODES, g: float = 0.0
+) -> Slabs:
+    """Compute slabs by adding and doubling; exact except for the discretisation of directions.
 
-    albedo : of single scattering, reduced where that goes forward [-]
-    optical_depth : (n,) thickness in mean free paths, reduced ones likewise, above 0 [-]
-    eta : index of refraction against the air on both sides, at least 1 [-]
+    albedo : of single scattering, reduced if scattering is anisotropic [-]
+    optical_depth : (n,) thickness in (reduced) mean free paths, above 0 [-]
+    eta : index of refraction relative to the air on both sides, at least 1 [-]
     nodes : as `NODES`
-    g : mean cosine of scattering, 0 or more [-]
+    g : mean cosine of scattering, at least 0 [-]
 
-    Source: [Chandrasekhar1960] section 50 for what layers do together.
+    Source: [Chandrasekhar1960] section 50 for the addition of layers.
     """
     tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
-    way = _Way.of(albedo, eta, nodes, g)
-    times = way.times(float(tau.max()))
-    *_, (R, T, straight) = _doubled(way, tau / 2.0**times, times)
-    return _cut(way, R, T, straight)
+    transport = _Transport.create(albedo, eta, nodes, g)
+    doublings = transport.doublings(float(tau.max()))
+    *_, (R, T, unscattered) = _doubling_steps(transport, tau / 2.0**doublings, doublings)
+    return _slabs_in_air(transport, R, T, unscattered)
 
 
-def doubled_slabs(
-    albedo: float, least: ArrayLike, times: int, eta: float, nodes: int = NODES, g: float = 0.0
+def solve_doubled_slabs(
+    albedo: float, smallest_depth: ArrayLike, doublings: int, eta: float, nodes: int = NODES, g: float = 0.0
 ) -> Slabs:
-    """`slabs` of the least depths, of twice those and so on: each is on the way to the next.
+    """Compute slabs of given depths and all their doublings, in the time of the thickest alone.
 
-    least : (n,) optical depths, of about the same size [-]
-    times : that they are doubled; there are n (times + 1) slabs, ordered by times, then by `least`
+    smallest_depth : (n,) optical depths of similar size [-]
+    doublings : number of doublings; the n (doublings + 1) slabs are ordered by doubling, then as
+        `smallest_depth`
     """
-    way = _Way.of(albedo, eta, nodes, g)
-    before = way.times(float(np.max(least)))
-    made = list(_doubled(way, np.asarray(least, np.float64) / 2.0**before, before + times))[before:]
-    R, T, straight = (np.concatenate(part) for part in zip(*made, strict=True))
-    return _cut(way, R, T, straight)
+    transport = _Transport.create(albedo, eta, nodes, g)
+    before = transport.doublings(float(np.max(smallest_depth)))
+    tau = np.asarray(smallest_depth, np.float64) / 2.0**before
+    steps = list(_doubling_steps(transport, tau, before + doublings))[before:]
+    R, T, unscattered = (np.concatenate(part) for part in zip(*steps, strict=True))
+    return _slabs_in_air(transport, R, T, unscattered)
 
 
-def leaving_deep(albedo: float, eta: float, nodes: int, g: float) -> tuple[Floats, Floats, Floats]:
-    """What a half-space makes of light by its directions.
+def half_space_radiance(albedo: float, eta: float, nodes: int, g: float) -> tuple[Floats, Floats, Floats]:
+    """Return cosines, fractions of uniform light and emerging radiance of a half-space by directions.
 
-    Cosines (m,) below the surface, shares (m,) of uniform light that enters or leaves there, and (m, m) light
-    that leaves by direction, of exit first, over what enters: its mean by the shares is all that leaves.
+    Cosines (m,) are below the surface. Fractions (m,) are those of uniform light that enters at each cosine.
+    Radiance (m, m) is by exit direction, then entry direction, per light that enters: its mean weighted by
+    the fractions is the reflectance.
     """
-    way = _Way.of(albedo, eta, nodes, g)
-    times = way.times(DEEP)
-    *_, (R, T, straight) = _doubled(way, np.array([DEEP / 2.0**times]), times)
-    back, _ = _between_faces(R * way.flux, T * way.flux, straight, way.held, R, T)
-    leaving = (way.flux * (1.0 - way.held))[way.escapes]
-    radiance = back[0][np.ix_(way.escapes, way.escapes)] * leaving.sum()
-    return way.mu[way.escapes], leaving / leaving.sum(), radiance
+    transport = _Transport.create(albedo, eta, nodes, g)
+    doublings = transport.doublings(DEEP_OPTICAL_DEPTH)
+    *_, (R, T, unscattered) = _doubling_steps(
+        transport, np.array([DEEP_OPTICAL_DEPTH / 2.0**doublings]), doublings
+    )
+    reflected, _ = _add_faces(R * transport.flux, T * transport.flux, unscattered, transport.internal, R, T)
+    leaving = (transport.flux * (1.0 - transport.internal))[transport.escapes]
+    radiance = reflected[0][np.ix_(transport.escapes, transport.escapes)] * leaving.sum()
+    return transport.mu[transport.escapes], leaving / leaving.sum(), radiance
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
-    """How light goes on in a medium: cosines (m,), their shares of uniform light inside, what faces hold
-    back, which of them leave, and what scattering does."""
+class _Transport:
+    """Discrete directions in a medium, with their internal reflection and scattering.
+
+    mu, flux : (m,) cosines, and fractions of uniform light inside
+    internal : (m,) reflectance of the faces from inside
+    escapes : (m,) whether light at this cosine leaves through a face
+    phase : how the medium scatters
+    """
 
     mu: Floats
     flux: Floats
-    held: Floats
+    internal: Floats
     escapes: NDArray[np.bool_]
-    phase: Phase
+    phase: PhaseMatrices
 
     @classmethod
-    def of(cls, albedo: float, eta: float, nodes: int, g: float) -> _Way:
-        mu, weight = _cosines(eta, nodes)
-        held, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
-        return cls(mu, 2.0 * weight * mu, held, escapes, phase(albedo, g, mu, nodes))
+    def create(cls, albedo: float, eta: float, nodes: int, g: float) -> _Transport:
+        mu, weight = _quadrature(eta, nodes)
+        internal, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
+        return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
 
-    def times(self, depth: float) -> int:
-        """How often slabs are doubled that begin so thin that light scatters in them once at most."""
-        return int(np.ceil(np.log2(max(depth * self.phase.extinction / _THINNEST, 1.0))))
+    def doublings(self, depth: float) -> int:
+        """Return how often a slab in which light scatters at most once must be doubled to reach a depth."""
+        return int(np.ceil(np.log2(max(depth * self.phase.extinction / _MIN_OPTICAL_DEPTH, 1.0))))
 
 
-def _cut(way: _Way, R: Floats, T: Floats, straight: Floats) -> Slabs:
-    """What slabs between two faces make of light from the air."""
-    flux, escapes = way.flux, way.escapes
-    back, through = _between_faces(R * flux, T * flux, straight, way.held, R, T)
-    leaving = flux * (1.0 - way.held)
+def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floats) -> Slabs:
+    """Return slabs between two faces, lit from air."""
+    flux, escapes = transport.flux, transport.escapes
+    reflected, transmitted = _add_faces(R * flux, T * flux, unscattered, transport.internal, R, T)
+    leaving = flux * (1.0 - transport.internal)
     entering = leaving[escapes] / leaving[escapes].sum()
-    up, down = (np.einsum("k,nkm->nm", leaving, part[..., escapes]) for part in (back, through))
-    if way.phase.extinction < way.phase.whole_extinction:  # what scattered straight on has scattered too
-        whole = straight ** (way.phase.whole_extinction / way.phase.extinction)
-        (up_on, down_on), (up_off, down_off) = (_unscattered(one, way.held) for one in (straight, whole))
+    up, down = (np.einsum("k,nkm->nm", leaving, part[..., escapes]) for part in (reflected, transmitted))
+    phase = transport.phase
+    if phase.extinction < phase.unscaled_extinction:  # light in the truncated forward peak has scattered
+        unscaled = unscattered ** (phase.unscaled_extinction / phase.extinction)
+        (up_on, down_on), (up_off, down_off) = (
+            _leaving_unscattered(part, transport.internal) for part in (unscattered, unscaled)
+        )
         up, down = up + (up_on - up_off)[:, escapes], down + (down_on - down_off)[:, escapes]
-    return Slabs(way.mu[escapes], entering, up, down)
+    return Slabs(transport.mu[escapes], entering, up, down)
 
 
-def _unscattered(straight: Floats, held: Floats) -> tuple[Floats, Floats]:
-    """(n, m) light that leaves as it entered, on the side of entry and on the far one."""
-    down = (1.0 - held) * straight / (1.0 - (straight * held) ** 2)
-    return down * straight * held, down
+def _leaving_unscattered(unscattered: Floats, internal: Floats) -> tuple[Floats, Floats]:
+    """Return unscattered light that leaves on the side of entry and on the far side, (n, m) each."""
+    down = (1.0 - internal) * unscattered / (1.0 - (unscattered * internal) ** 2)
+    return down * unscattered * internal, down
 
 
-def _cosines(eta: float, nodes: int) -> tuple[Floats, Floats]:
-    """Gaussian nodes and weights below the surface: those that escape, and those that it holds back."""
+def _quadrature(eta: float, nodes: int) -> tuple[Floats, Floats]:
+    """Return nodes and weights of cosines below the surface: escaping ones, then totally reflected ones."""
     critical = critical_cosine(eta)
     spans = [(critical, 1.0), (0.0, critical)] if critical > 0.0 else [(0.0, 1.0)]
-    parts = [gaussian_nodes(low, high, nodes) for low, high in spans]
+    parts = [gauss_legendre(low, high, nodes) for low, high in spans]
     mu, weight = (np.concatenate(both) for both in zip(*parts, strict=True))
     return mu, weight
 
 
-def _doubled(way: _Way, tau: Floats, times: int) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Of slabs so thin, then of ones twice as thick each time: (n, m, m) radiance over pi, back and through,
-    per power from each direction; (n, m) unscattered.
+def _doubling_steps(
+    transport: _Transport, tau: Floats, doublings: int
+) -> Iterator[tuple[Floats, Floats, Floats]]:
+    """Yield reflection, transmission and unscattered light of very thin slabs, then of each doubling.
 
-    tau : (n,) in reduced mean free paths
+    Reflection and transmission are (n, m, m): radiance over pi per power from each direction. Unscattered
+    light is (n, m).
+
+    tau : (n,) first thickness in reduced mean free paths
     """
-    mu, flux, albedo = way.mu, way.flux, way.phase.albedo
-    t = way.phase.extinction * tau[:, None, None]
+    mu, flux, albedo = transport.mu, transport.flux, transport.phase.albedo
+    t = transport.phase.extinction * tau[:, None, None]
     a, b = mu[:, None], mu[None, :]
-    R = -0.25 * albedo / (a + b) * np.expm1(-t * (1.0 / a + 1.0 / b)) * way.phase.backward
-    T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b)) * way.phase.forward
-    straight = np.exp(-t[..., 0] / mu)
-    yield R, T, straight
-    for _ in range(times):
-        up, down = R * flux, T * flux + straight[:, :, None] * np.eye(len(mu))
-        entering = R * straight[:, None, :]
+    R = -0.25 * albedo / (a + b) * np.expm1(-t * (1.0 / a + 1.0 / b)) * transport.phase.backward
+    T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b)) * transport.phase.forward
+    unscattered = np.exp(-t[..., 0] / mu)
+    yield R, T, unscattered
+    for _ in range(doublings):
+        up, down = R * flux, T * flux + unscattered[:, :, None] * np.eye(len(mu))
+        entering = R * unscattered[:, None, :]
         between = np.linalg.solve(np.eye(len(mu)) - up @ up, T + up @ entering)
-        R, T = R + down @ (up @ between + entering), down @ between + T * straight[:, None, :]
-        straight = straight**2
-        yield R, T, straight
+        R, T = R + down @ (up @ between + entering), down @ between + T * unscattered[:, None, :]
+        unscattered = unscattered**2
+        yield R, T, unscattered
 
 
-def _between_faces(
-    up: Floats, down: Floats, straight: Floats, held: Floats, R: Floats, T: Floats
+def _add_faces(
+    up: Floats, down: Floats, unscattered: Floats, internal: Floats, R: Floats, T: Floats
 ) -> tuple[Floats, Floats]:
-    """Scattered radiance over pi below the upper and above the lower face, per power that enters.
+    """Return scattered radiance over pi below the upper and above the lower face, per power that enters.
 
-    up, down : (n, m, m) what the slab makes of radiance: it reflects and scatters it through
-    held : (m,) share that a face reflects back into the slab
+    up, down : (n, m, m) reflection and transmission operators of the slab
+    internal : (m,) reflectance of a face from inside
     """
-    if not held.any():
+    if not internal.any():
         return R, T
-    unit, count = np.eye(len(held)), len(held)
-    passing = (down + straight[:, :, None] * unit) * held
-    around = np.block([[unit - up * held, -passing], [-passing, unit - up * held]])
-    # What has not scattered goes to and fro between the faces by itself.
-    once = 1.0 / (1.0 - (straight * held) ** 2)
-    below = held * straight * once
-    top = R * (once[:, None, :]) + T * below[:, None, :]
-    bottom = T * once[:, None, :] + R * below[:, None, :]
-    solved = np.linalg.solve(around, np.concatenate([top, bottom], axis=1))
+    identity, count = np.eye(len(internal)), len(internal)
+    passing = (down + unscattered[:, :, None] * identity) * internal
+    system = np.block([[identity - up * internal, -passing], [-passing, identity - up * internal]])
+    # Unscattered light is reflected back and forth between the faces.
+    passes = 1.0 / (1.0 - (unscattered * internal) ** 2)
+    below = internal * unscattered * passes
+    top = R * (passes[:, None, :]) + T * below[:, None, :]
+    bottom = T * passes[:, None, :] + R * below[:, None, :]
+    solved = np.linalg.solve(system, np.concatenate([top, bottom], axis=1))
     return solved[:, :count], solved[:, count:]
 
 
-def forward_directions(total: ArrayLike, eta: float, g: float) -> Directions:
-    """`directions` of half-spaces of the same reduced coefficients whose scattering goes forward.
+def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularResponse:
+    """Return `angular_response` of half-spaces with anisotropic scattering and the same reduced coefficients.
 
-    To what leaves at a slant there comes what the best fits to all pairs of directions differ by.
+    The single-scattering term changes by the difference of least-squares fits to all pairs of directions.
 
-    total : (c,) that half-spaces which scatter alike in all directions return [-]
-    eta : index of refraction against the air, at least 1 [-]
-    g : mean cosine of scattering, 0 or more [-]
+    total : (c,) reflectance of half-spaces that scatter isotropically [-]
+    eta : index of refraction relative to air, at least 1 [-]
+    g : mean cosine of scattering, at least 0 [-]
     """
-    even = directions(total, eta)
+    isotropic = angular_response(total, eta)
     if g == 0.0:
-        return even
-    shares = np.atleast_1d(np.asarray(total, np.float64))
-    found, plain = (
-        np.stack([interpolated(partial(_numbers, eta, one), float(share)) for share in shares], axis=-1)
-        for one in (g, 0.0)
+        return isotropic
+    totals = np.atleast_1d(np.asarray(total, np.float64))
+    table, isotropic_table = (
+        np.stack(
+            [
+                interpolate_table(partial(_response_column, eta, mean_cosine), float(value))
+                for value in totals
+            ],
+            axis=-1,
+        )
+        for mean_cosine in (g, 0.0)
     )
-    once = even.once + found[ROWS + 1] - plain[ROWS + 1]
-    return Directions(eta, found[:ROWS], found[ROWS], once, even.mean_once)
+    change = table[DIRECTION_ROWS + 1] - isotropic_table[DIRECTION_ROWS + 1]
+    single_scattering = isotropic.single_scattering + change
+    return AngularResponse(
+        eta, table[:DIRECTION_ROWS], table[DIRECTION_ROWS], single_scattering, isotropic.mean_kernel
+    )
 
 
-@lru_cache(maxsize=KEPT)
-def _numbers(eta: float, g: float, total: float) -> Floats:
-    """(ROWS + 2,) as `directions` has them."""
-    a, share, radiance = leaving_deep(albedo_returning(total, eta), eta, NODES, g)
-    returned = share @ radiance
-    above = float(_beyond(a, returned, np.ones(1))[0])
-    if above <= _LEAST:
-        return np.append(np.ones(ROWS + 1), 0.0)
-    table = _beyond(a, returned, refracted(np.linspace(0.0, 1.0, ROWS) ** 2, eta))
+@lru_cache(maxsize=CACHE_SIZE)
+def _response_column(eta: float, g: float, total: float) -> Floats:
+    """Return relative and relative diffuse reflectance and single scattering, (DIRECTION_ROWS + 2,)."""
+    a, fraction, radiance = half_space_radiance(albedo_for_reflectance(total, eta), eta, NODES, g)
+    reflectance = fraction @ radiance
+    normal = float(_extrapolated(a, reflectance, np.ones(1))[0])
+    if normal <= _MIN_REFLECTANCE:
+        return np.append(np.ones(DIRECTION_ROWS + 1), 0.0)
+    table = _extrapolated(a, reflectance, refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta))
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
-    slant, uneven = 1.0 / (a[:, None] + a) - mean_of_once(air, eta), radiance - returned
-    weight = np.outer(share, share)
-    once = (weight * slant * uneven).sum() / (weight * slant**2).sum()
-    return np.concatenate([table, [share @ returned, once]]) / above
+    kernel, deviation = (
+        1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta),
+        radiance - reflectance,
+    )
+    weight = np.outer(fraction, fraction)
+    single_scattering = (weight * kernel * deviation).sum() / (weight * kernel**2).sum()
+    return np.concatenate([table, [fraction @ reflectance, single_scattering]]) / normal
 
 
-def _beyond(known: Floats, values: Floats, cosine: Floats) -> Floats:
-    """Values at cosines, between those known and a little beyond."""
+def _extrapolated(known: Floats, values: Floats, cosine: Floats) -> Floats:
+    """Interpolate values at cosines, and extrapolate a little beyond the known ones."""
     order = np.argsort(known)
     x, y = known[order], values[order]
     found = np.interp(cosine, x, y)
-    for end, outside in ((slice(_NEAR), cosine < x[0]), (slice(-_NEAR, None), cosine > x[-1])):
-        found = np.where(outside, np.polyval(np.polyfit(x[end], y[end], _NEAR - 1), cosine), found)
+    for end, outside in (
+        (slice(_EXTRAPOLATION_POINTS), cosine < x[0]),
+        (slice(-_EXTRAPOLATION_POINTS, None), cosine > x[-1]),
+    ):
+        found = np.where(
+            outside, np.polyval(np.polyfit(x[end], y[end], _EXTRAPOLATION_POINTS - 1), cosine), found
+        )
     return np.asarray(found)

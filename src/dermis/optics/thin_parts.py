@@ -1,4 +1,4 @@
-"""What thin parts of a profile's medium let through, and what they therefore return less, by Gaussians."""
+"""Transmittance and lost reflectance of thin parts of a half-space, as weights of its profile's Gaussians."""
 
 from __future__ import annotations
 
@@ -10,152 +10,177 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.optics.angular_response import CACHE_SIZE, DIRECTION_ROWS, interpolate_table, refracted_cosine
 from dermis.optics.diffusion import hankel
-from dermis.optics.diffusion.boundary import mismatch
-from dermis.optics.diffusion.layered_diffusion import respond_sheets
-from dermis.optics.directions import KEPT, interpolated, refracted
-from dermis.optics.directions import ROWS as DIRECTIONS
-from dermis.optics.flesh import LEAST_ALBEDO, MOST_ALBEDO, albedo_of_total
+from dermis.optics.diffusion.boundary import boundary_mismatch
+from dermis.optics.diffusion.layered_diffusion import solve_thicknesses
+from dermis.optics.equivalent_medium import MAX_ALBEDO, MIN_ALBEDO, albedo_for_total
 from dermis.optics.media import Layer, Medium
-from dermis.optics.slabs import DEEP, NODES, Slabs, doubled_slabs, slabs
+from dermis.optics.slabs import DEEP_OPTICAL_DEPTH, NODES, Slabs, solve_doubled_slabs, solve_slabs
 
 Floats = NDArray[np.float64]
-ROWS = 32
-"""Thicknesses of the tables."""
-_LAW_DEPTH = 10.0  # mean free paths from which on directions of entry count alike
-_FEW = 8  # cosines for what uniform light does
-_LEAST_DEPTHS, _DOUBLED = 1e-4 * np.array([1.0, 2.0**0.5]), 25  # of slabs that are cut [mean free path]
-_DEPTHS = (_LEAST_DEPTHS * 2.0 ** np.arange(_DOUBLED + 1)[:, None]).ravel()
-_LEAST = 1e-300  # share that passes black slabs as deep as the last
-_FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which shapes are compared [1/mean free path]
+THICKNESS_ROWS = 32
+"""Number of thicknesses in the tables."""
+_DEEP_ENOUGH = 10.0  # mean free paths beyond which relative transmittance by direction is constant
+_UNIFORM_NODES = 8  # quadrature nodes for uniform light
+_MIN_DEPTHS, _DOUBLINGS = (
+    1e-4 * np.array([1.0, 2.0**0.5]),
+    25,
+)  # smallest slabs that are solved, and how often they are doubled [mean free paths]
+_DEPTHS = (_MIN_DEPTHS * 2.0 ** np.arange(_DOUBLINGS + 1)[:, None]).ravel()
+_MIN_TRANSMITTANCE = 1e-300  # of black slabs of the largest depth
+_FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which profiles are compared [1/mean free path]
 
 
 @dataclass(frozen=True, eq=False)
 class ThinParts:
-    """Tables by thickness, evenly spaced in its root, of weights of a profile's k Gaussians in 3 channels.
+    """Tables over thickness of weights of k Gaussians in 3 channels, for parts thinner than a half-space.
 
-    Both are shares of what a half-space returns of the same light.
+    Rows are evenly spaced in the square root of the thickness. Weights are relative to the reflectance of the
+    half-space.
 
-    reach_mm : thickness of the last row; that of the first is 0
-    through : (ROWS, k, 3) that leave on the far side [-]
-    lost : (ROWS, k, 3) share that no longer leaves on the near side, spread as what leaves on the far one [-]
-    deep : (ROWS,) how far directions of entry count as in deep slabs, see `across` [-1, 1]
+    max_thickness_mm : thickness of the last row; that of the first is 0
+    transmitted : (THICKNESS_ROWS, k, 3) light that leaves on the far side [-]
+    lost : (THICKNESS_ROWS, k, 3) light that no longer leaves on the near side, spread like transmitted light
+        [-]
+    directionality : (THICKNESS_ROWS,) weight of `oblique_transmittance`: 1 as in deep slabs, 0 for none [-1,
+        1]
     """
 
-    reach_mm: float
-    through: Floats
+    max_thickness_mm: float
+    transmitted: Floats
     lost: Floats
-    deep: Floats
+    directionality: Floats
 
 
-def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float, g: float = 0.0) -> ThinParts:
-    """The tables of slabs that are cut from a half-space of one layer.
+def solve_thin_parts(
+    medium: Medium, variance_mm2: Floats, max_thickness_mm: float, g: float = 0.0
+) -> ThinParts:
+    """Return the tables of slabs of a medium of one layer.
 
     variance_mm2 : (k,) of the Gaussians that spread light
-    reach_mm : largest thickness of use
-    g : mean cosine of the body's scattering, whose coefficients are reduced [-]
+    max_thickness_mm : largest thickness of the tables
+    g : mean cosine of the medium's scattering; its coefficients are reduced [-]
 
-    How much goes through is exact, for uniform light from all directions, as its change with direction nearly
-    is; how wide it spreads is layered diffusion's, for light from above.
+    Transmittance is exact for uniform light; its width is that of layered diffusion at normal incidence.
 
     Sources: [Chandrasekhar1960] for the amounts, [Kienle1998] for the widths.
     """
-    depth = reach_mm * np.linspace(0.0, 1.0, ROWS) ** 2
-    through, lost = np.zeros((2, ROWS, len(variance_mm2), body.channels))
-    deep, weight = np.zeros((2, ROWS, body.channels))
-    for c, share in enumerate(_shares(body.layers[0], depth[1:], body.eta, g)):
-        shape = _shapes(body.channel(c), depth[1:], variance_mm2)
-        through[1:, :, c], lost[1:, :, c] = share.passed[:, None] * shape, share.lost[:, None] * shape
-        deep[1:, c], weight[1:, c] = share.deep, share.amount
-        lost[0, :, c] = shape[0]
-    deep[0], weight[0] = deep[1], weight[1]
-    mean = (weight * deep).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-12)
-    return ThinParts(reach_mm, through, lost, np.clip(mean, -1.0, 1.0))
+    thickness_mm = max_thickness_mm * np.linspace(0.0, 1.0, THICKNESS_ROWS) ** 2
+    transmitted, lost = np.zeros((2, THICKNESS_ROWS, len(variance_mm2), medium.channels))
+    directionality, weight = np.zeros((2, THICKNESS_ROWS, medium.channels))
+    for c, totals in enumerate(_slab_totals(medium.layers[0], thickness_mm[1:], medium.eta, g)):
+        spread = _spread_weights(medium.channel(c), thickness_mm[1:], variance_mm2)
+        transmitted[1:, :, c] = totals.relative_transmittance[:, None] * spread
+        lost[1:, :, c] = totals.lost[:, None] * spread
+        directionality[1:, c], weight[1:, c] = totals.directionality, totals.transmittance
+        lost[0, :, c] = spread[0]
+    directionality[0], weight[0] = directionality[1], weight[1]
+    mean = (weight * directionality).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-12)
+    return ThinParts(max_thickness_mm, transmitted, lost, np.clip(mean, -1.0, 1.0))
 
 
-def across(total: Floats, eta: float, counted: bool = False, g: float = 0.0) -> Floats:
-    """(directions.ROWS, c) what passes deep slabs from a direction, over what does of uniform light.
+def oblique_transmittance(total: Floats, eta: float, from_photons: bool = False, g: float = 0.0) -> Floats:
+    """Return the transmittance of deep slabs by incident direction, relative to uniform light.
 
-    Both for light of which as much comes back; by evenly spaced roots of the cosine, as `directions` has it.
+    The result (DIRECTION_ROWS, c) is divided by the reflectance of the half-space by direction. Rows are as
+    in `AngularResponse`.
 
-    total : (c,) that the half-space returns of what enters perpendicularly [-]
-    counted : whether the profile is of photons, as of `GaussianSum`
-    g : as of `thin_parts`
+    total : (c,) reflectance of the half-space for light that enters perpendicularly [-]
+    from_photons : whether the profile comes from photon counts, as in `GaussianSum`
+    g : as in `solve_thin_parts`
     """
-    return np.stack([interpolated(partial(_across, eta, counted, g), float(one)) for one in total], axis=-1)
+    return np.stack(
+        [interpolate_table(partial(_oblique_column, eta, from_photons, g), float(value)) for value in total],
+        axis=-1,
+    )
 
 
-@lru_cache(maxsize=KEPT)
-def _across(eta: float, counted: bool, g: float, total: float) -> Floats:
-    cosine = refracted(np.linspace(0.0, 1.0, DIRECTIONS) ** 2, eta)
-    whole, law = _law(albedo_of_total(total, eta, counted), eta, NODES, g)
-    return np.interp(cosine, whole.cosine, law)
+@lru_cache(maxsize=CACHE_SIZE)
+def _oblique_column(eta: float, from_photons: bool, g: float, total: float) -> Floats:
+    cosine = refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta)
+    half_space, relative = _deep_transmittance(albedo_for_total(total, eta, from_photons), eta, NODES, g)
+    return np.interp(cosine, half_space.cosine, relative)
 
 
-def _law(albedo: float, eta: float, nodes: int, g: float) -> tuple[Slabs, Floats]:
-    """The half-space, and what passes deep slabs of it by its cosines of entry, as `across` has it."""
-    whole = slabs(albedo, DEEP, eta, nodes, g)
-    return whole, _slanted(slabs(albedo, _LAW_DEPTH, eta, nodes, g), whole)[0]
+def _deep_transmittance(albedo: float, eta: float, nodes: int, g: float) -> tuple[Slabs, Floats]:
+    """Return the half-space, and `oblique_transmittance` of deep slabs at its incident cosines."""
+    half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, nodes, g)
+    deep = solve_slabs(albedo, _DEEP_ENOUGH, eta, nodes, g)
+    return half_space, _relative_transmittance(deep, half_space)[0]
 
 
-def _slanted(cut: Slabs, whole: Slabs) -> Floats:
-    """(n, m) what passes of light from each direction, as `across` has it."""
-    returned = whole.back[0] / _uniform(whole, whole.back)
-    passing = np.maximum(_uniform(cut, cut.through), _LEAST)[:, None]
-    return np.asarray(cut.through / passing / returned)
+def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
+    """Return the transmittance of slabs by direction, (n, m), scaled as in `oblique_transmittance`."""
+    reflected = half_space.reflected[0] / _uniform_mean(half_space, half_space.reflected)
+    transmitted = np.maximum(_uniform_mean(slabs, slabs.transmitted), _MIN_TRANSMITTANCE)[:, None]
+    return np.asarray(slabs.transmitted / transmitted / reflected)
 
 
-class _Shares(NamedTuple):
-    """Of uniform light by thickness, (n,) each: what comes through; this and what returns no longer over what
-    a half-space returns; and `ThinParts.deep`."""
+class _SlabTotals(NamedTuple):
+    """Power transmitted by slabs in uniform light, (n,) each.
 
-    amount: Floats
-    passed: Floats
+    transmittance : of the slab
+    relative_transmittance : transmittance over the reflectance of the half-space
+    lost : reflectance lost by the finite thickness, over the reflectance of the half-space
+    directionality : as in `ThinParts`
+    """
+
+    transmittance: Floats
+    relative_transmittance: Floats
     lost: Floats
-    deep: Floats
+    directionality: Floats
 
 
-def _shares(layer: Layer, depth_mm: Floats, eta: float, g: float) -> Iterator[_Shares]:
-    """Of each channel, by cubics between depths for which an albedo's slabs are cut once."""
+def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> Iterator[_SlabTotals]:
+    """Yield the totals of each channel, by cubic interpolation between cached depths."""
     from scipy.interpolate import CubicSpline
 
     roots = np.sqrt(1.0 - layer.alpha_prime).tolist()
-    cut = [interpolated(partial(_by_depth, eta, g), root) for root in roots]
-    spline = CubicSpline(np.log(_DEPTHS), np.stack(cut, axis=1))
+    columns = [interpolate_table(partial(_totals_column, eta, g), root) for root in roots]
+    spline = CubicSpline(np.log(_DEPTHS), np.stack(columns, axis=1))
     for c, extinction in enumerate(layer.sigma_t_prime.tolist()):
-        depth = np.clip(extinction * depth_mm, _DEPTHS[0], _DEPTHS[-1])
-        yield _Shares(*spline(np.log(depth))[:, c].T)
+        depth = np.clip(extinction * thickness_mm, _DEPTHS[0], _DEPTHS[-1])
+        yield _SlabTotals(*spline(np.log(depth))[:, c].T)
 
 
-@lru_cache(maxsize=KEPT)
-def _by_depth(eta: float, g: float, root: float) -> Floats:
-    """(n, 4) what `_Shares` holds by `_DEPTHS`, for the root of what a scattering absorbs."""
-    return np.stack(_cut(min(max(1.0 - root**2, LEAST_ALBEDO), MOST_ALBEDO), eta, g), axis=-1)
+@lru_cache(maxsize=CACHE_SIZE)
+def _totals_column(eta: float, g: float, root: float) -> Floats:
+    """Return the totals at all `_DEPTHS`, (n, 4), by the square root of 1 minus the albedo."""
+    return np.stack(_solve_depths(min(max(1.0 - root**2, MIN_ALBEDO), MAX_ALBEDO), eta, g), axis=-1)
 
 
-def _cut(albedo: float, eta: float, g: float) -> _Shares:
-    """Of slabs of `_DEPTHS`."""
-    cut = doubled_slabs(albedo, _LEAST_DEPTHS, _DOUBLED, eta, _FEW, g)
-    whole, slanted = _law(albedo, eta, _FEW, g)
-    returned, law = _uniform(whole, whole.back), slanted - 1.0
-    weight = whole.flux * whole.back[0]
-    deep = (_slanted(cut, whole) - 1.0) @ (weight * law) / (weight * law**2).sum()
-    amount, lost = _uniform(cut, cut.through), np.maximum(1.0 - _uniform(cut, cut.back) / returned, 0.0)
-    return _Shares(amount, amount / returned, lost, deep)
+def _solve_depths(albedo: float, eta: float, g: float) -> _SlabTotals:
+    """Compute the totals of slabs of all `_DEPTHS`."""
+    slabs = solve_doubled_slabs(albedo, _MIN_DEPTHS, _DOUBLINGS, eta, _UNIFORM_NODES, g)
+    half_space, deep = _deep_transmittance(albedo, eta, _UNIFORM_NODES, g)
+    reflectance, change = _uniform_mean(half_space, half_space.reflected), deep - 1.0
+    weight = half_space.flux * half_space.reflected[0]
+    own_change = _relative_transmittance(slabs, half_space) - 1.0
+    directionality = own_change @ (weight * change) / (weight * change**2).sum()
+    transmittance = _uniform_mean(slabs, slabs.transmitted)
+    lost = np.maximum(1.0 - _uniform_mean(slabs, slabs.reflected) / reflectance, 0.0)
+    return _SlabTotals(transmittance, transmittance / reflectance, lost, directionality)
 
 
-def _uniform(of: Slabs, share: Floats) -> Floats:
-    return np.asarray(share @ of.flux)
+def _uniform_mean(slabs: Slabs, by_direction: Floats) -> Floats:
+    return np.asarray(by_direction @ slabs.flux)
 
 
-def _shapes(body: Medium, depth_mm: Floats, variance_mm2: Floats) -> Floats:
-    """(n, k) weights of Gaussians, which sum to 1, that spread as what comes through each thickness."""
+def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) -> Floats:
+    """Fit weights of Gaussians to the transmittance profile of each thickness, (n, k); rows sum to 1."""
     from scipy.optimize import nnls
 
-    layer, A, sure = body.layers[0], mismatch(body.eta, "exact"), 100.0
+    layer, A, stiffness = medium.layers[0], boundary_mismatch(medium.eta, "exact"), 100.0
     s = _FREQUENCIES * float(layer.sigma_t_prime[0])
-    passed = respond_sheets(np.concatenate([hankel.STILL, s]), layer, depth_mm, A)[1][..., 0]
-    bells = np.vstack([np.exp(-0.5 * variance_mm2 * s[:, None] ** 2), np.full((1, len(variance_mm2)), sure)])
-    shape = passed[:, 1:] / np.maximum(passed[:, :1], _LEAST)  # deep in dark flesh nothing passes
-    made = np.stack([nnls(bells, np.append(one, sure))[0] for one in shape])
-    return np.asarray(made / made.sum(axis=1, keepdims=True))
+    frequency = np.concatenate([hankel.ZERO_FREQUENCY, s])
+    transform = solve_thicknesses(frequency, layer, thickness_mm, A)[1][..., 0]
+    # the last row makes the weights sum to 1
+    gaussians = np.vstack(
+        [np.exp(-0.5 * variance_mm2 * s[:, None] ** 2), np.full((1, len(variance_mm2)), stiffness)]
+    )
+    spread = transform[:, 1:] / np.maximum(
+        transform[:, :1], _MIN_TRANSMITTANCE
+    )  # thick dark slabs are opaque
+    weight = np.stack([nnls(gaussians, np.append(row, stiffness))[0] for row in spread])
+    return np.asarray(weight / weight.sum(axis=1, keepdims=True))

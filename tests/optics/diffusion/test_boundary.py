@@ -10,10 +10,10 @@ from slabs import table
 from tolerances import PUBLISHED
 
 from dermis.optics.diffusion.boundary import (
+    boundary_mismatch,
     diffuse_reflectance,
     fresnel,
     internal_moment,
-    mismatch,
     normal_reflectance,
 )
 
@@ -26,20 +26,20 @@ def test_fresnel_of_the_table(sample_folder: Path) -> None:
 def test_hemispherical_means_of_the_table(sample_folder: Path) -> None:
     for row in table(sample_folder, "fresnel_hemispherical.csv"):
         assert diffuse_reflectance(row["eta"], "exact") == pytest.approx(row["Fdr_internal_exact"], abs=1e-12)
-        assert mismatch(row["eta"], "exact") == pytest.approx(row["A_exact"], rel=1e-12)
+        assert boundary_mismatch(row["eta"], "exact") == pytest.approx(row["A_exact"], rel=1e-12)
         # The table rounds the polynomial's coefficients to three digits.
-        assert mismatch(row["eta"]) == pytest.approx(row["A_egan"], rel=1e-3)
+        assert boundary_mismatch(row["eta"]) == pytest.approx(row["A_egan"], rel=1e-3)
 
 
 def test_marble_of_the_notebook() -> None:
     """Intermediates of the fit that comes with [dEonLuebke2007]."""
     assert diffuse_reflectance(1.5) == pytest.approx(0.59681111, abs=1e-8)
-    assert mismatch(1.5) == pytest.approx(3.96045416, abs=1e-8)
+    assert boundary_mismatch(1.5) == pytest.approx(3.96045416, abs=1e-8)
 
 
 @pytest.mark.parametrize("kind", ["polynomial", "exact"])
 def test_matched_surface_does_nothing(kind: str) -> None:
-    assert mismatch(1.0, kind) == 1.0  # type: ignore[arg-type]
+    assert boundary_mismatch(1.0, kind) == 1.0  # type: ignore[arg-type]
     assert normal_reflectance(1.0) == 0.0
     assert internal_moment(1, 1.0) == 0.0
 

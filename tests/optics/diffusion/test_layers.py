@@ -11,12 +11,12 @@ from slabs import TWO_LAYER, case, ring_means, slab, table
 from tolerances import CLOSED_FORM, LAYERED_TOTAL
 
 from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
-from dermis.optics.diffusion.boundary import mismatch
+from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Layer, Medium, media
-from dermis.optics.radial import enclosed, resample
+from dermis.optics.radial import enclosed_energy, resample
 
-A = mismatch(1.4, "exact")
+A = boundary_mismatch(1.4, "exact")
 PRINTED_A = 3.250697461379377  # at 1.4, with the polynomial's coefficients rounded to three digits
 CASES = ("dj3_R", "dj3_G", "dj3_B", "two_layer")
 MODELS = ("multipole", "layered", "layered-point")
@@ -28,9 +28,9 @@ def test_totals_of_the_table(sample_folder: Path, name: str) -> None:
         if row["case"] != name:
             continue
         medium, A = case(name), row["A"]
-        added = multipole.respond(hankel.STILL, medium, A, "none").R_above[0, 0]
+        added = multipole.stack_response(hankel.ZERO_FREQUENCY, medium, A, "none").R_above[0, 0]
         beam, point = (
-            layered_diffusion.respond(hankel.STILL, medium, A, s)[0][0, 0] for s in ("beam", "point")
+            layered_diffusion.solve(hankel.ZERO_FREQUENCY, medium, A, s)[0][0, 0] for s in ("beam", "point")
         )
         assert added == pytest.approx(row["R_total_DJ_or_dipole"], rel=CLOSED_FORM)
         assert beam == pytest.approx(row["R_total_LD"], rel=CLOSED_FORM)
@@ -43,10 +43,10 @@ def test_profiles_of_the_table(sample_folder: Path, name: str) -> None:
     own = rows[(rows["case"] == name) & (rows["r_mm"] > 0.0)]
     s = hankel.frequencies()
     for transform, column in (
-        (multipole.respond(s, case(name), A, "none").R_above, "R_DJ_or_dipole_A_exact"),
-        (layered_diffusion.respond(s, case(name), A, "point")[0], "R_layered_point_LP_A_exact"),
+        (multipole.stack_response(s, case(name), A, "none").R_above, "R_DJ_or_dipole_A_exact"),
+        (layered_diffusion.solve(s, case(name), A, "point")[0], "R_layered_point_LP_A_exact"),
     ):
-        R = resample(own["r_mm"], hankel.radii(), hankel.to_radius(transform))[:, 0]
+        R = resample(own["r_mm"], hankel.radii(), hankel.inverse_transform(transform))[:, 0]
         assert np.allclose(R, own[column], rtol=CLOSED_FORM, atol=1e-8 * own[column].max())
 
 
@@ -57,8 +57,8 @@ def test_beam_profile_in_the_rings_of_the_table(sample_folder: Path, name: str) 
     own = rows[rows["case"] == f"{name}_g0"]
     own = own[(own["r_lo_mm"] > 0.003) & (own["r_hi_mm"] < 8.0)]
     grid = hankel.radii()[500:1400]
-    R = hankel.to_radius(layered_diffusion.respond(hankel.frequencies(), case(name), A)[0])[500:1400]
-    within = enclosed(np.append(own["r_lo_mm"], own["r_hi_mm"][-1]), grid, R)
+    R = hankel.inverse_transform(layered_diffusion.solve(hankel.frequencies(), case(name), A)[0])[500:1400]
+    within = enclosed_energy(np.append(own["r_lo_mm"], own["r_hi_mm"][-1]), grid, R)
     means = np.diff(within, axis=0)[:, 0] / (np.pi * (own["r_hi_mm"] ** 2 - own["r_lo_mm"] ** 2))
     assert np.allclose(means, own["R_layered_diffusion_LD"], rtol=0.025, atol=1e-6)
 
@@ -71,7 +71,7 @@ def test_beam_profile_by_another_quadrature(r: float) -> None:
     def part(low: float, high: float) -> float:
         x, w = np.polynomial.legendre.leggauss(64)
         s = 0.5 * (high - low) * x + 0.5 * (low + high)
-        R = layered_diffusion.respond(s, medium, A)[0][:, 0]
+        R = layered_diffusion.solve(s, medium, A)[0][:, 0]
         return float(0.5 * (high - low) * w @ (R * s * j0(s * r)))
 
     zeros = jn_zeros(0, 200) / r
@@ -79,7 +79,7 @@ def test_beam_profile_by_another_quadrature(r: float) -> None:
     sums = np.cumsum([sum(map(part, fine[:-1], fine[1:])), *map(part, zeros[:-1], zeros[1:])])
     for _ in range(60):
         sums = 0.5 * (sums[1:] + sums[:-1])
-    R = hankel.to_radius(layered_diffusion.respond(hankel.frequencies(), medium, A)[0])
+    R = hankel.inverse_transform(layered_diffusion.solve(hankel.frequencies(), medium, A)[0])
     assert resample(np.array([r]), hankel.radii(), R)[0, 0] == pytest.approx(sums[-1] / (2 * np.pi), rel=1e-7)
 
 
@@ -103,7 +103,7 @@ def test_layered_diffusion_does_not_see_a_cut(alpha_prime: float, depth: float) 
     parted = Medium("cut", (Layer(layer.sigma_a, layer.sigma_s_prime, depth), layer))
     s = np.geomspace(1e-6, 1e3, 60)
     for source in ("beam", "point"):
-        one, two = (layered_diffusion.respond(s, medium, A, source)[0] for medium in (whole, parted))
+        one, two = (layered_diffusion.solve(s, medium, A, source)[0] for medium in (whole, parted))
         assert np.allclose(one, two, rtol=1e-9, atol=1e-15)
 
 
@@ -112,9 +112,9 @@ def test_cuts_of_the_table_in_the_multipole(sample_folder: Path) -> None:
         medium = _cut(row["mua"], row["musp"], row["cut_depth_mfp"])
         if row["cut_depth_mfp"] == 1.0:
             continue  # the printed source is just on the cut: either side of it is right
-        total = multipole.respond(hankel.STILL, medium, PRINTED_A, "none").R_above[0, 0]
+        total = multipole.stack_response(hankel.ZERO_FREQUENCY, medium, PRINTED_A, "none").R_above[0, 0]
         assert total == pytest.approx(row["R_total_DJ_two_layers"], rel=CLOSED_FORM)
-        uncut = dipole.total(medium.layers[-1], PRINTED_A)[0]
+        uncut = dipole.total_reflectance(medium.layers[-1], PRINTED_A)[0]
         assert uncut == pytest.approx(row["R_total_uncut_dipole"], rel=CLOSED_FORM)
 
 
@@ -127,15 +127,15 @@ def test_white_stack_gives_all_back() -> None:
     white = Medium(
         "white", (Layer(np.zeros(1), np.array([5.0]), 0.3), Layer(np.zeros(1), np.array([1.0]), 4.0))
     )
-    R, T = layered_diffusion.respond(hankel.STILL, white, A)
+    R, T = layered_diffusion.solve(hankel.ZERO_FREQUENCY, white, A)
     unscattered = np.exp(-(5.0 * 0.3 + 4.0))
     assert (R + T)[0, 0] == pytest.approx(1.0 - unscattered, abs=1e-6)
 
 
 def test_slab_transmits_alike_in_both_models_when_it_is_thick() -> None:
     thick = slab(0.99, 12.0)
-    T = multipole.respond(hankel.STILL, thick, A).T_down[0, 0]
-    assert layered_diffusion.respond(hankel.STILL, thick, A)[1][0, 0] == pytest.approx(T, rel=0.05)
+    T = multipole.stack_response(hankel.ZERO_FREQUENCY, thick, A).T_down[0, 0]
+    assert layered_diffusion.solve(hankel.ZERO_FREQUENCY, thick, A)[1][0, 0] == pytest.approx(T, rel=0.05)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -147,7 +147,7 @@ def test_rings_hold_the_total(model: str) -> None:
 
 
 def test_point_in_a_thin_slab_is_inside_it() -> None:
-    R, T = layered_diffusion.respond(hankel.STILL, slab(0.9, 0.2), A, "point")
+    R, T = layered_diffusion.solve(hankel.ZERO_FREQUENCY, slab(0.9, 0.2), A, "point")
     assert 0.0 < R[0, 0] < 1.0 and 0.0 < T[0, 0] < 1.0 and R[0, 0] + T[0, 0] < 1.0
 
 
@@ -155,7 +155,7 @@ def test_point_in_a_thin_slab_is_inside_it() -> None:
 def test_point_of_a_slab_thinner_than_a_mean_free_path_lies_in_its_middle(thickness: float) -> None:
     """So that as much of its light leaves above as below, when both faces are alike."""
     thin = Medium("thin", (Layer(np.zeros(1), np.array([0.01]), thickness),))
-    R, T = layered_diffusion.respond(hankel.STILL, thin, A, "point")
+    R, T = layered_diffusion.solve(hankel.ZERO_FREQUENCY, thin, A, "point")
     assert R[0, 0] == pytest.approx(T[0, 0], rel=1e-6)
 
 
@@ -177,5 +177,5 @@ def test_two_layer_total_is_near_monte_carlo(sample_folder: Path) -> None:
 @pytest.mark.parametrize("source", ["beam", "point"])
 def test_what_is_reflected_alone_is_the_same(source: layered_diffusion.Source) -> None:
     medium, frequency = media()["dj3"], hankel.frequencies()
-    alone = layered_diffusion.reflect(frequency, medium, A, source)
-    assert np.array_equal(alone, layered_diffusion.respond(frequency, medium, A, source)[0])
+    alone = layered_diffusion.solve_reflectance(frequency, medium, A, source)
+    assert np.array_equal(alone, layered_diffusion.solve(frequency, medium, A, source)[0])

@@ -20,21 +20,21 @@ from dermis.optics.fits.burley import (
     unity_parameters,
     unreal_parameters,
 )
-from dermis.optics.fits.targets import Rings
+from dermis.optics.fits.targets import RingTarget
 
 EDGES = np.append(0.0, np.geomspace(1e-3, 60.0, 120))
 PROFILE = BurleyProfile(np.array([0.6, 0.4, 0.2]), np.array([0.8, 2.0, 4.5]))
 
 
-def rings_of(profile: BurleyProfile) -> Rings:
-    return Rings(EDGES, np.diff(profile.within(EDGES), axis=0), profile.albedo)
+def rings_of(profile: BurleyProfile) -> RingTarget:
+    return RingTarget(EDGES, np.diff(profile.energy_within(EDGES), axis=0), profile.albedo)
 
 
 def test_light_within_a_radius_is_the_integral() -> None:
     for i in range(3):
         ring = quad(lambda r, i=i: 2 * np.pi * r * PROFILE.radiant_exitance(r)[i], 1e-12, 1.7)[0]
-        assert PROFILE.within(1.7)[i] == pytest.approx(ring, rel=CLOSED_FORM)
-    assert np.allclose(PROFILE.within(1e3), PROFILE.albedo, rtol=1e-12)
+        assert PROFILE.energy_within(1.7)[i] == pytest.approx(ring, rel=CLOSED_FORM)
+    assert np.allclose(PROFILE.energy_within(1e3), PROFILE.albedo, rtol=1e-12)
 
 
 def test_transform_by_quadrature() -> None:
@@ -51,8 +51,8 @@ def test_transform_by_quadrature() -> None:
 
 @pytest.mark.parametrize("share", [1e-6, 0.3, 0.9, 0.997, 1 - 1e-9])
 def test_radius_of_a_share_holds_that_share(share: float) -> None:
-    radius = PROFILE.radius_of(share)
-    held = PROFILE.within(radius).diagonal() / PROFILE.albedo
+    radius = PROFILE.radius_at_fraction(share)
+    held = PROFILE.energy_within(radius).diagonal() / PROFILE.albedo
     assert np.allclose(held, share, rtol=CLOSED_FORM)
 
 
@@ -68,11 +68,11 @@ def test_shape_is_found_again() -> None:
     assert (found.error < CLOSED_FORM).all() and (found.energy_error == 0.0).all()
 
 
-def test_fit_has_the_least_error(counted_skin: Rings) -> None:
+def test_fit_has_the_least_error(counted_skin: RingTarget) -> None:
     found = fit_burley(counted_skin)
     for factor in (0.98, 1.02):
         moved = BurleyProfile(found.profile.albedo, factor * found.profile.shape)
-        through = np.diff(moved.within(counted_skin.edges_mm), axis=0)
+        through = np.diff(moved.energy_within(counted_skin.edges_mm), axis=0)
         error = np.linalg.norm(through - counted_skin.energy, axis=0) / np.linalg.norm(
             counted_skin.energy, axis=0
         )
@@ -103,7 +103,7 @@ def test_unreal_makes_the_same_shape_of_its_parameters(size: float) -> None:
     assert max(unreal.mean_free_path_colour) <= 1.0
 
 
-def test_unreal_parameters_of_counted_skin_come_near_the_engines_own_preset(counted_skin: Rings) -> None:
+def test_unreal_parameters_of_counted_skin_come_near_the_engines_own_preset(counted_skin: RingTarget) -> None:
     """Its Skin1 is 0.1295 cm times (1, 0.735, 0.518): 1 / sigma_t' of the same medium.
 
     Blue, with an albedo of 0.11, is beyond what the law was made for.

@@ -17,12 +17,12 @@ from dermis.base.errors import DermisError
 from dermis.optics.fits import gaussian as fit_module
 from dermis.optics.fits import variable_projection
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
-from dermis.optics.fits.targets import Points, Rings, ring_error
+from dermis.optics.fits.targets import PointTarget, RingTarget, ring_error
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.tissue import load_tissue
 
 Floats = NDArray[np.float64]
-Counted = Callable[[str], Rings]
+Counted = Callable[[str], RingTarget]
 
 BAR = 1.001
 """Errors of our fits against the best that other code found from ten random starts."""
@@ -46,7 +46,7 @@ MARBLE = {
 """Weights, variances and errors of fits to green marble, printed with [dEonLuebke2007]."""
 
 
-def marble() -> Points:
+def marble() -> PointTarget:
     """R(r) of green marble's classical dipole."""
     sigma_a, sigma_s, eta = 0.0041, 2.62, 1.5
     sigma_t = sigma_a + sigma_s
@@ -58,10 +58,10 @@ def marble() -> Points:
     rho = np.sqrt(r[:, None] ** 2 + z**2)
     R = alpha / (4 * np.pi) * (z * (1 + sigma_tr * rho) * np.exp(-sigma_tr * rho) / rho**3).sum(axis=1)
     total = 0.5 * alpha * np.exp(-sigma_tr * z).sum()
-    return Points(r, R[:, None], np.array([total]))
+    return PointTarget(r, R[:, None], np.array([total]))
 
 
-def best_known(folder: Path) -> list[tuple[Points, int, Floats]]:
+def best_known(folder: Path) -> list[tuple[PointTarget, int, Floats]]:
     """Targets, terms and the errors that other code reached."""
     data = folder / "reference" / "data"
     stored: dict[str, Floats] = {}
@@ -74,7 +74,7 @@ def best_known(folder: Path) -> list[tuple[Points, int, Floats]]:
                 groups[group, int(row["n_gauss"])][row["target"]] = float(row["err"])
     return [
         (
-            Points(
+            PointTarget(
                 stored["r"],
                 np.stack([stored[name] for name in errors], axis=1),
                 np.array([float(stored[f"{name}_total"]) for name in errors]),
@@ -86,19 +86,19 @@ def best_known(folder: Path) -> list[tuple[Points, int, Floats]]:
     ]
 
 
-def stored_rgb(folder: Path, name: str) -> Points:
+def stored_rgb(folder: Path, name: str) -> PointTarget:
     stored = np.load(folder / "reference" / "data" / "fit_targets.npz")
     values = np.stack([stored[f"{name}_{c}"] for c in "RGB"], axis=1)
-    return Points(stored["r"], values, np.array([float(stored[f"{name}_{c}_total"]) for c in "RGB"]))
+    return PointTarget(stored["r"], values, np.array([float(stored[f"{name}_{c}_total"]) for c in "RGB"]))
 
 
-def made_of(profile: GaussianSum, kind: str) -> Points | Rings:
+def made_of(profile: GaussianSum, kind: str) -> PointTarget | RingTarget:
     """The target that a sum of Gaussians is."""
     if kind == "pointwise":
         r = np.geomspace(1e-4, 60.0, 400)
-        return Points(r, profile.radiant_exitance(r), profile.albedo)
+        return PointTarget(r, profile.radiant_exitance(r), profile.albedo)
     edges = np.append(0.0, np.geomspace(1e-3, 60.0, 120))
-    return Rings(edges, np.diff(profile.within(edges), axis=0), profile.albedo)
+    return RingTarget(edges, np.diff(profile.energy_within(edges), axis=0), profile.albedo)
 
 
 def three() -> GaussianSum:
@@ -187,7 +187,7 @@ def test_own_widths_are_no_worse_than_shared_ones(sample_folder: Path) -> None:
 def test_error_over_rings_is_that_of_its_formula(counted: Counted) -> None:
     target = counted("dj3/g0")
     found = fit_gaussians(target, 5)
-    through = np.diff(found.profile.within(target.edges_mm), axis=0)
+    through = np.diff(found.profile.energy_within(target.edges_mm), axis=0)
     by_hand = np.sqrt(((through - target.energy) ** 2).sum(axis=0) / (target.energy**2).sum(axis=0))
     assert np.allclose(found.error, by_hand, rtol=1e-9)
     sectors = np.repeat(through[:, None] / 7, 7, axis=1)
@@ -199,26 +199,26 @@ def test_a_near_fit_leads_to_the_cold_optimum(
     sample_folder: Path, monkeypatch: pytest.MonkeyPatch, shared: bool
 ) -> None:
     target = stored_rgb(sample_folder, "dj3")
-    wider = Points(1.1 * target.radius_mm, target.reflectance * [1.0, 0.8, 0.6], target.total)
+    wider = PointTarget(1.1 * target.radius_mm, target.reflectance * [1.0, 0.8, 0.6], target.total)
     before, cold = (fit_gaussians(t, 6, shared=shared) for t in (wider, target))
     monkeypatch.setattr(fit_module, "_STARTS", ())  # no other start is needed
-    warm = fit_gaussians(target, 6, shared=shared, near=before.profile)
+    warm = fit_gaussians(target, 6, shared=shared, initial=before.profile)
     assert mean_error(warm) <= 1.001 * mean_error(cold)
 
 
 def test_a_slider_over_all_melanin_stays_near_the_cold_optima() -> None:
-    near = None
+    initial = None
     for melanin in np.linspace(0.0, 0.5, 21):
         target = load_tissue("spectral", pigments={"melanin": float(melanin)}).profile().rings()
-        warm, cold = fit_gaussians(target, 6, near=near), fit_gaussians(target, 6)
+        warm, cold = fit_gaussians(target, 6, initial=initial), fit_gaussians(target, 6)
         assert mean_error(warm) < 1.2 * mean_error(cold)
-        near = warm.profile
+        initial = warm.profile
 
 
 def test_a_near_fit_of_another_size_is_left_aside(sample_folder: Path) -> None:
     target = stored_rgb(sample_folder, "dj3")
     four = fit_gaussians(target, 4)
-    assert np.allclose(fit_gaussians(target, 5, near=four.profile).error, fit_gaussians(target, 5).error)
+    assert np.allclose(fit_gaussians(target, 5, initial=four.profile).error, fit_gaussians(target, 5).error)
 
 
 def test_fits_take_few_steps(sample_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -233,13 +233,13 @@ def test_fits_take_few_steps(sample_folder: Path, monkeypatch: pytest.MonkeyPatc
     profile = fit_gaussians(target, 6).profile
     assert 0 < steps[0] < 200
     steps[0] = 0
-    fit_gaussians(target, 6, near=profile)
+    fit_gaussians(target, 6, initial=profile)
     assert 0 < steps[0] < 10
 
 
 def test_size_and_strength_scale_out() -> None:
     base = marble()
-    scaled = Points(0.1 * base.radius_mm, 50.0 * base.reflectance, 0.5 * base.total)
+    scaled = PointTarget(0.1 * base.radius_mm, 50.0 * base.reflectance, 0.5 * base.total)
     a, b = fit_gaussians(base, 4), fit_gaussians(scaled, 4)
     assert np.allclose(b.profile.variance_mm2, 0.01 * a.profile.variance_mm2, rtol=1e-3)
     assert np.allclose(b.profile.weight, 0.5 * a.profile.weight, rtol=1e-3)
@@ -250,12 +250,12 @@ def test_size_and_strength_scale_out() -> None:
 def test_light_below_zero_is_fitted_around(kind: str) -> None:
     """A multipole whose source lies below its slab can turn negative."""
     clean = made_of(three(), kind)
-    r = clean.radius_mm if isinstance(clean, Points) else clean.edges_mm[1:]
+    r = clean.radius_mm if isinstance(clean, PointTarget) else clean.edges_mm[1:]
     dent = 0.05 * np.exp(-((np.log(r / 3.0)) ** 2))[:, None]
-    if isinstance(clean, Points):
-        target: Points | Rings = Points(r, clean.reflectance - dent, clean.total)
+    if isinstance(clean, PointTarget):
+        target: PointTarget | RingTarget = PointTarget(r, clean.reflectance - dent, clean.total)
     else:
-        target = Rings(clean.edges_mm, clean.energy - dent, clean.total)
+        target = RingTarget(clean.edges_mm, clean.energy - dent, clean.total)
     assert (target.samples < 0).any()
     found = fit_gaussians(target, 4)
     assert (found.profile.weight >= 0).all() and np.isfinite(found.error).all()
@@ -269,14 +269,14 @@ RADII = np.array([0.1, 1.0, 2.0])
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: Points(RADII, np.ones((2, 1)), np.ones(1)), "n, n x c and c"),
-        (lambda: Points(RADII, GOOD, np.ones(2)), "n, n x c and c"),
-        (lambda: Points(RADII, GOOD * np.nan, np.ones(1)), "finite"),
-        (lambda: Points(RADII[::-1], GOOD, np.ones(1)), "increase"),
-        (lambda: Points(np.array([0.0, 1.0, 2.0]), GOOD, np.ones(1)), "above 0"),
-        (lambda: Points(RADII, np.stack([RADII, 0 * RADII], 1), np.ones(2)), "channel 1 holds 0"),
-        (lambda: Points(RADII, GOOD, np.array([-0.2])), "-0.2 in all"),
-        (lambda: Rings(np.array([0.5, 0.2, 1.0, 2.0]), GOOD, np.ones(1)), "increase from 0"),
+        (lambda: PointTarget(RADII, np.ones((2, 1)), np.ones(1)), "n, n x c and c"),
+        (lambda: PointTarget(RADII, GOOD, np.ones(2)), "n, n x c and c"),
+        (lambda: PointTarget(RADII, GOOD * np.nan, np.ones(1)), "finite"),
+        (lambda: PointTarget(RADII[::-1], GOOD, np.ones(1)), "increase"),
+        (lambda: PointTarget(np.array([0.0, 1.0, 2.0]), GOOD, np.ones(1)), "above 0"),
+        (lambda: PointTarget(RADII, np.stack([RADII, 0 * RADII], 1), np.ones(2)), "channel 1 holds 0"),
+        (lambda: PointTarget(RADII, GOOD, np.array([-0.2])), "-0.2 in all"),
+        (lambda: RingTarget(np.array([0.5, 0.2, 1.0, 2.0]), GOOD, np.ones(1)), "increase from 0"),
     ],
 )
 def test_impossible_targets_are_refused(make: Callable[[], object], said: str) -> None:
@@ -293,4 +293,4 @@ def test_impossible_numbers_of_terms_are_refused(terms: int) -> None:
 def test_a_profile_that_no_gaussian_comes_near_is_refused() -> None:
     r = np.geomspace(1e-3, 10.0, 50)
     with pytest.raises(DermisError, match="Gaussians can follow"):
-        fit_gaussians(Points(r, -np.exp(-r)[:, None], np.ones(1)), 3)
+        fit_gaussians(PointTarget(r, -np.exp(-r)[:, None], np.ones(1)), 3)

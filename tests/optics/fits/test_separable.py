@@ -9,16 +9,22 @@ from scipy.special import ndtr
 
 from dermis.optics.fits.burley import fit_burley
 from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.fits.separable import SECTORS, SeparableKernel, fit_separable, judge, preintegrate
-from dermis.optics.fits.targets import Rings
+from dermis.optics.fits.separable import (
+    SECTORS,
+    SeparableKernel,
+    evaluate_kernel,
+    fit_separable,
+    preintegrated_kernel,
+)
+from dermis.optics.fits.targets import RingTarget
 from dermis.optics.gaussians import GaussianSum
 
 EDGES = np.append(0.0, np.geomspace(1e-3, 60.0, 120))
 CROSS = SeparableKernel(np.array([0.8]), np.array([[0.04], [4.0]]), np.array([[0.5], [0.5]]))
 
 
-def rings_of(profile: GaussianSum) -> Rings:
-    return Rings(EDGES, np.diff(profile.within(EDGES), axis=0), profile.albedo)
+def rings_of(profile: GaussianSum) -> RingTarget:
+    return RingTarget(EDGES, np.diff(profile.energy_within(EDGES), axis=0), profile.albedo)
 
 
 def one(variance: float) -> GaussianSum:
@@ -26,7 +32,7 @@ def one(variance: float) -> GaussianSum:
 
 
 def test_all_light_goes_somewhere_alike_in_x_and_y() -> None:
-    cells = CROSS.cells(EDGES)
+    cells = CROSS.sector_energy(EDGES)
     assert cells.shape == (120, SECTORS, 1)
     assert cells.sum() == pytest.approx(0.8, rel=1e-9)
     assert np.allclose(cells, cells[:, ::-1], atol=1e-15)
@@ -39,18 +45,18 @@ def test_cells_are_the_integral_of_the_kernel() -> None:
     def column(x: float) -> float:
         height = np.sqrt(radius**2 - x**2)
         under = 0.5 * sum(2 * ndtr(height / s) - 1 for s in (0.2, 2.0))
-        return float(CROSS.line(x)[0] * under)
+        return float(CROSS.line_profile(x)[0] * under)
 
     disc = 4 * 0.8 * quad(column, 0, radius, epsabs=1e-12)[0] / 2
-    assert CROSS.cells(np.array([0.0, radius])).sum() == pytest.approx(disc, rel=1e-7)
+    assert CROSS.sector_energy(np.array([0.0, radius])).sum() == pytest.approx(disc, rel=1e-7)
 
 
 def test_sectors_near_the_axes_get_the_light_of_the_cross() -> None:
     """Directions 2.8 degrees from an axis against 42: by the kernel itself on a thin ring."""
     ring = np.array([1.99, 2.01])
-    cells = CROSS.cells(ring)[0, :, 0]
+    cells = CROSS.sector_energy(ring)[0, :, 0]
     theta = (np.arange(SECTORS) + 0.5) * np.pi / 2 / SECTORS
-    density = 0.8 * CROSS.line(2 * np.cos(theta))[:, 0] * CROSS.line(2 * np.sin(theta))[:, 0]
+    density = 0.8 * CROSS.line_profile(2 * np.cos(theta))[:, 0] * CROSS.line_profile(2 * np.sin(theta))[:, 0]
     area = np.pi * (ring[1] ** 2 - ring[0] ** 2) / SECTORS
     assert cells[0] > 3 * cells[7]
     assert np.allclose(cells[3:-3], (area * density)[3:-3], rtol=0.02)  # the middle stands for the sector
@@ -59,24 +65,26 @@ def test_sectors_near_the_axes_get_the_light_of_the_cross() -> None:
 def test_a_round_kernel_has_the_ring_error_of_its_gaussian() -> None:
     target = rings_of(GaussianSum("two", np.array([0.1, 2.0]), np.array([[0.4], [0.5]])))
     single = fit_gaussians(target, 1, keep_energy=True)
-    assert np.allclose(judge(preintegrate(single.profile), target).error, single.error, rtol=1e-9)
+    assert np.allclose(
+        evaluate_kernel(preintegrated_kernel(single.profile), target).error, single.error, rtol=1e-9
+    )
 
 
 def test_preintegrated_kernel_is_the_profile_from_its_side() -> None:
     profile = GaussianSum("two", np.array([0.1, 2.0]), np.array([[0.4, 0.1], [0.5, 0.2]]))
-    kernel = preintegrate(profile)
+    kernel = preintegrated_kernel(profile)
     assert np.allclose(kernel.weight.sum(axis=0), 1.0)
     for x in (0.0, 0.4, 2.0):
         side = [
             2 * quad(lambda y, i=i, x=x: profile.radiant_exitance(np.hypot(x, y))[i], 0, 30)[0]
             for i in range(2)
         ]
-        assert np.allclose(kernel.albedo * kernel.line(x), side, rtol=1e-6)
+        assert np.allclose(kernel.albedo * kernel.line_profile(x), side, rtol=1e-6)
 
 
 def test_preintegrated_kernel_is_not_round() -> None:
     profile = GaussianSum("two", np.array([0.1, 2.0]), np.array([[0.4], [0.5]]))
-    found = judge(preintegrate(profile), rings_of(profile))
+    found = evaluate_kernel(preintegrated_kernel(profile), rings_of(profile))
     assert found.error[0] > 0.1 and abs(found.energy_error[0]) < 1e-12
 
 
@@ -88,16 +96,18 @@ def test_one_gaussian_is_found_again(variance: float) -> None:
     assert spread == pytest.approx(variance, rel=1e-3)
 
 
-def test_the_artists_model_beats_preintegration_by_this_number(counted_skin: Rings) -> None:
+def test_the_artists_model_beats_preintegration_by_this_number(counted_skin: RingTarget) -> None:
     fitted = fit_separable(counted_skin)
-    exact = judge(preintegrate(fit_gaussians(counted_skin, 6, keep_energy=True).profile), counted_skin)
+    exact = evaluate_kernel(
+        preintegrated_kernel(fit_gaussians(counted_skin, 6, keep_energy=True).profile), counted_skin
+    )
     assert (fitted.error < exact.error).all()
     assert (abs(fitted.energy_error) < 1e-12).all() and (abs(exact.energy_error) < 1e-6).all()
     near, far = np.sqrt(fitted.kernel.variance_mm2)
     assert (near < far).all() and np.allclose(fitted.kernel.weight.sum(axis=0), 1.0)
 
 
-def test_three_kinds_of_fit_compare_by_one_number(counted_skin: Rings) -> None:
+def test_three_kinds_of_fit_compare_by_one_number(counted_skin: RingTarget) -> None:
     gaussians = fit_gaussians(counted_skin, 6).error
     burley = fit_burley(counted_skin).error
     separable = fit_separable(counted_skin).error

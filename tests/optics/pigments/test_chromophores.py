@@ -104,7 +104,7 @@ def test_scattering_in_the_reading_per_millimetre() -> None:
     """6.08 per mm at 550 nm; the dermis, half of it, is the law that others give for skin."""
     assert chromophores.donner_jensen_2006(550.0) == pytest.approx(6.08, abs=0.005)
     others_per_cm = 73.7 * VISIBLE_NM**-0.22 + 1.1e12 * VISIBLE_NM**-4.0
-    dermis = chromophores.DERMIS_SHARE * chromophores.donner_jensen_2006(VISIBLE_NM)
+    dermis = chromophores.DERMIS_SCATTERING_RATIO * chromophores.donner_jensen_2006(VISIBLE_NM)
     assert np.allclose(10.0 * dermis, others_per_cm, rtol=PUBLISHED)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from dermis.base import citations as cite
 from dermis.base.errors import DermisError
-from dermis.optics.diffusion.boundary import mismatch
+from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.media import Floats, Layer
 from dermis.optics.pigments.parameters import SKINS, SkinParameters, Structure
 from dermis.optics.pigments.skin import LEAKED_MELANIN, spectral_medium
@@ -31,7 +31,7 @@ SKIN = SkinParameters(melanin=0.02, eumelanin=0.6, blood=0.01, oxygen=0.8, epide
 def colour(layer: Layer) -> Floats:
     """Linear Rec. 709 of a half-space of the layer's tissue, by the dipole's total [Jensen2001]."""
     q = np.sqrt(3.0 * (1.0 - layer.alpha_prime))
-    A = mismatch(1.4)
+    A = boundary_mismatch(1.4)
     total = 0.5 * layer.alpha_prime * (1.0 + np.exp(-4.0 / 3.0 * A * q)) * np.exp(-q)
     return rgb_weights() @ total
 

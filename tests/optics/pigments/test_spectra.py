@@ -13,7 +13,7 @@ from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Medium
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import spectral_medium
-from dermis.optics.pigments.spectra import WAVELENGTHS_NM, jacques_1998, rgb_weights, tabulated
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, interpolate_spectrum, jacques_1998, rgb_weights
 
 FINE_NM = np.arange(380.0, 781.0, 5.0)
 COLOUR = 3e-5
@@ -43,7 +43,7 @@ def test_observer_and_illuminant_are_the_published_tables(sample_folder: Path) -
     path = sample_folder / "reference" / "data" / "spectral_coefficients.csv"
     table = np.genfromtxt(path, delimiter=",", names=True)
     for ours, theirs in [("x_bar", "xbar"), ("y_bar", "ybar"), ("z_bar", "zbar"), ("d65", "D65")]:
-        column = tabulated("cie-1931-d65", ours, table["lambda_nm"])
+        column = interpolate_spectrum("cie-1931-d65", ours, table["lambda_nm"])
         assert np.allclose(column, table[theirs], rtol=1e-9, atol=1e-12), ours
 
 
@@ -79,8 +79,8 @@ def test_whole_chain_from_pigments_to_the_colours_of_another_program(sample_fold
 def test_weights_are_those_of_the_srgb_standard() -> None:
     """Its printed matrix, of four digits and so 0.0002 off white, on the XYZ of five spectra."""
     printed = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
-    observer = np.array([tabulated("cie-1931-d65", f"{axis}_bar", FINE_NM) for axis in "xyz"])
-    light = observer * tabulated("cie-1931-d65", "d65", FINE_NM)
+    observer = np.array([interpolate_spectrum("cie-1931-d65", f"{axis}_bar", FINE_NM) for axis in "xyz"])
+    light = observer * interpolate_spectrum("cie-1931-d65", "d65", FINE_NM)
     spectra = np.array([np.interp(FINE_NM, [380.0, 450.0, 550.0, 650.0, 780.0], one) for one in np.eye(5)])
     xyz = spectra @ light.T / light[1].sum()
     assert np.allclose(spectra @ rgb_weights(FINE_NM).T, xyz @ printed.T, rtol=0.0, atol=3e-4)

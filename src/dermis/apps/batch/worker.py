@@ -103,7 +103,7 @@ class Worker:
 
     def __init__(self, adapter: str, options: RunOptions) -> None:
         self._options = options
-        self._renderer = Renderer(adapter, rounds=_CACHE_FRAMES)
+        self._renderer = Renderer(adapter, cache_ttl=_CACHE_FRAMES)
         self._builder = SceneBuilder(options.spec)
         self._encoders = EncoderPool(options.encoders, partial(_encode, options.spec))
         gc.freeze()  # excludes the objects created so far from collections, which would scan them each time

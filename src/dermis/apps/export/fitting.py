@@ -8,79 +8,78 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.optics.curve import Curve
+from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import BurleyProfile
-from dermis.optics.half_space import Kind, albedo_of, half_space
+from dermis.optics.half_space import HalfSpaceKind, half_space, tabulated_albedo
 from dermis.optics.media import Floats
 from dermis.optics.radial import TINY
 
-_BURLEY_MEDIAN = 1.58  # radius within which half of the light leaves, by d
-_REACH = np.log(30.0)  # of sizes about the one of the same median
-_HALVINGS, _MEDIUM_HALVINGS = 40, 30
-_THINNEST_MM = 1e-9
-_FARTHEST, _DISTANCES = 12.0, 97  # of an edge's distances, in median radii
-_LEAST, _MOST, _NODES = 1e-2, 60.0, 400  # radii that a fit is judged at, by the true median
-_KNOWN = np.geomspace(1e-4, 1e4, 2000)
-_SPAN, _EXACT = 2.0, 1e-4  # logarithms of lengths: about the one of the same median, and the tolerance
+_BURLEY_MEDIAN_RADIUS = 1.58  # of Burley's profile, in units of d: half of the light leaves within
+_LOG_RANGE = np.log(30.0)  # search range of lengths on each side of the one with equal median radius
+_BISECTIONS, _MEDIUM_BISECTIONS = 40, 30
+_MIN_WIDTH_MM = 1e-9
+_MAX_EDGE_DISTANCE, _EDGE_SAMPLES = 12.0, 97  # distances from an edge of light, in median radii
+_MIN_RADIUS, _MAX_RADIUS, _RADIUS_SAMPLES = 1e-2, 60.0, 400  # radii of least squares fits, in median radii
+_CDF_RADII = np.geomspace(1e-4, 1e4, 2000)
+_LOG_BOUND, _LOG_TOLERANCE = 2.0, 1e-4  # search range and tolerance of least squares fits
 
 
-def lobe(d_mm: ArrayLike, energy: ArrayLike) -> Curve:
+def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
     """Return the curve of Burley's lobe R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
 
     d_mm : (3,) above 0 [mm]
     energy : (3,) A [-]
     """
-    d = np.maximum(np.asarray(d_mm, np.float64), _THINNEST_MM)
-    return Curve.of(BurleyProfile(np.ones(3), 1.0 / d).within, energy)
+    d = np.maximum(np.asarray(d_mm, np.float64), _MIN_WIDTH_MM)
+    return CumulativeProfile.from_function(BurleyProfile(np.ones(3), 1.0 / d).energy_within, energy)
 
 
-def fit_d(curve: Curve) -> Floats:
+def fit_burley_width(curve: CumulativeProfile) -> Floats:
     """Return the widths d (3,) of the lobes with the least largest difference from a cumulative profile [mm].
 
     Least squares would weigh radii as they are spaced.
     """
-    median = np.array([np.interp(0.5, curve.share[:, i], curve.radii_mm) for i in range(3)])
-    middle = np.log(median / _BURLEY_MEDIAN)
-    return _balanced(
-        lambda d: BurleyProfile(np.ones(3), np.exp(-d)).within(curve.radii_mm) - curve.share,
-        middle - _REACH,
-        middle + _REACH,
-        _HALVINGS,
-    )
+    median = np.array([np.interp(0.5, curve.fraction[:, i], curve.radii_mm) for i in range(3)])
+    middle = np.log(median / _BURLEY_MEDIAN_RADIUS)
+
+    def excess(log_d: Floats) -> Floats:
+        return BurleyProfile(np.ones(3), np.exp(-log_d)).energy_within(curve.radii_mm) - curve.fraction
+
+    return _bisect_minimax(excess, middle - _LOG_RANGE, middle + _LOG_RANGE, _BISECTIONS)
 
 
-def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Curve:
+def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> CumulativeProfile:
     """Return the curve of a sum of Gaussians.
 
     variance_mm2, weight : (n,) [mm^2], (n, 3) [-]
     """
-    share = weight / weight.sum(axis=0)
+    fraction = weight / weight.sum(axis=0)
 
     def within(radius_mm: Floats) -> Floats:
         with np.errstate(under="ignore"):
-            return np.asarray(1.0 - np.exp(-0.5 * radius_mm[:, None] ** 2 / variance_mm2) @ share)
+            return np.asarray(1.0 - np.exp(-0.5 * radius_mm[:, None] ** 2 / variance_mm2) @ fraction)
 
-    return Curve.of(within, energy)
+    return CumulativeProfile.from_function(within, energy)
 
 
-def resized(unit: Curve, size_mm: ArrayLike) -> Curve:
+def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
     """Return a curve whose lengths are in a unit, with a unit (3,) for each channel."""
-    size = np.maximum(np.asarray(size_mm, np.float64), _THINNEST_MM)
+    scale = np.maximum(np.asarray(scale_mm, np.float64), _MIN_WIDTH_MM)
 
     def within(radius_mm: Floats) -> Floats:
-        return np.stack([unit.within(radius_mm / size[i])[:, i] for i in range(3)], axis=-1)
+        return np.stack([unit.fraction_within(radius_mm / scale[i])[:, i] for i in range(3)], axis=-1)
 
-    return Curve.of(within, unit.energy)
+    return CumulativeProfile.from_function(within, unit.energy)
 
 
-def nearest_size(curve: Curve, unit: Curve) -> Floats:
+def fit_scale(curve: CumulativeProfile, unit: CumulativeProfile) -> Floats:
     """Return the units (3,) with the least largest difference from a curve [mm]."""
-    middle = np.log(curve.radius_of(0.5) / unit.radius_of(0.5))
-    return _nearest(curve, unit, middle, _REACH, _HALVINGS - 1)
+    middle = np.log(curve.radius_at_fraction(0.5) / unit.radius_at_fraction(0.5))
+    return _fit_scale_near(curve, unit, middle, _LOG_RANGE, _BISECTIONS - 1)
 
 
 @dataclass(frozen=True)
-class Homogeneous:
+class HomogeneousMedium:
     """A half-space of one medium with isotropic scattering.
 
     albedo : (3,) single-scattering albedo, reduced [-]
@@ -90,29 +89,34 @@ class Homogeneous:
 
     albedo: Floats
     mfp_mm: Floats
-    curve: Curve
+    curve: CumulativeProfile
 
 
-def homogeneous(curve: Curve, energy: Floats | None = None, kind: Kind = "skin") -> Homogeneous:
+def fit_homogeneous_medium(
+    curve: CumulativeProfile, energy: Floats | None = None, kind: HalfSpaceKind = "skin"
+) -> HomogeneousMedium:
     """Return the medium with a curve's energy whose cumulative profile is nearest to the curve.
 
     energy : (3,) total that it has instead, a colour's [-]
     kind : surface and light of the half-space
     """
-    albedo = albedo_of(kind, curve.energy if energy is None else energy)
+    albedo = tabulated_albedo(kind, curve.energy if energy is None else energy)
     unit = half_space(kind, albedo, np.ones(3))
-    middle = np.log(fit_d(curve) / fit_d(unit))  # both are as wide as the same lobe
-    mfp = _nearest(curve, unit, middle, 2.0, _MEDIUM_HALVINGS)
-    return Homogeneous(albedo, mfp, half_space(kind, albedo, mfp))
+    middle = np.log(fit_burley_width(curve) / fit_burley_width(unit))  # ratio of equivalent Burley profiles
+    mfp = _fit_scale_near(curve, unit, middle, 2.0, _MEDIUM_BISECTIONS)
+    return HomogeneousMedium(albedo, mfp, half_space(kind, albedo, mfp))
 
 
-def _nearest(curve: Curve, unit: Curve, middle: Floats, reach: float, halvings: int) -> Floats:
-    return _balanced(
-        lambda size: resized(unit, np.exp(size)).share - curve.share, middle - reach, middle + reach, halvings
-    )
+def _fit_scale_near(
+    curve: CumulativeProfile, unit: CumulativeProfile, middle: Floats, log_range: float, bisections: int
+) -> Floats:
+    def excess(log_scale: Floats) -> Floats:
+        return scale_lengths(unit, np.exp(log_scale)).fraction - curve.fraction
+
+    return _bisect_minimax(excess, middle - log_range, middle + log_range, bisections)
 
 
-def _balanced(surplus: Callable[[Floats], Floats], low: Floats, high: Floats, halvings: int) -> Floats:
+def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Floats, bisections: int) -> Floats:
     """Return the sizes (3,) at which the largest surplus and the largest deficit of light are equal.
 
     A wider curve has less light within each radius, so that its largest surplus falls with the size and its
@@ -121,15 +125,15 @@ def _balanced(surplus: Callable[[Floats], Floats], low: Floats, high: Floats, ha
     surplus : (n, 3) of the light within some radii, by the logarithms of the sizes (3,)
     low, high : logarithms of the sizes (3,)
     """
-    for _ in range(halvings):
+    for _ in range(bisections):
         middle = 0.5 * (low + high)
-        over = surplus(middle)
-        wider = over.max(axis=0) > -over.min(axis=0)
-        low, high = np.where(wider, middle, low), np.where(wider, high, middle)
+        difference = excess(middle)
+        too_narrow = difference.max(axis=0) > -difference.min(axis=0)
+        low, high = np.where(too_narrow, middle, low), np.where(too_narrow, high, middle)
     return np.asarray(np.exp(0.5 * (low + high)))
 
 
-def fit_length(curve: Curve, channel: int, within: Callable[[Floats], Floats]) -> float:
+def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[[Floats], Floats]) -> float:
     """Return the length at which a cumulative profile is nearest to one channel's [mm].
 
     Least squares over log r.
@@ -138,21 +142,21 @@ def fit_length(curve: Curve, channel: int, within: Callable[[Floats], Floats]) -
     """
     from scipy.optimize import minimize_scalar
 
-    median = float(curve.radius_of(0.5)[channel])
-    r = median * np.geomspace(_LEAST, _MOST, _NODES)
-    true = curve.within(r)[:, channel]
-    middle = np.log(median / float(np.interp(0.5, within(_KNOWN), _KNOWN)))
+    median = float(curve.radius_at_fraction(0.5)[channel])
+    r = median * np.geomspace(_MIN_RADIUS, _MAX_RADIUS, _RADIUS_SAMPLES)
+    reference = curve.fraction_within(r)[:, channel]
+    middle = np.log(median / float(np.interp(0.5, unit_cdf(_CDF_RADII), _CDF_RADII)))
 
-    def error(length: float) -> float:
-        return float(((within(r / np.exp(length)) - true) ** 2).sum())
+    def squared_error(log_length: float) -> float:
+        return float(((unit_cdf(r / np.exp(log_length)) - reference) ** 2).sum())
 
-    bounds = middle - _SPAN, middle + _SPAN
-    found = minimize_scalar(error, bounds=bounds, method="bounded", options={"xatol": _EXACT})
-    return float(np.exp(found.x))
+    bounds = middle - _LOG_BOUND, middle + _LOG_BOUND
+    result = minimize_scalar(squared_error, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE})
+    return float(np.exp(result.x))
 
 
 @dataclass(frozen=True)
-class Deviation:
+class CurveError:
     """Differences of a target's curve from the true one, in red, green and blue.
 
     cdf : (3,) largest difference of the share of light that leaves within a radius [-]
@@ -169,16 +173,16 @@ class Deviation:
         return {name: [round(float(x), 6) for x in getattr(self, name)] for name in ("cdf", "edge", "energy")}
 
 
-def deviation(true: Curve, shown: Curve) -> Deviation:
-    """Return how far a target's curve is from the true one."""
-    steps = np.geomspace(1e-3, 1.0, _DISTANCES)
-    widest = _FARTHEST * np.maximum(true.radius_of(0.5), shown.radius_of(0.5))
+def curve_error(reference: CumulativeProfile, curve: CumulativeProfile) -> CurveError:
+    """Return the errors of a curve relative to a reference."""
+    steps = np.geomspace(1e-3, 1.0, _EDGE_SAMPLES)
+    widest = _MAX_EDGE_DISTANCE * np.maximum(reference.radius_at_fraction(0.5), curve.radius_at_fraction(0.5))
     edge = np.zeros(3)
     for i in range(3):
         x = widest[i] * steps
-        edge[i] = np.abs(shown.edge(x) - true.edge(x))[:, i].max()
-    return Deviation(
-        cdf=np.abs(shown.within(true.radii_mm) - true.share).max(axis=0),
+        edge[i] = np.abs(curve.edge_response(x) - reference.edge_response(x))[:, i].max()
+    return CurveError(
+        cdf=np.abs(curve.fraction_within(reference.radii_mm) - reference.fraction).max(axis=0),
         edge=edge,
-        energy=shown.energy / np.maximum(true.energy, TINY) - 1.0,
+        energy=curve.energy / np.maximum(reference.energy, TINY) - 1.0,
     )

@@ -9,28 +9,28 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dermis.apps.export.fitting import Deviation, deviation, fit_d
+from dermis.apps.export.fitting import CurveError, curve_error, fit_burley_width
 from dermis.apps.export.registry import TARGETS
-from dermis.apps.export.subject import ModelName, Subject, subject_of
-from dermis.apps.export.target import Rows, Target, Value
-from dermis.base.atomic_write import check_output, folder_beside, replacing, replacing_folder
+from dermis.apps.export.subject import ModelName, Subject, load_subject
+from dermis.apps.export.target import Parameters, Target, Value
+from dermis.base.atomic_write import atomic_file, atomic_folder, check_output, temporary_folder
 from dermis.base.errors import refuse
 from dermis.optics.media import Floats
 
-_NOTABLE = 0.05  # of the light at the wrong radius
+_NOTABLE_ERROR = 0.05  # fraction of the light that leaves at the wrong radius
 _CHANNELS = "red", "green", "blue"
 _ERRORS = {
-    "cdf": "most light at the wrong radius, of 1",
-    "edge": "most beside an edge of light, of 1",
-    "energy": "too much or too little light in all, relative",
+    "cdf": "largest fraction of the light that leaves at the wrong radius",
+    "edge": "largest error beside an edge of light",
+    "energy": "relative error of the total light",
 }
-REPORT = "export.json"
-_PAGE = "README.md"
-_SIDE = 2048
+REPORT_FILE = "export.json"
+_PAGE_FILE = "README.md"
+_MAP_SIDE = 2048
 
 
 @dataclass(frozen=True)
-class Report:
+class ExportReport:
     """One export.
 
     target, title, version, variant : of the program; the variant is "" where there is only one
@@ -50,13 +50,13 @@ class Report:
     variant: str
     subject: str
     model: str
-    rows: Rows
-    naive_rows: Rows
+    parameters: Parameters
+    naive_parameters: Parameters
     d_mm: Floats
-    error: Deviation
-    naive_error: Deviation
-    wrong: str
-    not_run: bool
+    error: CurveError
+    naive_error: CurveError
+    limitations: str
+    untested: bool
     files: tuple[Path, ...] = ()
 
     def as_json(self) -> dict[str, object]:
@@ -67,14 +67,14 @@ class Report:
             **({"variant": self.variant} if self.variant else {}),
             "subject": self.subject,
             "model": self.model,
-            "parameters": {row.name: row.value for row in self.rows},
-            "units": {row.name: row.unit for row in self.rows},
+            "parameters": {one.name: one.value for one in self.parameters},
+            "units": {one.name: one.unit for one in self.parameters},
             "d_mm": [round(float(d), 6) for d in self.d_mm],
             "error": self.error.as_json(),
-            "naive_parameters": {row.name: row.value for row in self.naive_rows},
+            "naive_parameters": {one.name: one.value for one in self.naive_parameters},
             "naive_error": self.naive_error.as_json(),
-            "wrong": " ".join(self.words()),
-            "run": not self.not_run,
+            "wrong": " ".join(self.limitation_texts()),
+            "run": not self.untested,
             "files": [str(file) for file in self.files],
         }
 
@@ -83,41 +83,42 @@ class Report:
 
         naive : also what a user would have typed
         """
-        what = " ".join(filter(None, (self.title, self.version, self.variant)))
-        head = f"{self.subject}, profile by {self.model}, for {what}"
-        lines = [head, *(["not run: by published meanings"] if self.not_run else []), "", *_table(self.rows)]
+        target = " ".join(filter(None, (self.title, self.version, self.variant)))
+        lines = [f"{self.subject}, profile by {self.model}, for {target}"]
+        lines += ["not tested: parameters follow published documentation"] if self.untested else []
+        lines += ["", *_table(self.parameters)]
         if naive:
-            lines += ["", "what one would type", *_table(self.naive_rows)]
+            lines += ["", "naive parameters", *_table(self.naive_parameters)]
         lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNELS)]
-        lines.append(f"{'d [mm]':12}{_numbers(self.d_mm)}  of the nearest lobe")
+        lines.append(f"{'d [mm]':12}{_numbers(self.d_mm)}  width of the fitted Burley profile")
         for name, meaning in _ERRORS.items():
             lines.append(f"{name:12}{_numbers(getattr(self.error, name))}  {meaning}")
-            lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  as one would type it")
-        return [*lines, "", *self.words()]
+            lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  with the naive parameters")
+        return [*lines, "", *self.limitation_texts()]
 
-    def words(self) -> list[str]:
+    def limitation_texts(self) -> list[str]:
         """Return what stays wrong, of this skin and of the target."""
         worst = int(self.error.cdf.argmax())
-        share = float(self.error.cdf[worst])
-        if share < _NOTABLE:
-            return [self.wrong]
-        what = f"the program cannot hold this profile: {share:.0%} of the {_CHANNELS[worst]} light leaves"
-        return [f"Whatever is typed, {what} at another radius.", self.wrong]
+        error = float(self.error.cdf[worst])
+        if error < _NOTABLE_ERROR:
+            return [self.limitations]
+        text = f"No parameters reproduce this profile: {error:.0%} of the {_CHANNELS[worst]} light leaves"
+        return [f"{text} at another radius.", self.limitations]
 
     def markdown(self) -> str:
         """Return the report as a Markdown page."""
-        lines = [f"# {_plain(self.subject)} for {self.title} {self.version}".rstrip(), ""]
-        lines += [f"```\n{chr(10).join(map(_plain, self.lines(naive=True)))}\n```", ""]
+        lines = [f"# {_single_line(self.subject)} for {self.title} {self.version}".rstrip(), ""]
+        lines += [f"```\n{chr(10).join(map(_single_line, self.lines(naive=True)))}\n```", ""]
         return "\n".join(lines)
 
 
-def _table(rows: Rows) -> Sequence[str]:
-    cells = [(row.name, shown(row.value), row.unit, row.meaning) for row in rows]
-    wide = [max((len(line[i]) for line in cells), default=0) for i in range(3)]
-    return ["  ".join([*(one.ljust(wide[i]) for i, one in enumerate(line[:3])), line[3]]) for line in cells]
+def _table(parameters: Parameters) -> Sequence[str]:
+    rows = [(one.name, format_parameter(one.value), one.unit, one.meaning) for one in parameters]
+    widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
+    return ["  ".join([*map(str.ljust, row[:3], widths), row[3]]) for row in rows]
 
 
-def shown(value: Value) -> str:
+def format_parameter(value: Value) -> str:
     """Return a parameter's value as it is printed."""
     if isinstance(value, tuple):
         return ", ".join(f"{x:.4g}" for x in value)
@@ -128,9 +129,9 @@ def _numbers(values: Floats) -> str:
     return "".join(f"{x:9.4f}" for x in values)
 
 
-def _plain(words: str) -> str:
-    """Return words without what would end a line or a block of code."""
-    return words.replace("`", "'").replace("\n", " ").replace("\r", " ")
+def _single_line(text: str) -> str:
+    """Return a text without characters that would end a line or a block of code."""
+    return text.replace("`", "'").replace("\n", " ").replace("\r", " ")
 
 
 def export_skin(
@@ -143,18 +144,18 @@ def export_skin(
     model: ModelName | None = None,
     profile: str | Path | None = None,
     library: str | Path | None = None,
-    side: int = _SIDE,
+    side: int = _MAP_SIDE,
     adapter: str = "auto",
     **head: Any,
-) -> Report:
+) -> ExportReport:
     """Write a skin or a head for another program, and say how wrong it will be there.
 
-    subject : a profile by name or file, a head, or what `subject_of` has made
+    subject : a profile by name or file, a head, or what `load_subject` has made
     to : a target's name: "unity", "blender" ...
     output : file, or a folder that is made where the name has no suffix; beside a file come a page and JSON
     version : of the program, its newest known by default
     variant : of what it can do, a method of scattering say, its first by default
-    model : of the profile, see `true_curve`
+    model : of the profile, see `reference_curve`
     profile : skin of a head
     library : of a page, the folder that npm has installed its library into, which it then holds
     side : of maps that are painted [texels]
@@ -165,82 +166,81 @@ def export_skin(
     """
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     target = target if library is None else target.with_library(library)
-    known, place = target.known_version(version), _checked_place(target, output)
+    resolved, path = target.resolve_version(version), _checked_output(target, output)
     options = {"model": model, "profile": profile, **head}
     if not isinstance(subject, Subject):
-        subject = subject_of(subject, **options)
+        subject = load_subject(subject, **options)
     elif given := [name for name, value in options.items() if value is not None]:
-        refuse(given[0], "a subject that is still to be made", "it came with one", "Leave it out")
+        refuse(given[0], "a subject by name or file", "it is given with a Subject", "Omit this option")
     if target.needs_maps:
-        subject = subject.painted(side, adapter)
-    report = assess(subject, target, known)
-    with _staged(place) as inside:
-        home = inside.parent if place.suffix else inside
-        files = target.write(subject, report.rows, inside, known)
-        ends = place.parent if place.suffix else place
-        files += _write_report(replace(report, files=tuple(file.relative_to(home) for file in files)), inside)
-    return replace(report, files=tuple(ends / file.relative_to(home) for file in files))
+        subject = subject.with_painted_maps(side, adapter)
+    report = evaluate_export(subject, target, resolved)
+    with _staging_path(path) as staged:
+        root, final_root = (one.parent if path.suffix else one for one in (staged, path))
+        files = target.write(subject, report.parameters, staged, resolved)
+        files += _write_report(replace(report, files=tuple(file.relative_to(root) for file in files)), staged)
+    return replace(report, files=tuple(final_root / file.relative_to(root) for file in files))
 
 
-def assess(subject: Subject, target: Target, version: str) -> Report:
+def evaluate_export(subject: Subject, target: Target, version: str) -> ExportReport:
     """Return the report of an export, before anything is written."""
-    rows, naive = target.parameters(subject, version), target.naive(subject, version)
-    errors = [deviation(subject.curve, target.shown(one, subject, version)) for one in (rows, naive)]
-    return Report(
+    parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
+    errors = [curve_error(subject.curve, target.predicted_curve(one, subject, version)) for one in (parameters, naive)]
+    return ExportReport(
         target=target.name,
         title=target.title,
         version=version,
         variant=target.variant,
         subject=subject.name,
         model=subject.model,
-        rows=rows,
-        naive_rows=naive,
-        d_mm=fit_d(subject.curve),
+        parameters=parameters,
+        naive_parameters=naive,
+        d_mm=fit_burley_width(subject.curve),
         error=errors[0],
         naive_error=errors[1],
-        wrong=target.wrong,
-        not_run=target.not_run,
+        limitations=target.limitations,
+        untested=target.untested,
     )
 
 
-def _checked_place(target: Target, output: str | Path) -> Path:
+def _checked_output(target: Target, output: str | Path) -> Path:
     """Return where to write, if the target can."""
-    place = Path(output)
-    if place.suffix.lower() not in target.suffixes:
-        words = [suffix or "no suffix, for a folder" for suffix in target.suffixes]
-        came = f"its suffix is {place.suffix!r}" if place.suffix else "it has no suffix"
-        refuse(output, f"a name that ends in {' or '.join(words)}", came, "Choose one of them")
-    return check_output(place, target.suffixes) if place.suffix else place
+    path = Path(output)
+    if path.suffix.lower() not in target.suffixes:
+        allowed = [suffix or "no suffix, for a folder" for suffix in target.suffixes]
+        actual = f"its suffix is {path.suffix!r}" if path.suffix else "it has no suffix"
+        refuse(output, f"a name that ends in {' or '.join(allowed)}", actual, "Choose one of them")
+    return check_output(path, target.suffixes) if path.suffix else path
 
 
 @contextmanager
-def _staged(place: Path) -> Iterator[Path]:
-    """Provide the place that `Target.write` gets, and move what it wrote to its end if all went well."""
-    if not place.suffix:
-        with replacing_folder(place, REPORT) as folder:
+def _staging_path(output: Path) -> Iterator[Path]:
+    """Yield a temporary path for `Target.write`, and move the written files to the output afterwards."""
+    if not output.suffix:
+        with atomic_folder(output, REPORT_FILE) as folder:
             yield folder
         return
-    with folder_beside(place) as folder:
-        yield folder / place.name
-        for part in sorted(folder.iterdir(), key=lambda part: part.name == place.name):  # it comes last
-            _move(part, place.with_name(part.name))
+    with temporary_folder(output) as folder:
+        yield folder / output.name
+        for file in sorted(folder.iterdir(), key=lambda file: file.name == output.name):  # the output last
+            _move_into_place(file, output.with_name(file.name))
 
 
-def _move(part: Path, end: Path) -> None:
-    if part.is_dir():
-        with replacing_folder(end, REPORT) as folder:
+def _move_into_place(source: Path, target: Path) -> None:
+    if source.is_dir():
+        with atomic_folder(target, REPORT_FILE) as folder:
             folder.rmdir()
-            part.replace(folder)
+            source.replace(folder)
         return
-    with replacing(end) as trial:
-        part.replace(trial)
+    with atomic_file(target) as temporary:
+        source.replace(temporary)
 
 
-def _write_report(report: Report, inside: Path) -> list[Path]:
-    """Write the page and the numbers in the folder or beside the file; return their paths."""
-    single = bool(inside.suffix)
-    page = inside.with_name(f"{inside.name}.md") if single else inside / _PAGE
-    numbers = inside.with_name(f"{inside.name}.json") if single else inside / REPORT
+def _write_report(report: ExportReport, output: Path) -> list[Path]:
+    """Write the page and the numbers into the folder or beside the file; return their paths."""
+    single = bool(output.suffix)
+    page = output.with_name(f"{output.name}.md") if single else output / _PAGE_FILE
+    numbers = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE
     page.write_text(report.markdown(), encoding="utf-8")
     numbers.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
     return [page, numbers]

@@ -11,25 +11,25 @@ from dermis.base.errors import notify
 from dermis.scene.lights import Light
 
 
-def known_lights(lights: Iterable[Light], known: Container[str], program: str) -> list[Light]:
+def supported_lights(lights: Iterable[Light], supported: Container[str], program: str) -> list[Light]:
     """Return the lights, one of an unknown kind as the nearest known kind that it derives from, with a note.
 
     known : kinds that the program has, points and parallel light among them
     """
-    return [_known(light, known, f"light {k}: {program}") for k, light in enumerate(lights, start=1)]
+    return [_nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, start=1)]
 
 
-def _known(light: Light, known: Container[str], culprit: str) -> Light:
-    if light.kind in known:
+def _nearest_kind(light: Light, supported: Container[str], culprit: str) -> Light:
+    if light.kind in supported:
         return light
     bases = (one for one in type(light).__mro__ if issubclass(one, Light))
-    base = next(one for one in bases if one.model_fields["kind"].default in known)
-    found = base(**{name: getattr(light, name) for name in base.model_fields if name != "kind"})
-    notify(f"{culprit} has no {light.kind} light and takes it for a {found.kind} light")
-    return found
+    base = next(one for one in bases if one.model_fields["kind"].default in supported)
+    replacement = base(**{name: getattr(light, name) for name in base.model_fields if name != "kind"})
+    notify(f"{culprit} has no {light.kind} light, so it becomes a {replacement.kind} light")
+    return replacement
 
 
-def ply(
+def encode_ply(
     triangles: NDArray[np.integer],
     positions: ArrayLike,
     normals: ArrayLike | None = None,
@@ -41,9 +41,9 @@ def ply(
     triangles : (t, 3) vertices
     positions, normals, uv, colour : (v, 3), (v, 3), (v, 2), (v, 3) linear, of each vertex
     """
-    given = {"x y z": positions, "nx ny nz": normals, "u v": uv, "r g b": colour}
-    columns = {names: values for names, values in given.items() if values is not None}
-    vertices = np.concatenate([np.asarray(one, "<f4") for one in columns.values()], axis=1)
+    attributes = {"x y z": positions, "nx ny nz": normals, "u v": uv, "r g b": colour}
+    columns = {names: values for names, values in attributes.items() if values is not None}
+    vertices = np.concatenate([np.asarray(values, "<f4") for values in columns.values()], axis=1)
     header = [
         "ply",
         "format binary_little_endian 1.0",

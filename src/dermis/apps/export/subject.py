@@ -11,8 +11,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from dermis.base.errors import refuse, shown_value
-from dermis.base.reading import named_path
+from dermis.base.errors import format_value, refuse
+from dermis.base.reading import checked_path
 from dermis.formats.gltf.materials import skin_pictures
 from dermis.formats.samples import SAMPLES
 from dermis.human.person_file import relief_slopes
@@ -20,29 +20,29 @@ from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.optics.curve import Curve
+from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.half_space import counted_curve
+from dermis.optics.half_space import tabulated_curve
 from dermis.optics.media import Floats
-from dermis.optics.profiles import find_table
-from dermis.optics.radial import RadialProfile, profile_of_table
+from dermis.optics.profiles import find_gaussians
+from dermis.optics.radial import RadialProfile, gaussian_radial_profile
 from dermis.optics.tissue import Tissue
-from dermis.scene.heads import is_person, load_head, person_of
+from dermis.scene.heads import is_person_name, load_head, load_person
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.skin import Skin
-from dermis.scene.tissue import tissue_of
+from dermis.scene.tissue import skin_tissue
 
 BALL_MM = 100.0
-"""Diameter of the ball that stands for a head where there is none."""
+"""Diameter of the ball that replaces the head of a skin without one [mm]."""
 
 ModelName = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
 MODELS: tuple[ModelName, ...] = get_args(ModelName)
 _PHOTONS = 1_000_000
-_ROLES = "colour", "normal", "roughness", "specular", "height"
-_DARKEST = 1e-9
+_MAP_ROLES = "colour", "normal", "roughness", "specular", "height"
+_MIN_ALBEDO = 1e-9
 _MESHES = ".glb", ".gltf", ".obj", ".ply"
-_LONGEST_NAME = 40
+_MAX_NAME_LENGTH = 40
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Subject:
     """
 
     name: str
-    curve: Curve
+    curve: CumulativeProfile
     albedo: Floats
     model: str
     tissue: Tissue | None = None
@@ -71,39 +71,38 @@ class Subject:
         return None if self.scene is None else self.scene.head
 
     @cached_property
-    def shape(self) -> Head:
+    def head_or_ball(self) -> Head:
         """The head, or a ball of `BALL_MM` where a target needs geometry."""
         return self.head or Head("ball", uv_sphere(0.5 * BALL_MM), Maps())
 
     @property
     def identifier(self) -> str:
         """The name with nothing but letters, digits and underscores of ASCII in it, for names in files."""
-        words = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[:_LONGEST_NAME]
-        return f"skin_{words}" if not words or words[0].isdigit() else words
+        name = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[:_MAX_NAME_LENGTH]
+        return f"skin_{name}" if not name or name[0].isdigit() else name
 
     @property
     def skin(self) -> Skin:
         """The scene's skin, or the default one."""
         return Skin() if self.scene is None else self.scene.skin
 
-    def colour(self, least: float = 0.0, most: float = 1.0) -> Floats:
-        """Return the albedo (3,) within bounds."""
-        return np.clip(self.albedo, least, most)
+    def clipped_albedo(self, low: float = 0.0) -> Floats:
+        """Return the albedo (3,) clipped to the interval from `low` to 1."""
+        return np.clip(self.albedo, low, 1.0)
 
-    def scaled(self, shown: Curve) -> Curve:
-        """Return a curve with the subject's energy, times the error of the curve's energy as an albedo."""
-        energy = self.curve.energy * shown.energy / np.maximum(self.albedo, _DARKEST)
-        return shown.with_energy(energy)
+    def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
+        """Return a curve with the subject's energy, times the ratio of the curve's energy to the albedo."""
+        return curve.with_energy(self.curve.energy * curve.energy / np.maximum(self.albedo, _MIN_ALBEDO))
 
     def eye_pictures(self) -> EyePictures | None:
         """Return what the eyes of the shape look like, painted on a device; None for a shape without eyes."""
         from dermis.frame.features.surface.painting.painted_head import eye_pictures
         from dermis.gpu.failures import run_on_device
 
-        eyes = self.shape.eyes
+        eyes = self.head_or_ball.eyes
         return None if eyes is None else run_on_device("auto", lambda device: eye_pictures(device, eyes.look))
 
-    def painted(self, side: int, adapter: str) -> Subject:
+    def with_painted_maps(self, side: int, adapter: str) -> Subject:
         """Return the subject with all maps of its head as arrays; itself where nothing has to be painted.
 
         side : of the maps, a power of two from 256 to 4096 [texels]
@@ -115,10 +114,10 @@ class Subject:
         from dermis.frame.features.surface.painting.painted_head import with_painted_maps
         from dermis.gpu.failures import run_on_device
 
-        made = run_on_device(adapter, lambda device: with_painted_maps(device, head, side))
-        return replace(self, scene=replace(self.scene, head=made))
+        painted = run_on_device(adapter, lambda device: with_painted_maps(device, head, side))
+        return replace(self, scene=replace(self.scene, head=painted))
 
-    def map_pictures(self) -> dict[str, bytes]:
+    def encode_maps(self) -> dict[str, bytes]:
         """Return the maps of the head as PNG files by role: colour (sRGB), normal (green up), and grey ones.
 
         Roughness is Beckmann's m, specular the strength of the reflection, both plain; height is from its
@@ -127,46 +126,44 @@ class Subject:
         if self.head is None:
             return {}
         pictures, _ = skin_pictures(self.head.maps, relief_slopes(self.head))
-        return {role: pictures[role] for role in _ROLES if role in pictures}
+        return {role: pictures[role] for role in _MAP_ROLES if role in pictures}
 
 
-def subject_of(
-    word: str | Path, *, profile: str | Path | None = None, model: ModelName | None = None, **head: Any
+def load_subject(
+    source: str | Path, *, profile: str | Path | None = None, model: ModelName | None = None, **head: Any
 ) -> Subject:
     """Return the subject of a name or file.
 
     word : a profile by name ("skin1", "dj3", "light", "gpu-gems-3"), its file (.toml, .csv), or a head:
         "human", "human:7", a person's .json, a sample, or a file (.glb, .gltf, .obj, .ply)
     profile : skin of a head; by default a person's own pigments, or else the default skin
-    model : of the profile, see `true_curve`
+    model : of the profile, see `reference_curve`
     head : options of `load_head`
 
     DermisError : there is no such thing, or an option that it has no use for
     """
-    path = named_path(word, "a skin or a head")
-    name = str(word)
-    if not (is_person(name) or name in SAMPLES or path.suffix.lower() in _MESHES):
-        return _skin(name, profile, model, head)
-    made = load_head(word, **head)
+    path = checked_path(source, "a skin or a head")
+    name = str(source)
+    if not (is_person_name(name) or name in SAMPLES or path.suffix.lower() in _MESHES):
+        return _load_skin(name, profile, model, head)
+    loaded = load_head(source, **head)
     if profile is not None:
         skin = Skin(profile=str(profile))
     else:
-        skin = skin_of(person_of(name)) if is_person(name) else Skin()
-    curve, used, tissue = true_curve(skin, model)
-    mean = made.maps.mean_colour
-    return Subject(
-        path.name, curve, curve.energy if mean is None else mean, used, tissue, Scene(made, skin=skin)
-    )
+        skin = skin_of(load_person(name)) if is_person_name(name) else Skin()
+    curve, used, tissue = reference_curve(skin, model)
+    albedo = curve.energy if loaded.maps.mean_colour is None else loaded.maps.mean_colour
+    return Subject(path.name, curve, albedo, used, tissue, Scene(loaded, skin=skin))
 
 
-def _skin(name: str, profile: str | Path | None, model: ModelName | None, head: Iterable[str]) -> Subject:
+def _load_skin(name: str, profile: str | Path | None, model: ModelName | None, head: Iterable[str]) -> Subject:
     for option in ("profile",) if profile is not None else tuple(head):
-        refuse(option, "a head that it is for", f"the skin {name} came", "Leave it out, or name a head")
-    curve, used, tissue = true_curve(Skin(profile=name), model)
+        refuse(option, "a head", f"got the skin {name}", "Omit this option, or name a head")
+    curve, used, tissue = reference_curve(Skin(profile=name), model)
     return Subject(Path(name).name, curve, curve.energy, used, tissue)
 
 
-def true_curve(skin: Skin, model: ModelName | None = None) -> tuple[Curve, str, Tissue | None]:
+def reference_curve(skin: Skin, model: ModelName | None = None) -> tuple[CumulativeProfile, str, Tissue | None]:
     """Return the curve of a skin's profile, the model that it is by, and its tissue.
 
     model : by default Monte Carlo for homogeneous media by name, which the package has tables of, layered
@@ -175,19 +172,19 @@ def true_curve(skin: Skin, model: ModelName | None = None) -> tuple[Curve, str, 
     DermisError : an unknown model, or one for a table of Gaussians
     """
     if model is not None and model not in MODELS:
-        refuse("model", f"one of {', '.join(MODELS)}", f"{shown_value(model)} came", "Choose one of them")
-    table = None if skin.has_own_tissue else find_table(skin.profile)
+        refuse("model", f"one of {', '.join(MODELS)}", f"got {format_value(model)}", "Choose one of them")
+    table = None if skin.overrides_tissue else find_gaussians(skin.profile)
     if table is not None:
         if model is not None:
-            refuse("model", "a tissue", f"{skin.profile} is a table of Gaussians", "Leave it out")
-        return Curve.of_profile(profile_of_table(table)), "table", None
-    tissue = tissue_of(skin)
-    counted = counted_curve(tissue.medium) if tissue.rgb is None and model in (None, "montecarlo") else None
-    if counted is not None:
-        return counted, "montecarlo", tissue
+            refuse("model", "a tissue", f"{skin.profile} is a table of Gaussians", "Omit this option")
+        return CumulativeProfile.from_radial_profile(gaussian_radial_profile(table)), "table", None
+    tissue = skin_tissue(skin)
+    tabulated = tabulated_curve(tissue.medium) if tissue.rgb is None and model in (None, "montecarlo") else None
+    if tabulated is not None:
+        return tabulated, "montecarlo", tissue
     used: ModelName = model or "layered"
-    entering = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)
-    return Curve.of_profile(_profile(tissue, used), entering), used, tissue
+    transmitted = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)
+    return CumulativeProfile.from_radial_profile(_profile(tissue, used), transmitted), used, tissue
 
 
 def _profile(tissue: Tissue, model: ModelName) -> RadialProfile:

@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.apps.export.subject import Subject
-from dermis.base.errors import refuse, shown_value
-from dermis.optics.curve import Curve
+from dermis.base.errors import format_value, refuse
+from dermis.optics.cumulative_profile import CumulativeProfile
 
 Value = bool | int | float | str | tuple[float, ...]
 T = TypeVar("T", bound="Target")
 
 
 @dataclass(frozen=True)
-class Row:
+class Parameter:
     """A parameter as it is typed into a target.
 
     name : in the target
@@ -36,23 +36,23 @@ class Row:
     meaning: str
 
 
-Rows = tuple[Row, ...]
+Parameters = tuple[Parameter, ...]
 
 
-def value_of(rows: Rows, name: str) -> Value:
+def get_value(parameters: Parameters, name: str) -> Value:
     """Return the value of the row of a name."""
-    return next(row.value for row in rows if row.name == name)
+    return next(one.value for one in parameters if one.name == name)
 
 
-def numbers_of(rows: Rows, name: str) -> tuple[float, ...]:
+def get_numbers(parameters: Parameters, name: str) -> tuple[float, ...]:
     """Return the value of the row of a name as numbers; one number is a tuple of one."""
-    value = value_of(rows, name)
+    value = get_value(parameters, name)
     return value if isinstance(value, tuple) else (float(value),)
 
 
-def with_values(rows: Rows, values: Mapping[str, Value]) -> Rows:
+def replace_values(parameters: Parameters, values: Mapping[str, Value]) -> Parameters:
     """Return the rows with other values by name."""
-    return tuple(replace(row, value=values.get(row.name, row.value)) for row in rows)
+    return tuple(replace(one, value=values.get(one.name, one.value)) for one in parameters)
 
 
 def floats(values: ArrayLike) -> tuple[float, ...]:
@@ -94,9 +94,9 @@ class Target(ABC):
     """Methods of scattering, say; the first is the default."""
     needs_maps: ClassVar[bool] = False
     """Whether the maps of a head have to be arrays before `write`: they are then painted."""
-    wrong: ClassVar[str]
+    limitations: ClassVar[str]
     """What stays wrong there, in one or two sentences."""
-    not_run: ClassVar[bool] = False
+    untested: ClassVar[bool] = False
     """Whether nobody has run the program with what is written."""
 
     def with_variant(self: T, variant: str | None) -> T:
@@ -108,7 +108,7 @@ class Target(ABC):
             return replace(self, variant=self.variants[0] if self.variants else "")
         if variant not in self.variants:
             expected = f"one of {', '.join(self.variants)}" if self.variants else f"none for {self.name}"
-            refuse("variant", expected, f"{shown_value(variant)} came", "Correct it")
+            refuse("variant", expected, f"got {format_value(variant)}", "Correct it")
         return replace(self, variant=variant)
 
     def with_library(self, folder: str | Path) -> Target:
@@ -116,9 +116,9 @@ class Target(ABC):
 
         DermisError : it draws with none
         """
-        refuse("library", f"none for {self.name}", f"{shown_value(str(folder))} came", "Leave it out")
+        refuse("library", f"none for {self.name}", f"got {format_value(str(folder))}", "Omit this option")
 
-    def known_version(self, version: str | None) -> str:
+    def resolve_version(self, version: str | None) -> str:
         """Return the requested version, the newest where None.
 
         DermisError : it is not known
@@ -126,32 +126,32 @@ class Target(ABC):
         if version is None:
             return self.versions[-1]
         if version not in self.versions:
-            expected = f"a version of {self.title} that is known: {', '.join(self.versions)}"
-            refuse("version", expected, f"{shown_value(version)} came", "Choose the nearest, and check it")
+            expected = f"a supported version of {self.title}: {', '.join(self.versions)}"
+            refuse("version", expected, f"got {format_value(version)}", "Choose the nearest, and check the result")
         return version
 
-    def file_in(self, place: Path, subject: Subject, suffix: str = "") -> Path:
+    def main_file(self, output: Path, subject: Subject, suffix: str = "") -> Path:
         """Return the main file: the place itself, or one in it where it is a folder.
 
         suffix : of the file in a folder, the usual one by default
         """
         suffix = suffix or next(filter(None, self.suffixes))
-        return place if place.suffix else place / f"{subject.identifier}{suffix}"
+        return output if output.suffix else output / f"{subject.identifier}{suffix}"
 
     @abstractmethod
-    def parameters(self, subject: Subject, version: str) -> Rows:
+    def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the parameters that show the subject best."""
 
     @abstractmethod
-    def naive(self, subject: Subject, version: str) -> Rows:
+    def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return what a user would type who does not know what the numbers mean in this program."""
 
     @abstractmethod
-    def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
+    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve that the target shows with parameters, by its own formulas."""
 
     @abstractmethod
-    def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
+    def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the files that the target reads; return their paths.
 
         place : a folder that is empty, where the output's name has no suffix; else a file of that name in
@@ -159,24 +159,24 @@ class Target(ABC):
         """
 
 
-class ParameterTable(Target):
+class JsonTarget(Target):
     """A program that nobody has run with the parameters: a JSON file of them with units and meanings."""
 
     suffixes = (".json", "")
-    not_run = True
+    untested = True
 
-    def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
+    def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the parameters, marked as not run."""
-        file = self.file_in(place, subject)
-        told = {
+        file = self.main_file(output, subject)
+        content = {
             "for": f"{self.title} {version}",
-            "status": "not run: by the published meanings",
+            "status": "not run: by published documentation",
             "skin": subject.name,
             "profile": subject.model,
             "parameters": {
-                row.name: {"value": row.value, "unit": row.unit, "meaning": row.meaning} for row in rows
+                one.name: {"value": one.value, "unit": one.unit, "meaning": one.meaning} for one in parameters
             },
-            "remains_wrong": self.wrong,
+            "remains_wrong": self.limitations,
         }
-        file.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        file.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
         return [file]

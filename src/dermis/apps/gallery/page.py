@@ -14,7 +14,7 @@ from string import Template
 
 from dermis.apps.gallery.script import Picture
 from dermis.base import citations as cite
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 
 _FIELD = re.compile(r"(\w+)\s*=\s*\{")
 _ACCENT = re.compile(r"\\(['\"`^~])\s*(\w)")
@@ -48,7 +48,7 @@ def write_page(path: Path, pictures: Sequence[Picture], head: str, adapter: str)
         deck=_deck(pictures),
         works=_works(pictures),
     )
-    with replacing(path) as trial:
+    with atomic_file(path) as trial:
         trial.write_text(page, encoding="utf-8")
 
 

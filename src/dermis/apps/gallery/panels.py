@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 from dermis.frame.observation import Landmarks
 from dermis.images.colour import encode_srgb8
 from dermis.scene.outputs import OUTPUTS
@@ -52,8 +52,8 @@ def plotted(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
     plot : draws into matplotlib axes
     side : of the picture [pixel]
     """
-    canvases = needed("matplotlib.backends.backend_agg", "the gallery")
-    figure = needed("matplotlib.figure", "the gallery").Figure(
+    canvases = import_extra("matplotlib.backends.backend_agg", "the gallery")
+    figure = import_extra("matplotlib.figure", "the gallery").Figure(
         figsize=(_INCHES, _INCHES), dpi=side / _INCHES, facecolor="#141417", layout="constrained"
     )
     plot(figure.subplots())

@@ -17,9 +17,9 @@ import numpy as np
 
 from dermis.apps.gallery.panels import Panel, Panels, as_bytes, sheet, still
 from dermis.apps.gallery.studio import Studio
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import DermisError, refuse
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 
 _FACT = re.compile(r"^(Deck|Equation|Sources|Slider|Columns): *(.+)$", re.MULTILINE)
 
@@ -55,7 +55,7 @@ class Script:
 
         Raises DermisError when the script lacks something that it needs.
         """
-        with needed("matplotlib.style", "the gallery").context("dark_background"):
+        with import_extra("matplotlib.style", "the gallery").context("dark_background"):
             panels: Panels = runpy.run_path(str(self.path))["draw"](studio)
         return panels
 
@@ -87,7 +87,7 @@ def find_scripts(only: Sequence[str] = ()) -> list[Script]:
     for wanted in only:
         if not any(_named(script, wanted) for script in scripts):
             names = ", ".join(script.name for script in scripts)
-            refuse("--only", "names of pictures", f"{wanted!r} came", f"Choose from: {names}")
+            refuse("--only", "names of pictures", f"got {wanted!r}", f"Choose from: {names}")
     return [script for script in scripts if not only or any(_named(script, name) for name in only)]
 
 
@@ -103,7 +103,7 @@ def draw_script(draw: Callable[[Studio], Panels]) -> None:
     from dermis.images.io import write_png
 
     output, head = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
-    with needed("matplotlib.style", "the gallery").context("dark_background"):
+    with import_extra("matplotlib.style", "the gallery").context("dark_background"):
         panels = draw(Studio(head))
     write_png(output, sheet(panels, read_script(Path(sys.argv[0])).columns))
 
@@ -173,5 +173,5 @@ def write_panels(folder: Path, picture: Picture) -> None:
     Raises DermisError when that is not possible.
     """
     for number, file in enumerate(picture.panels.values(), 1):
-        with replacing(folder / f"{picture.script.name}-{number}.webp") as trial:
+        with atomic_file(folder / f"{picture.script.name}-{number}.webp") as trial:
             trial.write_bytes(file)

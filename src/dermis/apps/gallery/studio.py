@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.formats.samples import cached
+from dermis.formats.samples import is_available
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
-from dermis.frame.rendered import Rendered
+from dermis.frame.rendered_frame import RenderedFrame
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.heads import HUMAN, load_head
@@ -31,7 +31,7 @@ class Studio:
     def __init__(
         self, name: str | None = None, side: int = 448, adapter: str = "auto", **settings: Any
     ) -> None:
-        self.name = name or (_SCAN if cached(_SCAN) else HUMAN)
+        self.name = name or (_SCAN if is_available(_SCAN) else HUMAN)
         self.side = side
         self.adapter, self._settings = adapter, settings
         self.frames_ms: list[float] = []
@@ -72,7 +72,7 @@ class Studio:
         view : as named by the viewer, such as "blur 3"
         """
         from dermis.apps.viewer.state import PARTS
-        from dermis.apps.viewer.views import Views
+        from dermis.apps.viewer.views import IntermediateViews
         from dermis.gpu import download
 
         if view in ("picture", *PARTS):
@@ -80,10 +80,10 @@ class Studio:
 
         def seen() -> NDArray[np.uint8]:
             self._draw(scene, scale, settings)
-            texture = Views(self.renderer).draw(scene, self.settings(scale, **settings), view)
+            texture = IntermediateViews(self.renderer).draw(scene, self.settings(scale, **settings), view)
             return np.asarray(download(self.renderer.device, texture), np.uint8)[..., :3]
 
-        return self.renderer.kept_open.run(seen)
+        return self.renderer.reopening_device.run(seen)
 
     def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
         """(n, n, 3) light on the atlas, irradiance over pi: level 0 as it enters, higher levels blurred."""
@@ -98,7 +98,7 @@ class Studio:
             found = download(self.renderer.device, levels.stacks[halved], layer=layer - levels.first[halved])
             return np.asarray(found, np.float32)[..., :3] / np.float32(blur.scale)
 
-        return self.renderer.kept_open.run(light)
+        return self.renderer.reopening_device.run(light)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
         """A panel's settings."""
@@ -106,7 +106,7 @@ class Studio:
         chosen: dict[str, Any] = {"size": (side, side), "atlas": 1024}
         return Settings(**(chosen | settings | self._settings))
 
-    def _draw(self, scene: Scene, scale: float, settings: dict[str, Any]) -> Rendered:
+    def _draw(self, scene: Scene, scale: float, settings: dict[str, Any]) -> RenderedFrame:
         rendered = self.renderer.draw(scene, self.settings(scale, **settings))
         self.frames_ms.append(rendered.frame_ms)
         return rendered

@@ -17,30 +17,30 @@ from dermis.base.console import print_lines
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
 
-Figures = dict[str, Any]
+JsonObject = dict[str, Any]
 """A JSON object: numbers, words, lists and further objects."""
 CHECKOUT = Path(str(files("dermis"))).resolve().parents[1]
 DOCS, RESULTS = CHECKOUT / "docs", CHECKOUT / "benchmarks" / "results"
-_REMEDY = "Install the package from a clone of the project (make setup) and run this there"
+_CHECKOUT_HINT = "Install the package from a clone of the project (make setup) and run this there"
 SOFTWARE_WEBGL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
-def in_checkout(path: Path) -> Path:
+def require_in_checkout(path: Path) -> Path:
     """Return a path of the checkout that has to exist.
 
     Raises DermisError where the package was installed without the rest of the project.
     """
     if not path.exists():
-        refuse(path.name, "a checkout of the project", f"there is no {path}", _REMEDY)
+        refuse(path.name, "a checkout of the project", f"there is no {path}", _CHECKOUT_HINT)
     return path
 
 
-def use_tests_folder() -> None:
+def add_tests_to_path() -> None:
     """Make the modules of the tests importable: some measurements use their surfaces.
 
     Raises DermisError where the tests are missing.
     """
-    folder = str(in_checkout(CHECKOUT / "tests"))
+    folder = str(require_in_checkout(CHECKOUT / "tests"))
     if folder not in sys.path:
         sys.path.append(folder)
 
@@ -58,19 +58,19 @@ def data_file(name: str) -> Path:
 
 def write_page(page: Path, text: str) -> None:
     """Write a page of the documentation, whole or not at all."""
-    in_checkout(page.parent)
+    require_in_checkout(page.parent)
     with atomic_file(page) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
 
 
-def template_of(page: Path) -> Path:
+def template_path(page: Path) -> Path:
     """Return the template of a page of the documentation."""
     return page.parent / "templates" / page.name
 
 
 def fill_page(page: Path, **parts: object) -> None:
     """Write docs/NAME.md from docs/templates/NAME.md with its parts filled in."""
-    write_page(page, in_checkout(template_of(page)).read_text(encoding="utf-8").format(**parts))
+    write_page(page, require_in_checkout(template_path(page)).read_text(encoding="utf-8").format(**parts))
 
 
 def print_tables(tables: Mapping[str, str]) -> None:
@@ -78,7 +78,7 @@ def print_tables(tables: Mapping[str, str]) -> None:
     print_lines(*(f"{name}\n{text}\n" for name, text in tables.items()))
 
 
-def write_figures(path: Path, figures: Mapping[str, Any], digits: int | None = None) -> None:
+def write_results(path: Path, figures: Mapping[str, Any], digits: int | None = None) -> None:
     """Write raw figures as JSON, whole or not at all.
 
     figures : what JSON can have
@@ -89,9 +89,9 @@ def write_figures(path: Path, figures: Mapping[str, Any], digits: int | None = N
         unfinished.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
-def read_figures(path: Path) -> Any:
+def read_results(path: Path) -> Any:
     """Return the figures that were written last."""
-    return json.loads(in_checkout(path).read_text(encoding="utf-8"))
+    return json.loads(require_in_checkout(path).read_text(encoding="utf-8"))
 
 
 def _rounded(value: object, digits: int) -> object:

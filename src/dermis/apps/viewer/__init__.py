@@ -1,1 +1,1 @@
-"""The interactive viewer: in a desktop window, a browser or a notebook."""
+"""Interactive viewer in a desktop window, a web page or a notebook."""

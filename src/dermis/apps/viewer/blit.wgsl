@@ -1,7 +1,7 @@
-// Scales the rendered image into the window's texture.
+// Scales the rendered image to the texture of the window.
 //#include "bilinear.wgsl"
 
-override DECODED: bool = false; // for a target that encodes sRGB itself
+override DECODED: bool = false; // whether the target encodes linear values as sRGB
 
 @group(0) @binding(0) var image: texture_2d<u32>; // sRGB bytes
 
@@ -16,9 +16,9 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     return Corner(vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, 0.0, 1.0), uv);
 }
 
-fn texel(at: vec2i) -> vec3f {
+fn texel(index: vec2i) -> vec3f {
     let last = vec2i(textureDimensions(image)) - 1;
-    return vec3f(textureLoad(image, clamp(at, vec2i(0), last), 0).rgb) / 255.0;
+    return vec3f(textureLoad(image, clamp(index, vec2i(0), last), 0).rgb) / 255.0;
 }
 
 fn decode_srgb(c: vec3f) -> vec3f {
@@ -27,9 +27,9 @@ fn decode_srgb(c: vec3f) -> vec3f {
 
 @fragment
 fn fragment(corner: Corner) -> @location(0) vec4f {
-    let place = corner.uv * vec2f(textureDimensions(image)) - 0.5;
-    let a = vec2i(floor(place));
-    let w = bilinear_weights(place);
+    let position = corner.uv * vec2f(textureDimensions(image)) - 0.5;
+    let a = vec2i(floor(position));
+    let w = bilinear_weights(position);
     let colour = w.x * texel(a) + w.y * texel(a + vec2i(1, 0)) + w.z * texel(a + vec2i(0, 1)) + w.w * texel(a + 1);
     return vec4f(select(colour, decode_srgb(colour), DECODED), 1.0);
 }

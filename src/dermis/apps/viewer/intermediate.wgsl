@@ -1,74 +1,74 @@
-// What lies on the way to the picture, over the pixels that see it: levels of light, stretch, thickness, shadow, normals.
+// Intermediate results on the visible surface: irradiance levels, stretch, thickness, shadow and normals.
 //#include "shape/geometry.wgsl"
 //#include "bilinear.wgsl"
 //#include "layer_colours.wgsl"
 //#include "surface/skin.wgsl"
 //#include "lights.wgsl"
 
-const SHADOW_VIEW: u32 = 3u; // before it the layers of the atlas, after it normals
+const SHADOW_VIEW: u32 = 3u; // smaller numbers are layers of the atlas, larger ones normals
 
-struct Look {
+struct ViewParameters {
     eye: vec3f,
-    what: u32, // a layer of the atlas, shadow, or normals
+    quantity: u32, // number of the displayed quantity
     forward: vec3f,
     samples: u32,
     right: vec3f,
-    scale: f32, // of light to the display, or the mean texels per mm
+    scale: f32, // from light to display values, or the mean number of texels per mm
     up: vec3f,
-    shift: vec2f, // of the picture's middle from the axis, in half pictures
+    shift: vec2f, // offset of the image centre from the optical axis, in half images
     jitter: array<vec4f, 64>,
 }
 
-@group(0) @binding(30) var<uniform> look: Look;
+@group(0) @binding(30) var<uniform> view_parameters: ViewParameters;
 @group(0) @binding(31) var visibility_buffer: texture_2d_array<u32>;
-@group(0) @binding(32) var layer: texture_2d<f32>; // of the atlas: light, stretch, or thickness [mm]
+@group(0) @binding(32) var layer: texture_2d<f32>; // atlas map of light, stretch or thickness [mm]
 @group(0) @binding(33) var bytes: texture_storage_2d<rgba8uint, write>;
 
-// Share of the lights' own light that arrives; back faces see none.
-fn lit_share(point: Point) -> f32 {
-    var all = 0.0;
-    var seen_of_all = 0.0;
+// Fraction of the unshadowed light that arrives at a point; 0 on back faces.
+fn lit_fraction(point: Point) -> f32 {
+    var total = 0.0;
+    var visible = 0.0;
     for (var i = 0u; i < skin.light_count; i++) {
         let light = lights.light[i];
         let arriving = incident(light, point.position, 0u);
         let strength = dot(arriving.irradiance, vec3f(1.0)) * f32(parts_of(light));
-        all += strength;
+        total += strength;
         if (dot(point.normal, arriving.direction) > 0.0) {
-            seen_of_all += strength * visibility(light, point, arriving.direction);
+            visible += strength * visibility(light, point, arriving.direction);
         }
     }
-    return seen_of_all / max(all, 1e-6);
+    return visible / max(total, 1e-6);
 }
 
-fn shown(point: Point) -> vec3f {
+fn displayed_colour(point: Point) -> vec3f {
     let mapped = (point.flags & MAPPED) != 0u && (point.flags & OPAQUE) == 0u;
-    if (look.what == SHADOW_VIEW) {
-        return vec3f(lit_share(point));
+    if (view_parameters.quantity == SHADOW_VIEW) {
+        return vec3f(lit_fraction(point));
     }
-    if (look.what > SHADOW_VIEW) {
+    if (view_parameters.quantity > SHADOW_VIEW) {
         return 0.5 + 0.5 * surface_at(point, 0.0).normal;
     }
     if (!mapped) {
         return vec3f(0.0);
     }
-    if (look.what == STRETCH_VIEW) { // a mean of shears of several charts would mean nothing
+    if (view_parameters.quantity == STRETCH_VIEW) { // not interpolated: a mean over several charts is meaningless
         let texel = vec2u(point.place * vec2f(textureDimensions(layer)));
-        return layer_colour(look.what, textureLoad(layer, texel, 0), look.scale);
+        return layer_colour(view_parameters.quantity, textureLoad(layer, texel, 0), view_parameters.scale);
     }
-    return layer_colour(look.what, load_bilinear(layer, point.place), look.scale);
+    return layer_colour(view_parameters.quantity, load_bilinear(layer, point.place), view_parameters.scale);
 }
 
-// The point of a triangle under a place of the image.
-fn point_under(index: u32, place: vec2f, size: vec2f) -> Point {
+// Surface point of a triangle under a position of the image.
+fn point_under(index: u32, pixel: vec2f, size: vec2f) -> Point {
     let t = triangle_at(index);
     let a = corner_at(t.x);
     let b = corner_at(t.y);
     let c = corner_at(t.z);
-    let ea = a.position - look.eye;
-    let eb = b.position - look.eye;
-    let ec = c.position - look.eye;
-    let ndc = vec2f(2.0, -2.0) * place / size + vec2f(-1.0, 1.0);
-    let ray = look.forward + (ndc.x + look.shift.x) * look.right + (ndc.y + look.shift.y) * look.up;
+    let ea = a.position - view_parameters.eye;
+    let eb = b.position - view_parameters.eye;
+    let ec = c.position - view_parameters.eye;
+    let ndc = vec2f(2.0, -2.0) * pixel / size + vec2f(-1.0, 1.0);
+    let ray = view_parameters.forward + (ndc.x + view_parameters.shift.x) * view_parameters.right + (ndc.y + view_parameters.shift.y) * view_parameters.up;
     let w = vec3f(dot(cross(eb, ec), ray), dot(cross(ec, ea), ray), dot(cross(ea, eb), ray));
     let inside = max(w * sign(w.x + w.y + w.z), vec3f(0.0));
     let weights = inside / max(inside.x + inside.y + inside.z, 1e-20);
@@ -84,12 +84,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     var sum = vec3f(0.0);
-    for (var s = 0u; s < look.samples; s++) {
+    for (var s = 0u; s < view_parameters.samples; s++) {
         let triangle = textureLoad(visibility_buffer, id.xy, s, 0).x;
         if (triangle > 0u) {
-            let place = vec2f(id.xy) + look.jitter[s].xy;
-            sum += clamp(shown(point_under(triangle - 1u, place, vec2f(size))), vec3f(0.0), vec3f(1.0));
+            let pixel = vec2f(id.xy) + view_parameters.jitter[s].xy;
+            sum += clamp(displayed_colour(point_under(triangle - 1u, pixel, vec2f(size))), vec3f(0.0), vec3f(1.0));
         }
     }
-    textureStore(bytes, id.xy, vec4u(vec3u(round(255.0 * sum / f32(look.samples))), 255u));
+    textureStore(bytes, id.xy, vec4u(vec3u(round(255.0 * sum / f32(view_parameters.samples))), 255u));
 }

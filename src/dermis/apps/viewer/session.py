@@ -1,4 +1,4 @@
-"""A viewing session: everything of the viewer except its window, shared by input and panel."""
+"""Viewing session: everything of the viewer except its window, shared by input and panel."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from dermis.apps.viewer.controls import Controls, Split
-from dermis.apps.viewer.player import MotionFile, Player
-from dermis.apps.viewer.state import PARTS, PICTURE, History, ViewerState, load_state, save_state
-from dermis.apps.viewer.studio import Studio
+from dermis.apps.viewer.controls import Controls, SplitView
+from dermis.apps.viewer.player import MotionFile, MotionPlayer
+from dermis.apps.viewer.state import PARTS, PICTURE, UndoHistory, ViewerState, load_state, save_state
+from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.base.errors import DermisError, refuse
-from dermis.formats.samples import SAMPLES, cached
+from dermis.formats.samples import SAMPLES, is_available
 from dermis.mesh.head import Head
 from dermis.scene.files import head_and_skin
 from dermis.scene.head_table import AUTO, HeadTable
@@ -24,171 +24,172 @@ from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.skin import Skin
 
 HEAD_FILES = (".glb", ".obj", ".ply", ".json", ".toml")
-"""Suffixes of files that a page may send: meshes, people, scenes."""
+"""Suffixes of files that a page may upload: meshes, people and scenes."""
 
-_MOST_RECENT = 8
-Opened = Head | ViewerState
+_MAX_RECENT = 8
+LoadedHead = Head | ViewerState
 
 
-class Heads:
-    """Heads that the viewer can show, opened in a thread while the picture goes on.
+class HeadLoader:
+    """Loader of heads in a background thread, while the picture stays interactive.
 
-    recent : paths of files opened, the last one first
-    wake : called from another thread when a head was opened for the next frame
+    recent : paths of opened files, the last one first
+    request_frame : function called from another thread when a head is ready for the next frame
     """
 
     def __init__(self) -> None:
         self.recent: list[str] = []
-        self.wake: Callable[[], None] = lambda: None
-        self._names: dict[str, str] = {}  # of files that pages have sent, by path
+        self.request_frame: Callable[[], None] = lambda: None
+        self._names: dict[str, str] = {}  # original names of uploaded files, by path
         self._thread = ThreadPoolExecutor(1, "head")
-        self._coming: Future[Opened] | None = None
+        self._future: Future[LoadedHead] | None = None
         self._name = ""
 
     @property
     def note(self) -> str:
-        """Message about the head that is being opened, empty for none."""
-        return f"opening {self.called(self._name)} ..." if self._coming else ""
+        """Return the message about the head that is being opened, empty for none."""
+        return f"opening {self.display_name(self._name)} ..." if self._future else ""
 
-    def called(self, name: str) -> str:
-        """Return a head's name as people read it: a file's without its folder."""
-        return Path(self.sent_as(name)).name
+    def display_name(self, name: str) -> str:
+        """Return the name of a head as displayed: that of a file without its folder."""
+        return Path(self.uploaded_name(name)).name
 
-    def sent_as(self, name: str) -> str:
-        """Return the name that the page that sent a file gave it; the name itself for others."""
+    def uploaded_name(self, name: str) -> str:
+        """Return the original name of an uploaded file; the name itself for other heads."""
         return self._names.get(name, name)
 
-    def open(self, name: str, called: str = "") -> None:
-        """Begin to open a head or a scene; one that was begun before is dropped.
+    def open(self, name: str, uploaded_as: str = "") -> None:
+        """Start to open a head or a scene, instead of any that is still being opened.
 
-        called : by the page that sent it, where its path says nothing
+        uploaded_as : name given by the page that sent the file
         """
-        if self._coming:
-            self._coming.cancel()
+        if self._future:
+            self._future.cancel()
         self._name = str(Path(name).resolve()) if Path(name).is_file() else name
-        if called:
-            self._names[self._name] = called
-        self._coming = self._thread.submit(_read, self._name)
-        self._coming.add_done_callback(lambda _: self.wake())
+        if uploaded_as:
+            self._names[self._name] = uploaded_as
+        self._future = self._thread.submit(_load, self._name)
+        self._future.add_done_callback(lambda _: self.request_frame())
 
-    def take(self, state: ViewerState) -> ViewerState | None:
-        """Return the state with the opened head, once; None while there is none.
+    def take_loaded(self, state: ViewerState) -> ViewerState | None:
+        """Return the state with the opened head, once; None if none is ready.
 
-        Raises DermisError for what cannot be opened.
+        Raises DermisError if the head cannot be opened.
         """
-        if self._coming is None or not self._coming.done():
+        if self._future is None or not self._future.done():
             return None
-        coming, self._coming = self._coming, None
+        future, self._future = self._future, None
         try:
-            opened = coming.result()
+            loaded = future.result()
         except DermisError as error:
-            raise DermisError(str(error).replace(self._name, self.called(self._name))) from error
+            raise DermisError(str(error).replace(self._name, self.display_name(self._name))) from error
         if Path(self._name).is_file():
-            self.recent = [self._name, *(one for one in self.recent if one != self._name)][:_MOST_RECENT]
-        return opened if isinstance(opened, ViewerState) else _with_head(state, opened, self._name)
+            self.recent = [self._name, *(path for path in self.recent if path != self._name)][:_MAX_RECENT]
+        return loaded if isinstance(loaded, ViewerState) else _with_head(state, loaded, self._name)
 
 
-def _read(name: str) -> Opened:
+def _load(name: str) -> LoadedHead:
     return load_state(Path(name)) if Path(name).suffix.lower() == ".toml" else load_head(name)
 
 
 def _with_head(state: ViewerState, head: Head, name: str) -> ViewerState:
-    """Return the state with another head in the same light, posed as before where it has the same names."""
-    old = state.scene.head
-    alike = old.targets == head.targets and old.bones == head.bones
-    pose = state.scene.pose if alike else None
-    kept = pose if pose is None or pose.positions_mm is None else None
-    return replace(state, scene=replace(state.scene, head=head, pose=kept), head={"name": name})
+    """Return the state with another head; the pose is kept if morph targets and bones are equal."""
+    old_head = state.scene.head
+    same_names = old_head.targets == head.targets and old_head.bones == head.bones
+    pose = state.scene.pose if same_names else None
+    reused_pose = pose if pose is None or pose.positions_mm is None else None
+    return replace(state, scene=replace(state.scene, head=head, pose=reused_pose), head={"name": name})
 
 
 @lru_cache(maxsize=1)
-def built_in() -> tuple[str, ...]:
-    """Return names of the heads that need neither a file nor a download."""
-    samples = (name for name, sample in SAMPLES.items() if sample.kind == "head" and cached(name))
+def built_in_heads() -> tuple[str, ...]:
+    """Return the names of heads that need neither a file nor a download."""
+    samples = (name for name, sample in SAMPLES.items() if sample.kind == "head" and is_available(name))
     return (HUMAN, *samples)
 
 
-_LONGEST_REASON = 160
+_MAX_REASON_LENGTH = 160
 _log = logging.getLogger(__name__)
 
 
 class Session:
-    """The undo history, the controls and the player that change it, and the studio that draws its state.
+    """Undo history, the controls and the player that change it, and the renderer that draws its state.
 
-    motion : what the player plays, None for nothing
-    clock : time [s]
+    motion : motion to play, None for none
+    clock : function that returns the time [s]
 
-    split : the before/after comparison
-    status, message : text over the picture: the adapter's state, and the result of the last action
-    scene_file, picture_file : what the panel's buttons write
-    picture_size, view_size : of a screenshot, (0, 0) for that of the view; and of the view [pixel]
-    heads, head_file : what opens other heads, and the file that it is to open
-    ask_for_file : asks a page for a file; None where files have paths
-    offer : takes name and bytes of a file that a page offers as a download; None where files are written
-    motion_file, search : what is opened, and which expressions the panel shows
-    positions : of the panel's controls in the window, by label
+    split : before/after comparison
+    status, message : text over the picture: state of the adapter, and result of the last action
+    scene_file, picture_file : file names for the buttons of the panel
+    picture_size, view_size : sizes of screenshots, (0, 0) for that of the view, and of the view [pixel]
+    heads, head_file : loader of other heads, and the file name typed for it
+    request_file : function that asks a page for a file; None if files have paths
+    offer_download : function that sends name and bytes of a file to a page; None if files are written
+    motion_file, search : name of the motion file, and text that filters the expressions
+    positions : positions of the panel's controls in the window, by label
     """
 
     def __init__(
         self,
         state: ViewerState,
-        studio: Studio,
+        view_renderer: ViewRenderer,
         motion: MotionFile | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self.history = History(state)
-        self.player = Player(self.history, motion, clock)
-        self.controls = Controls(self.history, lambda: self.shown)
-        self.studio = studio
-        self.split = Split()
+        self.history = UndoHistory(state)
+        self.player = MotionPlayer(self.history, motion, clock)
+        self.controls = Controls(self.history, lambda: self.displayed_state)
+        self.view_renderer = view_renderer
+        self.split = SplitView()
         self.status = self.message = ""
         self.scene_file, self.picture_file = "scene.toml", "dermis.png"
         self.picture_size = self.view_size = 0, 0
-        self.heads, self.head_file = Heads(), ""
-        self.ask_for_file: Callable[[], None] | None = None
-        self.offer: Callable[[str, bytes], None] | None = None
+        self.heads, self.head_file = HeadLoader(), ""
+        self.request_file: Callable[[], None] | None = None
+        self.offer_download: Callable[[str, bytes], None] | None = None
         self.motion_file, self.search = motion.path if motion else "", ""
         self.positions: dict[str, tuple[float, float]] = {}
         self._faults: set[str] = set()
 
     @property
     def state(self) -> ViewerState:
-        """The current state."""
+        """Return the current state."""
         return self.history.state
 
     @property
-    def shown(self) -> ViewerState:
-        """The current state, moved while a motion plays: what is seen, saved and frozen."""
-        return self.player.shown
+    def displayed_state(self) -> ViewerState:
+        """Return the current state with the playing motion: what is displayed, saved and frozen."""
+        return self.player.displayed_state
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
-        """Go to a new state; changes with the same gesture are undone together."""
+        """Set a new state; changes with the same gesture are undone together."""
         self.history.change(state, gesture)
         self.message = ""
 
-    def tell_fault(self, what: str, error: Exception) -> None:
+    def report_error(self, failure: str, error: Exception) -> None:
         """Report an unexpected error once: over the picture, and with its traceback in the log."""
-        said = f"{what} ({type(error).__name__}: {_shortened(str(error))})"
-        if said not in self._faults:
-            self._faults.add(said)
-            self.message = said
-            _log.error(said, exc_info=error)
+        message = f"{failure} ({type(error).__name__}: {_shorten(str(error))})"
+        if message not in self._faults:
+            self._faults.add(message)
+            self.message = message
+            _log.error(message, exc_info=error)
 
     def save(self, path: Path) -> None:
         """Write the scene file, or offer it as a download.
 
-        Raises DermisError when that is not possible.
+        Raises DermisError if that is not possible.
         """
-        shown = self.shown
-        if "name" in shown.head:  # a file that a page has sent is to lie beside the scene
-            shown = replace(shown, head={**shown.head, "name": self.heads.sent_as(str(shown.head["name"]))})
-        self._write(path, lambda target: save_state(target, shown))
+        state = self.displayed_state
+        if "name" in state.head:  # the scene refers to an uploaded file by its original name
+            name = self.heads.uploaded_name(str(state.head["name"]))
+            state = replace(state, head={**state.head, "name": name})
+        self._write(path, lambda target: save_state(target, state))
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
         """Open a scene file.
 
-        Raises DermisError for a file that is not a scene.
+        Raises DermisError if the file is not a scene.
         """
         state = load_state(path, self.state)
         self.player.stop()
@@ -196,14 +197,14 @@ class Session:
         self.message = f"loaded {path}"
 
     def take_head(self) -> None:
-        """Show the head that was opened meanwhile, if there is one, or the reason why it cannot be opened."""
+        """Show the head that has been opened in the background, or the reason why it cannot be opened."""
         try:
-            state = self.heads.take(self.state)
+            state = self.heads.take_loaded(self.state)
         except DermisError as error:
             self.message = str(error)
             return
         except Exception as error:
-            self.tell_fault("That cannot be opened", error)
+            self.report_error("The head cannot be opened", error)
             return
         if state is not None:
             self.player.stop()
@@ -212,56 +213,55 @@ class Session:
     def open_motion(self, path: str) -> None:
         """Play the motion of a file.
 
-        Raises DermisError for one that cannot be read and for one of which the head has no name.
+        Raises DermisError if the file cannot be read, or if the head has none of its names.
         """
         self.player.open(MotionFile(path))
         self.message = f"opened {path}"
 
     def screenshot(self, path: Path, size: tuple[int, int]) -> None:
-        """Write the picture at any size, or offer it as a download: .png with the tone curve or .exr, linear.
+        """Write the picture at any size, or offer it as a download: .png (tone-mapped) or .exr (linear).
 
-        Raises DermisError when that is not possible.
+        Raises DermisError if that is not possible.
         """
-        kind, view = path.suffix.lower(), self.shown.view
-        if kind not in (".png", ".exr"):
-            refuse(f"picture {path}", "a name that ends in .png or .exr", f"{path.name!r} came", "Change it")
-        if kind == ".exr" and view not in (PICTURE, *PARTS):
-            refuse(f"view {view} as .exr", "a view of linear light", "its numbers are colours", "Take .png")
-        self._write(path, lambda target: self.studio.screenshot(target, self.shown, size))
+        suffix, view = path.suffix.lower(), self.displayed_state.view
+        if suffix not in (".png", ".exr"):
+            refuse(f"picture {path}", "a name that ends in .png or .exr", f"got {path.name!r}", "Rename it")
+        if suffix == ".exr" and view not in (PICTURE, *PARTS):
+            refuse(f"view {view} as .exr", "a view of linear light", "it shows display colours", "Use .png")
+        self._write(path, lambda target: self.view_renderer.screenshot(target, self.displayed_state, size))
         self.message = f"wrote {path}, {size[0]} x {size[1]}"
 
-    def _write(self, path: Path, write: Callable[[Path], None]) -> None:
-        if self.offer is None:
-            write(path)
+    def _write(self, path: Path, write_file: Callable[[Path], None]) -> None:
+        if self.offer_download is None:
+            write_file(path)
             return
         with TemporaryDirectory(prefix="dermis-") as folder:
             target = Path(folder) / path.name
-            write(target)
-            self.offer(path.name, target.read_bytes())
+            write_file(target)
+            self.offer_download(path.name, target.read_bytes())
 
 
-def _shortened(text: str) -> str:
+def _shorten(text: str) -> str:
     line = " ".join(text.split())
-    return line if len(line) <= _LONGEST_REASON else f"{line[:_LONGEST_REASON]} ..."
+    return line if len(line) <= _MAX_REASON_LENGTH else f"{line[:_MAX_REASON_LENGTH]} ..."
 
 
-def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = ()) -> ViewerState:
-    """Return the state with the maps of a table of face regions, or without them.
+def apply_regions(state: ViewerState, name: str, known_states: Iterable[ViewerState] = ()) -> ViewerState:
+    """Return the state with the maps of a table of face regions, or without such maps.
 
-    name : of the table, "auto" or "none"
-    known : states whose heads are reused when they already have these maps
+    name : name of the table, "auto" or "none"
+    known_states : states whose heads are reused if they already have these maps
 
-    Raises DermisError for heads whose regions are not known and for heads made in memory.
+    Raises DermisError for heads without known regions and for heads created in memory.
     """
     if not state.head:
-        refuse(
-            "regions", "a head from a file or a sample", "it was made in memory", "Write it to a file first"
-        )
-    wanted = {key: value for key, value in state.table.items() if key != "regions"}
+        expected = "a head from a file or a sample"
+        refuse("regions", expected, "it was created in memory", "Write it to a file first")
+    table = {key: value for key, value in state.table.items() if key != "regions"}
     if name != AUTO:
-        wanted["regions"] = name
-    for other in known:
-        if dict(other.table) == wanted:
-            return state.with_head(other.scene.head, wanted, other.scene.skin.rho_s)
-    head, skin = head_and_skin(HeadTable(**wanted), Skin(), Path())
-    return state.with_head(head, wanted, skin.rho_s)
+        table["regions"] = name
+    for other in known_states:
+        if dict(other.table) == table:
+            return state.with_head(other.scene.head, table, other.scene.skin.rho_s)
+    head, skin = head_and_skin(HeadTable(**table), Skin(), Path())
+    return state.with_head(head, table, skin.rho_s)

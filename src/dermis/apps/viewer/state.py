@@ -1,4 +1,4 @@
-"""State of the viewer as immutable data, and its undo history: every change makes a new state."""
+"""Immutable state of the viewer and its undo history."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.apps.viewer.posing import same_pose
+from dermis.apps.viewer.posing import poses_equal
 from dermis.base.errors import refuse
 from dermis.human.person import Human
 from dermis.mesh.clip import Clip
@@ -17,27 +17,27 @@ from dermis.mesh.pose import Pose, laid_over
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.files import head_table, load_lights, load_scene
-from dermis.scene.head_table import names_regions
+from dermis.scene.frozen_model import FrozenModel
+from dermis.scene.head_table import has_region_table
 from dermis.scene.heads import load_head
 from dermis.scene.lights import NO_LIGHTS, Light
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
-from dermis.scene.plain import Plain
 from dermis.scene.saving import save_scene
-from dermis.scene.settings import PHOTOGRAPHED, Settings
+from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS, Settings
 from dermis.scene.skin import Pigments
 
 ATLAS = "atlas"
-"""Name of the view of the atlas as a flat picture."""
-_LEAST_SPAN, _MOST_SPAN = 2.0**-10, 2.0
+"""Name of the view of the atlas as a flat image."""
+_MIN_SPAN, _MAX_SPAN = 2.0**-10, 2.0
 
 
 @dataclass(frozen=True)
-class Chart:
-    """The part of the atlas that fills the picture.
+class AtlasView:
+    """Part of the atlas that fills the picture.
 
     layer : one of `views.LAYERS`
-    centre : uv at the middle of the picture, u to the right and v down [-]
+    centre : uv at the centre of the picture, u to the right and v down [-]
     span : extent of the picture's shorter side, in sides of the atlas [-]
     """
 
@@ -45,42 +45,42 @@ class Chart:
     centre: tuple[float, float] = (0.5, 0.5)
     span: float = 1.05
 
-    def panned(self, right: float, down: float) -> Chart:
-        """Drag the atlas, in fractions of the picture's shorter side."""
+    def panned(self, right: float, down: float) -> AtlasView:
+        """Return the view after a drag, in fractions of the picture's shorter side."""
         u, v = self.centre
         return self._at(u - self.span * right, v - self.span * down)
 
-    def zoomed(self, factor: float, x: float, y: float) -> Chart:
-        """Zoom in (factor below 1) or out, keeping the point under the cursor fixed.
+    def zoomed(self, factor: float, x: float, y: float) -> AtlasView:
+        """Return the view zoomed in (factor below 1) or out around the cursor.
 
-        x, y : of the cursor from the picture's middle, right and down, in fractions of its shorter side
+        x, y : cursor relative to the centre of the picture, right and down, in fractions of its shorter side
         """
-        span = min(_MOST_SPAN, max(_LEAST_SPAN, factor * self.span))
-        (u, v), shrunk = self.centre, self.span - span
-        return replace(self, span=span)._at(u + shrunk * x, v + shrunk * y)
+        span = min(_MAX_SPAN, max(_MIN_SPAN, factor * self.span))
+        (u, v), reduction = self.centre, self.span - span
+        return replace(self, span=span)._at(u + reduction * x, v + reduction * y)
 
-    def _at(self, u: float, v: float) -> Chart:
+    def _at(self, u: float, v: float) -> AtlasView:
         return replace(self, centre=(min(1.0, max(0.0, u)), min(1.0, max(0.0, v))))
 
 
-P = TypeVar("P", bound=Plain)
+P = TypeVar("P", bound=FrozenModel)
 Table = Mapping[str, Any]
 """The [head] table of a scene file."""
 PICTURE = "picture"
 PARTS = {"diffuse": "diffuse", "specular": "specular"}
-"""Views that are the picture with part of its light, by the value of `Settings.parts`."""
+"""Views of a part of the light, and their values of `Settings.parts`."""
 
 
 @dataclass(frozen=True, eq=False)
 class ViewerState:
-    """A scene, how it is rendered, and which view of it is shown.
+    """Scene, render settings, and the view that is displayed.
 
-    settings : `size` is ignored: the window has its own
-    head : the [head] table that the head was loaded from
+    settings : render settings; `size` is ignored because the window determines it
+    head : [head] table that the head was loaded from
     view : one of `views.VIEWS`: the picture or an intermediate result
-    rig : the lights' preset, empty for custom lights
-    chart : the part of the atlas that the view "atlas" shows
-    seconds : where in the motion the pose is [s]
+    rig : preset of the lights, empty for custom lights
+    atlas_view : part of the atlas that the view "atlas" shows
+    seconds : time of the pose in the motion [s]
     """
 
     scene: Scene
@@ -88,166 +88,179 @@ class ViewerState:
     head: Table = field(default_factory=dict)
     view: str = PICTURE
     rig: str = "studio"
-    chart: Chart = field(default_factory=Chart)
+    atlas_view: AtlasView = field(default_factory=AtlasView)
     seconds: float = 0.0
 
     @property
     def table(self) -> Table:
-        """The [head] table with the levels of subdivision that were found; empty for one made in memory."""
+        """Return the [head] table with the actual subdivision level; empty for a head created in memory."""
         return self.head and {"subdivide": self.scene.head.levels, **self.head}
 
     def with_skin(self, **fields: object) -> ViewerState:
-        """Change fields of the skin.
+        """Return a copy with other values of skin fields.
 
-        Raises DermisError for impossible values.
+        Raises DermisError for invalid values.
         """
-        return self._with_scene(skin=changed(self.scene.skin, **fields))
+        return self._with_scene(skin=validated_copy(self.scene.skin, **fields))
 
     def with_pigments(self, **fields: object) -> ViewerState:
-        """Change pigments of the skin."""
+        """Return a copy with other values of pigments."""
         pigments = self.scene.skin.pigments or Pigments()
-        return self.with_skin(pigments=changed(pigments, **fields).model_dump())
+        return self.with_skin(pigments=validated_copy(pigments, **fields).model_dump())
 
     def with_settings(self, **fields: object) -> ViewerState:
-        """Change settings."""
-        return replace(self, settings=changed(self.settings, **fields))
+        """Return a copy with other values of settings."""
+        return replace(self, settings=validated_copy(self.settings, **fields))
 
     def with_camera(self, camera: Camera) -> ViewerState:
-        """Replace the camera."""
+        """Return a copy with another camera."""
         return self._with_scene(camera=camera)
 
     def with_lights(self, lights: Sequence[Light], rig: str = "") -> ViewerState:
-        """Replace the lights."""
+        """Return a copy with other lights."""
         return replace(self._with_scene(lights=tuple(lights)), rig=rig)
 
     def with_rig(self, name: str) -> ViewerState:
-        """Replace the lights by a preset."""
+        """Return a copy with the lights of a preset."""
         return self.with_lights(load_lights(name), name)
 
     def with_light(self, index: int, **fields: object) -> ViewerState:
-        """Change fields of one light."""
+        """Return a copy with other values of one light."""
         lights = list(self.scene.lights)
-        lights[index] = changed(lights[index], **fields)
+        lights[index] = validated_copy(lights[index], **fields)
         return self.with_lights(lights)
 
     def with_environment(self, environment: Environment | None) -> ViewerState:
-        """Replace the environment."""
+        """Return a copy with another environment."""
         return self._with_scene(environment=environment)
 
-    def in_view(self, name: str) -> ViewerState:
-        """Switch to another view."""
+    def with_view(self, name: str) -> ViewerState:
+        """Return a copy that shows another view."""
         return replace(self, view=name)
 
-    def with_chart(self, chart: Chart) -> ViewerState:
-        """Show another part of the atlas."""
-        return replace(self, chart=chart)
+    def with_atlas_view(self, atlas_view: AtlasView) -> ViewerState:
+        """Return a copy that shows another part of the atlas."""
+        return replace(self, atlas_view=atlas_view)
 
     def with_pose(self, pose: Pose | None) -> ViewerState:
-        """Replace the pose; None for at rest."""
+        """Return a copy with another pose; None for the rest pose."""
         return self._with_scene(pose=pose)
 
-    def at(self, clip: Clip, seconds: float) -> ViewerState:
-        """Take the pose that a motion has at a time [s]; what it does not move stays.
+    def with_motion(self, clip: Clip, seconds: float) -> ViewerState:
+        """Return a copy with the pose of a motion at a time [s]; names without animation keep their pose.
 
-        Raises DermisError for a frame that cannot be read.
+        Raises DermisError if a frame cannot be read.
         """
         pose = laid_over(clip.pose_at(seconds), self.scene.pose)
         return replace(self.with_pose(pose), seconds=seconds)
 
     def with_head(self, head: Head, table: Table, rho_s: float) -> ViewerState:
-        """Replace the head or its maps.
+        """Return a copy with another head or other maps.
 
-        table : the [head] table that it was loaded from
+        table : [head] table that the head was loaded from
         rho_s : mean strength of the surface reflection [-]
         """
-        skin = changed(self.scene.skin, rho_s=rho_s)
+        skin = validated_copy(self.scene.skin, rho_s=rho_s)
         return replace(self._with_scene(head=head, skin=skin), head=table)
 
     def _with_scene(self, **fields: Any) -> ViewerState:
         return replace(self, scene=replace(self.scene, **fields))
 
 
-def same(a: ViewerState, b: ViewerState) -> bool:
-    """Return whether two states are equal; heads are compared by identity, not by their arrays."""
+def states_equal(a: ViewerState, b: ViewerState) -> bool:
+    """Return whether two states are equal; heads are compared by identity."""
 
-    def rest(state: ViewerState) -> tuple[object, ...]:
+    def comparable_values(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
-        seen = tuple(scene.lights), scene.camera, scene.skin, scene.environment
-        return (*seen, state.settings, state.table, state.view, state.rig, state.chart, state.seconds)
+        scene_values = tuple(scene.lights), scene.camera, scene.skin, scene.environment
+        return (
+            *scene_values,
+            state.settings,
+            state.table,
+            state.view,
+            state.rig,
+            state.atlas_view,
+            state.seconds,
+        )
 
-    one, other = a.scene, b.scene
-    return one.head is other.head and same_pose(one.pose, other.pose) and rest(a) == rest(b)
+    first, second = a.scene, b.scene
+    return (
+        first.head is second.head
+        and poses_equal(first.pose, second.pose)
+        and comparable_values(a) == comparable_values(b)
+    )
 
 
-def changed(values: P, **fields: object) -> P:
-    """Return a validated copy with other values."""
+def validated_copy(values: P, **fields: object) -> P:
+    """Return a copy of a model with other values, validated."""
     return type(values)(**(values.model_dump() | fields))
 
 
 def save_state(path: Path, state: ViewerState) -> None:
-    """Write the scene file that `dermis render` and `dermis view` take; views of intermediates are not saved.
+    """Write the scene file of a state for `dermis render` and `dermis view`.
 
-    Raises DermisError for a head made in memory and for a path that cannot be written.
+    Views of intermediate results are not saved. Raises DermisError for a head created in memory and if the
+    path cannot be written.
     """
     if not state.head:
-        refuse(path, "a head from a file or a sample", "it was made in memory", "Write it to a file first")
+        refuse(path, "a head from a file or a sample", "it was created in memory", "Write it to a file first")
     parts = state.view if state.view in PARTS else state.settings.parts
-    save_scene(path, state.scene, changed(state.settings, parts=parts), state.table)
+    save_scene(path, state.scene, validated_copy(state.settings, parts=parts), state.table)
 
 
-def _named_state(name: str) -> ViewerState:
-    """Return a built-in head, a sample or a mesh file in studio light, or the scene of a TOML file."""
+def _load_named_state(name: str) -> ViewerState:
+    """Return the state of a built-in head, sample or mesh file in studio light, or of a scene file."""
     if Path(name).suffix.lower() == ".toml":
         return load_state(Path(name))
     path = str(Path(name).resolve()) if Path(name).is_file() else name
-    return ViewerState(Scene(load_head(name)), Settings(**PHOTOGRAPHED), {"name": path})
+    return ViewerState(Scene(load_head(name)), Settings(**PHOTOGRAPHIC_SETTINGS), {"name": path})
 
 
-def state_of(shown: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
-    """Return the first state of a viewer: a head or a person in studio light, a scene, or one by name.
+def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
+    """Return the initial state of a viewer for a head, person, scene, state or name.
 
     Raises DermisError for anything else.
     """
-    if isinstance(shown, ViewerState):
-        return shown
-    if isinstance(shown, Human):
-        return ViewerState(Scene(shown.head(), skin=skin_of(shown)), Settings(**PHOTOGRAPHED))
-    if isinstance(shown, Head):
-        return ViewerState(Scene(shown), Settings(**PHOTOGRAPHED))
-    if isinstance(shown, Scene):
-        return ViewerState(shown, Settings(**PHOTOGRAPHED), rig="")
-    if not isinstance(shown, str | os.PathLike):
-        came = f"a {type(shown).__name__} came"
-        refuse("view", "a head, a person, a scene or a name", came, "Try dermis.Human()")
-    return _named_state(os.fspath(shown))
+    if isinstance(subject, ViewerState):
+        return subject
+    if isinstance(subject, Human):
+        return ViewerState(Scene(subject.head(), skin=skin_of(subject)), Settings(**PHOTOGRAPHIC_SETTINGS))
+    if isinstance(subject, Head):
+        return ViewerState(Scene(subject), Settings(**PHOTOGRAPHIC_SETTINGS))
+    if isinstance(subject, Scene):
+        return ViewerState(subject, Settings(**PHOTOGRAPHIC_SETTINGS), rig="")
+    if not isinstance(subject, str | os.PathLike):
+        actual = f"got a {type(subject).__name__}"
+        refuse("view", "a head, a person, a scene or a name", actual, "Try dermis.Human()")
+    return _load_named_state(os.fspath(subject))
 
 
-def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
-    """Return the state of a scene file; the head is not loaded again if `before` has the same one.
+def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
+    """Return the state of a scene file; the head of the current state is reused if it is the same.
 
-    Raises DermisError for a file that is not a scene.
+    Raises DermisError if the file is not a scene.
     """
     table = head_table(path)
-    alike = before is not None and table in (before.head, before.table)
-    known = before.scene.head if before and alike and not names_regions(table) else None
-    scene, described = load_scene(path, known)
-    settings = Settings(**{**PHOTOGRAPHED, **described.model_dump(exclude_unset=True)})
-    return opened(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)
+    same_table = current is not None and table in (current.head, current.table)
+    known_head = current.scene.head if current and same_table and not has_region_table(table) else None
+    scene, scene_settings = load_scene(path, known_head)
+    settings = Settings(**{**PHOTOGRAPHIC_SETTINGS, **scene_settings.model_dump(exclude_unset=True)})
+    return initial_state(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)
 
 
-def opened(scene: Scene, settings: Settings, head: Table, rig: str) -> ViewerState:
-    """Return the first state of a scene: `Settings.parts` becomes the view."""
+def initial_state(scene: Scene, settings: Settings, head: Table, rig: str) -> ViewerState:
+    """Return the first state of a scene; `Settings.parts` selects the view."""
     view = settings.parts if settings.parts in PARTS else PICTURE
-    return ViewerState(scene, changed(settings, parts="all"), head, view, rig)
+    return ViewerState(scene, validated_copy(settings, parts="all"), head, view, rig)
 
 
-_MOST_STEPS = 200
+_MAX_STEPS = 200
 
 
-class History:
+class UndoHistory:
     """Undo history of states.
 
-    A gesture (a drag, a slider held down) changes the state many times and is undone in one step.
+    A gesture such as a drag changes the state many times and is undone in one step.
     """
 
     def __init__(self, state: ViewerState) -> None:
@@ -257,38 +270,38 @@ class History:
 
     @property
     def state(self) -> ViewerState:
-        """The current state."""
+        """Return the current state."""
         return self._past[-1]
 
     @property
     def states(self) -> list[ViewerState]:
-        """All states, those that were undone included."""
+        """Return all states, including undone ones."""
         return [*self._past, *self._undone]
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is an earlier state."""
+        """Return whether there is an earlier state."""
         return len(self._past) > 1
 
     @property
     def can_redo(self) -> bool:
-        """Whether the last step was an undo."""
+        """Return whether the last step was an undo."""
         return bool(self._undone)
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
-        """Add a state; during one gesture it replaces the last one."""
-        if same(state, self.state):
+        """Add a state; during one gesture it replaces the last state."""
+        if states_equal(state, self.state):
             return
         if gesture and gesture == self._gesture:
             self._past[-1] = state
         else:
             self._past.append(state)
-            del self._past[: -_MOST_STEPS - 1]
+            del self._past[: -_MAX_STEPS - 1]
         self._gesture = gesture
         self._undone.clear()
 
     def end_gesture(self) -> None:
-        """Make the next change a step of its own."""
+        """End the gesture, so that the next change is a new step."""
         self._gesture = ""
 
     def undo(self) -> None:
@@ -298,7 +311,7 @@ class History:
             self._undone.append(self._past.pop())
 
     def redo(self) -> None:
-        """Repeat the step undone last."""
+        """Repeat the last undone step."""
         self.end_gesture()
         if self._undone:
             self._past.append(self._undone.pop())

@@ -1,20 +1,20 @@
-// Least depth of the flesh between each cell that takes light through it and those that give light.
+// Least tissue thickness between each cell that receives transmitted light and its source cells.
 //#include "translucency/translucent_pair.wgsl"
 //#include "each.wgsl"
 
-struct Sum {
-    cell: u32, // of the coarse atlas, x and y packed
-    first: u32, // pair
-    end: u32, // of its pairs
+struct ReceiverRange {
+    cell: u32, // receiving cell of the coarse atlas, x and y packed
+    first: u32, // first pair of the cell
+    end: u32, // one past its last pair
 }
 
-struct Reach {
-    radius_mm: f32, // pairs are nearer
-    count: u32, // of sums
+struct ThicknessParameters {
+    radius_mm: f32, // maximum distance of a pair
+    count: u32, // number of receiver ranges
 }
 
-@group(0) @binding(0) var<uniform> reach: Reach;
-@group(0) @binding(1) var<storage, read> sums: array<Sum>;
+@group(0) @binding(0) var<uniform> parameters: ThicknessParameters;
+@group(0) @binding(1) var<storage, read> receiver_ranges: array<ReceiverRange>;
 @group(0) @binding(2) var<storage, read> pairs: array<u32>; // three words: source, receiver, offset in the map
 @group(0) @binding(3) var<storage, read> receiver_points: array<Receiver>;
 @group(0) @binding(4) var<storage, read> source_points: array<Source>;
@@ -27,16 +27,17 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = number_of(group, groups, lane);
-    if (index >= reach.count) {
+    if (index >= parameters.count) {
         return;
     }
-    let sum = sums[index];
-    var least = reach.radius_mm;
-    for (var k = sum.first; k < sum.end; k++) {
+    let range = receiver_ranges[index];
+    var thickness_mm = parameters.radius_mm;
+    for (var k = range.first; k < range.end; k++) {
         let receiver = receiver_points[pairs[3u * k + 1u]];
-        let lie = lie_of(receiver.position, receiver.normal, source_points[pairs[3u * k]]);
-        let counts = share_of(lie.cosine, lie.inward) > 0.0 && lie.square < reach.radius_mm * reach.radius_mm;
-        least = select(least, min(least, lie.depth), counts);
+        let geometry = pair_geometry(receiver.position, receiver.normal, source_points[pairs[3u * k]]);
+        let is_near = geometry.distance2 < parameters.radius_mm * parameters.radius_mm;
+        let is_connected = pair_fraction(geometry.cosine, geometry.inward) > 0.0 && is_near;
+        thickness_mm = select(thickness_mm, min(thickness_mm, geometry.depth), is_connected);
     }
-    textureStore(thickness, vec2u(sum.cell & 0xffffu, sum.cell >> 16u), vec4f(least, 0.0, 0.0, 0.0));
+    textureStore(thickness, vec2u(range.cell & 0xffffu, range.cell >> 16u), vec4f(thickness_mm, 0.0, 0.0, 0.0));
 }

@@ -1,4 +1,4 @@
-"""From states to images on the device: pacing of frames in motion, and preparation of other heads."""
+"""Rendering of viewer states: images, adaptive quality in motion, and preparation of new heads."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.viewer.state import ATLAS, PARTS, PICTURE, ViewerState, changed, same
-from dermis.apps.viewer.views import Views
+from dermis.apps.viewer.state import ATLAS, PARTS, PICTURE, ViewerState, states_equal, validated_copy
+from dermis.apps.viewer.views import IntermediateViews
 from dermis.base.errors import refuse
-from dermis.frame.rendered import Rendered
+from dermis.frame.rendered_frame import RenderedFrame
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, Texture, download, make_texture
 from dermis.images.io import write_image, write_png
 from dermis.mesh.mesh import Mesh
 from dermis.scene.camera import Camera
-from dermis.scene.settings import MOST_WORK, Settings
+from dermis.scene.settings import MAX_SAMPLE_COUNT, Settings
 
-_BUDGET_MS = {True: 100.0, False: 33.0}  # of a frame in motion, on a software adapter and on a GPU
-_MOST_MS_OVER, _LEAST_SHARE = 1.25, 0.45
-_PATIENCE = 2  # slow or fast frames in a row before a change: a single one may have lit the atlas again
+_BUDGET_MS = {True: 100.0, False: 33.0}  # time of a frame in motion on a software adapter and on a GPU
+_SLOW_RATIO, _FAST_RATIO = 1.25, 0.45  # frame time over the budget above or below which the quality changes
+_STREAK_LENGTH = 2  # consecutive slow or fast frames before a change; a single one may have relit the atlas
 
 
 @dataclass(frozen=True)
 class Quality:
-    """Quality limits of a frame in motion; a still one has all that the settings ask for.
+    """Quality limits of a frame in motion; still frames use the settings without limits.
 
-    scale : of the image's sides
-    samples, atlas, shadow_size : maxima
+    scale : factor of the image size [-]
+    samples, atlas, shadow_size : maximum values
     """
 
     scale: float
@@ -43,20 +43,20 @@ class Quality:
     shadow_size: int
 
 
-_ALL = 1 << 14
+_UNLIMITED = 1 << 14
 QUALITY_LEVELS = (
-    Quality(1.0, _ALL, _ALL, _ALL),
+    Quality(1.0, _UNLIMITED, _UNLIMITED, _UNLIMITED),
     Quality(1.0, 2, 1024, 1024),
     Quality(1.0, 1, 512, 512),
     Quality(0.75, 1, 512, 512),
     Quality(0.5, 1, 256, 512),
     Quality(0.35, 1, 256, 256),
 )
-_FIRST_ON_SOFTWARE = 2
+_FIRST_LEVEL_ON_CPU = 2
 
 
-class Pace:
-    """Chooses the quality of frames in motion from the time that the last ones took.
+class QualityController:
+    """Controller of the quality of frames in motion, based on the times of the last frames.
 
     software : whether the adapter renders on the CPU
     """
@@ -64,49 +64,52 @@ class Pace:
     def __init__(self, software: bool) -> None:
         self.software = software
         self._budget_ms = _BUDGET_MS[software]
-        self._level = self._first = _FIRST_ON_SOFTWARE if software else 0
+        self._level = self._first = _FIRST_LEVEL_ON_CPU if software else 0
         self._streak = 0
 
     @property
     def quality(self) -> Quality:
-        """Quality of the next frame in motion."""
+        """Return the quality of the next frame in motion."""
         return QUALITY_LEVELS[self._level]
 
-    def note(self, frame_ms: float) -> None:
+    def record_frame_time(self, frame_ms: float) -> None:
         """Record the time of the last frame in motion, without preparation [ms]."""
-        slow, fast = frame_ms > _MOST_MS_OVER * self._budget_ms, frame_ms < _LEAST_SHARE * self._budget_ms
-        wish = slow - fast
-        self._streak = self._streak + wish if wish * self._streak >= 0 else wish
-        if not wish:
+        is_slow, is_fast = (
+            frame_ms > _SLOW_RATIO * self._budget_ms,
+            frame_ms < _FAST_RATIO * self._budget_ms,
+        )
+        step = is_slow - is_fast
+        self._streak = self._streak + step if step * self._streak >= 0 else step
+        if not step:
             self._streak = 0
-        if abs(self._streak) >= _PATIENCE:
-            self._level = max(self._first, min(len(QUALITY_LEVELS) - 1, self._level + wish))
+        if abs(self._streak) >= _STREAK_LENGTH:
+            self._level = max(self._first, min(len(QUALITY_LEVELS) - 1, self._level + step))
             self._streak = 0
 
-    def settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
-        """Return the settings of a frame for a window of that size."""
+    def limited_settings(self, settings: Settings, size: tuple[int, int], moving: bool) -> Settings:
+        """Return the settings of a frame for a window of the given size, limited while in motion."""
         quality = self.quality if moving else QUALITY_LEVELS[0]
         width, height = (max(1, round(quality.scale * side)) for side in size)
-        return changed(
-            wanted,
+        return validated_copy(
+            settings,
             size=(width, height),
-            samples=min(wanted.samples, quality.samples, max(1, MOST_WORK // (width * height))),
-            atlas=min(wanted.atlas, quality.atlas),
-            shadow_size=min(wanted.shadow_size, quality.shadow_size),
+            samples=min(settings.samples, quality.samples, max(1, MAX_SAMPLE_COUNT // (width * height))),
+            atlas=min(settings.atlas, quality.atlas),
+            shadow_size=min(settings.shadow_size, quality.shadow_size),
         )
 
 
 Images = tuple[Texture, Texture | None]
-"""The live picture and that of a frozen state, None without."""
-_SIZES = 2  # of everything: for frames in motion and for still ones
-_SMALL = (96, 64)  # a picture that needs all shaders and little time
+"""Image of the live state, and that of the frozen state or None."""
+_CACHE_SIZE = 2  # resources for frames in motion and for still frames
+_PREPARATION_SIZE = (96, 64)  # size of quick frames that need all shaders
 _TIMED_FRAMES = 120
-_BEFORE = "before"  # the frozen state's own light, so that a camera that moves lights neither again
+_FROZEN_SIDE = "before"  # view with its own light, so that a moving camera relights neither side
 
 
 @dataclass(frozen=True)
-class Frozen:
-    """The image of a state that does not change, as the camera saw it."""
+class FrozenImage:
+    """Image of a frozen state, as seen by a camera."""
 
     state: ViewerState
     camera: Camera
@@ -114,130 +117,136 @@ class Frozen:
     image: Texture
 
 
-class Studio:
-    """A renderer that computes only what has changed, and the last image it made.
+class ViewRenderer:
+    """Renderer of viewer states that recomputes only what has changed and keeps the last image.
 
     adapter : "auto", "cpu" or part of an adapter's name
 
-    is_preparing : whether `prepare` runs, perhaps in another thread, when nothing else may be drawn
+    is_preparing : whether `prepare` is running, during which nothing else may be drawn
     """
 
     def __init__(self, adapter: str = "auto") -> None:
         self.is_preparing = False
-        self.renderer = Renderer(adapter, depth=_SIZES, reopens=False)
-        self.pace = Pace(software=self.renderer.device.adapter.kind == "CPU")
-        self.rendered: Rendered | None = None
+        self.renderer = Renderer(adapter, cache_size=_CACHE_SIZE, reopens=False)
+        self.quality_controller = QualityController(software=self.renderer.device.adapter.kind == "CPU")
+        self.rendered: RenderedFrame | None = None
         self.settings: Settings | None = None
-        self._views = Views(self.renderer)
-        self._shown: tuple[ViewerState, Camera, Settings] | None = None
+        self._views = IntermediateViews(self.renderer)
+        self._image_inputs: tuple[ViewerState, Camera, Settings] | None = None
         self.last_image: Texture | None = None
         self._size = (0, 0)
-        self.times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAMES)
-        self._frozen: Frozen | None = None
-        self._lit: tuple[ViewerState, str] | None = None
+        self.stage_times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAMES)
+        self._frozen: FrozenImage | None = None
+        self._atlas_state: tuple[ViewerState, str] | None = None
 
-    def prepare(self, state: ViewerState, go_on: Callable[[], None] = lambda: None) -> None:
-        """Make the resources and shaders of the first pictures of a state, in motion and still.
+    def prepare(self, state: ViewerState, on_resources_ready: Callable[[], None] = lambda: None) -> None:
+        """Create the resources and shaders for the first images of a state, in motion and still.
 
-        go_on : called when the head's resources are there
+        on_resources_ready : function called when the resources of the head have been created
 
-        Raises DermisError for states that cannot be rendered and when the device fails.
+        Raises DermisError if the state cannot be rendered or the device fails.
         """
         self.is_preparing = True
         try:
             for moving in (True, False):
-                self.renderer.prepare(state.scene, self._settings(state, _SMALL, moving))
-            go_on()
+                self.renderer.prepare(state.scene, self._settings(state, _PREPARATION_SIZE, moving))
+            on_resources_ready()
             for moving in (True, False):
-                self.image(state, state.scene.camera, _SMALL, moving)
+                self.render_image(state, state.scene.camera, _PREPARATION_SIZE, moving)
         finally:
             self.is_preparing = False
 
-    def pictures(
+    def render_images(
         self,
         state: ViewerState,
-        before: ViewerState | None,
+        frozen_state: ViewerState | None,
         camera: Camera,
         size: tuple[int, int],
         moving: bool,
     ) -> Images:
-        """Return the image of a state as `image` makes it, and that of a frozen one, None without.
+        """Return the image of a state as from `render_image`, and that of a frozen state or None.
 
-        Raises DermisError for states that cannot be rendered and when the device fails.
+        Raises DermisError if a state cannot be rendered or the device fails.
         """
-        if before is None:
+        if frozen_state is None:
             self._frozen = None
-            return self.image(state, camera, size, moving), None
-        image = self._frozen_image(before, camera, size, moving)
-        return self.image(state, camera, size, moving), image
+            return self.render_image(state, camera, size, moving), None
+        image = self._frozen_image(frozen_state, camera, size, moving)
+        return self.render_image(state, camera, size, moving), image
 
-    def image(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Texture:
-        """Return a texture of sRGB bytes, of the window's size or smaller in motion, or the last one.
+    def render_image(
+        self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+    ) -> Texture:
+        """Return a texture of sRGB bytes, of the window's size or smaller in motion; cached if unchanged.
 
-        Raises DermisError for states that cannot be rendered and when the device fails.
+        Raises DermisError if the state cannot be rendered or the device fails.
         """
         self._size = size
         settings = self._settings(state, size, moving)
-        known = self._shown and self._shown[0] is state and self._shown[1:] == (camera, settings)
-        if known and self.last_image is not None:
+        is_cached = (
+            self._image_inputs
+            and self._image_inputs[0] is state
+            and self._image_inputs[1:] == (camera, settings)
+        )
+        if is_cached and self.last_image is not None:
             return self.last_image
-        before = self.rendered
+        last_rendered = self.rendered
         self.last_image = self._draw(replace(state, settings=settings).with_camera(camera))
-        self._shown = state, camera, settings
-        if self.rendered and self.rendered is not before:
-            self.times.append(self.rendered.gpu_ms or {})
+        self._image_inputs = state, camera, settings
+        if self.rendered and self.rendered is not last_rendered:
+            self.stage_times.append(self.rendered.gpu_ms or {})
             stages = self.rendered.gpu_ms or {"shade"}
-            if moving and "shade" in stages:  # other frames tell nothing about the next one
-                self.pace.note(self.rendered.frame_ms)
+            if moving and "shade" in stages:  # times of frames without shading do not predict the next one
+                self.quality_controller.record_frame_time(self.rendered.frame_ms)
         return self.last_image
 
     def _frozen_image(
-        self, before: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+        self, frozen_state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
     ) -> Texture:
-        """Return a copy, as the renderer has one picture of a size; drawn again when the camera moves."""
-        settings, frozen = self._settings(before, size, moving), self._frozen
-        finest = self._settings(before, size, moving=False)
-        known = frozen and frozen.state is before and frozen.camera == camera
-        if frozen and known and frozen.settings in (settings, finest):
+        """Return a copy of the image of the frozen state, rendered again when the camera moves."""
+        settings, frozen = self._settings(frozen_state, size, moving), self._frozen
+        still_settings = self._settings(frozen_state, size, moving=False)
+        is_cached = frozen and frozen.state is frozen_state and frozen.camera == camera
+        if frozen and is_cached and frozen.settings in (settings, still_settings):
             return frozen.image
-        drawn = self._draw(replace(before, settings=settings).with_camera(camera), _BEFORE)
-        self._shown = None  # the picture was the live state's
-        copy = copied(self.renderer.device, drawn, frozen.image if frozen else None)
-        self._frozen = Frozen(before, camera, settings, copy)
-        return copy
+        image = self._draw(replace(frozen_state, settings=settings).with_camera(camera), _FROZEN_SIDE)
+        self._image_inputs = None  # the texture held the image of the live state
+        image_copy = copy_texture(self.renderer.device, image, frozen.image if frozen else None)
+        self._frozen = FrozenImage(frozen_state, camera, settings, image_copy)
+        return image_copy
 
     def _settings(self, state: ViewerState, size: tuple[int, int], moving: bool) -> Settings:
-        """Return the settings of a frame; the view of the atlas always has full quality."""
-        return self.pace.settings(state.settings, size, moving and state.view != ATLAS)
+        """Return the settings of a frame; the atlas view always has full quality."""
+        return self.quality_controller.limited_settings(state.settings, size, moving and state.view != ATLAS)
 
     @property
     def is_current(self) -> bool:
-        """Whether the last image is a still one of full quality."""
-        if not self._shown:
+        """Return whether the last image is a still image of full quality."""
+        if not self._image_inputs:
             return False
-        state, _, settings = self._shown
+        state, _, settings = self._image_inputs
         return self._settings(state, self._size, moving=False) == settings
 
     def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
-        """Write what the state shows at any size: .png with the tone curve, or .exr, linear.
+        """Write the displayed image at any size: .png (tone-mapped) or .exr (linear).
 
-        Raises DermisError when that is not possible.
+        Raises DermisError if that is not possible.
         """
         if self.is_preparing:
-            refuse("picture", "a head that can be drawn", "it is being prepared", "Try it again in a moment")
+            refuse("picture", "a head that is ready", "it is being prepared", "Try again in a moment")
         image = self._draw(state.with_settings(size=size))
-        self._shown = None
-        linear, made = path.suffix.lower() == ".exr", self.rendered
-        if not made or state.view not in (PICTURE, *PARTS):
+        self._image_inputs = None
+        is_linear, rendered = path.suffix.lower() == ".exr", self.rendered
+        if not rendered or state.view not in (PICTURE, *PARTS):
             write_png(path, self.read(image))
         elif state.settings.background == "none":
-            write_image(path, made.linear_rgba()) if linear else write_png(path, made.rgba8())
+            write_image(path, rendered.linear_rgba()) if is_linear else write_png(path, rendered.rgba8())
         else:
-            write_image(path, made.linear()) if linear else write_png(path, self.read(image))
+            write_image(path, rendered.linear()) if is_linear else write_png(path, self.read(image))
 
     @property
     def exposure(self) -> float:
-        """Exposure of the last frame, metered or given."""
+        """Return the exposure of the last frame, metered or set."""
         return self.rendered.exposure if self.rendered else 1.0
 
     def read(self, image: Texture) -> NDArray[np.uint8]:
@@ -246,95 +255,95 @@ class Studio:
 
     def _draw(self, state: ViewerState, side: str = "") -> Texture:
         parts = PARTS.get(state.view, state.settings.parts)
-        settings = self.settings = changed(state.settings, parts=parts)
-        if state.view == ATLAS and self._shows_light_of(state, side):
-            return self._views.draw_chart(state.scene, settings, state.chart, side)
-        self._lit = None
+        settings = self.settings = validated_copy(state.settings, parts=parts)
+        if state.view == ATLAS and self._has_atlas_light(state, side):
+            return self._views.draw_atlas(state.scene, settings, state.atlas_view, side)
+        self._atlas_state = None
         self.rendered = self.renderer.draw(state.scene, settings, view=side)
-        self._lit = state, side
+        self._atlas_state = state, side
         if state.view in (PICTURE, *PARTS):
             return self.rendered.picture.bytes
         if state.view == ATLAS:
-            return self._views.draw_chart(state.scene, settings, state.chart, side)
+            return self._views.draw_atlas(state.scene, settings, state.atlas_view, side)
         return self._views.draw(state.scene, settings, state.view, side)
 
-    def _shows_light_of(self, state: ViewerState, side: str) -> bool:
-        """Return whether the atlas holds a state's light, so that no frame is needed to show another part."""
-        if self._lit is None or self._lit[1] != side:
+    def _has_atlas_light(self, state: ViewerState, side: str) -> bool:
+        """Return whether the atlas already holds the light of a state, so that no frame must be rendered."""
+        if self._atlas_state is None or self._atlas_state[1] != side:
             return False
-        return same(replace(self._lit[0], chart=state.chart), state)
+        return states_equal(replace(self._atlas_state[0], atlas_view=state.atlas_view), state)
 
 
-def copied(device: Device, image: Texture, space: Texture | None = None) -> Texture:
-    """Return a copy of a texture of bytes.
+def copy_texture(device: Device, image: Texture, target: Texture | None = None) -> Texture:
+    """Return a copy of a byte texture.
 
-    space : an older copy, whose place is taken when its size fits
+    target : texture to reuse if its size matches
     """
-    if space is None or space.size != image.size:
-        space = make_texture(device, image.size[:2], "rgba8uint")
+    if target is None or target.size != image.size:
+        target = make_texture(device, image.size[:2], "rgba8uint")
     encoder = device.handle.create_command_encoder()
-    encoder.copy_texture_to_texture({"texture": image}, {"texture": space}, image.size)
+    encoder.copy_texture_to_texture({"texture": image}, {"texture": target}, image.size)
     device.handle.queue.submit([encoder.finish()])
-    return space
+    return target
 
 
 T = TypeVar("T")
 
 
-class Preparation:
-    """Prepares heads one after the other; meanwhile a studio draws nothing else.
+class HeadPreparation:
+    """Preparation of new heads in a thread, one at a time, during which nothing else is drawn.
 
-    wake : called from another thread when the next frame may draw
+    request_frame : function called from another thread when the next frame can be drawn
     """
 
-    def __init__(self, wake: Callable[[], None]) -> None:
-        self._wake = wake
-        self._ready: Mesh | None = None  # with other maps it takes little more than a frame
-        self._coming: Future[None] | None = None
+    def __init__(self, request_frame: Callable[[], None]) -> None:
+        self._request_frame = request_frame
+        self._ready: Mesh | None = None  # other maps of this mesh need no preparation
+        self._future: Future[None] | None = None
         self._next: Mesh | None = None
-        self._kept: Texture | None = None
+        self._held_image: Texture | None = None
 
     @property
     def is_running(self) -> bool:
-        """Whether a head is being prepared, or waits for the next frame."""
-        return self._coming is not None
+        """Return whether a head is being prepared or waits for the next frame."""
+        return self._future is not None
 
-    def forget(self) -> None:
-        """Drop what was begun, for another studio."""
-        self._ready = self._coming = self._next = self._kept = None
+    def reset(self) -> None:
+        """Discard all preparations, for another renderer."""
+        self._ready = self._future = self._next = self._held_image = None
 
-    def picture(self, studio: Studio, state: ViewerState) -> Texture | None:
-        """Return the last picture while the head of a state is prepared; None when the state may be drawn.
+    def picture(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
+        """Return the last image while the head of a state is prepared; None when the state can be drawn.
 
-        Raises what stopped the preparation, once.
+        Raises the exception that stopped the preparation, once.
         """
-        if self._coming is not None:
-            if not self._coming.done():
-                return self._kept
-            coming, self._coming, self._kept = self._coming, None, None
+        if self._future is not None:
+            if not self._future.done():
+                return self._held_image
+            future, self._future, self._held_image = self._future, None, None
             self._ready = self._next
-            coming.result()
+            future.result()
         mesh = state.scene.head.mesh
-        if studio.last_image is None or mesh is self._ready:
+        if view_renderer.last_image is None or mesh is self._ready:
             self._ready = mesh
             return None
-        self._kept = copied(studio.renderer.device, studio.last_image)
-        self._next, studio.is_preparing = mesh, True
-        self._coming = begun(lambda: studio.prepare(state))
-        self._coming.add_done_callback(lambda _: self._wake())
-        return self._kept
+        self._held_image = copy_texture(view_renderer.renderer.device, view_renderer.last_image)
+        self._next, view_renderer.is_preparing = mesh, True
+        self._future = run_in_thread(lambda: view_renderer.prepare(state))
+        self._future.add_done_callback(lambda _: self._request_frame())
+        return self._held_image
 
 
-def begun(work: Callable[[], T]) -> Future[T]:
-    """Run `work` in a thread that an interpreter that exits does not wait for; return its future result."""
-    coming: Future[T] = Future()
-    coming.set_running_or_notify_cancel()
+def run_in_thread(task: Callable[[], T]) -> Future[T]:
+    """Run a function in a daemon thread and return its future result."""
+    future: Future[T] = Future()
+    future.set_running_or_notify_cancel()
 
     def run() -> None:
         try:
-            coming.set_result(work())
+            future.set_result(task())
         except Exception as error:
-            coming.set_exception(error)
+            future.set_exception(error)
 
     threading.Thread(target=run, name="preparing", daemon=True).start()
-    return coming
+    return future

@@ -1,4 +1,4 @@
-"""The viewer on a canvas: the same in a desktop window, a browser and a notebook."""
+"""Viewer on a canvas, the same in a desktop window, a browser and a notebook."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dermis.apps.viewer.controls import Event, shifted
-from dermis.apps.viewer.navigation import Easing
+from dermis.apps.viewer.controls import Event, picture_event
+from dermis.apps.viewer.navigation import CameraEasing
 from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.state import ViewerState
-from dermis.apps.viewer.studio import Images, Preparation, Studio
+from dermis.apps.viewer.view_renderer import HeadPreparation, Images, ViewRenderer
 from dermis.base.errors import DermisError
 from dermis.gpu import Device, Texture, TextureView
 from dermis.gpu.failures import DeviceLostError, gpu_failures
@@ -21,24 +21,24 @@ from dermis.gpu.program import Program
 from dermis.scene.camera import Camera
 
 Canvas = Any
-"""A canvas of any backend of rendercanvas, which has no types for mypy."""
+"""Canvas of any backend of rendercanvas, which has no type annotations."""
 Box = tuple[int, int, int, int]
 """Left, top, width and height [pixel]."""
 
 
 class Patch(NamedTuple):
-    """An image scaled to a box of the target, and the part of that box that is drawn.
+    """Image scaled to a viewport of the target and clipped to a scissor rectangle.
 
     image : texture of sRGB bytes
     """
 
     image: Texture
-    box: Box
-    shown: Box
+    viewport: Box
+    scissor: Box
 
 
-class Blit(Program):
-    """Draws byte images into targets of one format."""
+class BlitProgram(Program):
+    """Program that draws byte images into targets of one format."""
 
     stages = "VERTEX", "FRAGMENT"
 
@@ -58,17 +58,17 @@ class Blit(Program):
         )
 
     def draw(self, patches: Sequence[Patch], view: TextureView) -> None:
-        """Draw patches on black.
+        """Draw the patches on black.
 
-        view : of the target texture
+        view : view of the target texture
         """
         encoder = self.device.handle.create_command_encoder()
-        target = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
-        render_pass = encoder.begin_render_pass(label="blit", color_attachments=[target])
+        attachment = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
+        render_pass = encoder.begin_render_pass(label="blit", color_attachments=[attachment])
         render_pass.set_pipeline(self._pipeline)
         for patch in patches:
-            render_pass.set_viewport(*patch.box, 0.0, 1.0)
-            render_pass.set_scissor_rect(*patch.shown)
+            render_pass.set_viewport(*patch.viewport, 0.0, 1.0)
+            render_pass.set_scissor_rect(*patch.scissor)
             entry = {"binding": 0, "resource": patch.image.create_view()}
             group = self.device.handle.create_bind_group(layout=self._group_layout, entries=[entry])
             render_pass.set_bind_group(0, group)
@@ -77,25 +77,25 @@ class Blit(Program):
         self.device.handle.queue.submit([encoder.finish()])
 
 
-_QUIET_S = 0.25  # without a change, after which the picture is refined
-_LONGEST_STEP_S = 0.2
-_MOST_FAILURES = 1  # in a row
-_PANEL_FRAMES = 3  # that the panel needs to settle after an event
+_STILL_AFTER_S = 0.25  # time since the last change after which the picture is refined
+_MAX_STEP_S = 0.2  # of the camera easing per frame
+_MAX_FAILURES = 1  # consecutive failures of the device
+_PANEL_FRAMES = 3  # frames that the panel needs to settle after an event
 _POINTER = "pointer_down", "pointer_move", "pointer_up", "pointer_leave", "double_click", "wheel"
 _KEYS = "key_down", "key_up", "char"
 
 
 class Viewer:
-    """An interactive view of a head.
+    """Interactive view of a head.
 
-    state : what is shown first
-    canvas : of any backend of rendercanvas
+    state : initial state
+    canvas : canvas of any backend of rendercanvas
     adapter : "auto", "cpu" or part of an adapter's name
-    clock : time [s]
-    motion : played from the beginning
-    studio : one on the adapter that has prepared the state already
+    clock : function that returns the time [s]
+    motion : motion to play
+    view_renderer : renderer on the adapter that has already prepared the state
 
-    `failure` is the error that closed the canvas when the device failed twice or could not be opened again.
+    `failure` is the error that closed the canvas because the device failed twice or could not be reopened.
 
     Raises DermisError without an adapter, ImportError without the extra `viewer`.
     """
@@ -107,22 +107,22 @@ class Viewer:
         adapter: str = "auto",
         clock: Callable[[], float] = time.perf_counter,
         motion: MotionFile | None = None,
-        studio: Studio | None = None,
+        view_renderer: ViewRenderer | None = None,
     ) -> None:
-        from dermis.apps.viewer.panel.panel import Panel  # whose packages are in the extra `viewer`
+        from dermis.apps.viewer.panel.panel import Panel  # needs packages of the extra `viewer`
 
         self.canvas = canvas
         self._adapter, self._clock = adapter, clock
         self._context = canvas.get_wgpu_context()
-        self.session = Session(state, studio or Studio(adapter), motion, clock)
-        self._preparation = Preparation(self._connect())
+        self.session = Session(state, view_renderer or ViewRenderer(adapter), motion, clock)
+        self._preparation = HeadPreparation(self._connect_page())
         self.session.player.play()
         self.panel = Panel(self.session)
-        self._easing = Easing(state.scene.camera)
+        self._easing = CameraEasing(state.scene.camera)
         self._last_draw = self._last_change = clock()
         self._last_state = state
         self._last_size = (0, 0)
-        self._refused: ViewerState | None = None
+        self._rejected_state: ViewerState | None = None
         self._failures = self._panel_frames = 0
         self.failure: DermisError | None = None
         self._on_panel, self._pressed_left = False, 0.0
@@ -131,38 +131,38 @@ class Viewer:
         canvas.request_draw(self.draw)
 
     def draw(self) -> None:
-        """Draw a frame into the canvas; a lost device is opened again."""
+        """Draw a frame into the canvas; reopen the device if it was lost."""
         try:
-            with gpu_failures(self.session.studio.renderer.device):
+            with gpu_failures(self.session.view_renderer.renderer.device):
                 self._draw(self._clock())
             self._failures = 0
         except DermisError as error:
             self._recover(error)
         except Exception as error:
-            self.session.tell_fault("This frame cannot be drawn", error)
-            return  # the next event draws another one
-        going_on = not self.is_still and not self._preparation.is_running  # whose end wakes it
-        if going_on or self._panel_frames:
+            self.session.report_error("This frame cannot be drawn", error)
+            return  # the next event draws another frame
+        needs_frame = not self.is_still and not self._preparation.is_running  # its end requests a frame
+        if needs_frame or self._panel_frames:
             self._panel_frames = max(0, self._panel_frames - 1)
             self.canvas.request_draw()
 
     @property
     def is_still(self) -> bool:
-        """Whether the last picture is final until something changes."""
-        state, studio = self.session.shown, self.session.studio
-        arrived = self._last_state is state and self._easing.camera == state.scene.camera
-        final = studio.is_current or self._refused is state
-        there = not self._preparation.is_running
-        return there and arrived and final and not self._is_moving(self._clock())
+        """Return whether the last picture is final until something changes."""
+        state, view_renderer = self.session.displayed_state, self.session.view_renderer
+        is_settled = self._last_state is state and self._easing.camera == state.scene.camera
+        is_final = view_renderer.is_current or self._rejected_state is state
+        is_ready = not self._preparation.is_running
+        return is_ready and is_settled and is_final and not self._is_moving(self._clock())
 
     def _draw(self, now: float) -> None:
         session, size = self.session, self._picture_size()
         session.take_head()
         session.player.advance()
-        state, elapsed = session.shown, min(now - self._last_draw, _LONGEST_STEP_S)
-        before = self._easing.camera
+        state, elapsed = session.displayed_state, min(now - self._last_draw, _MAX_STEP_S)
+        old_camera = self._easing.camera
         camera = self._easing.advance(state.scene.camera, elapsed)
-        if state is not self._last_state or camera != before or size != self._last_size:
+        if state is not self._last_state or camera != old_camera or size != self._last_size:
             self._last_change, self._last_state, self._last_size = now, state, size
         self._last_draw, session.view_size = now, size
         images = self._images(state, camera, size, self._is_moving(now))
@@ -182,120 +182,125 @@ class Viewer:
         return max(1, width - self._panel_width()), max(1, height)
 
     def _patches(self, image: Texture, frozen: Texture | None, size: tuple[int, int]) -> list[Patch]:
-        """Return the live picture, and the frozen one left of the divider."""
-        left = self._panel_width()
-        box = left, 0, *size
+        """Return the patches of the live image, and of the frozen image left of the divider."""
+        left, (width, height) = self._panel_width(), size
+        viewport = left, 0, width, height
         if frozen is None:
-            return [Patch(image, box, box)]
-        edge = round(self.session.split.share * size[0])
-        sides = (frozen, (left, 0, edge, size[1])), (image, (left + edge, 0, size[0] - edge, size[1]))
-        return [Patch(one, box, shown) for one, shown in sides if shown[2]]
+            return [Patch(image, viewport, viewport)]
+        divider = round(self.session.split.divider_position * width)
+        patches = (
+            Patch(frozen, viewport, (left, 0, divider, height)),
+            Patch(image, viewport, (left + divider, 0, width - divider, height)),
+        )
+        return [patch for patch in patches if patch.scissor[2]]
 
     def _images(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Images:
-        """Return the live and the frozen picture; a state that cannot be rendered leaves the last picture."""
+        """Return the live and the frozen image; for a state that cannot be rendered the last image."""
         import wgpu
 
         session = self.session
-        if state is not self._refused:
+        if state is not self._rejected_state:
             try:
-                if kept := self._preparation.picture(session.studio, state):
-                    return kept, None
-                images = session.studio.pictures(state, session.split.before, camera, size, moving)
-                if self._refused:
-                    self._refused, session.message = None, ""
+                if held_image := self._preparation.picture(session.view_renderer, state):
+                    return held_image, None
+                frozen_state = session.split.frozen_state
+                images = session.view_renderer.render_images(state, frozen_state, camera, size, moving)
+                if self._rejected_state:
+                    self._rejected_state, session.message = None, ""
                 return images
             except DermisError as error:
-                if session.studio.last_image is None or isinstance(error, DeviceLostError):
+                if session.view_renderer.last_image is None or isinstance(error, DeviceLostError):
                     raise
-                self._refuse(state, str(error))
+                self._reject(state, str(error))
             except wgpu.GPUError:
-                raise  # `draw` tells what it means for the device
+                raise  # converted to an error of the device by `draw`
             except Exception as error:
-                if session.studio.last_image is None:
+                if session.view_renderer.last_image is None:
                     raise
-                self._refuse(state)
-                session.tell_fault("This cannot be drawn", error)
-        assert session.studio.last_image is not None  # or it was raised
-        return session.studio.last_image, None
+                self._reject(state)
+                session.report_error("This cannot be drawn", error)
+        assert session.view_renderer.last_image is not None  # otherwise an exception was raised
+        return session.view_renderer.last_image, None
 
-    def _refuse(self, state: ViewerState, message: str = "") -> None:
-        self._refused = state
+    def _reject(self, state: ViewerState, message: str = "") -> None:
+        self._rejected_state = state
         self.session.message = message
 
     def _is_moving(self, now: float) -> bool:
-        return self.session.player.is_playing or now - self._last_change < _QUIET_S
+        return self.session.player.is_playing or now - self._last_change < _STILL_AFTER_S
 
     def _status(self, size: tuple[int, int]) -> str:
-        studio = self.session.studio
-        settings = studio.settings
+        view_renderer = self.session.view_renderer
+        settings = view_renderer.settings
         if self._preparation.is_running:
             return "preparing the head ..."
-        if settings is None or studio.rendered is None or not studio.pace.software:
+        is_software = view_renderer.quality_controller.software
+        if settings is None or view_renderer.rendered is None or not is_software:
             return ""
         width, height = settings.size
         text = f"software adapter, no GPU: {width} x {height}"
-        if studio.is_current and settings.size == size:
+        if view_renderer.is_current and settings.size == size:
             return text
         return f"{text}, atlas {settings.atlas} while moving, refined when still"
 
     def _on_event(self, event: Event) -> None:
         kind = event["event_type"]
         self._panel_frames = _PANEL_FRAMES
-        wanted = self.panel.feed(event, self.canvas.get_logical_size())
+        is_for_panel = self.panel.handle_event(event, self.canvas.get_logical_size())
         if kind == "pointer_down":
-            self._on_panel = wanted
-        if not (self._on_panel if kind in ("pointer_move", "pointer_up") else wanted):
+            self._on_panel = is_for_panel
+        if not (self._on_panel if kind in ("pointer_move", "pointer_up") else is_for_panel):
             self._on_picture(event)
         if kind == "pointer_up":
             self._on_panel = False
         self.canvas.request_draw()
 
     def _on_picture(self, event: Event) -> None:
-        """Handle an event over the picture, which begins where the panel ended at the press."""
+        """Handle an event over the picture, whose left edge during a drag is that of the press."""
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))
         if event["event_type"] == "pointer_down":
             self._pressed_left = left
         start = self._pressed_left if event["event_type"] in ("pointer_move", "pointer_up") else left
-        moved, size = shifted(event, start), (max(1.0, width - left), height)
-        if not self.session.split.handle(moved, size[0]):
-            self.session.controls.handle(moved, size)
+        shifted, size = picture_event(event, start), (max(1.0, width - left), height)
+        if not self.session.split.handle(shifted, size[0]):
+            self.session.controls.handle(shifted, size)
 
     def _open(self) -> None:
-        """Configure the canvas for the studio's device."""
-        device = self.session.studio.renderer.device
+        """Configure the canvas for the device of the renderer."""
+        device = self.session.view_renderer.renderer.device
         format_ = str(self._context.get_preferred_format(device.adapter.handle)).removesuffix("-srgb")
         self._context.configure(device=device.handle, format=format_)
-        self._blit = Blit(device, format_)
+        self._blit = BlitProgram(device, format_)
         self.panel.open(device, format_)
 
-    def _connect(self) -> Callable[[], None]:
-        """Let files come from and go to a page, which may be on another machine; returns what wakes it."""
+    def _connect_page(self) -> Callable[[], None]:
+        """Connect uploads and downloads of a web page; return the function that requests a frame."""
         canvas, session = self.canvas, self.session
-        session.offer = getattr(canvas, "offer", None)
-        session.ask_for_file = getattr(canvas, "ask_for_file", None)
-        if session.ask_for_file:
+        session.offer_download = getattr(canvas, "offer_download", None)
+        session.request_file = getattr(canvas, "request_file", None)
+        if session.request_file:
             canvas.on_file = lambda path, name: session.heads.open(str(path), name)
         loop = canvas._rc_canvas_group.get_loop()
-        session.heads.wake = lambda: loop and loop.call_soon_threadsafe(canvas.request_draw)
-        return session.heads.wake
+        session.heads.request_frame = lambda: loop and loop.call_soon_threadsafe(canvas.request_draw)
+        return session.heads.request_frame
 
     def _recover(self, error: DermisError) -> None:
-        """Open the device again after it was lost or ran out of memory."""
+        """Reopen the device after it was lost or ran out of memory."""
         import wgpu
 
         self._failures += 1
-        with contextlib.suppress(wgpu.GPUError):  # releases the texture of the old device
+        with contextlib.suppress(wgpu.GPUError):  # release the texture of the old device
             self._context.unconfigure()
         try:
-            if self._failures > _MOST_FAILURES:
-                raise error.again() if isinstance(error, DeviceLostError) else error
-            self.session.studio = Studio(self._adapter)
-            self._preparation.forget()
+            if self._failures > _MAX_FAILURES:
+                raise error.lost_twice() if isinstance(error, DeviceLostError) else error
+            self.session.view_renderer = ViewRenderer(self._adapter)
+            self._preparation.reset()
             self._open()
-        except DermisError as final:
-            self.failure = final
+        except DermisError as final_error:
+            self.failure = final_error
             self.canvas.close()
             return
-        self.session.message = "the graphics device was lost and opened again"
+        self.session.message = "the graphics device was lost and has been reopened"
         self.canvas.request_draw()

@@ -1,4 +1,4 @@
-"""Where a viewer is shown: a desktop window, a web page, a notebook cell."""
+"""Display of a viewer in a desktop window, a web page or a notebook cell."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 from dermis.apps.viewer.controls import Event
 from dermis.apps.viewer.player import MotionFile
-from dermis.apps.viewer.state import ViewerState, state_of
+from dermis.apps.viewer.state import ViewerState, make_state
 from dermis.apps.viewer.viewer import Viewer
 from dermis.base.errors import refuse
 from dermis.human.person import Human
@@ -25,41 +25,41 @@ from dermis.scene.model import Scene
 
 Size = tuple[int, int]
 _TITLE = "dermis"
-_MOST_FPS = 60
-_SIGNALLED = 128  # plus the signal's number, as shells tell it
+_MAX_FPS = 60
+_SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal
 
 
 def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionFile | None = None) -> None:
     """Open a desktop window and return when it is closed.
 
-    motion : played in it
+    motion : motion to play
 
     Raises DermisError without a display, a device or the extra `viewer`.
     """
-    backend = _backend("glfw", ("glfw",), "viewer")
-    with warnings.catch_warnings(record=True) as caught:  # without a display glfw warns, and exits later
+    backend = _load_backend("glfw", ("glfw",), "viewer")
+    with warnings.catch_warnings(record=True) as caught:  # without a display glfw only warns
         warnings.simplefilter("always")
         if not backend.glfw.init():
-            _refuse_display("; ".join(str(one.message) for one in caught))
+            _refuse_display("; ".join(str(warning.message) for warning in caught))
     try:
-        canvas = backend.RenderCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
-    except Exception as error:  # glfw has no class of its own for a missing display
+        canvas = backend.RenderCanvas(size=size, title=_TITLE, max_fps=_MAX_FPS)
+    except Exception as error:  # glfw has no exception class for a missing display
         _refuse_display(error)
     viewer = Viewer(state, canvas, adapter, motion=motion)
-    with _untouched_signals():
+    with _without_signal_handlers():
         backend.loop.run()
     _raise_failure(viewer)
 
 
 @contextmanager
-def _untouched_signals() -> Iterator[None]:
-    """rendercanvas would close the window at a signal, in the middle of a frame that then fails."""
+def _without_signal_handlers() -> Iterator[None]:
+    """Disable the signal handlers of rendercanvas, which would close the window in the middle of a frame."""
     loops: Any = importlib.import_module("rendercanvas.core.loop")
-    usual, loops.HANDLED_SIGNALS = loops.HANDLED_SIGNALS, ()
+    original, loops.HANDLED_SIGNALS = loops.HANDLED_SIGNALS, ()
     try:
         yield
     finally:
-        loops.HANDLED_SIGNALS = usual
+        loops.HANDLED_SIGNALS = original
 
 
 def serve(
@@ -70,33 +70,33 @@ def serve(
     port: int,
     announce: Callable[[str, bool], None],
     *,
-    secret: bool = False,
+    require_token: bool = False,
 ) -> None:
-    """Serve web pages until interrupted; until there is a picture they show the stage of preparation.
+    """Serve web pages until interrupted; they show the stage of preparation until the first picture.
 
-    load : reads what is shown first and the motion that is played, in a thread
-    size : of the canvas until a page reports its own
-    port : 0 for any free one
-    announce : called with the page's URL and whether other machines can reach it, before anything is read
-    secret : whether the URL has a token even when only this machine can reach it
+    load : function that loads the initial state and motion, called in a thread
+    size : size of the canvas until a page reports its own
+    port : 0 for any free port
+    announce : function called first, with the URL and whether other machines can reach it
+    require_token : whether the URL has a token even if only this machine can reach it
 
-    Raises what `load` does, and DermisError when the address cannot be used, without a device or the extra
-    `viewer`.
+    Raises every exception of `load`, and DermisError if the address cannot be used, without a device or
+    without the extra `viewer`.
     """
-    _backend("http", ("uvicorn", "websockets"), "viewer")
+    _load_backend("http", ("uvicorn", "websockets"), "viewer")
     from dermis.apps.viewer.browser.canvas import PageCanvas
-    from dermis.apps.viewer.browser.guard import is_local
-    from dermis.apps.viewer.browser.server import bind, run_until, server, shown
+    from dermis.apps.viewer.browser.request_filter import is_local
+    from dermis.apps.viewer.browser.server import bind, make_server, prepare_viewer, run_server
 
-    listener, address = bind(host, port, secret=secret)
-    with _tidy_end(), listener, TemporaryDirectory(prefix="dermis-") as folder:
-        canvas = PageCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
+    listener, address = bind(host, port, require_token=require_token)
+    with _exit_on_signals(), listener, TemporaryDirectory(prefix="dermis-") as folder:
+        canvas = PageCanvas(size=size, title=_TITLE, max_fps=_MAX_FPS)
         canvas._size_info.set_physical_size(*size, 1.0)
-        pages = server(address, canvas, Path(folder))
-        # rendercanvas handles Ctrl+C by closing the canvas; without this the server would keep running.
-        canvas.add_event_handler(lambda event: setattr(pages, "should_exit", True), "close")
+        http_server = make_server(address, canvas, Path(folder))
+        # rendercanvas handles Ctrl+C by closing the canvas; the server must stop too.
+        canvas.add_event_handler(lambda event: setattr(http_server, "should_exit", True), "close")
         announce(address.url, not is_local(host))
-        viewer = run_until(pages, listener, lambda: shown(pages, canvas, load, adapter))
+        viewer = run_server(http_server, listener, lambda: prepare_viewer(http_server, canvas, load, adapter))
     if viewer:
         _raise_failure(viewer)
 
@@ -107,60 +107,82 @@ def view(
     size: Size = (720, 540),
     motion: str = "",
 ) -> Any:
-    """A widget that shows a head in a notebook, to turn it and to change skin and light.
+    """Return a notebook widget that shows a head interactively.
 
-    shown : a head, a person, a scene, or what `dermis view` takes: human, a sample, a mesh file, a TOML scene
-    adapter : "auto", "cpu" or part of an adapter's name
-    size : of the widget, logical
-    motion : a file that `load_motion` takes, empty for none
+    The widget is an anywidget: display it as the last line of a cell. Its attribute `viewer` is the `Viewer`,
+    with the current state in `viewer.session.state`.
 
-    The widget is an anywidget, to be displayed as the last line of a cell, and its `viewer` the `Viewer`
-    behind it, with the current state in `viewer.session.state`.
+    Parameters
+    ----------
+    shown : Head, Human, Scene, ViewerState, str or path, optional
+        What to show: a head, a person, a scene, or a name that `dermis view` accepts (human, a sample, a mesh
+        file or a TOML scene). Default: the human.
+    adapter : str, optional
+        "auto", "cpu" or part of an adapter's name.
+    size : (int, int), optional
+        Width and height of the widget [logical pixel].
+    motion : str, optional
+        Motion file that `load_motion` accepts; empty for none.
 
-    Raises DermisError for anything else, and without the extra `notebook`.
+    Returns
+    -------
+    anywidget.AnyWidget
+        Widget with the attribute `viewer`.
+
+    Raises
+    ------
+    DermisError
+        If `shown` is of another type, if it cannot be loaded, or without the extra `notebook`.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> widget = dermis.view("human", size=(640, 480))  # doctest: +SKIP
+    >>> widget.viewer.session.state.view  # doctest: +SKIP
+    'picture'
     """
-    canvas = _notebook_canvas(_backend("anywidget", ("anywidget",), "notebook"))
-    state = state_of(shown)
-    played = MotionFile(motion) if motion else None
-    widget = canvas(size=size, max_fps=_MOST_FPS)
-    widget.viewer = Viewer(state, widget, adapter, motion=played)
+    canvas = _notebook_canvas(_load_backend("anywidget", ("anywidget",), "notebook"))
+    state = make_state(shown)
+    motion_file = MotionFile(motion) if motion else None
+    widget = canvas(size=size, max_fps=_MAX_FPS)
+    widget.viewer = Viewer(state, widget, adapter, motion=motion_file)
     return widget
 
 
 def _notebook_canvas(backend: Any) -> Any:
-    """rendercanvas' notebook widget with two corrections."""
+    """Return the notebook widget class of rendercanvas with two corrections."""
 
     class NotebookCanvas(backend.AnywidgetRenderCanvas):  # type: ignore[misc]
         def _rfb_handle_msg(self, widget: object, content: Event, buffers: list[bytes]) -> None:
             kind = content.get("type")
             super()._rfb_handle_msg(widget, content, buffers)
             if kind == "resize":
-                self.request_draw()  # otherwise a resized cell would not redraw until something moves
+                self.request_draw()  # otherwise a resized cell would be redrawn only when something moves
 
         def _rc_close(self) -> None:
-            if not self.get_closed():  # the base class would call itself without end
+            if not self.get_closed():  # the base class would recurse infinitely
                 self._is_closed = True
                 super()._rc_close()
 
     return NotebookCanvas
 
 
-def _backend(name: str, needed: tuple[str, ...], extra: str) -> Any:
-    """A module of rendercanvas, provided that the packages it needs are installed."""
+def _load_backend(name: str, needed: tuple[str, ...], extra: str) -> Any:
+    """Import and return a module of rendercanvas, after checking that the packages it needs are installed."""
     for package in (*needed, "imgui_bundle", "rendercanvas"):
         try:
             importlib.import_module(package)
         except ImportError:
-            remedy = f'Install it: pip install "dermis[{extra}]"'
-            refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", remedy)
+            advice = f'Install it: pip install "dermis[{extra}]"'
+            refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", advice)
     return importlib.import_module(f"rendercanvas.{name}")
 
 
 @contextmanager
-def _tidy_end() -> Iterator[None]:
-    """Let signals that end the process leave nothing behind, as Ctrl+C does."""
+def _exit_on_signals() -> Iterator[None]:
+    """Exit cleanly after SIGTERM and SIGHUP, as after Ctrl+C."""
     replaced = {}
-    is_main = threading.current_thread() is threading.main_thread()  # which alone may handle them
+    is_main = threading.current_thread() is threading.main_thread()  # only the main thread handles signals
     for name in ("SIGTERM", "SIGHUP") if is_main else ():
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is signal.SIG_DFL:
@@ -168,16 +190,16 @@ def _tidy_end() -> Iterator[None]:
     try:
         yield
     finally:
-        for number, usual in replaced.items():
-            signal.signal(number, usual)
+        for number, handler in replaced.items():
+            signal.signal(number, handler)
 
 
 def _exit(number: int, _: object) -> None:
-    sys.exit(_SIGNALLED + number)
+    sys.exit(_SIGNAL_EXIT_BASE + number)
 
 
 def _refuse_display(reason: object) -> NoReturn:
-    refuse("window", "a display to open it on", f"none opens ({reason})", "Set DISPLAY, or use --browser")
+    refuse("window", "a display", f"none can be opened ({reason})", "Set DISPLAY, or use --browser")
 
 
 def _raise_failure(viewer: Viewer) -> None:

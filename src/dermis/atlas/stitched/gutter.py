@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.raster import covered_texels
-from dermis.atlas.stitched.nearest import Nearest, Sides, nearest_sides
+from dermis.atlas.stitched.geodesics import GeodesicEnds, trace_geodesics
+from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_border_points
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
-from dermis.atlas.stitched.walk import Ends, walk
 
 _MOST_STRETCH = 2.0  # largest texels per mm of a border over its piece's mean, for gutter widths
 
@@ -36,7 +36,7 @@ class Packing(NamedTuple):
     """
 
     places: Doubles
-    per_uv: Doubles
+    texels_per_uv: Doubles
     per_mm: Doubles
 
 
@@ -44,7 +44,7 @@ class GutterWidth(NamedTuple):
     """How far gutters reach: on the surface [mm], and at most [texel]."""
 
     gutter_mm: float
-    widest: float
+    max_texels: float
 
 
 def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
@@ -53,25 +53,25 @@ def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
     piece : (f,) piece of each triangle, -1 for triangles that have no place
     own : triangles to examine, all of which have one
     """
-    beside = surface.beside_uv[own]
-    row, index = np.nonzero((beside == own[:, None]) | (piece[own, None] != piece[beside]))
+    neighbour = surface.uv_neighbour[own]
+    row, index = np.nonzero((neighbour == own[:, None]) | (piece[own, None] != piece[neighbour]))
     triangle = own[row]
-    beyond = surface.adjacency.beside[triangle, index]
-    return Border(triangle, index, (beyond >= 0) & surface.adjacency.free[beyond])
+    beyond = surface.adjacency.neighbour[triangle, index]
+    return Border(triangle, index, (beyond >= 0) & surface.adjacency.passable[beyond])
 
 
-def sides_of(surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth) -> Sides:
+def border_sides(surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth) -> BorderSides:
     """The sides of a border as they are placed."""
     triangle, both = border.triangle, (border.side, (border.side + 1) % 3)
-    ends = np.stack([packing.places[triangle, k] for k in both], axis=1)
-    steps = np.stack([surface.along[triangle, k] for k in both], axis=1)
-    steps = steps / packing.per_uv[triangle][:, None, None, None]
+    ends = np.stack([packing.corners[triangle, k] for k in both], axis=1)
+    steps = np.stack([surface.uv_steps[triangle, k] for k in both], axis=1)
+    steps = steps / packing.texels_per_uv[triangle][:, None, None, None]
     # slivers may be stretched a hundredfold: gutters that wide would waste room
-    widest = np.minimum(width.widest, _MOST_STRETCH * width.gutter_mm * packing.per_mm[triangle])
-    return Sides(ends, steps, np.where(border.seam, width.gutter_mm, 0.0), widest)
+    max_texels = np.minimum(width.max_texels, _MOST_STRETCH * width.gutter_mm * packing.per_mm[triangle])
+    return BorderSides(ends, steps, np.where(border.seam, width.gutter_mm, 0.0), max_texels)
 
 
-def needed(
+def needed_texels(
     surface: FlatSurface,
     own: Index,
     border: Border,
@@ -81,8 +81,8 @@ def needed(
 ) -> Flags:
     """(h, w) texels that pieces, rims and gutters may need."""
     found = np.zeros(shape, np.bool_)
-    found.ravel()[covered_texels(packing.places[own], shape)[0]] = True
-    found.ravel()[nearest_sides(sides_of(surface, border, packing, width), found).texel] = True
+    found.ravel()[covered_texels(packing.corners[own], shape)[0]] = True
+    found.ravel()[nearest_border_points(border_sides(surface, border, packing, width), found).texel] = True
     return found
 
 
@@ -100,51 +100,51 @@ class GutterTexels(NamedTuple):
     y: Index
     x: Index
     rim: Flags
-    away_mm: Doubles
+    distance_mm: Doubles
     root: NDArray[np.int32]
     root_weights: Doubles
     triangle: NDArray[np.int32]
     weights: Doubles
-    whole: Flags
+    complete: Flags
 
 
-def walk_gutter(
+def trace_gutter(
     surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: NDArray[np.int32]
 ) -> GutterTexels:
     """The surface beyond a border, on texels that no piece owns.
 
     owner : (h, w) triangles of the pieces, -1 outside
     """
-    nearest = nearest_sides(sides := sides_of(surface, border, packing, width), owner >= 0)
+    nearest = nearest_border_points(sides := border_sides(surface, border, packing, width), owner >= 0)
     texels = np.column_stack(np.divmod(nearest.texel, owner.shape[1])[::-1])
-    ends, weights = walk_from(surface, border, sides, nearest, texels)
+    ends, weights = trace_from_border(surface, border, sides, nearest, texels)
     y, x = texels.T[::-1]
     root = border.triangle[nearest.side].astype(np.int32)
-    return GutterTexels(y, x, nearest.rim, nearest.away_mm, root, weights, *ends)
+    return GutterTexels(y, x, nearest.rim, nearest.distance_mm, root, weights, *ends)
 
 
-def walk_from(
-    surface: FlatSurface, border: Border, sides: Sides, nearest: Nearest, texels: NDArray[Any]
-) -> tuple[Ends, Doubles]:
+def trace_from_border(
+    surface: FlatSurface, border: Border, sides: BorderSides, nearest: NearestPoints, texels: NDArray[Any]
+) -> tuple[GeodesicEnds, Doubles]:
     """Where straight walks to texels (n, 2) from the nearest places on a border end, and weights of these."""
     t, root = nearest.share[:, None], border.triangle[nearest.side]
     first, rows = border.side[nearest.side], np.arange(len(root))
     second = (first + 1) % 3
     start = _between(surface.adjacency.flat[root, first], surface.adjacency.flat[root, second], t)
-    off = texels - places_on(sides, nearest)
-    step = np.einsum("ns,nsa->na", off, steps_at(sides, nearest))
+    off = texels - border_points(sides, nearest)
+    step = np.einsum("ns,nsa->na", off, border_steps(sides, nearest))
     corner = np.zeros((len(root), 3))
     corner[rows, first], corner[rows, second] = 1 - t[:, 0], t[:, 0]
-    return walk(surface.adjacency, root, start, start + step), corner[:, 1:]
+    return trace_geodesics(surface.adjacency, root, start, start + step), corner[:, 1:]
 
 
-def places_on(sides: Sides, nearest: Nearest) -> Doubles:
+def border_points(sides: BorderSides, nearest: NearestPoints) -> Doubles:
     """(n, 2) the nearest places [texel]."""
     first, second = np.moveaxis(sides.ends[nearest.side], 1, 0)
     return _between(first, second, nearest.share[:, None])
 
 
-def steps_at(sides: Sides, nearest: Nearest) -> Doubles:
+def border_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
     """(n, 2, 2) steps on the surface there, for a texel to the right and for one down [mm]."""
     first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
     return _between(first, second, nearest.share[:, None, None])

@@ -15,7 +15,7 @@ Flags = NDArray[np.bool_]
 _TEXEL = 1.001  # a texel, and what rounding may add
 
 
-class Sides(NamedTuple):
+class BorderSides(NamedTuple):
     """The sides of a border on a grid.
 
     ends : (k, 2, 2) [texel]
@@ -27,10 +27,10 @@ class Sides(NamedTuple):
     ends: Doubles
     steps: Doubles
     gutter_mm: Doubles
-    widest: Doubles
+    max_texels: Doubles
 
 
-class Nearest(NamedTuple):
+class NearestPoints(NamedTuple):
     """Texels (n,) outside of pieces, and the place on a border that each is nearest to.
 
     texel : flat index
@@ -42,7 +42,7 @@ class Nearest(NamedTuple):
     texel: Index
     side: Index
     share: Doubles
-    away_mm: Doubles
+    distance_mm: Doubles
     rim: Flags
 
 
@@ -61,7 +61,7 @@ class _Metric(NamedTuple):
     half: Doubles
 
 
-def nearest_sides(sides: Sides, inside: Flags) -> Nearest:
+def nearest_border_points(sides: BorderSides, inside: Flags) -> NearestPoints:
     """The nearest side of each texel within reach, by the metric that the surface has along the side.
 
     inside : (h, w) texels of pieces
@@ -85,15 +85,15 @@ def nearest_sides(sides: Sides, inside: Flags) -> Nearest:
     on_rim = np.zeros(inside.size, np.bool_)
     on_rim[texel[rim]] = True
     found = first[first >= 0]
-    return Nearest(texel[found], k[found], share[found], np.sqrt(away2[found]), on_rim[texel[found]])
+    return NearestPoints(texel[found], k[found], share[found], np.sqrt(away2[found]), on_rim[texel[found]])
 
 
-def _metric(sides: Sides) -> _Metric:
+def _metric(sides: BorderSides) -> _Metric:
     u, v = np.moveaxis(sides.steps.mean(axis=1), 1, 0)
     e, f, g = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
     det = np.maximum(np.maximum(e * g - f * f, 1e-9 * e * g), 1e-30)
     reach = sides.gutter_mm * np.sqrt(np.stack((g, e)) / det)
-    half = np.maximum(np.minimum(reach, sides.widest), _TEXEL).T
+    half = np.maximum(np.minimum(reach, sides.max_texels), _TEXEL).T
     x, y = (sides.ends[:, 1] - sides.ends[:, 0]).T
     length = np.maximum(e * x * x + 2 * f * x * y + g * y * y, 1e-30)
     along = np.column_stack((e * x + f * y, f * x + g * y)) / length[:, None]
@@ -101,7 +101,7 @@ def _metric(sides: Sides) -> _Metric:
     return _Metric(across, f / across, np.sqrt(det) / across, along, half)
 
 
-def _around(sides: Sides, metric: _Metric, shape: tuple[int, ...]) -> tuple[Index, Index, Index]:
+def _around(sides: BorderSides, metric: _Metric, shape: tuple[int, ...]) -> tuple[Index, Index, Index]:
     """Sides (n,) and all texels (n,), (n,) of the boxes around them that may be within reach."""
     height, width = shape
     low = np.ceil(sides.ends.min(axis=1) - metric.half)

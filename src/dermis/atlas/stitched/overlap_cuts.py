@@ -11,15 +11,22 @@ from dermis.atlas.stitched.gutter import (
     Border,
     GutterWidth,
     Packing,
+    border_points,
+    border_sides,
+    border_steps,
     find_border,
-    places_on,
-    sides_of,
-    steps_at,
-    walk_from,
+    trace_from_border,
 )
-from dermis.atlas.stitched.nearest import Nearest, Sides, nearest_sides
+from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_border_points
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
-from dermis.atlas.stitched.texels import Rooted, gap_mm, opposed, owners, unsure, weights_in
+from dermis.atlas.stitched.texels import (
+    AnchoredTexels,
+    anchors_diverge,
+    barycentric_weights,
+    gap_mm,
+    rasterise_owners,
+    unconnected_pairs,
+)
 from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.mesh.geometry import components
 
@@ -49,7 +56,7 @@ class Conflicts(NamedTuple):
     one: Doubles
     other: Doubles
     inside: Doubles
-    per_uv: float
+    texels_per_uv: float
     texel_mm: float
 
     @property
@@ -69,11 +76,11 @@ class _Grid(NamedTuple):
 
     owner: NDArray[np.int32]
     number: Index
-    rooted: Rooted
+    rooted: AnchoredTexels
     packing: Packing
     border: Border
-    sides: Sides
-    nearest: Nearest
+    sides: BorderSides
+    nearest: NearestPoints
 
 
 def find_conflicts(surface: FlatSurface, placed: Flags, own: Index, gutter_mm: float) -> Conflicts:
@@ -85,47 +92,47 @@ def find_conflicts(surface: FlatSurface, placed: Flags, own: Index, gutter_mm: f
     low, high = surface.uv[own].min(axis=(0, 1)), surface.uv[own].max(axis=(0, 1))
     box_mm2 = float((high - low).prod()) * mm2 / area_uv
     texel_mm = float(max(_FINEST_MM, np.sqrt(mm2 / _MOST_TEXELS), np.sqrt(box_mm2 / _MOST_CELLS)))
-    per_uv = float(np.sqrt(mm2 / area_uv) / texel_mm)
+    texels_per_uv = float(np.sqrt(mm2 / area_uv) / texel_mm)
     width = GutterWidth(gutter_mm, np.ceil(2 * gutter_mm / texel_mm))
-    margin, every = width.widest + 2, np.ones(len(placed))
+    margin, every = width.max_texels + 2, np.ones(len(placed))
     places = np.zeros(surface.uv.shape)
-    places[own] = (surface.uv[own] - low) * per_uv + margin
-    across, down = np.ceil((high - low) * per_uv + 2 * margin + 1).astype(int)
+    places[own] = (surface.uv[own] - low) * texels_per_uv + margin
+    across, down = np.ceil((high - low) * texels_per_uv + 2 * margin + 1).astype(int)
     piece = np.where(placed, 1, -1)
     piece[own] = 0
-    packing, shape = Packing(places, per_uv * every, every / texel_mm), (int(down), int(across))
-    grid = _grid(surface, find_border(surface, piece, own), packing, width, owners(places, own, shape))
-    one, other = (grid.rooted.those(found) for found in _meetings(surface, placed, grid))
-    origin = low * per_uv - margin
+    packing, shape = Packing(places, texels_per_uv * every, every / texel_mm), (int(down), int(across))
+    grid = _grid(surface, find_border(surface, piece, own), packing, width, rasterise_owners(places, own, shape))
+    one, other = (grid.rooted.select(found) for found in _meetings(surface, placed, grid))
+    origin = low * texels_per_uv - margin
     inside = grid.rooted.texels[: np.count_nonzero(grid.owner >= 0)] + origin
-    return Conflicts(one.roots + origin, other.roots + origin, inside, per_uv, texel_mm)
+    return Conflicts(one.roots + origin, other.roots + origin, inside, texels_per_uv, texel_mm)
 
 
 def _grid(
     surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: NDArray[np.int32]
 ) -> _Grid:
-    sides = sides_of(surface, border, packing, width)
+    sides = border_sides(surface, border, packing, width)
     sides = sides._replace(gutter_mm=_NEAR * sides.gutter_mm)
-    nearest, own = nearest_sides(sides, owner >= 0), np.flatnonzero(owner >= 0)
+    nearest, own = nearest_border_points(sides, owner >= 0), np.flatnonzero(owner >= 0)
     f, texel = owner.ravel()[own], np.concatenate((own, nearest.texel))
     number, labels = np.full(owner.shape, -1), np.where(owner >= 0, owner, -2)
     number.ravel()[texel] = np.arange(len(texel))
     labels.ravel()[nearest.texel] = -1
     texels = np.column_stack(np.divmod(texel, owner.shape[1])[::-1]).astype(np.float64)
-    roots = np.concatenate((texels[: len(own)], places_on(sides, nearest)))
-    steps = surface.lengths[f, 0, :2] / packing.per_uv[f, None]
-    step_mm = np.concatenate((steps, np.linalg.norm(steps_at(sides, nearest), axis=2)))
-    return _Grid(labels, number, Rooted(texels, roots, step_mm), packing, border, sides, nearest)
+    roots = np.concatenate((texels[: len(own)], border_points(sides, nearest)))
+    steps = surface.uv_metric[f, 0, :2] / packing.texels_per_uv[f, None]
+    step_mm = np.concatenate((steps, np.linalg.norm(border_steps(sides, nearest), axis=2)))
+    return _Grid(labels, number, AnchoredTexels(texels, roots, step_mm), packing, border, sides, nearest)
 
 
 def _meetings(surface: FlatSurface, placed: Flags, grid: _Grid) -> tuple[Index, Index]:
     """Pairs (n,), (n,) of texels beside each other between which there is a gap."""
     found = []
     for axis in (0, 1):
-        a, b = (grid.number.ravel()[texel] for texel in unsure(surface, grid.owner, axis))
-        far = opposed(grid.rooted.those(a), grid.rooted.those(b))
+        a, b = (grid.number.ravel()[texel] for texel in unconnected_pairs(surface, grid.owner, axis))
+        far = anchors_diverge(grid.rooted.select(a), grid.rooted.select(b))
         a, b = a[far], b[far]
-        found.append((a, b, gap_mm(grid.rooted.those(a), grid.rooted.those(b), axis)))
+        found.append((a, b, gap_mm(grid.rooted.select(a), grid.rooted.select(b), axis)))
     one, other, limit = (np.concatenate(part) for part in zip(*found, strict=True))
     points = _points(surface, placed, grid, np.concatenate((one, other)))
     # places that do not exist are NaN, and not far from anything
@@ -140,11 +147,11 @@ def _points(surface: FlatSurface, placed: Flags, grid: _Grid, chosen: Index) -> 
     wanted[chosen] = True
     own, beyond = np.flatnonzero(wanted[: len(owner)]), np.flatnonzero(wanted[len(owner) :])
     f = owner[own]
-    points[own] = surface.at(f, weights_in(grid.packing.places[f], texels[own]))
-    nearest = Nearest._make(part[beyond] for part in grid.nearest)
-    ends, _ = walk_from(surface, grid.border, grid.sides, nearest, texels[len(owner) + beyond])
-    there = nearest.rim | (ends.whole & placed[ends.triangle])
-    points[len(owner) + beyond[there]] = surface.at(ends.triangle, ends.weights)[there]
+    points[own] = surface.points(f, barycentric_weights(grid.packing.corners[f], texels[own]))
+    nearest = NearestPoints._make(part[beyond] for part in grid.nearest)
+    ends, _ = trace_from_border(surface, grid.border, grid.sides, nearest, texels[len(owner) + beyond])
+    there = nearest.rim | (ends.complete & placed[ends.triangle])
+    points[len(owner) + beyond[there]] = surface.points(ends.triangle, ends.weights)[there]
     return points
 
 
@@ -175,7 +182,7 @@ def _cut_mm(surface: FlatSurface, own: Index, part: Index) -> float:
     """Length of all sides between parts of the triangles `own`."""
     of = np.full(len(surface.uv), -1, np.int64)
     of[own] = part
-    other = of[surface.beside_uv[own]]
+    other = of[surface.uv_neighbour[own]]
     length = np.linalg.norm(np.roll(surface.corners[own], -1, axis=1) - surface.corners[own], axis=2)
     return float(length[(other >= 0) & (other != part[:, None])].sum()) / 2
 
@@ -190,7 +197,7 @@ def _cut(surface: FlatSurface, placed: Flags, own: Index, gutter_mm: float) -> I
             continue
         overlap = found._replace(one=found.one[cluster], other=found.other[cluster])
         normal, offset, parted = _best_line(overlap, reach)
-        half = surface.uv[own].mean(axis=1) * found.per_uv @ normal > offset
+        half = surface.uv[own].mean(axis=1) * found.texels_per_uv @ normal > offset
         across = float(np.count_nonzero(np.abs(found.inside @ normal - offset) < 0.5))
         around = float(parted + 2 * reach)
         if parted < _WORTH * min(across, around):
@@ -205,8 +212,8 @@ def _clusters(found: Conflicts, reach: float) -> list[Index]:
     """Clusters of conflicts near each other, as their indices."""
     cells = np.floor((found.one + found.other) / 2 / (_CELL * reach)).astype(np.int64)
     cells, of = np.unique(cells, axis=0, return_inverse=True)
-    beside = np.abs(cells[:, None] - cells).max(axis=2) <= 1
-    label = components(len(cells), *np.nonzero(beside))[of.reshape(-1)]
+    neighbour = np.abs(cells[:, None] - cells).max(axis=2) <= 1
+    label = components(len(cells), *np.nonzero(neighbour))[of.reshape(-1)]
     return [np.flatnonzero(label == k) for k in range(label.max(initial=-1) + 1)]
 
 
@@ -225,7 +232,7 @@ def _near(places: Doubles, others: Doubles, reach: float) -> Flags:
 
 def _strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Flags, reach: float) -> Flags:
     """Triangles along that side of an overlap where they have less area."""
-    corners = surface.uv[own] * overlap.per_uv
+    corners = surface.uv[own] * overlap.texels_per_uv
     places = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)
     near = np.asarray(_near(places, np.concatenate((overlap.one, overlap.other)), reach).any(axis=1))
     area = surface.area_mm2[own]
@@ -255,11 +262,11 @@ def _parts(surface: FlatSurface, own: Index, part: Index, gutter_mm: float) -> I
     """Connected parts; crumbs along the cut join the largest part beside them. None for a single part."""
     index = np.full(len(surface.uv), -1, np.int64)
     index[own] = np.arange(len(own))
-    there = index[surface.beside_uv[own]]
-    beside = np.where(there >= 0, there, np.arange(len(own))[:, None])
-    part = connected_pieces(part, beside)
+    there = index[surface.uv_neighbour[own]]
+    neighbour = np.where(there >= 0, there, np.arange(len(own))[:, None])
+    part = connected_pieces(part, neighbour)
     area = np.bincount(part, surface.area_mm2[own])
     crumbs = area[part] < _CRUMB * gutter_mm**2
-    host = np.take_along_axis(part[beside], area[part[beside]].argmax(axis=1)[:, None], axis=1)[:, 0]
-    part = connected_pieces(np.where(crumbs, host, part), beside)
+    host = np.take_along_axis(part[neighbour], area[part[neighbour]].argmax(axis=1)[:, None], axis=1)[:, 0]
+    part = connected_pieces(np.where(crumbs, host, part), neighbour)
     return part if part.max() > 0 else None

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.atlas.stitched.gutter import Border, GutterWidth, Packing, find_border, needed
+from dermis.atlas.stitched.gutter import Border, GutterWidth, Packing, find_border, needed_texels
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 
 Span = tuple[int, int, int]
@@ -24,7 +24,7 @@ _CLOSE = 0.65  # share of the scale of masks below which they are made again,
 _ABOVE = 1.15  # so much above the one that was found
 
 
-def lay_shapes(shapes: Sequence[Sequence[Span]], n: int) -> list[tuple[int, int]] | None:
+def place_shapes(shapes: Sequence[Sequence[Span]], n: int) -> list[tuple[int, int]] | None:
     """Column and row of shapes in n x n cells, each at the first free place by rows; None if one has none.
 
     shapes : runs of each, from row and column 0
@@ -127,13 +127,13 @@ def pack_pieces(
     packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(piece))))
     if not pieces:
         return packing
-    found = _search(pieces, cells, width._replace(widest=width.widest * cells / size))
+    found = _search(pieces, cells, width._replace(max_texels=width.max_texels * cells / size))
     if found is None:
         return None
     per_cell = size / cells
     for own, one, low in zip(groups, pieces, found.corners, strict=True):
-        packing.places[own] = (one.uv * found.scale + low) * per_cell - 0.5
-        packing.per_uv[own] = one.scale * found.scale * per_cell
+        packing.corners[own] = (one.uv * found.scale + low) * per_cell - 0.5
+        packing.texels_per_uv[own] = one.scale * found.scale * per_cell
         packing.per_mm[own] = one.per_mm * found.scale * per_cell
     return packing
 
@@ -143,7 +143,7 @@ def _apart(surface: FlatSurface, piece: Index, own: Index, scale: float) -> _Pie
     number = np.empty(len(piece), np.int64)
     number[own] = np.arange(len(own))
     border = border._replace(triangle=number[border.triangle])
-    uv, part = surface.uv[own] * scale, surface.part(own)
+    uv, part = surface.uv[own] * scale, surface.subset(own)
     uv -= uv.min(axis=(0, 1))
     per_mm = scale * float(np.sqrt(np.abs(part.area_uv).sum() / part.area_mm2.sum()))
     return _Piece(part, uv, uv.max(axis=(0, 1)), scale, per_mm, border)
@@ -202,7 +202,7 @@ def _pack(masks: list[_Mask], scale: float, cells: int, order: int) -> _Layout |
     if sum(area for area, _, _ in size) > cells**2:
         return None
     first = np.argsort([-one[order // 2] for one in size], kind="stable")
-    found = lay_shapes([_spans(shapes[k]).tolist() for k in first], cells)
+    found = place_shapes([_spans(shapes[k]).tolist() for k in first], cells)
     if found is None:
         return None
     corners = np.empty((len(masks), 2))
@@ -231,7 +231,7 @@ def _mask(one: _Piece, scale: float, width: GutterWidth) -> _Mask:
     every = np.ones(len(one.uv))
     places = one.uv * scale + margin - 0.5
     packing = Packing(places, every * one.scale * scale, every * one.per_mm * scale)
-    mask = needed(one.part, np.arange(len(every)), one.border, packing, width, (int(down), int(across)))
+    mask = needed_texels(one.part, np.arange(len(every)), one.border, packing, width, (int(down), int(across)))
     # a needed texel may lie in a cell whose centre is not needed
     mask[1:] |= mask[:-1].copy()
     mask[:-1] |= mask[1:].copy()
@@ -249,11 +249,11 @@ def _spans(mask: Flags) -> Index:
 
 def _half_extent(one: _Piece, scale: float, width: GutterWidth) -> Doubles:
     """(2,) how far gutters reach along u and v at most [cell]."""
-    steps = one.part.along[one.border.triangle] / (one.scale * scale)
+    steps = one.part.uv_steps[one.border.triangle] / (one.scale * scale)
     if not len(steps):
         return np.ones(2)
     e, g = ((steps[..., k, :] ** 2).sum(axis=-1) for k in (0, 1))
     f = (steps[..., 0, :] * steps[..., 1, :]).sum(axis=-1)
     det = np.maximum(e * g - f * f, 1e-9 * e * g)
     half = width.gutter_mm * np.sqrt(np.array([(g / det).max(), (e / det).max()]))
-    return np.asarray(np.clip(half, 1.0, max(width.widest, 1.0)))
+    return np.asarray(np.clip(half, 1.0, max(width.max_texels, 1.0)))

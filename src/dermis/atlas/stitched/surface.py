@@ -15,7 +15,7 @@ from dermis.mesh.mesh import Mesh
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
-_LEAST_MM = 1e-9
+_MIN_LENGTH_MM = 1e-9
 
 
 class Adjacency(NamedTuple):
@@ -30,11 +30,11 @@ class Adjacency(NamedTuple):
     """
 
     flat: NDArray[np.float64]
-    beside: NDArray[np.int32]
-    entry: NDArray[np.int8]
+    neighbour: NDArray[np.int32]
+    neighbour_side: NDArray[np.int8]
     flipped: NDArray[np.bool_]
     apex: NDArray[np.float64]
-    free: NDArray[np.bool_]
+    passable: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -57,23 +57,23 @@ class FlatSurface:
     area_mm2: Doubles
     area_uv: Doubles
     skin: Flags
-    sound: Flags
+    valid: Flags
     adjacency: Adjacency
-    beside_uv: Index
-    along: Doubles
-    lengths: Doubles
+    uv_neighbour: Index
+    uv_steps: Doubles
+    uv_metric: Doubles
 
-    def at(self, triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> Doubles:
+    def points(self, triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> Doubles:
         """Points (n, 3) in triangles, by the weights (n, 2) of their second and third corner [mm]."""
-        return read(self.corners, triangle, weights.astype(np.float64))
+        return interpolate_corners(self.corners, triangle, weights.astype(np.float64))
 
-    def part(self, own: Index) -> FlatSurface:
+    def subset(self, own: Index) -> FlatSurface:
         """Some of its triangles, not to be walked on: their neighbours keep their old numbers."""
         names = [field.name for field in fields(self) if field.name != "adjacency"]
         return replace(self, **{name: getattr(self, name)[own] for name in names})
 
 
-def read(
+def interpolate_corners(
     corners: NDArray[np.floating], triangle: NDArray[np.integer], weights: NDArray[np.floating]
 ) -> NDArray[Any]:
     """(n, c) in triangles of what their corners (f, 3, c) have.
@@ -87,7 +87,7 @@ def read(
     return np.asarray(found)
 
 
-def survey(mesh: Mesh) -> FlatSurface:
+def flat_surface(mesh: Mesh) -> FlatSurface:
     """The surface of a mesh."""
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     uv = mesh.uv[mesh.triangles].astype(np.float64)
@@ -95,47 +95,47 @@ def survey(mesh: Mesh) -> FlatSurface:
     # v runs down, so uv that is not mirrored has a negative cross product in (u, v)
     area_uv = -uv_cross(uv) / 2
     area = triangle_areas(corners)
-    sound = skin & (2 * np.abs(area_uv) > MIN_UV_CROSS) & (area > 0)
-    flat, axes = _flat(corners)
-    along, lengths = _steps(mesh, flat, axes, uv, area_uv)
+    valid = skin & (2 * np.abs(area_uv) > MIN_UV_CROSS) & (area > 0)
+    flat, axes = _planar_corners(corners)
+    uv_steps, uv_metric = _uv_steps(mesh, flat, axes, uv, area_uv)
     same_uv = weld(np.hstack((mesh.positions, mesh.uv)))[mesh.triangles]
-    beside_uv = (opposite_sides(same_uv.astype(np.int64)) % len(uv)).reshape(3, -1).T
+    uv_neighbour = (opposite_sides(same_uv.astype(np.int64)) % len(uv)).reshape(3, -1).T
     return FlatSurface(
         corners,
         uv,
         area,
         area_uv,
         skin,
-        sound,
-        Adjacency(flat, *sides_across(mesh), _apexes(flat), skin),
-        beside_uv,
-        along,
-        lengths,
+        valid,
+        Adjacency(flat, *side_neighbours(mesh), _apexes(flat), skin),
+        uv_neighbour,
+        uv_steps,
+        uv_metric,
     )
 
 
-def _flat(corners: Doubles) -> tuple[Doubles, Doubles]:
+def _planar_corners(corners: Doubles) -> tuple[Doubles, Doubles]:
     """Corners (f, 3, 2) in the triangle's plane, first at 0 and second to its right; both axes (f, 2, 3)."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    x = first / np.maximum(np.linalg.norm(first, axis=1, keepdims=True), _LEAST_MM)
+    x = first / np.maximum(np.linalg.norm(first, axis=1, keepdims=True), _MIN_LENGTH_MM)
     up = second - (second * x).sum(axis=1, keepdims=True) * x
-    y = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), _LEAST_MM)
+    y = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), _MIN_LENGTH_MM)
     axes = np.stack((x, y), axis=1)
     return np.einsum("fki,fai->fka", corners - corners[:, :1], axes), axes
 
 
-def sides_across(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int8], Flags]:
+def side_neighbours(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int8], Flags]:
     """(f, 3) triangle across each side, -1 for none, its side of this edge, and whether it is turned over."""
     points, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.triangles)
     side = np.arange(3 * count)
     other = opposite_sides(points)
     start = points.T.ravel()
-    beside = np.where(other == side, -1, other % count).reshape(3, -1).T
-    entry = (other // count).reshape(3, -1).T
+    neighbour = np.where(other == side, -1, other % count).reshape(3, -1).T
+    neighbour_side = (other // count).reshape(3, -1).T
     flipped = (start[other] == start).reshape(3, -1).T
     return (
-        np.ascontiguousarray(beside, np.int32),
-        np.ascontiguousarray(entry, np.int8),
+        np.ascontiguousarray(neighbour, np.int32),
+        np.ascontiguousarray(neighbour_side, np.int8),
         np.ascontiguousarray(flipped),
     )
 
@@ -144,16 +144,16 @@ def _apexes(flat: Doubles) -> Doubles:
     """(f, 3, 2) the third corner as seen from each side: along it and to its left, in lengths of the side."""
     side = np.roll(flat, -1, axis=1) - flat
     rest = np.roll(flat, -2, axis=1) - flat
-    square = np.maximum((side**2).sum(axis=2), _LEAST_MM**2)
-    along = (side * rest).sum(axis=2) / square
+    square = np.maximum((side**2).sum(axis=2), _MIN_LENGTH_MM**2)
+    uv_steps = (side * rest).sum(axis=2) / square
     left = (side[..., 0] * rest[..., 1] - side[..., 1] * rest[..., 0]) / square
-    return np.stack((along, left), axis=-1)
+    return np.stack((uv_steps, left), axis=-1)
 
 
-def _steps(
+def _uv_steps(
     mesh: Mesh, flat: Doubles, axes: Doubles, uv: Doubles, area_uv: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """`along` and `lengths` of a `FlatSurface`: at each corner the mean of triangles mirrored alike in uv."""
+    """`uv_steps` and `uv_metric` of a `FlatSurface`: at each corner the mean of triangles mirrored alike in uv."""
     count = len(mesh.positions)
     corner = mesh.triangles + count * (area_uv < 0)[:, None].astype(np.int32)
     positions, uvs, normals = (np.concatenate((a, a)) for a in (mesh.positions, mesh.uv, mesh.normals))
@@ -161,21 +161,21 @@ def _steps(
     length = np.linalg.norm(steps, axis=-1)
     cosine = (steps[:, :, 0] * steps[:, :, 1]).sum(axis=-1) / np.maximum(length.prod(axis=-1), 1e-12)
     # laid into the triangle's plane without getting shorter
-    along = np.einsum("fksi,fai->fksa", steps, axes)
-    along *= (length / np.maximum(np.linalg.norm(along, axis=-1), 1e-12))[..., None]
-    own = _own_steps(flat, uv)[:, None]
+    uv_steps = np.einsum("fksi,fai->fksa", steps, axes)
+    uv_steps *= (length / np.maximum(np.linalg.norm(uv_steps, axis=-1), 1e-12))[..., None]
+    own = _triangle_steps(flat, uv)[:, None]
     # the mean over triangles that face all ways may be meaningless: then the triangle's own steps
-    bad = _turn(along) * np.sign(area_uv)[:, None] >= -0.05 * length.prod(axis=-1)
-    along = np.where(bad[..., None, None], own, along)
-    return along, np.concatenate((length, cosine[..., None]), axis=-1)
+    bad = _uv_orientation(uv_steps) * np.sign(area_uv)[:, None] >= -0.05 * length.prod(axis=-1)
+    uv_steps = np.where(bad[..., None, None], own, uv_steps)
+    return uv_steps, np.concatenate((length, cosine[..., None]), axis=-1)
 
 
-def _turn(along: Doubles) -> Doubles:
+def _uv_orientation(uv_steps: Doubles) -> Doubles:
     """Positive where v lies to the left of u."""
-    return np.asarray(along[..., 0, 0] * along[..., 1, 1] - along[..., 0, 1] * along[..., 1, 0])
+    return np.asarray(uv_steps[..., 0, 0] * uv_steps[..., 1, 1] - uv_steps[..., 0, 1] * uv_steps[..., 1, 0])
 
 
-def _own_steps(flat: Doubles, uv: Doubles) -> Doubles:
+def _triangle_steps(flat: Doubles, uv: Doubles) -> Doubles:
     """(f, 2, 2) steps for u and v of each triangle by itself [mm per unit of uv]."""
     e, d = flat[:, 1:] - flat[:, :1], uv[:, 1:] - uv[:, :1]
     cross = d[:, 0, 0] * d[:, 1, 1] - d[:, 0, 1] * d[:, 1, 0]

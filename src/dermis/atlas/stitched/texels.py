@@ -19,7 +19,7 @@ _STEPS, _SLACK_MM = 2.0, 0.5  # neighbours farther apart than so many steps plus
 _WELL = 1e-3  # texels this far from an edge are on no other triangle that only shares it
 
 
-def owners(places: Doubles, triangles: Index, shape: tuple[int, int]) -> NDArray[np.int32]:
+def rasterise_owners(places: Doubles, triangles: Index, shape: tuple[int, int]) -> NDArray[np.int32]:
     """(h, w) the last triangle in which each texel's centre lies, -1 for none.
 
     places : (f, 3, 2) corners [texel]
@@ -31,23 +31,23 @@ def owners(places: Doubles, triangles: Index, shape: tuple[int, int]) -> NDArray
     return owner
 
 
-def lost(places: Doubles, triangles: Index, owner: NDArray[np.int32]) -> Flags:
-    """Triangles (f,) most of whose texels are owned by others; arguments as for `owners`."""
+def mostly_hidden(places: Doubles, triangles: Index, owner: NDArray[np.int32]) -> Flags:
+    """Triangles (f,) most of whose texels are owned by others; arguments as for `rasterise_owners`."""
     texel, which = covered_texels(places[triangles], owner.shape, _WELL)
     drawn, count = triangles[which], len(places)
     owned = np.bincount(drawn[owner.ravel()[texel] == drawn], minlength=count)
     return np.asarray(owned < 0.5 * np.bincount(drawn, minlength=count))
 
 
-def weights_at(places: Doubles, owner: NDArray[np.int32]) -> Singles:
+def centre_weights(places: Doubles, owner: NDArray[np.int32]) -> Singles:
     """(h, w, 2) of the second and third corner at the centre of each texel that has an owner."""
     y, x = np.nonzero(owner >= 0)
     weights = np.zeros((*owner.shape, 2), np.float32)
-    weights[y, x] = weights_in(places[owner[y, x]], np.column_stack((x, y)))
+    weights[y, x] = barycentric_weights(places[owner[y, x]], np.column_stack((x, y)))
     return weights
 
 
-def weights_in(corners: Doubles, at: NDArray[Any]) -> Doubles:
+def barycentric_weights(corners: Doubles, at: NDArray[Any]) -> Doubles:
     """(n, 2) of the second and third corner of triangles (n, 3, 2) at places (n, 2) in them [texel]."""
     e1, e2, off = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], at - corners[:, 0]
     area = cross_2d(e1, e2)
@@ -56,7 +56,7 @@ def weights_in(corners: Doubles, at: NDArray[Any]) -> Doubles:
     return np.stack((second, third), axis=1) / np.maximum(second + third, 1.0)[:, None]
 
 
-class Rooted(NamedTuple):
+class AnchoredTexels(NamedTuple):
     """Texels (n,) and the places of their piece that they belong to.
 
     texels : (n, 2) x and y
@@ -68,12 +68,12 @@ class Rooted(NamedTuple):
     roots: Doubles
     step_mm: Doubles
 
-    def those(self, chosen: Index) -> Rooted:
+    def select(self, chosen: Index) -> AnchoredTexels:
         """Some of them."""
-        return Rooted._make(part[chosen] for part in self)
+        return AnchoredTexels._make(part[chosen] for part in self)
 
 
-def unsure(surface: FlatSurface, owner: NDArray[np.int32], axis: int) -> tuple[Index, Index]:
+def unconnected_pairs(surface: FlatSurface, owner: NDArray[np.int32], axis: int) -> tuple[Index, Index]:
     """Flat indices of texels beside each other along x (0) or y (1) that no triangles join.
 
     owner : (h, w) triangles of a piece, -1 in its gutters, -2 where nothing is
@@ -85,18 +85,18 @@ def unsure(surface: FlatSurface, owner: NDArray[np.int32], axis: int) -> tuple[I
     f, g = (owner.ravel()[texel] for texel in (first, first + ahead))
     apart = (f < 0) | (g < 0)
     owned = ~apart
-    beside, g = surface.beside_uv[f[owned]].T, g[owned]
-    apart[owned] = (beside[0] != g) & (beside[1] != g) & (beside[2] != g)
+    neighbour, g = surface.uv_neighbour[f[owned]].T, g[owned]
+    apart[owned] = (neighbour[0] != g) & (neighbour[1] != g) & (neighbour[2] != g)
     return first[apart], first[apart] + ahead
 
 
-def opposed(one: Rooted, other: Rooted) -> Flags:
+def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Flags:
     """Whether the roots of two texels are farther apart than either texel is from its root."""
     away2 = np.maximum(_square(one.texels - one.roots), _square(other.texels - other.roots))
     return np.asarray(_square(one.roots - other.roots) > away2)
 
 
-def gap_mm(one: Rooted, other: Rooted, axis: int) -> Doubles:
+def gap_mm(one: AnchoredTexels, other: AnchoredTexels, axis: int) -> Doubles:
     """Distance (n,) on the surface from which texels beside each other have a gap between them."""
     return _STEPS * np.maximum(one.step_mm[:, axis], other.step_mm[:, axis]) + _SLACK_MM
 
@@ -106,7 +106,7 @@ def _square(off: Doubles) -> Doubles:
     return np.asarray(off[:, 0] ** 2 + off[:, 1] ** 2)
 
 
-def lengths(joined: Flags) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def run_lengths(joined: Flags) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """(h, w) how many texels of each row are joined before each, and after it.
 
     joined : (h, w) whether each goes on where the one before it ends

@@ -10,11 +10,11 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
-from dermis.base.reading import BROKEN, understood
-from dermis.formats.gltf.document import Document, Tree, numbered, read_document
+from dermis.base.reading import MALFORMED_DATA_ERRORS, parsing
+from dermis.formats.gltf.document import Document, Tree, checked_index, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
 from dermis.formats.gltf.rigs import target_names
-from dermis.formats.size_limits import MOST_CHANNELS
+from dermis.formats.size_limits import MAX_CHANNELS
 from dermis.mesh.rotations import slerp
 
 _WIDTH = {"translation": 3, "rotation": 4, "scale": 3}
@@ -24,12 +24,12 @@ Interpolation = Literal["STEP", "LINEAR", "CUBICSPLINE"]
 _TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
 
 
-class Track(NamedTuple):
+class AnimationTrack(NamedTuple):
     """What one curve moves: `path` of the named nodes, or "weights" of the named morph targets."""
 
     path: str
     names: tuple[str, ...]
-    curve: Curve
+    curve: AnimationCurve
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Animation:
     """A clip of a file."""
 
     name: str
-    tracks: tuple[Track, ...]
+    tracks: tuple[AnimationTrack, ...]
 
 
 class _Keys(NamedTuple):
@@ -66,26 +66,26 @@ def read_clip(path: Path, name: str | None) -> Animation:
     if not names:
         refuse(path, "a file with animation clips", "it has none", "Export it with its animation")
     if name is None and len(names) > 1:
-        came, remedy = f"it has {', '.join(names)}", f"Name one, as in {path.name}#{names[0]}"
-        refuse(path, "to know which of its clips is meant", came, remedy)
+        actual, advice = f"it has {', '.join(names)}", f"Name one, as in {path.name}#{names[0]}"
+        refuse(path, "to know which of its clips is meant", actual, advice)
     if name is not None and name not in names:
-        refuse(path, f"one of its clips ({', '.join(names)})", f"{name!r} came", "Correct the name")
+        refuse(path, f"one of its clips ({', '.join(names)})", f"got {name!r}", "Correct the name")
     index = 0 if name is None else names.index(name)
-    with understood(f"{path}: clip {names[index][:80]!r}", "a sound animation", *BROKEN):
+    with parsing(f"{path}: clip {names[index][:80]!r}", "a sound animation", *MALFORMED_DATA_ERRORS):
         return Animation(names[index], tuple(_tracks(document, index, names[index])))
 
 
 def _names(document: Document) -> tuple[str, ...]:
-    clips = document.all("animations")
+    clips = document.items("animations")
     return tuple(str(clip.get("name") or f"clip {k}") for k, clip in enumerate(clips))
 
 
-def _tracks(document: Document, index: int, name: str) -> list[Track]:
+def _tracks(document: Document, index: int, name: str) -> list[AnimationTrack]:
     """The clip's curves, those of the same kind and keys side by side in one."""
-    clip, nodes = document.one("animations", index), read_nodes(document)
-    if len(clip["channels"]) > MOST_CHANNELS:
-        came = f"{name!r} has {len(clip['channels']):,}"
-        refuse(document.path, f"clips of at most {MOST_CHANNELS:,} channels", came, "Export it again")
+    clip, nodes = document.item("animations", index), read_nodes(document)
+    if len(clip["channels"]) > MAX_CHANNELS:
+        actual = f"{name!r} has {len(clip['channels']):,}"
+        refuse(document.path, f"clips of at most {MAX_CHANNELS:,} channels", actual, "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keys]]] = {}
     found, names = [], dict[int, tuple[str, ...]]()
     for number, channel in enumerate(clip["channels"]):
@@ -93,16 +93,16 @@ def _tracks(document: Document, index: int, name: str) -> list[Track]:
         if "node" not in target or target["path"] not in (*_WIDTH, "weights"):
             continue  # of an extension
         _check_node(nodes, target["node"], culprit)
-        sampler = clip["samplers"][numbered(channel["sampler"], len(clip["samplers"]), "samplers")]
+        sampler = clip["samplers"][checked_index(channel["sampler"], len(clip["samplers"]), "samplers")]
         if target["path"] == "weights":
-            found.append(_weights(document, target["node"], sampler, culprit, names))
+            found.append(_weight_track(document, target["node"], sampler, culprit, names))
             continue
-        keys = _keys(document, sampler, _WIDTH[target["path"]], culprit)
+        keys = _read_keys(document, sampler, _WIDTH[target["path"]], culprit)
         if target["path"] == "rotation" and not keys.plain.any(axis=-1).all():
             refuse(culprit, "rotations as unit quaternions", "one is 0", _DAMAGED)
         group = (target["path"], keys.kind, keys.times_s.tobytes())
         groups.setdefault(group, []).append((nodes.names[target["node"]], keys))
-    return found + [_side_by_side(str(path), members) for (path, *_), members in groups.items()]
+    return found + [_merge_tracks(str(path), members) for (path, *_), members in groups.items()]
 
 
 def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
@@ -110,54 +110,56 @@ def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
         refuse(culprit, f"nodes from 0 to {len(nodes.names) - 1}", f"it moves node {node}", _DAMAGED)
 
 
-def _weights(
+def _weight_track(
     document: Document, node: int, sampler: Tree, culprit: str, known: dict[int, tuple[str, ...]]
-) -> Track:
+) -> AnimationTrack:
     """Weights of a node's targets; known : names by mesh, of those that were met."""
-    mesh = document.all("nodes")[node].get("mesh")
+    mesh = document.items("nodes")[node].get("mesh")
     if mesh is not None and mesh not in known:
-        known[mesh] = target_names(document.one("meshes", mesh))
+        known[mesh] = target_names(document.item("meshes", mesh))
     names = () if mesh is None else known[mesh]
     if not names:
-        came = f"node {node} has no morph targets"
-        refuse(culprit, "weights of a mesh with morph targets", came, _DAMAGED)
-    keys = _keys(document, sampler, len(names), culprit)
-    return Track("weights", names, Curve(keys.times_s, keys.values[..., None, :], keys.kind))  # type: ignore[arg-type]
+        actual = f"node {node} has no morph targets"
+        refuse(culprit, "weights of a mesh with morph targets", actual, _DAMAGED)
+    keys = _read_keys(document, sampler, len(names), culprit)
+    return AnimationTrack(
+        "weights", names, AnimationCurve(keys.times_s, keys.values[..., None, :], keys.kind)
+    )  # type: ignore[arg-type]
 
 
-def _side_by_side(path: str, members: list[tuple[str, _Keys]]) -> Track:
+def _merge_tracks(path: str, members: list[tuple[str, _Keys]]) -> AnimationTrack:
     keys = members[0][1]
     values = np.stack([one.values for _, one in members], axis=-2)
-    curve = Curve(keys.times_s, values, keys.kind, turns=path == "rotation")  # type: ignore[arg-type]
-    return Track(path, tuple(name for name, _ in members), curve)
+    curve = AnimationCurve(keys.times_s, values, keys.kind, is_rotation=path == "rotation")  # type: ignore[arg-type]
+    return AnimationTrack(path, tuple(name for name, _ in members), curve)
 
 
-def _keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keys:
+def _read_keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keys:
     """Times and values of a sampler, (k, n), or (k, 3, n) with the tangents of a spline."""
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in _KINDS:
-        refuse(culprit, f"an interpolation of {', '.join(_KINDS)}", f"{kind!r} came", _DAMAGED)
-    times, values = document.real(sampler["input"]).ravel(), document.real(sampler["output"])
+        refuse(culprit, f"an interpolation of {', '.join(_KINDS)}", f"got {kind!r}", _DAMAGED)
+    times, values = document.read_floats(sampler["input"]).ravel(), document.read_floats(sampler["output"])
     shape = (len(times), 3, width) if kind == "CUBICSPLINE" else (len(times), width)
     if len(times) == 0 or values.size != np.prod(shape):
-        came = f"{len(times)} and {values.size} came"
-        refuse(culprit, f"a time and {np.prod(shape[1:])} numbers for each key", came, _DAMAGED)
+        actual = f"got {len(times)} and {values.size}"
+        refuse(culprit, f"a time and {np.prod(shape[1:])} numbers for each key", actual, _DAMAGED)
     if not (np.isfinite(times).all() and np.isfinite(values).all()):
         refuse(culprit, "finite keys", "some are NaN or infinite", _DAMAGED)
     if (np.diff(times) < 0).any():
         late = int(np.flatnonzero(np.diff(times) < 0)[0])
-        came = f"key {late + 1} at {times[late + 1]:g} s comes after {times[late]:g} s"
-        refuse(culprit, "keys in the order of time", came, _DAMAGED)
+        actual = f"key {late + 1} at {times[late + 1]:g} s comes after {times[late]:g} s"
+        refuse(culprit, "keys in the order of time", actual, _DAMAGED)
     return _Keys(times, values.reshape(shape), kind)
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class AnimationCurve:
     """Values that change over time, several with the same keys side by side.
 
     times_s : (k,) of the keys, growing
     values : (k, m, n); of a cubic spline (k, 3, m, n): tangent in, value, tangent out
-    turns : whether the values are quaternions (n = 4), which go round on arcs
+    is_rotation : whether the values are quaternions (n = 4), which go round on arcs
 
     Source: glTF 2.0, appendix C.
     """
@@ -165,9 +167,9 @@ class Curve:
     times_s: Doubles
     values: Doubles
     kind: Interpolation = "LINEAR"
-    turns: bool = False
+    is_rotation: bool = False
 
-    def at(self, seconds: float) -> Doubles:
+    def sample(self, seconds: float) -> Doubles:
         """(m, n) the values at a time; before the first key and after the last theirs."""
         index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
         keys = self.values[:, _VALUE] if self.kind == "CUBICSPLINE" else self.values
@@ -179,7 +181,7 @@ class Curve:
         share = (seconds - float(self.times_s[index])) / step
         if self.kind == "CUBICSPLINE":
             return self._unit(self._spline(index, share, step))
-        if self.turns:
+        if self.is_rotation:
             return slerp(self._unit(keys[index]), self._unit(keys[index + 1]), share)
         return np.asarray((1 - share) * keys[index] + share * keys[index + 1])
 
@@ -191,4 +193,4 @@ class Curve:
         return np.asarray(mixed)
 
     def _unit(self, values: Doubles) -> Doubles:
-        return values / np.linalg.norm(values, axis=-1, keepdims=True) if self.turns else values
+        return values / np.linalg.norm(values, axis=-1, keepdims=True) if self.is_rotation else values

@@ -15,23 +15,23 @@ from dermis.formats.gltf.document import FrozenTree, Tree
 
 VERTICES, INDICES = 34962, 34963
 """What a buffer view holds, where it holds nothing else."""
-CLAMPED = {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}
+CLAMPED_SAMPLER = {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}
 """A sampler that repeats nothing, with mips."""
 _TYPES = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
 _KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-_MOST_SHORT = 65535  # the number itself begins a strip anew
+_MAX_SHORT_COUNT = 65535  # the number itself begins a strip anew
 
 
 @dataclass
-class Binary:
+class BufferBuilder:
     """The file's one buffer as it grows, with the views and accessors into it."""
 
     data: bytearray = field(default_factory=bytearray)
     views: list[Tree] = field(default_factory=list)
     accessors: list[Tree] = field(default_factory=list)
-    _still: dict[int, int] = field(default_factory=dict)
+    _zero_accessors: dict[int, int] = field(default_factory=dict)
 
-    def view(self, part: bytes, target: int | None = None) -> int:
+    def add_view(self, part: bytes, target: int | None = None) -> int:
         """The number of a new view of these bytes."""
         self.data += b"\0" * (-len(self.data) % 4)
         entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(part)}
@@ -39,61 +39,61 @@ class Binary:
         self.data += part
         return len(self.views) - 1
 
-    def array(self, rows: Numbers, target: int | None = None, *, bounded: bool = False) -> int:
+    def add_accessor(self, rows: Numbers, target: int | None = None, *, bounded: bool = False) -> int:
         """The number of a new accessor; rows : (n, k), float32 or unsigned.
 
         bounded : tell the least and the largest of each column
         """
-        values = _little(rows)
+        values = _little_endian(rows)
         more = _bounds(values) if bounded else {}
-        return self._accessor(values, {"bufferView": self.view(values.tobytes(), target)} | more)
+        return self._append_accessor(values, {"bufferView": self.add_view(values.tobytes(), target)} | more)
 
-    def triangles(self, index: Numbers, count: int) -> int:
+    def add_triangles(self, index: Numbers, count: int) -> int:
         """An accessor of corners (f, 3) among so many vertices."""
-        return self.array(index.reshape(-1, 1).astype(_whole(count)), INDICES)
+        return self.add_accessor(index.reshape(-1, 1).astype(_index_dtype(count)), INDICES)
 
-    def displacements(self, row: Numbers, columns: Sequence[Numbers], count: int) -> list[int]:
+    def add_displacements(self, row: Numbers, columns: Sequence[Numbers], count: int) -> list[int]:
         """Accessors of `count` rows of three of which most are 0, whichever form is the smaller.
 
         row : (m,) those that are not, in order
         columns : each (m, 3) their values
         """
         if not len(row):
-            return [self._zeros(count)] * len(columns)
-        index = row.astype(_whole(count))
+            return [self._zero_accessor(count)] * len(columns)
+        index = row.astype(_index_dtype(count))
         if len(row) * (12 + index.itemsize) >= 12 * count:
-            return [self._dense(row, values, count) for values in columns]
-        places = {"bufferView": self.view(_little(index).tobytes())}
-        places["componentType"] = _TYPES[_little(index).dtype.str]
+            return [self._dense_accessor(row, values, count) for values in columns]
+        places = {"bufferView": self.add_view(_little_endian(index).tobytes())}
+        places["componentType"] = _TYPES[_little_endian(index).dtype.str]
         found = []
         for values in columns:
-            stored = _little(values)
-            told = {"bufferView": self.view(stored.tobytes())}
+            stored = _little_endian(values)
+            told = {"bufferView": self.add_view(stored.tobytes())}
             sparse = {"count": len(row), "indices": dict(places), "values": told}
             low, high = np.minimum(stored.min(axis=0), 0), np.maximum(stored.max(axis=0), 0)
             more = {"sparse": sparse, "min": low.tolist(), "max": high.tolist()}
-            found.append(self._accessor(np.broadcast_to(np.zeros(1, "<f4"), (count, 3)), more))
+            found.append(self._append_accessor(np.broadcast_to(np.zeros(1, "<f4"), (count, 3)), more))
         return found
 
-    def _zeros(self, count: int) -> int:
+    def _zero_accessor(self, count: int) -> int:
         """One accessor for all of so many zeros; it takes no room."""
-        if count not in self._still:
+        if count not in self._zero_accessors:
             none = np.broadcast_to(np.zeros(1, "<f4"), (count, 3))
-            self._still[count] = self._accessor(none, {"min": [0.0] * 3, "max": [0.0] * 3})
-        return self._still[count]
+            self._zero_accessors[count] = self._append_accessor(none, {"min": [0.0] * 3, "max": [0.0] * 3})
+        return self._zero_accessors[count]
 
-    def _dense(self, row: Numbers, values: Numbers, count: int) -> int:
+    def _dense_accessor(self, row: Numbers, values: Numbers, count: int) -> int:
         whole = np.zeros((count, 3), "<f4")
         whole[row] = values
-        return self.array(whole, VERTICES, bounded=True)
+        return self.add_accessor(whole, VERTICES, bounded=True)
 
-    def _accessor(self, values: Numbers, more: FrozenTree) -> int:
+    def _append_accessor(self, values: Numbers, more: FrozenTree) -> int:
         told = {"componentType": _TYPES[values.dtype.str], "type": _KINDS[values.shape[1]]}
         self.accessors.append({"count": len(values), **told, **more})
         return len(self.accessors) - 1
 
 
-def _little(rows: Numbers) -> Numbers:
+def _little_endian(rows: Numbers) -> Numbers:
     """The same with the bytes in a file's order."""
     return np.ascontiguousarray(rows, rows.dtype.newbyteorder("<"))
 
@@ -102,16 +102,16 @@ def _bounds(values: Numbers) -> dict[str, list[float]]:
     return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
 
 
-def _whole(count: int) -> str:
+def _index_dtype(count: int) -> str:
     """The smallest type for numbers of so many things."""
-    return "<u2" if count <= _MOST_SHORT else "<u4"
+    return "<u2" if count <= _MAX_SHORT_COUNT else "<u4"
 
 
-def placed(value: Any, places: Mapping[str, int]) -> Any:
+def resolve_textures(value: Any, places: Mapping[str, int]) -> Any:
     """The tree with pictures' names, as {"index": name}, replaced by their textures' numbers."""
     if isinstance(value, Mapping):
         return {
-            key: places[one] if key == "index" and one in places else placed(one, places)
+            key: places[one] if key == "index" and one in places else resolve_textures(one, places)
             for key, one in value.items()
         }
     return value

@@ -17,10 +17,10 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Numbers
 from dermis.base.errors import refuse
-from dermis.base.reading import BROKEN, parse_json, read_file, understood
-from dermis.formats.named_files import named_by_uri
-from dermis.formats.parts import fractions
-from dermis.formats.size_limits import MOST_BYTES, MOST_JSON, MOST_NUMBERS
+from dermis.base.reading import MALFORMED_DATA_ERRORS, parse_json, parsing, read_file
+from dermis.formats.parts import to_floats
+from dermis.formats.referenced_files import resolve_uri
+from dermis.formats.size_limits import MAX_ACCESSOR_NUMBERS, MAX_FILE_BYTES, MAX_JSON_VALUES
 
 Tree = dict[str, Any]
 FrozenTree = Mapping[str, Any]
@@ -30,7 +30,7 @@ _MAGIC = 0x46546C67
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_LEAST_READ = 512  # numbers that take as long as reading any
+_MIN_READ_COST = 512  # numbers that take as long as reading any
 _LISTS = (
     "accessors",
     "animations",
@@ -59,47 +59,52 @@ class Document:
     tree: Tree
     binary: bytes = b""
     _buffers: dict[int, bytes] = field(default_factory=dict)
-    _asked: int = 0
+    _numbers_read: int = 0
 
-    def all(self, key: str) -> list[Tree]:
+    def items(self, key: str) -> list[Tree]:
         """Things of one kind, none where the file has none."""
         found: list[Tree] = self.tree.get(key, [])
         return found
 
-    def one(self, key: str, index: object) -> Tree:
+    def item(self, key: str, index: object) -> Tree:
         """A thing by its kind and number.
 
         Raises ValueError where there is none of that number.
         """
-        return self.all(key)[numbered(index, len(self.all(key)), key)]
+        return self.items(key)[checked_index(index, len(self.items(key)), key)]
 
-    def buffer(self, index: int) -> bytes:
+    def read_buffer(self, index: int) -> bytes:
         """One of its buffers, wherever it lies."""
         if index not in self._buffers:
-            self._buffers[index] = self._read(self.one("buffers", index).get("uri"))
+            self._buffers[index] = self._read(self.item("buffers", index).get("uri"))
         return self._buffers[index]
 
-    def view(self, index: int) -> memoryview:
+    def read_view(self, index: int) -> memoryview:
         """The bytes of a buffer view, all of them."""
-        view = self.one("bufferViews", index)
-        start, length = _whole(view.get("byteOffset", 0)), _whole(view["byteLength"])
-        data = memoryview(self.buffer(view["buffer"]))[start : start + length]
+        view = self.item("bufferViews", index)
+        start, length = _checked_size(view.get("byteOffset", 0)), _checked_size(view["byteLength"])
+        data = memoryview(self.read_buffer(view["buffer"]))[start : start + length]
         if len(data) != length:
             raise ValueError(f"buffer view {index} ends outside of its buffer")
         return data
 
-    def numbers(self, index: int) -> Numbers:
+    def read_values(self, index: int) -> Numbers:
         """(n, k) the values of an accessor as they are stored; sparse ones in their places."""
-        accessor = self.one("accessors", index)
+        accessor = self.item("accessors", index)
         kind, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
-        shape = _whole(accessor["count"]), width
-        self._asked += max(shape[0] * width, _LEAST_READ)
-        if self._asked > MOST_NUMBERS:
-            came = f"accessor {index} takes it beyond"
-            remedy = "Export it with fewer instances or targets, or decimated"
-            refuse(self.path, f"accessors of at most {MOST_NUMBERS / 1e6:.0f} million numbers", came, remedy)
+        shape = _checked_size(accessor["count"]), width
+        self._numbers_read += max(shape[0] * width, _MIN_READ_COST)
+        if self._numbers_read > MAX_ACCESSOR_NUMBERS:
+            actual = f"accessor {index} takes it beyond"
+            advice = "Export it with fewer instances or targets, or decimated"
+            refuse(
+                self.path,
+                f"accessors of at most {MAX_ACCESSOR_NUMBERS / 1e6:.0f} million numbers",
+                actual,
+                advice,
+            )
         if "bufferView" in accessor:
-            stride = _whole(self.one("bufferViews", accessor["bufferView"]).get("byteStride", 0))
+            stride = _checked_size(self.item("bufferViews", accessor["bufferView"]).get("byteStride", 0))
             values = self._rows(accessor, shape, kind, stride)
         else:
             values = np.zeros(shape, kind)
@@ -107,15 +112,15 @@ class Document:
             return values
         return self._with_sparse(values, accessor["sparse"])
 
-    def real(self, index: int) -> Doubles:
+    def read_floats(self, index: int) -> Doubles:
         """(n, k) the values of an accessor; integers that are normalised are fractions of the largest."""
-        values = self.numbers(index)
-        if not self.one("accessors", index).get("normalized", False):
+        values = self.read_values(index)
+        if not self.item("accessors", index).get("normalized", False):
             return values.astype(np.float64)
-        return fractions(values)
+        return to_floats(values)
 
     def _with_sparse(self, values: Numbers, sparse: Tree) -> Numbers:
-        count = _whole(sparse["count"])
+        count = _checked_size(sparse["count"])
         if count > len(values):
             raise ValueError(f"{count} of {len(values)} values are said to differ")
         places = np.dtype(_TYPES[sparse["indices"]["componentType"]])
@@ -128,7 +133,7 @@ class Document:
         self, place: Tree, shape: tuple[int, int], kind: np.dtype[np.number], stride: int = 0
     ) -> Numbers:
         """(n, k) numbers that begin at a place in a buffer view; stride [byte] 0 where they lie close."""
-        data, start = self.view(place["bufferView"]), _whole(place.get("byteOffset", 0))
+        data, start = self.read_view(place["bufferView"]), _checked_size(place.get("byteOffset", 0))
         size = kind.itemsize
         if 0 in shape:
             return np.zeros(shape, kind)
@@ -137,18 +142,18 @@ class Document:
     def _read(self, uri: str | None) -> bytes:
         if uri is None:
             return self.binary
-        left = MOST_BYTES - sum(map(len, self._buffers.values()))
+        left = MAX_FILE_BYTES - sum(map(len, self._buffers.values()))
         if uri.startswith("data:"):
             data = base64.b64decode(uri.partition(",")[2])
         else:
-            data = read_file(named_by_uri(self.path, uri), "a buffer", left, f"{self.path}, {uri[:80]!r}")
+            data = read_file(resolve_uri(self.path, uri), "a buffer", left, f"{self.path}, {uri[:80]!r}")
         if len(data) > left:
-            came = "they have more"
-            refuse(self.path, f"buffers of at most {MOST_BYTES >> 20} MiB", came, "Make them smaller")
+            actual = "they have more"
+            refuse(self.path, f"buffers of at most {MAX_FILE_BYTES >> 20} MiB", actual, "Make them smaller")
         return data
 
 
-def numbered(index: object, count: int, kind: str) -> int:
+def checked_index(index: object, count: int, kind: str) -> int:
     """The number of one of so many things.
 
     Raises ValueError where it is none of them.
@@ -158,9 +163,9 @@ def numbered(index: object, count: int, kind: str) -> int:
     return index
 
 
-def _whole(value: object) -> int:
-    if not (isinstance(value, int) and 0 <= value <= MOST_BYTES):
-        raise ValueError(f"{str(value)[:40]!r} came for a number of bytes or values")
+def _checked_size(value: object) -> int:
+    if not (isinstance(value, int) and 0 <= value <= MAX_FILE_BYTES):
+        raise ValueError(f"got {str(value)[:40]!r} for a number of bytes or values")
     return value
 
 
@@ -169,25 +174,25 @@ def read_document(path: Path) -> Document:
 
     Raises DermisError when it is no glTF, is cut short, or says more than any head needs.
     """
-    data = read_file(path, "a glTF file", MOST_BYTES)
-    with understood(path, "a glTF file", *BROKEN):
+    data = read_file(path, "a glTF file", MAX_FILE_BYTES)
+    with parsing(path, "a glTF file", *MALFORMED_DATA_ERRORS):
         if path.suffix.lower() != ".glb":
-            return Document(path, _object(path, data))
+            return Document(path, _parse_tree(path, data))
         magic, version, length = struct.unpack_from("<III", data)
         if magic != _MAGIC or version != 2:
             raise ValueError("it does not begin as a .glb file of version 2")
         if length > len(data):
             raise ValueError(f"it should have {length} bytes and has {len(data)}")
         chunks = dict(_chunks(data))
-        return Document(path, _object(path, chunks[_JSON]), chunks.get(_BINARY, b""))
+        return Document(path, _parse_tree(path, chunks[_JSON]), chunks.get(_BINARY, b""))
 
 
-def _object(path: Path, text: bytes) -> Tree:
+def _parse_tree(path: Path, text: bytes) -> Tree:
     """The tree that a text says, with lists of objects where there are to be some."""
     values = sum(text.count(mark) for mark in (b",", b"[", b"{"))
-    if values > MOST_JSON:
-        came, remedy = f"it has {values:,}", "Export it with fewer nodes, materials or clips"
-        refuse(path, f"JSON of at most {MOST_JSON:,} values", came, remedy)
+    if values > MAX_JSON_VALUES:
+        actual, advice = f"it has {values:,}", "Export it with fewer nodes, materials or clips"
+        refuse(path, f"JSON of at most {MAX_JSON_VALUES:,} values", actual, advice)
     tree = parse_json(text, path, "a glTF file")
     if not isinstance(tree, dict):
         raise ValueError("its JSON is no object")

@@ -28,7 +28,7 @@ _ROUGH_ELSE = 0.8
 
 
 @dataclass(frozen=True)
-class Added:
+class SkinAdditions:
     """What the material of skin has besides.
 
     surface : members of its pbrMetallicRoughness, which then has no others for colour
@@ -41,7 +41,7 @@ class Added:
     extras: FrozenTree = field(default_factory=dict)
     pictures: Mapping[str, bytes] = field(default_factory=dict)
 
-    def to(self, material: FrozenTree) -> Tree:
+    def applied_to(self, material: FrozenTree) -> Tree:
         """The material with it; where a picture of colours is shown no more, this package still finds it."""
         told = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
         surface, extras = (
@@ -67,7 +67,7 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
         found["colour"] = encode_srgb8(maps.colour)
     shown = slopes if maps.normal is None else maps.normal
     if shown is not None:
-        found["normal"] = _normals(shown)
+        found["normal"] = _normal_colours(shown)
     if maps.normal is not None:
         roles["normal"] = {"index": "normal"}
     if maps.height is not None:
@@ -77,10 +77,10 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
     if maps.roughness is not None:
         perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
         perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
-        found["metallic roughness"] = _bytes(perceptual)
+        found["metallic roughness"] = _to_bytes(perceptual)
     for role in ("specular", "roughness"):
         if (grey_map := getattr(maps, role)) is not None:
-            found[role] = _bytes(grey_map)[..., None]
+            found[role] = _to_bytes(grey_map)[..., None]
     if maps.region is not None:
         found["region"] = maps.region[..., None]
     own = (role for role in ("height", "specular", "roughness", "region") if role in found)
@@ -89,15 +89,17 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
         return dict(zip(found, beside.map(encode_png, found.values()), strict=True)), roles
 
 
-def material_of(one: Material, pictures: Mapping[str, bytes], roles: FrozenTree, roughness: float) -> Tree:
+def surface_material(
+    one: Material, pictures: Mapping[str, bytes], roles: FrozenTree, roughness: float
+) -> Tree:
     """A glTF material, in which a texture is named by its picture: {"index": name}.
 
     roughness : Beckmann's m of skin without a map of it [-]
     """
     if one.kind != "skin":
         rough = next((value for word, value in _ROUGH.items() if word in one.name.casefold()), _ROUGH_ELSE)
-        return {"name": one.name, "pbrMetallicRoughness": _plain(one, rough)}
-    surface = _plain(one, float(np.sqrt(roughness)))
+        return {"name": one.name, "pbrMetallicRoughness": _base_material(one, rough)}
+    surface = _base_material(one, float(np.sqrt(roughness)))
     if "colour" in pictures:
         del surface["baseColorFactor"]
         surface["baseColorTexture"] = {"index": "colour"}
@@ -112,7 +114,7 @@ def material_of(one: Material, pictures: Mapping[str, bytes], roles: FrozenTree,
 
 def eye_pictures(eyes: EyePictures) -> dict[str, bytes]:
     """PNG files of an eyeball by name."""
-    return {EYE: colours_png(eyes.colour), EYE_NORMAL: encode_png(_bytes(0.5 * eyes.normal + 0.5))}
+    return {EYE: colours_png(eyes.colour), EYE_NORMAL: encode_png(_to_bytes(0.5 * eyes.normal + 0.5))}
 
 
 def eye_material(one: Material) -> Tree:
@@ -120,7 +122,7 @@ def eye_material(one: Material) -> Tree:
 
     What lies below faces otherwise than the coat, and shines by itself only where a program has none.
     """
-    surface = _plain(one, _TEARS) | {"baseColorTexture": {"index": EYE}}
+    surface = _base_material(one, _TEARS) | {"baseColorTexture": {"index": EYE}}
     del surface["baseColorFactor"]
     coat = {"clearcoatFactor": _COAT, "clearcoatRoughnessFactor": _TEARS}
     return {
@@ -142,17 +144,17 @@ def colours_png(linear: Floats) -> bytes:
     return encode_png(encode_srgb8(linear))
 
 
-def _plain(one: Material, roughness: float) -> Tree:
+def _base_material(one: Material, roughness: float) -> Tree:
     factor = [*(float(value) for value in one.colour), 1.0]
     return {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": round(roughness, 4)}
 
 
-def _normals(slopes: Floats) -> Bytes:
+def _normal_colours(slopes: Floats) -> Bytes:
     """(h, w, 3) tangent-space normals as colours, green up."""
     normal = np.concatenate([-slopes, np.ones_like(slopes[..., :1])], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    return _bytes(0.5 * normal + 0.5)
+    return _to_bytes(0.5 * normal + 0.5)
 
 
-def _bytes(values: Numbers) -> Bytes:
+def _to_bytes(values: Numbers) -> Bytes:
     return np.asarray(np.rint(np.clip(values, 0, 1) * 255), np.uint8)

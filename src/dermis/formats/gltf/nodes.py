@@ -8,8 +8,8 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
-from dermis.formats.gltf.document import Document, Tree, numbered
-from dermis.formats.size_limits import DEEPEST_NODE, MOST_NODES
+from dermis.formats.gltf.document import Document, Tree, checked_index
+from dermis.formats.size_limits import MAX_NODE_DEPTH, MAX_NODES
 from dermis.mesh.rotations import quaternion_matrix
 
 
@@ -21,7 +21,7 @@ class Nodes:
     parent : (n,) -1 for a root
     order : (n,) parents before children
     local, world : (n, 4, 4) to the parent's space and to the scene's, at rest
-    shown : those of the scene, in the order in which their meshes come; None for a file without scenes
+    scene_nodes : those of the scene, in the order in which their meshes come; None for a file without scenes
     """
 
     names: tuple[str, ...]
@@ -29,9 +29,9 @@ class Nodes:
     order: tuple[int, ...]
     local: Doubles
     world: Doubles
-    shown: tuple[int, ...] | None
+    scene_nodes: tuple[int, ...] | None
 
-    def above(self, node: int) -> list[int]:
+    def ancestors(self, node: int) -> list[int]:
         """The node, its parent and so on up to the root."""
         found = [node]
         while self.parent[found[-1]] >= 0:
@@ -44,22 +44,22 @@ def read_nodes(document: Document) -> Nodes:
 
     Raises DermisError when they go round in a circle, or are too many or too deep.
     """
-    nodes = document.all("nodes")
-    if len(nodes) > MOST_NODES:
-        came = f"it has {len(nodes):,}"
-        refuse(document.path, f"a scene of at most {MOST_NODES:,} nodes", came, "Export the head alone")
+    nodes = document.items("nodes")
+    if len(nodes) > MAX_NODES:
+        actual = f"it has {len(nodes):,}"
+        refuse(document.path, f"a scene of at most {MAX_NODES:,} nodes", actual, "Export the head alone")
     names, parent = node_names(nodes), _parents(nodes)
     order = _order(document, names, parent)
-    local = np.array([_local(node) for node in nodes]).reshape(-1, 4, 4)
+    local = np.array([_local_matrix(node) for node in nodes]).reshape(-1, 4, 4)
     world, depth = local.copy(), [0] * len(nodes)
     for index in order:
         if parent[index] >= 0:
             world[index] = world[parent[index]] @ local[index]
             depth[index] = depth[parent[index]] + 1
-    if max(depth, default=0) > DEEPEST_NODE:
-        came = f"it has {max(depth):,}"
-        refuse(document.path, f"at most {DEEPEST_NODE:,} nodes below each other", came, "Export it again")
-    return Nodes(names, parent, order, local, world, _shown(document, nodes))
+    if max(depth, default=0) > MAX_NODE_DEPTH:
+        actual = f"it has {max(depth):,}"
+        refuse(document.path, f"at most {MAX_NODE_DEPTH:,} nodes below each other", actual, "Export it again")
+    return Nodes(names, parent, order, local, world, _scene_nodes(document, nodes))
 
 
 def node_names(nodes: list[Tree]) -> tuple[str, ...]:
@@ -79,7 +79,7 @@ def _parents(nodes: list[Tree]) -> tuple[int, ...]:
     parent = [-1] * len(nodes)
     for index, node in enumerate(nodes):
         for child in node.get("children", []):
-            numbered(child, len(nodes), "nodes")
+            checked_index(child, len(nodes), "nodes")
             if parent[child] < 0:
                 parent[child] = index
     return tuple(parent)
@@ -94,26 +94,26 @@ def _order(document: Document, names: tuple[str, ...], parent: tuple[int, ...]) 
         order.extend(children.get(index, []))
     lost = sorted(set(range(len(parent))) - set(order))
     if lost:
-        came = f"{', '.join(repr(names[k]) for k in lost[:5])} are their own ancestors"
-        refuse(document.path, "nodes that form a tree", came, "The file is damaged: export it again")
+        actual = f"{', '.join(repr(names[k]) for k in lost[:5])} are their own ancestors"
+        refuse(document.path, "nodes that form a tree", actual, "The file is damaged: export it again")
     return tuple(order)
 
 
-def _shown(document: Document, nodes: list[Tree]) -> tuple[int, ...] | None:
+def _scene_nodes(document: Document, nodes: list[Tree]) -> tuple[int, ...] | None:
     """Nodes of the scene, the last child of each first."""
     if "scenes" not in document.tree:
         return None
-    waiting = list(document.one("scenes", document.tree.get("scene", 0)).get("nodes", []))
+    waiting = list(document.item("scenes", document.tree.get("scene", 0)).get("nodes", []))
     found: dict[int, None] = {}
     while waiting:
-        index = numbered(waiting.pop(), len(nodes), "nodes")
+        index = checked_index(waiting.pop(), len(nodes), "nodes")
         if index not in found:
             found[index] = None
             waiting.extend(nodes[index].get("children", []))
     return tuple(found)
 
 
-def _local(node: Tree) -> Doubles:
+def _local_matrix(node: Tree) -> Doubles:
     """(4, 4) from a node's space to its parent's: its matrix, or translation, rotation and scale."""
     matrix = np.eye(4)
     if "matrix" in node:

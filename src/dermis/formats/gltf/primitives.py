@@ -10,45 +10,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Index, Intp, Ints
-from dermis.formats.gltf.binary import VERTICES, Binary
+from dermis.formats.deformable_mesh import DeformableMesh, VertexTarget
+from dermis.formats.gltf.binary import VERTICES, BufferBuilder
 from dermis.formats.gltf.document import Tree
-from dermis.formats.moved_points import MovedPoints, Target
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, Strands, frames, weights
 
 _M = 1e-3  # of a millimetre
-COLOURS = 64
+HAIR_COLOURS = 64
 """That the hairs of a head are sorted into."""
 _SIDES = 3
-_WIDER = 2.0 * np.pi / (_SIDES * np.sqrt(3.0))  # a triangle is as wide as a circle, seen from all around
-_LEAST_MM = 0.01  # a smaller displacement is none
+_RADIUS_FACTOR = (
+    2.0 * np.pi / (_SIDES * np.sqrt(3.0))
+)  # a triangle is as wide as a circle, seen from all around
+_MIN_DISPLACEMENT_MM = 0.01  # a smaller displacement is none
 _ALBEDO = 5.89  # of a fibre of roughness 0.3 among others: [Chiang2016] equation 9
 _TINY = 1e-9
 
 
-class Part(Protocol):
+class PrimitiveSource(Protocol):
     """What becomes a primitive."""
 
-    def primitive(self, binary: Binary) -> Tree:
+    def primitive(self, binary: BufferBuilder) -> Tree:
         """Without its material and its targets."""
         ...
 
-    def target(self, binary: Binary, target: Target) -> dict[str, int]:
+    def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
         """Accessors of what a morph target does to it."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class SurfacePrimitive:
     """The triangles of one material, with the vertices that they use.
 
     faces : (f,) of the mesh
     eye : which of the head's eyes, where it is laid out as one that is painted; -1 for none
     """
 
-    points: MovedPoints
+    points: DeformableMesh
     faces: Intp
     eye: int = -1
 
@@ -61,23 +63,26 @@ class Surface:
         """(v,) of the mesh, in the order of the file."""
         return np.unique(self._head.mesh.triangles[self.faces])
 
-    def primitive(self, binary: Binary) -> Tree:
+    def primitive(self, binary: BufferBuilder) -> Tree:
         """Corners and attributes; in the extras, whether triangles are halves of quads and stand alone."""
         own, mesh = self.vertices, self._head.mesh
-        index = binary.triangles(np.searchsorted(own, mesh.triangles[self.faces]), len(own))
+        index = binary.add_triangles(np.searchsorted(own, mesh.triangles[self.faces]), len(own))
         uv = mesh.uv[own] if self.eye < 0 else self._eye_uv()
         attributes = _attributes(binary, self.points.positions_mm[own], self.points.normals[own], uv)
-        found: Tree = {"attributes": attributes | _bones(binary, self.points, own), "indices": index}
+        found: Tree = {
+            "attributes": attributes | _bone_attributes(binary, self.points, own),
+            "indices": index,
+        }
         kept = {"quads": self._halves_of_quads(), "alone": self._alone()}
         told = {key: True for key, value in kept.items() if value}
         return found | ({"extras": {"dermis": told}} if told else {})
 
-    def target(self, binary: Binary, target: Target) -> dict[str, int]:
+    def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
         """Of positions and normals."""
         here = np.flatnonzero(np.isin(target.vertex, self.vertices, assume_unique=True))
         row = np.searchsorted(self.vertices, target.vertex[here])
-        columns = [metres(target.delta_mm[here]), target.normal[here]]
-        found = binary.displacements(row, columns, len(self.vertices))
+        columns = [to_metres(target.delta_mm[here]), target.normal[here]]
+        found = binary.add_displacements(row, columns, len(self.vertices))
         return dict(zip(("POSITION", "NORMAL"), found, strict=True))
 
     def _eye_uv(self) -> Floats:
@@ -102,62 +107,66 @@ class Surface:
 
 
 @dataclass(frozen=True, eq=False)
-class Hairs:
+class HairPrimitive:
     """Hairs as tubes; their colours are along u of a picture of one row."""
 
-    points: MovedPoints
-    fibres: Fibres
+    points: DeformableMesh
+    fibres: FibreTubes
 
     @cached_property
     def _rest(self) -> Doubles:
         return replace(self.points.head.mesh, positions=self.points.positions_mm).points_mm
 
-    def primitive(self, binary: Binary) -> Tree:
+    def primitive(self, binary: BufferBuilder) -> Tree:
         """Corners and attributes; the extras tell this package to leave it out."""
-        places, normals = self.fibres.placed(self._rest)
+        places, normals = self.fibres.posed(self._rest)
         _, uv = self.fibres.colours()
         attributes = _attributes(binary, places, normals.astype(np.float32), uv)
-        attributes |= _bones(binary, self.points, np.repeat(self.fibres.vertex, self.fibres.each))
-        index = binary.triangles(self.fibres.triangles(), len(places))
+        attributes |= _bone_attributes(
+            binary, self.points, np.repeat(self.fibres.root_vertices, self.fibres.vertices_per_hair)
+        )
+        index = binary.add_triangles(self.fibres.triangles(), len(places))
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
-    def target(self, binary: Binary, target: Target) -> dict[str, int]:
+    def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
         """Of positions alone."""
         delta, mesh = np.zeros_like(self._rest), self.points.head.mesh
         delta[mesh.point[target.vertex]] = target.delta_mm
-        vertex, moved = self.fibres.moved(self._rest, delta)
-        (found,) = binary.displacements(vertex, [metres(moved)], self.fibres.count)
+        vertex, moved = self.fibres.displacements_at(self._rest, delta)
+        (found,) = binary.add_displacements(vertex, [to_metres(moved)], self.fibres.vertex_count)
         return {"POSITION": found}
 
 
-def metres(places_mm: NDArray[np.floating]) -> Floats:
+def to_metres(places_mm: NDArray[np.floating]) -> Floats:
     """In the file's unit."""
     return (places_mm.astype(np.float64) * _M).astype(np.float32)
 
 
 def _attributes(
-    binary: Binary, places_mm: NDArray[np.floating], normals: Floats, uv: Floats
+    binary: BufferBuilder, places_mm: NDArray[np.floating], normals: Floats, uv: Floats
 ) -> dict[str, int]:
     return {
-        "POSITION": binary.array(metres(places_mm), VERTICES, bounded=True),
-        "NORMAL": binary.array(normals, VERTICES),
-        "TEXCOORD_0": binary.array(uv, VERTICES),
+        "POSITION": binary.add_accessor(to_metres(places_mm), VERTICES, bounded=True),
+        "NORMAL": binary.add_accessor(normals, VERTICES),
+        "TEXCOORD_0": binary.add_accessor(uv, VERTICES),
     }
 
 
-def _bones(binary: Binary, points: MovedPoints, vertex: NDArray[np.integer]) -> dict[str, int]:
+def _bone_attributes(
+    binary: BufferBuilder, points: DeformableMesh, vertex: NDArray[np.integer]
+) -> dict[str, int]:
     """What some vertices of the mesh follow."""
     if points.rig.skeleton is None:
         return {}
     bone, share = points.bones
     return {
-        "JOINTS_0": binary.array(bone[vertex], VERTICES),
-        "WEIGHTS_0": binary.array(share[vertex], VERTICES),
+        "JOINTS_0": binary.add_accessor(bone[vertex], VERTICES),
+        "WEIGHTS_0": binary.add_accessor(share[vertex], VERTICES),
     }
 
 
 @dataclass(frozen=True, eq=False)
-class Fibres:
+class FibreTubes:
     """Tubes around hairs; they keep their shape and turn with the quads that they are rooted in.
 
     mesh : in whose quads
@@ -167,7 +176,7 @@ class Fibres:
     mesh: Mesh
 
     @classmethod
-    def of(cls, strands: Strands, mesh: Mesh, most: int, knots: int) -> Fibres:
+    def from_strands(cls, strands: Strands, mesh: Mesh, most: int, knots: int) -> FibreTubes:
         """The first hairs, so many at most, as wide as all together, bent at fewer knots."""
         kept = min(len(strands), most)
         wider = len(strands) / kept
@@ -188,17 +197,17 @@ class Fibres:
         return int(self.strands.knots_mm.shape[1])
 
     @property
-    def each(self) -> int:
+    def vertices_per_hair(self) -> int:
         """Vertices of a hair: rings around all knots but the last, the tip."""
         return _SIDES * (self._knots - 1) + 1
 
     @property
-    def count(self) -> int:
+    def vertex_count(self) -> int:
         """Vertices of all."""
-        return self.each * len(self.strands)
+        return self.vertices_per_hair * len(self.strands)
 
     @property
-    def vertex(self) -> Intp:
+    def root_vertices(self) -> Intp:
         """(n,) the mesh's vertex nearest to each root."""
         nearest = weights(self.strands.roots.place).argmax(axis=1)
         first, second = self.mesh.quads[self.strands.roots.quad].T
@@ -219,20 +228,20 @@ class Fibres:
             side = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), _TINY)
             both = np.stack([side, np.cross(along[:, k], side)], axis=1)
             out = np.einsum("sj,njc->nsc", np.stack([np.cos(angle), np.sin(angle)], axis=1), both)
-            places.append(knots[:, k, None] + _WIDER * self.strands.radius_mm[:, k, None, None] * out)
+            places.append(knots[:, k, None] + _RADIUS_FACTOR * self.strands.radius_mm[:, k, None, None] * out)
             normals.append(out)
         return (
             np.concatenate([*places, knots[:, -1:]], axis=1),
             np.concatenate([*normals, along[:, -1:]], axis=1),
         )
 
-    def placed(self, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
+    def posed(self, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
         """Places (n m, 3) [mm] and normals of all vertices where the points of the mesh (p, 3) are."""
         root, frame = frames(self.mesh, self.strands.roots, points_mm)
         places, normals = (np.einsum("nic,nki->nkc", frame, part) for part in self._rings)
         return (root[:, None] + places).reshape(-1, 3), normals.reshape(-1, 3)
 
-    def moved(self, points_mm: Doubles, delta_mm: Doubles) -> tuple[Index, Doubles]:
+    def displacements_at(self, points_mm: Doubles, delta_mm: Doubles) -> tuple[Index, Doubles]:
         """Vertices (n,) that move when the points of the mesh do, and by how much (n, 3) [mm]."""
         first, second = self.mesh.quads[self.strands.roots.quad].T
         around = self.mesh.point[np.column_stack([self.mesh.triangles[first], self.mesh.triangles[second]])]
@@ -243,8 +252,8 @@ class Fibres:
             frames(self.mesh, roots, points) for points in (points_mm, points_mm + delta_mm)
         )
         delta = (after - before)[:, None] + np.einsum("nic,nki->nkc", frame - rest, places)
-        far = np.flatnonzero(np.abs(delta).max(axis=(1, 2), initial=0.0) >= _LEAST_MM)
-        vertex = hair[far][:, None] * self.each + np.arange(self.each)
+        far = np.flatnonzero(np.abs(delta).max(axis=(1, 2), initial=0.0) >= _MIN_DISPLACEMENT_MM)
+        vertex = hair[far][:, None] * self.vertices_per_hair + np.arange(self.vertices_per_hair)
         return vertex.ravel(), delta[far].reshape(-1, 3)
 
     def triangles(self) -> Index:
@@ -255,8 +264,10 @@ class Fibres:
             a, b = _SIDES * k + one, _SIDES * k + ahead
             faces += [np.stack([a, b, b + _SIDES], axis=1), np.stack([a, b + _SIDES, a + _SIDES], axis=1)]
         last = _SIDES * (self._knots - 2)
-        faces.append(np.stack([last + one, last + ahead, np.full(_SIDES, self.each - 1)], axis=1))
-        begin = self.each * np.arange(len(self.strands))
+        faces.append(
+            np.stack([last + one, last + ahead, np.full(_SIDES, self.vertices_per_hair - 1)], axis=1)
+        )
+        begin = self.vertices_per_hair * np.arange(len(self.strands))
         return np.asarray((begin[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
     def colours(self) -> tuple[Floats, Floats]:
@@ -265,8 +276,8 @@ class Fibres:
         albedo = np.exp(-_ALBEDO * np.sqrt(through.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")
         group = np.empty(len(order), np.int64)
-        group[order] = np.arange(len(order)) * COLOURS // len(order)
-        sums = np.stack([np.bincount(group, albedo[:, c], COLOURS) for c in range(3)], axis=-1)
-        row = sums / np.maximum(np.bincount(group, minlength=COLOURS), 1)[:, None]
-        u = np.repeat((group + 0.5) / COLOURS, self.each)
+        group[order] = np.arange(len(order)) * HAIR_COLOURS // len(order)
+        sums = np.stack([np.bincount(group, albedo[:, c], HAIR_COLOURS) for c in range(3)], axis=-1)
+        row = sums / np.maximum(np.bincount(group, minlength=HAIR_COLOURS), 1)[:, None]
+        u = np.repeat((group + 0.5) / HAIR_COLOURS, self.vertices_per_hair)
         return row[None].astype(np.float32), np.stack([u, np.full_like(u, 0.5)], axis=1).astype(np.float32)

@@ -14,29 +14,29 @@ from dermis.formats.gltf.document import Document, Tree, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
 from dermis.formats.gltf.rigs import (
     Armature,
-    Displaced,
-    Followed,
-    displaced,
+    SkinInfluences,
+    VertexDisplacements,
+    apply_targets,
+    default_weights,
     read_armature,
-    read_followed,
+    read_influences,
     read_targets,
-    resting_weights,
     target_names,
 )
-from dermis.formats.parts import GREY, Group, Model, Part, colour_of, find_pairs, fractions
-from dermis.formats.size_limits import MOST_DISPLACEMENTS, MOST_GROUPS, MOST_TRIANGLES, MOST_VERTICES
+from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, find_quads, parse_colour, to_floats
+from dermis.formats.size_limits import MAX_DISPLACEMENTS, MAX_GROUPS, MAX_TRIANGLES, MAX_VERTICES
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_MOST = {
-    "primitives": MOST_GROUPS,
-    "triangles": MOST_TRIANGLES,
-    "vertices": MOST_VERTICES,
-    "displacements by targets": MOST_DISPLACEMENTS,
+_MAX_COUNTS = {
+    "primitives": MAX_GROUPS,
+    "triangles": MAX_TRIANGLES,
+    "vertices": MAX_VERTICES,
+    "displacements by targets": MAX_DISPLACEMENTS,
 }
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization")
 
 
-def read_gltf(path: Path) -> Model:
+def read_gltf(path: Path) -> MeshFile:
     """The scene of a .glb or .gltf file as it rests: joints at their nodes, targets at their default weights.
 
     A mesh with a skin lies where its joints take it, whatever its own node says.
@@ -44,17 +44,17 @@ def read_gltf(path: Path) -> Model:
     document = read_document(path)
     _refuse_extensions(document)
     nodes = read_nodes(document)
-    armature, weights = read_armature(document, nodes), resting_weights(document, nodes)
+    armature, weights = read_armature(document, nodes), default_weights(document, nodes)
     parts = list(_Reader(document, nodes, armature, weights).parts())
-    return Model(parts, armature.bones if armature else None, weights)
+    return MeshFile(parts, armature.bones if armature else None, weights)
 
 
 def _refuse_extensions(document: Document) -> None:
     """Refuse geometry in an encoding that would be read wrongly."""
-    foreign = [name for name in document.all("extensionsRequired") if not str(name).startswith(_HARMLESS)]
+    foreign = [name for name in document.items("extensionsRequired") if not str(name).startswith(_HARMLESS)]
     if foreign:
-        came = f"the file requires {', '.join(map(str, foreign))}"
-        refuse(document.path, "plain glTF geometry", came, "Export without compression")
+        actual = f"the file requires {', '.join(map(str, foreign))}"
+        refuse(document.path, "plain glTF geometry", actual, "Export without compression")
 
 
 @dataclass
@@ -66,7 +66,7 @@ class _Reader:
     armature: Armature | None
     weights: dict[str, float]
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[MeshPart]:
         counts = {"primitives": 0, "triangles": 0, "vertices": 0, "displacements by targets": 0}
         for part in self._all():
             moved = sum(len(vertex) for vertex, _ in part.targets.values())
@@ -77,36 +77,36 @@ class _Reader:
 
     def _check_most(self, name: str, count: int) -> None:
         """Refuse a scene before all of it is built; instances count as often as they are shown."""
-        if count > _MOST[name]:
-            came, remedy = "it has more", "Export the head alone, or decimated"
-            refuse(self.document.path, f"a scene of at most {_MOST[name]:,} {name}", came, remedy)
+        if count > _MAX_COUNTS[name]:
+            actual, advice = "it has more", "Export the head alone, or decimated"
+            refuse(self.document.path, f"a scene of at most {_MAX_COUNTS[name]:,} {name}", actual, advice)
 
-    def _all(self) -> Iterator[Part]:
-        nodes, shown = self.document.all("nodes"), self.nodes.shown or ()
+    def _all(self) -> Iterator[MeshPart]:
+        nodes, shown = self.document.items("nodes"), self.nodes.scene_nodes or ()
         meshes = [k for k in shown if "mesh" in nodes[k]]
         for node in meshes:
-            yield from self._mesh(self.document.one("meshes", nodes[node]["mesh"]), node)
+            yield from self._mesh(self.document.item("meshes", nodes[node]["mesh"]), node)
         if not meshes:  # a file of meshes alone
-            for mesh in self.document.all("meshes"):
+            for mesh in self.document.items("meshes"):
                 yield from self._mesh(mesh, None)
 
-    def _mesh(self, mesh: Tree, node: int | None) -> Iterator[Part]:
+    def _mesh(self, mesh: Tree, node: int | None) -> Iterator[MeshPart]:
         names = target_names(mesh)
         for primitive in mesh["primitives"]:
             drawn = primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
-            if drawn and _told(primitive).get("hair") is not True:
+            if drawn and _own_extras(primitive).get("hair") is not True:
                 yield self._part(mesh, names, primitive, node)
 
-    def _part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> Part:
+    def _part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> MeshPart:
         """A primitive where its node, or the joints of its skin, take it."""
         part, targets = self._unplaced(mesh, names, primitive)
         if node is None:
-            return _placed(part, targets, np.eye(4))
+            return _transformed(part, targets, np.eye(4))
         if "skin" in self.document.tree["nodes"][node] and self.armature:
-            followed, resting = read_followed(self.document, self.nodes, self.armature, node, primitive)
-            return _skinned(part, targets, followed, resting)
-        placed = _placed(part, targets, _unscaled(self.nodes.world[node]))
-        bone = self.armature.follow(self.nodes, node) if self.armature else None
+            followed, resting = read_influences(self.document, self.nodes, self.armature, node, primitive)
+            return _skin_part(part, targets, followed, resting)
+        placed = _transformed(part, targets, _nearest_rigid(self.nodes.world[node]))
+        bone = self.armature.bone_for_node(self.nodes, node) if self.armature else None
         if bone is None:
             return placed
         count = len(part.positions)
@@ -114,29 +114,29 @@ class _Reader:
 
     def _unplaced(
         self, mesh: Tree, names: tuple[str, ...], primitive: Tree
-    ) -> tuple[Part, dict[str, Displaced]]:
+    ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
         """A primitive in its mesh's space, with targets at their default weights, and all its targets."""
         given = primitive["attributes"]
-        self._check_most("vertices", self.document.one("accessors", given["POSITION"])["count"])
-        positions = self.document.real(given["POSITION"]).reshape(-1, 3)
+        self._check_most("vertices", self.document.item("accessors", given["POSITION"])["count"])
+        positions = self.document.read_floats(given["POSITION"]).reshape(-1, 3)
         uv, normals = (
-            fractions(self.document.numbers(given[name])) if name in given else None
+            to_floats(self.document.read_values(given[name])) if name in given else None
             for name in ("TEXCOORD_0", "NORMAL")
         )
         targets = read_targets(self.document, mesh, names, primitive, len(positions))
-        moved = displaced(positions, targets, self.weights)
+        moved = apply_targets(positions, targets, self.weights)
         if moved is not positions:
             normals = None  # they belong to another shape
         triangles = self._triangles(primitive, len(positions))
-        own = _told(primitive)
+        own = _own_extras(primitive)
         sides = np.full(len(triangles) // 2 if own.get("quads") is True else 0, 4)
-        return Part(
+        return MeshPart(
             self._group(mesh, primitive),
             moved,
             uv,
             normals,
             triangles,
-            quads=find_pairs(sides, triangles),
+            quads=find_quads(sides, triangles),
             alone=own.get("alone") is True,
         ), targets
 
@@ -144,9 +144,9 @@ class _Reader:
         """(f, 3) the corners of a primitive's triangles."""
         index = np.arange(count)
         if "indices" in primitive:
-            corners = self.document.one("accessors", primitive["indices"])["count"]
+            corners = self.document.item("accessors", primitive["indices"])["count"]
             self._check_most("triangles", corners // 3)
-            index = self.document.numbers(primitive["indices"]).ravel().astype(np.int64)
+            index = self.document.read_values(primitive["indices"]).ravel().astype(np.int64)
         mode = primitive.get("mode", _TRIANGLES)
         if mode == _TRIANGLES:
             return index.reshape(-1, 3)
@@ -156,22 +156,22 @@ class _Reader:
         strip[1::2] = strip[1::2, ::-1]
         return strip
 
-    def _group(self, mesh: Tree, primitive: Tree) -> Group:
-        one = self.document.one
-        material: Tree = one("materials", primitive["material"]) if "material" in primitive else {}
+    def _group(self, mesh: Tree, primitive: Tree) -> MaterialGroup:
+        item = self.document.item
+        material: Tree = item("materials", primitive["material"]) if "material" in primitive else {}
         names = tuple(str(thing["name"]) for thing in (material, mesh) if thing.get("name"))
         factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
-        return Group(names, colour_of(factor) if factor else GREY)
+        return MaterialGroup(names, parse_colour(factor) if factor else GREY)
 
 
-def _told(primitive: Tree) -> Tree:
+def _own_extras(primitive: Tree) -> Tree:
     """What this package wrote beside a primitive."""
     extras = primitive.get("extras")
     told = extras.get("dermis") if isinstance(extras, dict) else None
     return told if isinstance(told, dict) else {}
 
 
-def _placed(part: Part, targets: dict[str, Displaced], matrix: Doubles) -> Part:
+def _transformed(part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles) -> MeshPart:
     """A part moved by `matrix` (4, 4); a mirror turns its triangles round."""
     linear = matrix[:3, :3]
     return replace(
@@ -183,7 +183,7 @@ def _placed(part: Part, targets: dict[str, Displaced], matrix: Doubles) -> Part:
     )
 
 
-def _unscaled(matrix: Doubles) -> Doubles:
+def _nearest_rigid(matrix: Doubles) -> Doubles:
     """The nearest rigid matrix where it misses one by rounding alone, as with scales of 1.0000001."""
     missed = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
     if not 1e-13 < missed < 1e-5:
@@ -194,7 +194,9 @@ def _unscaled(matrix: Doubles) -> Doubles:
     return rigid
 
 
-def _skinned(part: Part, targets: dict[str, Displaced], followed: Followed, matrices: Doubles) -> Part:
+def _skin_part(
+    part: MeshPart, targets: dict[str, VertexDisplacements], followed: SkinInfluences, matrices: Doubles
+) -> MeshPart:
     """A part of which each vertex is moved by its own one of `matrices` (v, 4, 4)."""
     if len(followed.bone) != len(part.positions):
         raise ValueError(f"{len(part.positions)} vertices have {len(followed.bone)} joints")

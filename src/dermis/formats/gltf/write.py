@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from dermis.base.arrays import Doubles, Floats
-from dermis.formats.gltf.binary import CLAMPED, Binary, glb_bytes, placed
+from dermis.formats.deformable_mesh import DeformableMesh
+from dermis.formats.gltf.binary import CLAMPED_SAMPLER, BufferBuilder, glb_bytes, resolve_textures
 from dermis.formats.gltf.document import FrozenTree, Tree
 from dermis.formats.gltf.materials import (
-    Added,
+    SkinAdditions,
     colours_png,
     eye_material,
     eye_pictures,
     hair_material,
-    material_of,
     skin_pictures,
+    surface_material,
 )
-from dermis.formats.gltf.primitives import Fibres, Hairs, Part, Surface
-from dermis.formats.moved_points import MovedPoints
+from dermis.formats.gltf.primitives import FibreTubes, HairPrimitive, PrimitiveSource, SurfacePrimitive
 from dermis.mesh.eyeball import EyePictures
 from dermis.mesh.head import Head
 from dermis.mesh.skeleton import Skeleton
@@ -28,7 +28,7 @@ from dermis.mesh.skeleton import Skeleton
 BROWS, HAIR = "brows and lashes", "hair"
 """Names of the materials of hairs, and of their pictures."""
 _KNOTS = {BROWS: 5, HAIR: 4}
-_MOST_HAIRS = 16_000  # fewer stand for all, wider
+_MAX_HAIRS = 16_000  # fewer stand for all, wider
 _M = 1e-3  # of a millimetre
 
 
@@ -40,7 +40,7 @@ def encode_head(
     slopes: Floats | None = None,
     notes: FrozenTree | None = None,
     eyes: EyePictures | None = None,
-    added: Added | None = None,
+    added: SkinAdditions | None = None,
 ) -> bytes:
     """The bytes of a .glb file: metres, a primitive for each material, morph targets, a skin of four bones.
 
@@ -55,14 +55,14 @@ def encode_head(
 
     The same head gives the same bytes.
     """
-    binary, points = Binary(), MovedPoints(head)
+    binary, points = BufferBuilder(), DeformableMesh(head)
     pictures, roles = skin_pictures(head.maps, slopes)
     pictures |= {} if added is None else added.pictures
     parts, kinds = _parts(points, pictures, roles, roughness, eyes)
     if added is not None:
-        kinds = [added.to(kind) if "dermis" in kind.get("extras", {}) else kind for kind in kinds]
+        kinds = [added.applied_to(kind) if "dermis" in kind.get("extras", {}) else kind for kind in kinds]
     images = [
-        {"bufferView": binary.view(data), "mimeType": "image/png", "name": name}
+        {"bufferView": binary.add_view(data), "mimeType": "image/png", "name": name}
         for name, data in pictures.items()
     ]
     places = {name: index for index, name in enumerate(pictures)}
@@ -75,9 +75,9 @@ def encode_head(
         "nodes": nodes,
         "meshes": [_mesh(points, binary, parts, weights or {})],
         "skins": bound,
-        "materials": [placed(kind, places) for kind in kinds],
+        "materials": [resolve_textures(kind, places) for kind in kinds],
         "textures": [{"source": index, "sampler": 0} for index in range(len(images))],
-        "samplers": [CLAMPED] if images else [],
+        "samplers": [CLAMPED_SAMPLER] if images else [],
         "images": images,
         "bufferViews": binary.views,
         "accessors": binary.accessors,
@@ -87,27 +87,27 @@ def encode_head(
 
 
 def _parts(
-    points: MovedPoints,
+    points: DeformableMesh,
     pictures: dict[str, bytes],
     roles: FrozenTree,
     roughness: float,
     eyes: EyePictures | None,
-) -> tuple[list[Part], list[Tree]]:
+) -> tuple[list[PrimitiveSource], list[Tree]]:
     """What becomes primitives, and the material of each; adds the pictures of eyes and hairs."""
     head = points.head
     painted = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
     if eyes is not None and painted:
         pictures |= eye_pictures(eyes)
-    parts, kinds = list[Part](), list[Tree]()
+    parts, kinds = list[PrimitiveSource](), list[Tree]()
     for kind in np.unique(head.mesh.material).tolist():
         eye = painted.index(kind) if kind in painted else -1
-        parts.append(Surface(points, np.flatnonzero(head.mesh.material == kind), eye))
+        parts.append(SurfacePrimitive(points, np.flatnonzero(head.mesh.material == kind), eye))
         one = head.mesh.materials[kind]
-        kinds.append(material_of(one, pictures, roles, roughness) if eye < 0 else eye_material(one))
+        kinds.append(surface_material(one, pictures, roles, roughness) if eye < 0 else eye_material(one))
     for name, strands in ((BROWS, head.strands), (HAIR, head.hair)):
         if strands is not None and len(strands):
-            fibres = Fibres.of(strands, head.mesh, _MOST_HAIRS, _KNOTS[name])
-            parts.append(Hairs(points, fibres))
+            fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_HAIRS, _KNOTS[name])
+            parts.append(HairPrimitive(points, fibres))
             kinds.append(hair_material(name))
             pictures[name] = colours_png(fibres.colours()[0])
     return parts, kinds
@@ -120,7 +120,9 @@ def _asset(head: Head, notes: FrozenTree | None) -> Tree:
     return asset | ({"extras": dict(notes)} if notes else {})
 
 
-def _mesh(points: MovedPoints, binary: Binary, parts: list[Part], weights: Mapping[str, float]) -> Tree:
+def _mesh(
+    points: DeformableMesh, binary: BufferBuilder, parts: list[PrimitiveSource], weights: Mapping[str, float]
+) -> Tree:
     """A primitive for each part; its material has the same number."""
     primitives = [part.primitive(binary) | {"material": number} for number, part in enumerate(parts)]
     mesh: Tree = {"name": _name(points.head), "primitives": primitives}
@@ -141,7 +143,7 @@ def _name(head: Head) -> str:
     return f"{name} mesh" if name in head.bones else name
 
 
-def _nodes(head: Head, binary: Binary) -> tuple[list[Tree], list[int], list[Tree]]:
+def _nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
     """All nodes, those at the top, and the skin; bones first, the mesh last."""
     skeleton = head.control.skeleton
     if skeleton is None:
@@ -153,7 +155,7 @@ def _nodes(head: Head, binary: Binary) -> tuple[list[Tree], list[int], list[Tree
         tops = [len(nodes) - 1]
     skin = {"joints": list(range(len(skeleton.names))), "skeleton": tops[0]}
     rows = bound.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
-    skin["inverseBindMatrices"] = binary.array(rows)
+    skin["inverseBindMatrices"] = binary.add_accessor(rows)
     nodes.append({"name": _name(head), "mesh": 0, "skin": 0})
     return nodes, [*tops, len(nodes) - 1], [skin]
 
@@ -167,12 +169,12 @@ def _bones(skeleton: Skeleton) -> tuple[list[Tree], Doubles]:
     for bone, (name, parent) in enumerate(zip(skeleton.names, skeleton.parent.tolist(), strict=True)):
         above = to_file if parent < 0 else grown
         children = np.flatnonzero(skeleton.parent == bone).tolist()
-        node = {"name": name, **_placed(above @ skeleton.local[bone] @ shrunk)}
+        node = {"name": name, **_node_transform(above @ skeleton.local[bone] @ shrunk)}
         nodes.append(node | ({"children": children} if children else {}))
     return nodes, np.asarray(grown @ skeleton.inverse_bind @ np.linalg.inv(to_file))
 
 
-def _placed(matrix: Doubles) -> Tree:
+def _node_transform(matrix: Doubles) -> Tree:
     """A node's place: a translation where it is no more."""
     if np.abs(matrix[:3, :3] - np.eye(3)).max() < 1e-9:
         return {"translation": [float(x) for x in matrix[:3, 3]]}

@@ -14,17 +14,17 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
-from dermis.base.reading import read_text, understood
+from dermis.base.reading import parsing, read_text
 from dermis.formats.motion.captures import (
-    MOST_CLIP,
-    Samples,
-    TurningBones,
+    MAX_CLIP_BYTES,
+    CaptureSamples,
+    RotationBones,
+    capture_clip,
     check_size,
     check_weights,
-    head_turns,
-    sampled_clip,
-    steady,
-    turning_bones,
+    find_rotation_bones,
+    head_bone_angles,
+    unwrap_degrees,
 )
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
@@ -35,7 +35,7 @@ _PARTS = ("head", "lefteye", "righteye")
 _ANGLES = {f"{part}{angle}" for part in _PARTS for angle in ("pitch", "yaw", "roll")}
 _TIMECODE = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})[:;](\d{1,4}(?:\.\d{1,12})?)")
 _RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
-_APPS = 60.0
+_APP_RATE = 60.0
 _DAY_S, _MIDNIGHT_S = 86400.0, 82800.0
 
 
@@ -59,7 +59,7 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
 
     Columns count by their names, in any order: Timecode, blend shapes, and angles [rad] HeadPitch, HeadYaw
     and HeadRoll, about the head's x, y and z, likewise LeftEye... and RightEye..., for which
-    `turning_bones` tells the bones.
+    `find_rotation_bones` tells the bones.
 
     fps : frames a second of the timecode; when left out, what the largest of its frames tells
 
@@ -67,17 +67,17 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     """
     table = _read(path, fps)
     shapes = [k for k, name in enumerate(table.names) if name.casefold() not in _ANGLES]
-    bones = turning_bones(head.control.skeleton)
+    bones = find_rotation_bones(head.control.skeleton)
     angles, lost = _bone_angles(table, bones)
     names = tuple(table.names[k] for k in shapes)
-    samples = Samples(table.times_s, names, table.values[:, shapes], angles, lost)
-    return sampled_clip(path, path.stem, samples, head)
+    samples = CaptureSamples(table.times_s, names, table.values[:, shapes], angles, lost)
+    return capture_clip(path, path.stem, samples, head)
 
 
 def _read(path: Path, fps: float | None) -> _Table:
     expected = "a CSV of Live Link Face"
-    reader = csv.reader(io.StringIO(read_text(path, expected, MOST_CLIP), newline=""))
-    with understood(path, expected, csv.Error):
+    reader = csv.reader(io.StringIO(read_text(path, expected, MAX_CLIP_BYTES), newline=""))
+    with parsing(path, expected, csv.Error):
         header = [cell.strip() for cell in next(filter(_has_text, reader), [])]
         if not header:
             refuse(path, f"{expected} with a header and rows", "it is empty", "Export it again")
@@ -96,7 +96,7 @@ def _read(path: Path, fps: float | None) -> _Table:
             check_size(path, len(rows), len(kept))
     if not rows:
         refuse(path, f"{expected} with a header and rows", "it has only its header", "Export it again")
-    times = _times(path, lines, codes, fps)
+    times = _row_times(path, lines, codes, fps)
     return _Table([header[k] for k in kept], times, np.array(rows))
 
 
@@ -106,15 +106,15 @@ def _has_text(row: Sequence[str]) -> bool:
 
 def _check_row(culprit: str, header: Sequence[str], row: Sequence[str]) -> None:
     if len(row) < len(header) or any(cell.strip() for cell in row[len(header) :]):
-        refuse(culprit, f"{len(header)} cells", f"{len(row)} came", "Correct or remove the line")
+        refuse(culprit, f"{len(header)} cells", f"got {len(row)}", "Correct or remove the line")
 
 
 def _check_header(culprit: str, header: Sequence[str]) -> None:
     check_size(culprit, 0, len(header))
     folded = [name.casefold() for name in header if name]
     if _TIME not in folded:
-        came = f"the columns are {', '.join(header[:5])}{' ...' if len(header) > 5 else ''}"
-        refuse(culprit, "a column Timecode", came, "Export it from Live Link Face as it is")
+        actual = f"the columns are {', '.join(header[:5])}{' ...' if len(header) > 5 else ''}"
+        refuse(culprit, "a column Timecode", actual, "Export it from Live Link Face as it is")
     twice = [name for name in header if name and folded.count(name.casefold()) > 1]
     if twice:
         refuse(culprit, "each column once", f"{twice[0]} comes twice", "Remove one of them")
@@ -128,8 +128,8 @@ def _numbers(culprit: str, header: Sequence[str], row: Sequence[str], kept: Sequ
         try:
             values[place] = float(row[column])
         except ValueError:
-            came = f"{header[column]} is {row[column]!r}"
-            refuse(culprit, "numbers", came, "Correct or remove the line")
+            actual = f"{header[column]} is {row[column]!r}"
+            refuse(culprit, "numbers", actual, "Correct or remove the line")
     check_weights(culprit, [header[column] for column in kept], values)
     return values
 
@@ -137,12 +137,12 @@ def _numbers(culprit: str, header: Sequence[str], row: Sequence[str], kept: Sequ
 def _timecode(culprit: str, cell: str) -> _Timecode:
     match = _TIMECODE.fullmatch(cell.strip())
     if match is None:
-        refuse(culprit, "a Timecode as HH:MM:SS:FF.fff", f"{cell!r} came", "Correct or remove the line")
+        refuse(culprit, "a Timecode as HH:MM:SS:FF.fff", f"got {cell!r}", "Correct or remove the line")
     hours, minutes, seconds = (int(match[k]) for k in (1, 2, 3))
     return _Timecode(3600 * hours + 60 * minutes + seconds, float(match[4]))
 
 
-def _times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps: float | None) -> Doubles:
+def _row_times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps: float | None) -> Doubles:
     """Seconds of each row; a timecode that goes from 23 to 0 hours goes on."""
     rate = fps or _rate(codes)
     times = np.array([one.seconds + one.frames / rate for one in codes])
@@ -151,11 +151,11 @@ def _times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps: fl
     back = np.flatnonzero(np.diff(times) < 0)
     if len(back):
         row = int(back[0]) + 1
-        came = f"this line is {times[row - 1] - times[row]:.3f} s before the last"
+        actual = f"this line is {times[row - 1] - times[row]:.3f} s before the last"
         refuse(
             f"{path}, line {lines[row]}",
             "a Timecode that goes on",
-            came,
+            actual,
             "Sort the lines, or remove this one",
         )
     return times
@@ -166,10 +166,10 @@ def _rate(codes: Sequence[_Timecode]) -> float:
     largest = max(int(one.frames) for one in codes)
     turned = any(after.seconds > before.seconds for before, after in pairwise(codes))
     fitting = [rate for rate in _RATES if rate > largest] or [float(largest + 1)]
-    return fitting[0] if turned else max(_APPS, fitting[0])
+    return fitting[0] if turned else max(_APP_RATE, fitting[0])
 
 
-def _bone_angles(table: _Table, bones: TurningBones) -> tuple[dict[str, Doubles], tuple[str, ...]]:
+def _bone_angles(table: _Table, bones: RotationBones) -> tuple[dict[str, Doubles], tuple[str, ...]]:
     """Angles (k, 3) [degrees] of bones, and names of columns for which the head has no bone."""
     columns = {name.casefold(): k for k, name in enumerate(table.names)}
     angles: dict[str, Doubles] = {}
@@ -181,10 +181,10 @@ def _bone_angles(table: _Table, bones: TurningBones) -> tuple[dict[str, Doubles]
         rows = np.degrees([[0.0 if k is None else row[k] for k in own.values()] for row in table.values])
         eye = bones.eyes.get(part.removesuffix("eye")) if part != "head" else None
         if eye is not None:
-            angles[eye] = steady(rows)
+            angles[eye] = unwrap_degrees(rows)
         elif part == "head" and bones.head:
             turns = matrix_quaternion(np.array([angles_matrix(row) for row in rows.tolist()]))
-            angles |= head_turns(bones, turns)
+            angles |= head_bone_angles(bones, turns)
         elif rows.any():
             lost += [table.names[k] for k in own.values() if k is not None]
     return angles, tuple(lost)

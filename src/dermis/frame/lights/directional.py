@@ -1,4 +1,4 @@
-"""Parallel light, and light of a sun."""
+"""Parallel light, of one direction or of a sun."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-// Parallel light, the same everywhere.
+// Parallel light of constant irradiance.
 
 fn directional_incident(light: Light, p: vec3f, part: u32) -> Incident {
     return Incident(-light.direction, light.irradiance);

@@ -1,4 +1,4 @@
-"""The environment as the shaders read it: panorama and sun-like peaks."""
+"""Environment as the shaders read it: prefiltered panorama and suns."""
 
 from __future__ import annotations
 
@@ -8,95 +8,96 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.environment.mirrors import equivalent_mirrors
+from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import Sun, load_panorama
 from dermis.environment.prefilter import prefilter
 from dermis.frame.lights.records import sun_lights
-from dermis.gpu import ComputeProgram, Device, Memo, Record, Texture, make_texture, upload
+from dermis.gpu import ComputeProgram, Device, Memo, UniformRecord, Texture, make_texture, upload
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin, lobe_name
 
-_BRIGHTEST = 65504.0  # of 16-bit floats
-_SHARPEST_ROWS = 2048  # of a panorama that is looked at
+_MAX_HALF = 65504.0  # largest 16-bit float
+_BACKGROUND_ROWS = 2048  # limit of a panorama in the background
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
-    """A panorama on the device.
+class EnvironmentMap:
+    """Prefiltered panorama on the device.
 
-    panorama : layers of irradiance and of reflections, black without an environment
-    suns : its peaks
-    brightest : largest irradiance from the rest
+    panorama : texture with one layer of irradiance, then reflections by roughness; black without an
+        environment
+    suns : peaks of the panorama, which are lights of their own
+    peak_irradiance : largest irradiance without the suns [-]
     """
 
     panorama: Texture
     suns: tuple[Sun, ...]
-    brightest: float = 0.0
+    peak_irradiance: float = 0.0
 
 
-def load_surroundings(device: Device, name: str | None) -> Surroundings:
-    """The prefiltered panorama of an environment, or of none.
+def load_environment_map(device: Device, name: str | None) -> EnvironmentMap:
+    """Return the prefiltered panorama of an environment, or a black one for None.
 
     Raises DermisError when there is no such environment.
     """
     if name is None:
-        return Surroundings(make_texture(device, (1, 1), "rgba16float", layers=2, use="map"), ())
-    made = prefilter(name)
-    return Surroundings(_layered(device, made.layers), made.suns, float(made.layers[0].max()))
+        return EnvironmentMap(make_texture(device, (1, 1), "rgba16float", layers=2, use="map"), ())
+    prefiltered = prefilter(name)
+    return EnvironmentMap(_upload_layers(device, prefiltered.layers), prefiltered.suns, float(prefiltered.layers[0].max()))
 
 
-def sharp_panorama(device: Device, name: str) -> Texture:
-    """A panorama as it is, suns included, as the first of two layers."""
-    radiance = load_panorama(name, most_rows=_SHARPEST_ROWS).astype(np.float32)
-    return _layered(device, [radiance, np.zeros_like(radiance)])
+def unfiltered_panorama(device: Device, name: str) -> Texture:
+    """Upload an unfiltered panorama with its suns as the first of two layers, for backgrounds."""
+    radiance = load_panorama(name, max_rows=_BACKGROUND_ROWS).astype(np.float32)
+    return _upload_layers(device, [radiance, np.zeros_like(radiance)])
 
 
-def _layered(device: Device, layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]) -> Texture:
+def _upload_layers(device: Device, layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]) -> Texture:
     height, width = layers[0].shape[:2]
     size = width + 2, height + 2
     texture = make_texture(device, size, "rgba16float", layers=len(layers), use="map")
     for index, layer in enumerate(layers):
-        texels = np.dstack([_bordered(layer), np.ones(size[::-1])])
-        upload(device, texture, np.minimum(texels, _BRIGHTEST), layer=index)
+        texels = np.dstack([_with_border(layer), np.ones(size[::-1])])
+        upload(device, texture, np.minimum(texels, _MAX_HALF), layer=index)
     return texture
 
 
-def _bordered(layer: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A layer with a border for filters: beyond a pole its first row again, rotated by half a turn."""
+def _with_border(layer: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return a panorama with a border for filters; rows beyond a pole continue on the other side."""
     half = layer.shape[1] // 2
     rows = np.concatenate([np.roll(layer[:1], half, axis=1), layer, np.roll(layer[-1:], half, axis=1)])
     return np.concatenate([rows[:, -1:], rows, rows[:, :1]], axis=1)
 
 
-def with_suns(memo: Memo, scene: Scene, surroundings: Surroundings) -> Scene:
-    """The scene with its environment's peaks among its lights."""
+def add_suns(memo: Memo, scene: Scene, environment_map: EnvironmentMap) -> Scene:
+    """Return the scene with the suns of its environment among its lights."""
     environment = scene.environment
-    if environment is None or not surroundings.suns:
+    if environment is None or not environment_map.suns:
         return scene
-    suns = memo.keep(sun_lights, surroundings.suns, environment)
+    suns = memo.get(sun_lights, environment_map.suns, environment)
     return replace(scene, lights=(*scene.lights, *suns))
 
 
-def brightest(scene: Scene, surroundings: Surroundings) -> float:
-    """Irradiance that a surface gets from all lights, as they were given, and the environment together.
+def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
+    """Return the irradiance of a surface that faces all lights and the brightest part of the environment [-].
 
-    scene : with its environment's peaks among its lights
+    scene : with the suns of its environment among its lights
     """
-    around = surroundings.brightest * scene.environment.exposure if scene.environment else 0.0
-    return around + sum(max(light.irradiance) for light in scene.lights)
+    environment = environment_map.peak_irradiance * scene.environment.exposure if scene.environment else 0.0
+    return environment + sum(max(light.irradiance) for light in scene.lights)
 
 
 def environment_record(
     program: ComputeProgram,
     environment: Environment | None,
     skin: Skin,
-    total: NDArray[np.float64],
+    albedo: NDArray[np.float64],
     occluded: bool,
-) -> Record:
-    """The shader's record of the environment.
+) -> UniformRecord:
+    """Return the shader record of the environment.
 
-    total : (3,) the profile's albedo as the frame uses it
+    albedo : (3,) albedo of the profile as the frame uses it [-]
     """
     if environment is None:
         return program.record("Environment")
@@ -105,7 +106,7 @@ def environment_record(
         "Environment",
         turn=(np.cos(angle), np.sin(angle)),
         exposure=environment.exposure,
-        albedo=np.minimum(total, 1.0),
+        albedo=np.minimum(albedo, 1.0),
         occluded=int(occluded),
-        mirrors=equivalent_mirrors(lobe_name(skin)).reshape(-1, 4),
+        mirrors=isotropic_lobe_table(lobe_name(skin)).reshape(-1, 4),
     )

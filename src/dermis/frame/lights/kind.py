@@ -1,4 +1,4 @@
-"""The interface of a kind of light for the frame; its shader lies beside its module."""
+"""Interface of a kind of light in the frame; its shader is the WGSL file beside its module."""
 
 from __future__ import annotations
 
@@ -9,55 +9,105 @@ from typing import Any, Generic, TypeVar
 from numpy.typing import ArrayLike
 
 from dermis.base.registry import Registry
-from dermis.frame.projection import Triple, axes_of, between
+from dermis.frame.projection import Triple, view_axes, vector_between
 from dermis.gpu.wgsl_source import Member
 from dermis.mesh.head import Head
 from dermis.scene.lights import Light, PointLight
 
 Members = dict[str, ArrayLike]
-"""Members of a shader's struct, by their names."""
+"""Members of a shader struct, by name."""
 L = TypeVar("L", bound=Light)
 
 
 class Kind(Generic[L]):
-    """A kind of light; by default all of it comes from one place or, where it is parallel, in one direction.
+    """Kind of light in the frame; this base class is a punctual light without members of its own.
 
-    Its shader lies beside its module under the same name and has
-    `fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident`,
-    NAME as in scene files, with underscores for hyphens.
+    The shader has the name of the module with the suffix .wgsl. It defines `fn NAME_incident(light: Light, p:
+    vec3f, part: u32) -> Incident`, where NAME is the name of the kind in scene files, with underscores for
+    hyphens.
 
-    always : whether all shaders have it; others are compiled only for scenes that use them
-    narrow : whether all of it comes from its position or along its direction; else it is an area light
-    round : whether it is a disc as seen from the head, not a rectangle
-    sheet : whether it is a Gaussian across `half_u`, so that details finer than texels are known
+    Attributes
+    ----------
+    always : bool
+        Whether all shaders include the kind; others are compiled only for scenes that use them.
+    punctual : bool
+        Whether all light comes from one position or, in parallel light, from one direction; False for area lights.
+    round : bool
+        Whether the shape seen from the head is a disc instead of a rectangle.
+    sheet : bool
+        Whether the light is a Gaussian across the member `half_u`, so that details finer than texels are known.
+
+    Examples
+    --------
+    >>> from dermis.frame.lights.kind import KINDS
+    >>> KINDS["sphere"].punctual, KINDS["spot"].punctual
+    (False, True)
     """
 
     always = False
-    narrow = True
+    punctual = True
     round = True
     sheet = False
 
     @property
     def shader(self) -> Path:
-        """The file of its shader."""
+        """Return the path of the shader."""
         return Path(inspect.getfile(type(self))).with_suffix(".wgsl")
 
     def has_size(self, light: L) -> bool:
-        """Whether its shadows soften with the distance from the occluder."""
-        return not self.narrow
+        """Return whether shadows soften with the distance from the occluder.
+
+        Parameters
+        ----------
+        light : Light
+            Light of the scene.
+        """
+        return not self.punctual
 
     def parts(self, light: L) -> list[Light]:
-        """Lights that together make up this one, each with a shadow map of its own."""
+        """Return the lights that together equal this one, each with its own shadow map.
+
+        Parameters
+        ----------
+        light : Light
+            Light of the scene.
+        """
         return [light]
 
     def check(self, light: L, head: Head, culprit: str) -> None:
-        """Raise DermisError if the light cannot stand where it is."""
+        """Check that the light has a valid position.
+
+        Parameters
+        ----------
+        light : Light
+            Light of the scene.
+        head : Head
+            Head that is lit.
+        culprit : str
+            Name of the light in messages.
+
+        Raises
+        ------
+        DermisError
+            When the light cannot be at its position.
+        """
 
     def members(self, light: L, centre: Triple, distance: float) -> Members:
-        """Members of the shader's `Light` that are this kind's own.
+        """Return the members of the shader struct `Light` that only this kind sets.
 
-        centre : of the head [mm]
-        distance : from the light to its target, 1 for parallel light [mm]
+        Parameters
+        ----------
+        light : Light
+            Light of the scene.
+        centre : tuple of float
+            Centre of the head [mm].
+        distance : float
+            Distance from the light to its target, 1 for parallel light [mm].
+
+        Returns
+        -------
+        dict
+            Values by the names of the members.
         """
         return {}
 
@@ -68,18 +118,18 @@ KINDS: Registry[Kind[Any]] = Registry(
         shader.stem.replace("_", "-"): f"{__package__}.{shader.stem}:KIND"
         for shader in sorted(Path(__file__).parent.glob("*.wgsl"))
     },
-    f"Register how it is drawn in {__name__}.KINDS",
+    f"Register its Kind in {__name__}.KINDS",
 )
-"""By the names of scene files: each shader of this folder, with the module beside it."""
+"""Kinds by their names in scene files: each shader of this folder with the module beside it."""
 
 
-def facing(light: PointLight, radiance: float, half_width: float, half_height: float) -> Members:
-    """Members of an area light that faces its target; `irradiance` holds its radiance.
+def area_light_members(light: PointLight, radiance: float, half_width: float, half_height: float) -> Members:
+    """Return the shader members of an area light that faces its target.
 
-    radiance : for an irradiance of 1 at the target [1/sr]
-    half_width, half_height : [mm]
+    radiance : radiance that gives an irradiance of 1 at the target [1/sr]
+    half_width, half_height : half sides [mm]
     """
-    right, up, _ = axes_of(between(light.position, light.target))
+    right, up, _ = view_axes(vector_between(light.position, light.target))
     return {
         "half_u": tuple(half_width * c for c in right),
         "half_v": tuple(half_height * c for c in up),
@@ -88,14 +138,14 @@ def facing(light: PointLight, radiance: float, half_width: float, half_height: f
     }
 
 
-def override_of(name: str) -> str:
-    """The shaders' `override` for a kind, by its name in scene files."""
+def override_name(name: str) -> str:
+    """Return the name of the shaders' `override` for a kind, from its name in scene files."""
     return f"{name.replace('-', '_').upper()}_LIGHT"
 
 
 def light_shaders() -> list[Member]:
-    """The kinds as lights.wgsl includes them."""
+    """Return the shaders of all kinds, for lights.wgsl to include."""
     return [
-        Member(name, kind.shader, (("override", override_of(name)), ("always", str(kind.always).lower())))
+        Member(name, kind.shader, (("override", override_name(name)), ("always", str(kind.always).lower())))
         for name, kind in KINDS.items()
     ]

@@ -1,8 +1,8 @@
-// A uniform rectangle, as Lambertian points in the middles of its parts.
+// Uniform rectangle, sampled by Lambertian points at the centres of its parts.
 
 fn rectangle_incident(light: Light, p: vec3f, part: u32) -> Incident {
-    let place = place_of(part, light.side);
-    let d = light.position + place.x * light.half_u + place.y * light.half_v - p;
+    let position = part_centre(part, light.side);
+    let d = light.position + position.x * light.half_u + position.y * light.half_v - p;
     let d2 = max(dot(d, d), 1.0);
     let l = d * inverseSqrt(d2);
     let area = 4.0 * length(light.half_u) * length(light.half_v) / f32(parts_of(light));

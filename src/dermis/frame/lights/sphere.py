@@ -1,4 +1,4 @@
-"""A uniformly bright sphere."""
+"""Uniformly bright sphere."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ import math
 import numpy as np
 
 from dermis.base.errors import refuse
-from dermis.frame.lights.kind import Kind, Members, facing
-from dermis.frame.projection import Triple, place_of
+from dermis.frame.lights.kind import Kind, Members, area_light_members
+from dermis.frame.projection import Triple, world_position
 from dermis.mesh.head import Head
 from dermis.scene.lights import SphereLight
 
 
 class _Sphere(Kind[SphereLight]):
-    narrow = False
+    punctual = False
 
     def check(self, light: SphereLight, head: Head, culprit: str) -> None:
-        middle = place_of(light.position, head.centre_mm)
+        middle = world_position(light.position, head.centre_mm)
         near = float(np.linalg.norm(head.mesh.positions - np.array(middle), axis=1).min())
         if near <= light.radius_mm:
-            came = f"the head is {near:.0f} mm from its middle"
-            refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", came, "Move it away")
+            actual = f"the head is {near:.0f} mm from its middle"
+            refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", actual, "Move it away")
 
     def members(self, light: SphereLight, centre: Triple, distance: float) -> Members:
         radiance = 1.0 / (math.pi * (light.radius_mm / distance) ** 2)
-        return facing(light, radiance, light.radius_mm, light.radius_mm)
+        return area_light_members(light, radiance, light.radius_mm, light.radius_mm)
 
 
 KIND = _Sphere()

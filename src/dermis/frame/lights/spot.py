@@ -1,4 +1,4 @@
-"""A point light within a cone."""
+"""Point light within a cone."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""A sheet of parallel light."""
+"""Sheet of parallel light."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from dermis.frame.lights.kind import Kind, Members
-from dermis.frame.projection import Triple, frame_of, place_of
+from dermis.frame.projection import Triple, view_axes_array, world_position
 from dermis.scene.lights import StripeLight
 
 
@@ -13,9 +13,9 @@ class _Stripe(Kind[StripeLight]):
     sheet = True
 
     def members(self, light: StripeLight, centre: Triple, distance: float) -> Members:
-        right, up, _ = frame_of(np.array(light.direction), np.array(light.up))
+        right, up, _ = view_axes_array(np.array(light.direction), np.array(light.up))
         across, along = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm
-        return {"position": place_of(light.position, centre), "half_u": across, "half_v": along}
+        return {"position": world_position(light.position, centre), "half_u": across, "half_v": along}
 
 
 KIND = _Stripe()

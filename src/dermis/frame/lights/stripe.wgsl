@@ -1,8 +1,8 @@
-// A sheet of parallel light: a Gaussian across it, 1/e^2 at its edges; even along it.
+// Sheet of parallel light: a Gaussian across it, 1/e^2 at its edges, and constant along it.
 
-const STRIPE_VARIANCE: f32 = 0.25; // over the square of the half width
+const STRIPE_VARIANCE: f32 = 0.25; // relative to the square of the half width
 
-// Share of the middle's light at a distance from it, over the half width; averaged by a Gaussian of the added variance.
+// Irradiance relative to the centre at a distance in half widths, convolved with a Gaussian of the added variance.
 fn stripe_across(distance: f32, added: f32) -> f32 {
     let variance = STRIPE_VARIANCE + added;
     return sqrt(STRIPE_VARIANCE / variance) * exp(-0.5 * distance * distance / variance);

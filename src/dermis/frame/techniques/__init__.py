@@ -1,1 +1,1 @@
-"""Scattering techniques: one Python file each, with its shaders beside it."""
+"""Scattering techniques: a Python module each, with its shaders beside it."""

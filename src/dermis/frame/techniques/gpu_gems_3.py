@@ -1,4 +1,4 @@
-"""The blurs of 2007 as the baseline to measure against: seven taps, halves, a blurred stretch map."""
+"""Blurs of GPU Gems 3 (2007) as a baseline: seven taps, half floats, a blurred stretch map."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dermis.frame.features.atlas.textures import AtlasTextures
-from dermis.frame.features.diffusion.pyramid import Blur, Halvings, Levels, make_levels
+from dermis.frame.features.diffusion.pyramid import Blur, Halvings, PyramidLevels, make_levels
 from dermis.frame.programs import HALVES, program
 from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique
@@ -16,9 +16,9 @@ from dermis.gpu import (
     ComputeProgram,
     Constants,
     Device,
-    FragmentProgram,
     MutableBindings,
     Recorder,
+    RenderProgram,
     TextureOrView,
     make_texture,
 )
@@ -28,38 +28,38 @@ Pair = tuple[TextureOrView, TextureOrView]
 
 
 @dataclass(frozen=True, eq=False)
-class StretchedLevels(Levels):
-    """Levels with space for a stretch map that is blurred along with the light."""
+class StretchedLevels(PyramidLevels):
+    """Pyramid levels with textures for a stretch map that is blurred together with the light."""
 
     stretch: Pair | None = None
 
 
 class GpuGems3(AtlasTechnique):
-    """Twelve passes for six Gaussians."""
+    """Texture-space diffusion as published in 2007, with twelve passes for six Gaussians."""
 
     sources = ("dEonLuebke2007",)
-    stitches = False
-    transmits = True
+    stitches_seams = False
+    supports_translucency = True
 
-    def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
-        """Space for light, its blurred levels and a blurred stretch map."""
-        made = make_levels(device, side, halvings, HALVES)
+    def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
+        """Create textures for light, its blurred levels and a blurred stretch map."""
+        pyramid = make_levels(device, side, halvings, HALVES)
         first, second = (make_texture(device, (side, side), HALVES) for _ in range(2))
-        return StretchedLevels(made.stacks, made.first, made.scratch, side, HALVES, stretch=(first, second))
+        return StretchedLevels(pyramid.stacks, pyramid.first, pyramid.scratch, side, HALVES, stretch=(first, second))
 
     def texel_bytes(self, levels: int) -> float:
-        """Memory for each texel of the atlas."""
+        """Return the memory per atlas texel [bytes]."""
         return float(FORMAT_BYTES[HALVES] * (levels + 4))
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """All levels have the whole resolution."""
+        """Return 0 for each level: all have the full resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
-    def fill(self, graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
-        """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""
+    def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
+        """Declare the passes that fill level k with the light of level 0 blurred by the k-th Gaussian."""
         assert isinstance(levels, StretchedLevels) and levels.stretch is not None
         shaders = [
-            self.shader(graph.device, (("AXIS", axis), ("SKIPPED", blur.edge == "skipped")))
+            self.blur_program(graph.device, (("AXIS", axis), ("SKIPPED", blur.edge == "skipped")))
             for axis in (0, 1)
         ]
         before, (stretch, spare) = 0.0, levels.stretch
@@ -69,33 +69,33 @@ class GpuGems3(AtlasTechnique):
                 "Spread", sigma_mm=np.sqrt(variance - before), clear=blur.scale * np.asarray(blur.clear)
             )
             passes = (
-                (levels.layer(k - 1), source, levels.spare(), spare),
-                (levels.spare(), spare, levels.layer(k), stretch),
+                (levels.layer(k - 1), source, levels.scratch_view(), spare),
+                (levels.scratch_view(), spare, levels.layer(k), stretch),
             )
-            for shader, (light, wide, blurred, wider) in zip(shaders, passes, strict=True):
+            for shader, (light, stretch_source, blurred, stretch_blurred) in zip(shaders, passes, strict=True):
                 linear = graph.device.sampler(mag_filter="linear", min_filter="linear")
                 bound: MutableBindings = {
                     "spread": record,
                     "linear": linear,
                     "source": light,
-                    "stretch": wide,
+                    "stretch": stretch_source,
                 }
-                self.run(graph, shader, bound, (blurred, wider), levels.size)
+                self.draw_blur(graph, shader, bound, (blurred, stretch_blurred), levels.size)
             source, before = stretch, float(variance)
 
-    def shader(self, device: Device, constants: Constants) -> ComputeProgram | FragmentProgram:
-        """The pass along one axis."""
+    def blur_program(self, device: Device, constants: Constants) -> ComputeProgram | RenderProgram:
+        """Return the program that blurs along one axis."""
         return program(device, Path(__file__).with_name("gpu_gems_3.wgsl"), constants)
 
-    def run(
+    def draw_blur(
         self,
         graph: Recorder,
-        shader: ComputeProgram | FragmentProgram,
+        shader: ComputeProgram | RenderProgram,
         bound: MutableBindings,
         into: Pair,
         side: int,
     ) -> None:
-        """Declare one pass into a texture of light and one of stretch."""
+        """Declare one pass that writes a texture of light and one of stretch."""
         assert isinstance(shader, ComputeProgram)
         bound = bound | {"blurred": into[0], "stretch_blurred": into[1]}
         graph.compute("diffuse", shader, bound, (side, side))

@@ -1,5 +1,4 @@
-// One axis of one blur as published in 2007, in compute: light and the stretch map.
-// Kept as published, with the faults that the frame's own blur mends.
+// Blur of light and of the stretch map along one axis as published in 2007, with its known flaws.
 //#include "gpu_gems_3_taps.wgsl"
 
 @group(0) @binding(4) var blurred: texture_storage_2d<rgba16float, write>;

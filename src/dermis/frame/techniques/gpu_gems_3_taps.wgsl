@@ -1,13 +1,13 @@
-// Seven bilinear taps of light along one axis, and the same of the stretch map [dEonLuebke2007].
+// Seven bilinear taps of light and of the stretch map along one axis [dEonLuebke2007].
 
 override AXIS: u32 = 0u; // 0 along u, 1 along v
-override SKIPPED: bool = false; // whether empty texels are left out, as the talk's remedy with alpha does
+override SKIPPED: bool = false; // whether empty texels are excluded, as the alpha method of the talk does
 
-const LEAST: f32 = 1e-3; // least sum of weights to normalise by
+const MIN_WEIGHT: f32 = 1e-3; // least sum of weights that is normalised
 
 struct Spread {
-    sigma_mm: f32, // of the Gaussian to be added
-    clear: vec3f, // the light that empty texels show
+    sigma_mm: f32, // of this blur
+    clear: vec3f, // light of empty texels
 }
 
 struct Blurred {
@@ -20,9 +20,9 @@ struct Blurred {
 @group(0) @binding(2) var stretch: texture_2d<f32>; // filtered
 @group(0) @binding(3) var linear: sampler;
 
-// uv: of the texel
+// uv : position of the texel
 fn blurred_at(uv: vec2f) -> Blurred {
-    var weights = array(0.006, 0.061, 0.242, 0.383, 0.242, 0.061, 0.006); // their sum is 1.001, their variance 1.08
+    var weights = array(0.006, 0.061, 0.242, 0.383, 0.242, 0.061, 0.006); // as published: the sum is 1.001, the variance 1.08
     let per_mm = textureSampleLevel(stretch, linear, uv, 0.0)[AXIS];
     let axis = select(vec2f(0.0, 1.0), vec2f(1.0, 0.0), AXIS == 0u);
     let step = axis * spread.sigma_mm * per_mm / vec2f(textureDimensions(source));
@@ -39,7 +39,7 @@ fn blurred_at(uv: vec2f) -> Blurred {
         wide += weights[n] * textureSampleLevel(stretch, linear, at, 0.0);
     }
     if (SKIPPED) {
-        light = vec4f(light.rgb / max(light.a, LEAST), select(0.0, 1.0, light.a > LEAST));
+        light = vec4f(light.rgb / max(light.a, MIN_WEIGHT), select(0.0, 1.0, light.a > MIN_WEIGHT));
     } else {
         light.a = 1.0; // not the weights' sum, or the next pass would subtract some of the clear colour
     }

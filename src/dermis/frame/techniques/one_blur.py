@@ -1,4 +1,4 @@
-"""A single blur of the light map, as before 2007."""
+"""Single blur of the light map, the state of the art before 2007."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from dermis.scene.settings import Settings
 
 
 class OneBlur(TextureSpace):
-    """One Gaussian for all of the profile, alike everywhere on the map."""
+    """One Gaussian instead of the profile, with the same width everywhere on the map."""
 
     sources = ("Borshukov2003", "Green2004")
-    stitches = False
-    transmits = False
+    stitches_seams = False
+    supports_translucency = False
 
     def gaussians(self, profile: GaussianSum) -> GaussianSum:
-        """The one Gaussian."""
+        """Return the single Gaussian that replaces a profile."""
         return single_gaussian(profile)
 
-    def split(self, profile: GaussianSum, white: bool) -> ProfileSplit:
-        """The blur alone: texels are shown as they are."""
-        return AtlasTechnique.split(self, profile, white)
+    def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
+        """Return the single blur, without light finer than texels."""
+        return AtlasTechnique.split(self, profile, normalise)
 
-    def relights(self, profile: GaussianSum) -> bool:
-        """No: it blurs all light."""
+    def relights_narrowest(self, profile: GaussianSum) -> bool:
+        """Return False: all light is blurred."""
         return False
 
     def stretch(self, settings: Settings) -> str:
-        """One density for the whole map."""
+        """Return "none": one density for the whole map."""
         return "none"
 
 

@@ -1,25 +1,25 @@
-// All the skin of a pixel together.
+// Skin of all samples of a pixel.
 
-const ONE_SURFACE: f32 = 4.0; // largest change of depth over width within one surface, in a pixel
-const CROSSED: f32 = 2.0; // step in depth that light below the skin crosses [mm]: still one surface
+const MAX_SLOPE: f32 = 4.0; // change of depth over width within one surface
+const MAX_STEP: f32 = 2.0; // step in depth that light below the skin can cross [mm]
 
-// The skin of one pixel, each member times the share of its samples.
+// Skin of a pixel; the other members are multiplied by its coverage.
 struct PixelSkin {
     below: vec3f,
     leaving: vec3f,
     depth: f32,
-    share: f32,
+    coverage: f32,
 }
 
-// Adds a part of a pixel to its skin; of several surfaces the one that most samples see is kept.
-fn keep(held: PixelSkin, part: Shaded, share: f32, pixel: f32) -> PixelSkin {
-    let one = PixelSkin(share * part.below, share * part.leaving, share * part.depth, share);
-    let apart = abs(part.depth - held.depth / max(held.share, 1e-6));
-    if (held.share > 0.0 && apart <= max(ONE_SURFACE * pixel * part.depth, CROSSED)) {
-        return PixelSkin(held.below + one.below, held.leaving + one.leaving, held.depth + one.depth, held.share + share);
+// Adds samples to the skin of a pixel; of several surfaces the one with most samples is kept.
+fn keep(skin_so_far: PixelSkin, part: Shaded, coverage: f32, pixel: f32) -> PixelSkin {
+    let one = PixelSkin(coverage * part.below, coverage * part.leaving, coverage * part.depth, coverage);
+    let step = abs(part.depth - skin_so_far.depth / max(skin_so_far.coverage, 1e-6));
+    if (skin_so_far.coverage > 0.0 && step <= max(MAX_SLOPE * pixel * part.depth, MAX_STEP)) {
+        return PixelSkin(skin_so_far.below + one.below, skin_so_far.leaving + one.leaving, skin_so_far.depth + one.depth, skin_so_far.coverage + coverage);
     }
-    if (share > held.share) {
+    if (coverage > skin_so_far.coverage) {
         return one;
     }
-    return held;
+    return skin_so_far;
 }

@@ -1,4 +1,4 @@
-"""Tables of scattered light on spheres and across the edges of shadows [Penner2011]."""
+"""Pre-integrated skin shading: tables of scattered light on spheres and across shadow edges [Penner2011]."""
 
 from __future__ import annotations
 
@@ -8,103 +8,108 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.frame.features.shape import curvature
-from dermis.frame.inputs import Inputs
+from dermis.frame.inputs import FrameInputs
 from dermis.frame.technique import TechniqueResources
 from dermis.frame.techniques.technique import Technique
-from dermis.gpu import ComputeProgram, Device, Graph, Memo, Record, Texture
-from dermis.gpu.textures import texture_from
-from dermis.optics.fits.separable import preintegrate
+from dermis.gpu import ComputeProgram, Device, Graph, Memo, UniformRecord, Texture
+from dermis.gpu.textures import texture_from_array
+from dermis.optics.fits.separable import preintegrated_kernel
 from dermis.optics.gaussians import Floats, GaussianSum
 from dermis.scene.settings import Settings
 
-MOST_CURVED = 0.5
-"""Curvature of the last row of spheres [1/mm]: a radius of 2 mm."""
+MAX_CURVATURE = 0.5
+"""Curvature of the last row of the sphere table [1/mm], a radius of 2 mm."""
 
-_COSINES = 257  # odd: N.L = 0, where unspread light begins, has a column of its own
+_COSINES = 257  # odd, so that one column is N.L = 0, where incident light begins
 _CURVATURES, _EDGES = 33, 9  # as in pre_integrated.wgsl
 _NODES = 48
 _SIGMAS = 7.0  # standard deviations over which a Gaussian is integrated
-_SHADOW_TAIL = 0.01  # of the light that scatters across a shadow's edge: share beyond the table
-_MOST_PENUMBRA_MM = 8.0
+_SHADOW_TAIL = 0.01  # fraction of the light that scatters across the edge of a shadow beyond the table
+_MAX_PENUMBRA_MM = 8.0
 
 
 @dataclass(frozen=True, eq=False)
-class PreIntegrated(TechniqueResources):
-    """What the shading pass reads in place of light on an atlas.
+class PreIntegratedTables(TechniqueResources):
+    """Tables of a profile for the shading pass.
 
-    table : texture of `tables`
-    penumbra_mm : distance over which light spreads across a shadow's edge
-    relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue
+    table : texture of `sphere_table` rows, then `shadow_edge` rows
+    penumbra_mm : distance over which light scatters across the edge of a shadow [mm]
+    relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue [mm]
     """
 
     table: Texture
-    penumbra_mm: float
+    penumbra_width_mm: float
     relief_mm: Floats
 
 
 class PreIntegratedSkin(Technique):
-    """Light by tables over curvature, and across the edges of shadows."""
+    """Scattering by tables over curvature, and across the edges of shadows."""
 
     sources = ("Penner2011",)
-    curved = True
+    needs_curvature = True
     shade_constants = (("PRE_INTEGRATED", 1),)
 
-    def make(self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum) -> PreIntegrated:
-        """The profile's tables."""
-        return memo.keep(pre_integrate, device, profile)
+    def make(
+        self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
+    ) -> PreIntegratedTables:
+        """Return the tables of the profile."""
+        return memo.get(pre_integrate, device, profile)
 
-    def describe(self, view: Record, shade: ComputeProgram, own: TechniqueResources | None) -> None:
-        """Write the tables' scales."""
-        assert isinstance(own, PreIntegrated)
-        scales = {"most_curved": MOST_CURVED, "penumbra": own.penumbra_mm, "relief": own.relief_mm}
+    def write_view_record(self, view: UniformRecord, shade: ComputeProgram, own: TechniqueResources | None) -> None:
+        """Write the scales of the tables to the shading record."""
+        assert isinstance(own, PreIntegratedTables)
+        scales = {"most_curved": MAX_CURVATURE, "penumbra": own.penumbra_mm, "relief": own.relief_mm}
         view["pre"] = shade.record("PreIntegrated", **scales)
 
-    def scatter(self, graph: Graph, inputs: Inputs) -> Texture:
-        """Return the tables in place of light on the atlas."""
-        made, own = inputs.resources, inputs.resources.technique
-        assert made.shape.curvature is not None and isinstance(own, PreIntegrated)
-        graph.repeat(curvature.draw, made.head, made.shape.curvature)
+    def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
+        """Declare the passes that compute curvature, and return the tables instead of light on an atlas."""
+        resources, own = inputs.resources, inputs.resources.technique
+        assert resources.shape.curvature is not None and isinstance(own, PreIntegratedTables)
+        graph.repeat(curvature.draw, resources.head, resources.shape.curvature)
         return own.table
 
 
 TECHNIQUE = PreIntegratedSkin()
 
 
-def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegrated:
-    """The tables of a profile, on the device."""
-    penumbra = penumbra_mm(profile)
+def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegratedTables:
+    """Return the tables of a profile on the device."""
+    penumbra = penumbra_width_mm(profile)
     edges = [shadow_edge(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _EDGES)]
-    rows = np.concatenate([lit_spheres(profile), np.stack(edges)])
+    rows = np.concatenate([sphere_table(profile), np.stack(edges)])
     table = np.concatenate([rows, np.zeros((*rows.shape[:2], 1))], axis=-1)
-    return PreIntegrated(texture_from(device, table, "rgba32float"), penumbra, half_light_sigma(profile))
+    return PreIntegratedTables(
+        texture_from_array(device, table, "rgba32float"), penumbra, half_light_sigma_mm(profile)
+    )
 
 
-def lit_spheres(profile: GaussianSum) -> Floats:
-    """Scattered max(N.L, 0) on spheres, (n, m, c): rows by curvature to `MOST_CURVED`, columns by N.L [-].
+def sphere_table(profile: GaussianSum) -> Floats:
+    """Return max(N.L, 0) after scattering on spheres, (n, m, c): rows by curvature, columns by N.L [-].
 
-    Light spreads by straight distance: on a sphere of radius r a Gaussian of variance v is
-    exp(r^2/v (cos a - 1)), normalised over the sphere. [Penner2011] integrates around a ring instead, which
-    does not conserve light.
+    Rows end at `MAX_CURVATURE`. Light spreads by straight distance: on a sphere of radius r a Gaussian of
+    variance v is exp(r^2/v (cos a - 1)), normalised over the sphere. [Penner2011] integrates around a ring
+    instead, which does not conserve energy.
     """
     cosines = np.linspace(-1.0, 1.0, _COSINES)
     rows = [np.repeat(np.maximum(cosines, 0.0)[:, None], len(profile.albedo), axis=1)]
-    share = profile.weight / profile.albedo
-    for bent in np.linspace(0.0, MOST_CURVED, _CURVATURES)[1:]:
-        concentration = 1.0 / (bent**2 * profile.variance_mm2)
-        rows.append(np.stack([spread_cosine(cosines, k) for k in concentration], axis=1) @ share)
+    fractions = profile.weight / profile.albedo
+    for curvature_per_mm in np.linspace(0.0, MAX_CURVATURE, _CURVATURES)[1:]:
+        concentration = 1.0 / (curvature_per_mm**2 * profile.variance_mm2)
+        rows.append(np.stack([scattered_cosine(cosines, k) for k in concentration], axis=1) @ fractions)
     return np.stack(rows)
 
 
-def spread_cosine(cosines: ArrayLike, concentration: float) -> Floats:
-    """The clamped cosine convolved on the sphere with exp(k cos a) at unit integral, at N.L = cosines [-].
+def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
+    """Return the clamped cosine convolved on the sphere with a normalised exp(k cos a) [-].
 
-    concentration : k, the radius squared over the variance [-]
+    cosines : values of N.L at which the result is evaluated [-]
+    concentration : k, the squared radius over the variance [-]
     """
     from scipy.special import i0e
 
     theta = np.arccos(np.asarray(cosines, dtype=np.float64))
-    reach = _SIGMAS / np.sqrt(concentration)
-    low, high = np.clip(theta - reach, 0.0, 0.5 * np.pi), np.clip(theta + reach, 0.0, 0.5 * np.pi)
+    extent = _SIGMAS / np.sqrt(concentration)
+    low, high = np.clip(theta - extent, 0.0, 0.5 * np.pi), np.clip(theta + extent, 0.0, 0.5 * np.pi)
     x, w = np.polynomial.legendre.leggauss(_NODES)
     half = 0.5 * (high - low)[..., None]
     lit, theta = low[..., None] + half * (1.0 + x), theta[..., None]
@@ -119,25 +124,25 @@ def shadow_edge(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0
 
     half_width_mm : of the tent filter that already softens the edge
     """
-    kernel = preintegrate(profile)
+    kernel = preintegrated_kernel(profile)
     distance = radius_mm * np.linspace(-1.0, 1.0, _COSINES)
     x, w = np.polynomial.legendre.leggauss(_NODES)
-    x, w = 0.5 + 0.5 * x, w * (0.5 - 0.5 * x)  # one half of the tent, whose light is 1
+    x, w = 0.5 + 0.5 * x, w * (0.5 - 0.5 * x)  # one half of the tent, normalised
     ends = half_width_mm * np.concatenate([x, -x])
     lit = np.concatenate([0.5 * w, 0.5 * w]) @ kernel.one_side(distance[:, None] - ends)
     return np.asarray(np.clip(0.5 + 0.5 * lit / lit[-1], 0.0, 1.0))
 
 
-def penumbra_mm(profile: GaussianSum) -> float:
-    """Distance from a shadow's edge beyond which scattering changes the light by at most 1 % [mm]."""
-    distance = np.geomspace(0.05, _MOST_PENUMBRA_MM, 512)
-    beyond = (0.5 - preintegrate(profile).one_side(distance)).max(axis=1) > _SHADOW_TAIL
+def penumbra_width_mm(profile: GaussianSum) -> float:
+    """Return the distance from a shadow edge beyond which scattering changes light by at most 1 % [mm]."""
+    distance = np.geomspace(0.05, _MAX_PENUMBRA_MM, 512)
+    beyond = (0.5 - preintegrated_kernel(profile).one_side(distance)).max(axis=1) > _SHADOW_TAIL
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])
 
 
-def half_light_sigma(profile: GaussianSum) -> Floats:
-    """Standard deviation of the Gaussian with the profile's half-light radius, (c,) [mm]."""
+def half_light_sigma_mm(profile: GaussianSum) -> Floats:
+    """Return the (c,) standard deviations of Gaussians with the half-light radii of the profile [mm]."""
     radius = np.geomspace(1e-3, 100.0, 2048)
-    within = profile.within(radius) / profile.albedo
+    within = profile.energy_within(radius) / profile.albedo
     half = [np.interp(0.5, channel, radius) for channel in within.T]
     return np.array(half, dtype=np.float64) / float(np.sqrt(2.0 * np.log(2.0)))

@@ -160,7 +160,7 @@ fn curvature_towards(light: Light, point: Point, l: vec3f) -> f32 {
     let axes = WAYS_MM * beside(l);
     var sum = vec2f(0.0);
     for (var i = 0u; i < WAYS; i++) {
-        let aside = axes * place_on(i, true);
+        let aside = axes * sample_point(i, true);
         let clip = light.to_map * vec4f(point.lit_position + aside, 1.0);
         let way = aside + l * (depth_of(light, clip.z / clip.w) - depth_of(light, nearest_at(light, clip)));
         if (dot(way, l) > -shade.pre.penumbra) { // else it is no surface near by

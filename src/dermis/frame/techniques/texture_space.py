@@ -1,4 +1,4 @@
-"""Texture-space diffusion by a hierarchy of Gaussians, stitched across the map's seams."""
+"""Texture-space diffusion by a hierarchy of Gaussians, stitched across the seams of the atlas."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion import blur as diffuse
-from dermis.frame.features.diffusion.kernels import lead_up
-from dermis.frame.features.diffusion.pyramid import Blur, Levels
-from dermis.frame.features.irradiance.irradiance import fine_levels
+from dermis.frame.features.diffusion.kernels import add_intermediate_levels
+from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
+from dermis.frame.features.irradiance.irradiance import fine_light_members
 from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.gpu import Recorder
@@ -18,35 +18,35 @@ from dermis.optics.gaussians import GaussianSum
 
 
 class TextureSpace(AtlasTechnique):
-    """The package's own technique [dEonLuebke2007]."""
+    """Texture-space diffusion [dEonLuebke2007], the default technique."""
 
     sources = ("dEonLuebke2007", "Geusebroek2003")
-    transmits = True
-    mixes = True
+    supports_translucency = True
+    mixes_profiles = True
 
-    def split(self, profile: GaussianSum, white: bool) -> ProfileSplit:
-        """What is lit again, the Gaussians that blur, and what the picture adds to light on texels."""
-        split = super().split(profile, white)
-        relit_mm2 = float(profile.variance_mm2[0]) if self.relights(profile) else 0.0
-        return replace(split, fine=fine_levels(split.blurred_mm2, split.weight, relit_mm2))
+    def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
+        """Return the relit Gaussian, those that blur, and the constants for light finer than texels."""
+        split = super().split(profile, normalise)
+        relit_mm2 = float(profile.variance_mm2[0]) if self.relights_narrowest(profile) else 0.0
+        return replace(split, fine=fine_light_members(split.blurred_mm2, split.weight, relit_mm2))
 
-    def chain(
+    def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """The split with the levels between that make the blurs cheaper."""
-        most = len(atlas.sheets(edge)) - 1
-        variances, steps = lead_up(split.blurred_mm2, atlas.usual_per_mm, most)
+        """Return the split with intermediate Gaussians that make blurs cheaper, and their level numbers."""
+        max_halvings = len(atlas.mips_for(edge)) - 1
+        variances, steps = add_intermediate_levels(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
         own = [k for k in range(len(variances)) if k + 1 not in steps]
 
-        def led_up(one: ProfileSplit) -> ProfileSplit:
+        def with_all_levels(one: ProfileSplit) -> ProfileSplit:
             weight = np.zeros((len(variances), 3))
             weight[own] = one.weight
             return replace(one, blurred_mm2=variances, weight=weight)
 
-        return replace(led_up(split), others=tuple(map(led_up, split.others))), steps
+        return replace(with_all_levels(split), others=tuple(map(with_all_levels, split.others))), steps
 
-    def fill(self, graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
-        """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""
+    def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
+        """Declare the passes that fill level k with the light of level 0 blurred by the k-th Gaussian."""
         diffuse.draw(graph, levels, atlas, blur)
 
 

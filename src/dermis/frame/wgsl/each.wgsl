@@ -1,4 +1,4 @@
-// One invocation for each of a long list, in rows of workgroups.
+// Index of an invocation in a grid of workgroups over a long list.
 
 const EACH: u32 = 64u; // invocations of a workgroup
 

@@ -1,5 +1,4 @@
-// Floats rounded to halves. Some adapters cut them off when they store them, so that each pass would lose energy: here
-// nothing is left to be cut off.
+// Floats rounded to the nearest half floats. Some adapters truncate when they store halves, and each pass would lose energy.
 
 const LARGEST_HALF: f32 = 65504.0;
 

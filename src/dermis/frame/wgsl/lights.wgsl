@@ -1,4 +1,4 @@
-// Lights of every kind: what arrives from each at a point.
+// Lights of all kinds: incident light at a point.
 //#include "axes.wgsl"
 //#include "shadows/shadows.wgsl"
 //#include "shadows/soft_shadows.wgsl"
@@ -6,51 +6,51 @@
 
 override SHAPES: bool = false; // whether there are area lights
 
-// Whether the scene has lights of each kind; optional kinds are compiled only where it does.
+// Whether the scene has lights of each kind; optional kinds are compiled only if it has.
 //#each lights: override {override}: bool = {always};
 
 struct Light {
     to_map: mat4x4f, // world to the shadow map's clip space
-    position: vec3f, // [mm]; in parallel light where the shadow map's middle lies
+    position: vec3f, // [mm]; in parallel light the centre of the shadow map
     kind: u32,
     direction: vec3f, // from the light to its target
     reference_mm: f32, // distance at which `irradiance` holds
-    irradiance: vec3f, // on a surface that faces the light there; of area lights the radiance
+    irradiance: vec3f, // on a surface that faces the light at that distance; of area lights the radiance
     cos_inner: f32,
-    half_u: vec3f, // half sides [mm]; of a stripe the axes over its half sides [1/mm]
+    half_u: vec3f, // half sides [mm]; of a stripe the axes divided by its half sides [1/mm]
     cos_outer: f32,
     half_v: vec3f,
-    texel: f32, // side of a shadow texel [mm], for a cone: at 1 mm from the light
+    texel: f32, // side of a shadow texel [mm]; of a map with perspective at 1 mm from the light
     map_right: vec3f, // axes of the shadow map
-    map_near: f32, // depth at which it holds 1 [mm]
+    map_near: f32, // depth at which the map stores 1 [mm]
     map_up: vec3f,
-    map_far: f32, // and 0
-    extent: vec2f, // half sides on the map [mm], in parallel light tangents; 0 for one point or direction
-    softness: f32, // half of the least width of a shadow's edge [mm]
-    half_width: u32, // of the shadow filter's tent [shadow texel]
-    layer: i32, // in the shadow maps, -1 casts none
-    side: u32, // it is shaded as side x side lights
-    lines: u32, // shadow rays to places on the light
-    parallel: u32, // 1 where its map has no perspective
-    round: u32, // 1 where it is a disc on its map, 0 for a square
-    narrow: u32, // 1 where all of it comes from its position or, in parallel light, along its direction
-    sheet: u32, // 1 where it is a Gaussian across half_u, whose blurs are known
+    map_far: f32, // depth at which it stores 0 [mm]
+    extent: vec2f, // half sides on the map [mm], in parallel light tangents; 0 for punctual lights
+    softness: f32, // half of the least width of the edge of a shadow [mm]
+    half_width: u32, // of the tent of the shadow filter [shadow texels]
+    layer: i32, // in the shadow maps, -1 without shadows
+    side: u32, // it is sampled by side x side points
+    rays: u32, // number of shadow rays
+    parallel: u32, // 1 for parallel light, whose map has no perspective
+    round: u32, // 1 for a disc on its map, 0 for a rectangle
+    punctual: u32, // 1 if all light comes from one position or, in parallel light, from one direction
+    sheet: u32, // 1 if it is a Gaussian across half_u, whose convolutions are known
 }
 
 struct Lights {
-    //#fill light: array<Light, {most_lights}>,
-    //#fill place: array<vec4f, {most_lines}>, // spread evenly from -1 to 1: xy over a disc, zw over a square
+    //#fill light: array<Light, {max_lights}>,
+    //#fill sample_points: array<vec4f, {max_rays}>, // even distributions from -1 to 1: xy over a disc, zw over a square
 }
 
 @group(0) @binding(11) var<uniform> lights: Lights;
-@group(0) @binding(12) var shadow_maps: texture_2d_array<f32>; // depth: 1 near, 0 nothing
+@group(0) @binding(12) var shadow_maps: texture_2d_array<f32>; // depth: 1 near, 0 empty
 @group(0) @binding(25) var shadow_bounds: texture_2d_array<f32>; // nearest depths in squares, see shadow_bounds.wgsl
 
-// Light finer than what looks at it is averaged: standard deviations of that area along two ways [mm]; 0 for a point.
+// Standard deviations of the area over which light is averaged, along two directions [mm]; 0 samples a point.
 var<private> area_u: vec3f;
 var<private> area_v: vec3f;
 
-// Variance of the area along an axis [mm^2 times the square of the axis' length].
+// Variance of the area along an axis [mm^2 times the square of the length of the axis].
 fn area_variance(axis: vec3f) -> f32 {
     let u = dot(area_u, axis);
     let v = dot(area_v, axis);
@@ -66,7 +66,7 @@ fn is_parallel(light: Light) -> bool {
     return light.parallel != 0u;
 }
 
-// To the middle of a light.
+// Direction to the centre of a light.
 fn towards_light(light: Light, p: vec3f) -> vec3f {
     if (is_parallel(light)) {
         return -light.direction;
@@ -79,12 +79,12 @@ fn parts_of(light: Light) -> u32 {
     return select(1u, light.side * light.side, SHAPES);
 }
 
-// Middle of a part in the square from -1 to 1.
-fn place_of(part: u32, side: u32) -> vec2f {
+// Centre of a part in the square from -1 to 1.
+fn part_centre(part: u32, side: u32) -> vec2f {
     return (2.0 * vec2f(vec2u(part % side, part / side)) + 1.0) / f32(side) - 1.0;
 }
 
-// Incident light from a part of a light, by its kind.
+// Incident light from a part of a light.
 fn incident(light: Light, p: vec3f, part: u32) -> Incident {
     //#each lights: if ({override} && light.kind == {number}) { return {name}_incident(light, p, part); }
     return Incident(vec3f(0.0), vec3f(0.0));

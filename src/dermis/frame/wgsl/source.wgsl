@@ -1,29 +1,29 @@
-// Light read from a level, filtered by the sampler or in the shader.
+// Light read from a pyramid level, filtered by the sampler or in the shader.
 //#if FILTERED_SOURCE
-// A level whose texels every GPU can filter.
+// Level in a format that all GPUs can filter.
 
-@group(0) @binding(30) var source: texture_2d<f32>; // filtered; light, and 1 where there is surface
+@group(0) @binding(30) var source: texture_2d<f32>; // light; alpha is 1 on the surface
 @group(0) @binding(31) var linear: sampler;
 
 fn source_at(uv: vec2f) -> vec4f {
     return textureSampleLevel(source, linear, uv, 0.0);
 }
 
-// Between two texels of a row; whole numbers are texel centres.
+// Light between two texels of a row; integers are texel centres.
 fn source_between(at: vec2f) -> vec4f {
     return source_at((at + 0.5) * (1.0 / vec2f(textureDimensions(source))));
 }
 //#else
-// A level whose texels many GPUs cannot filter.
+// Level in a format that many GPUs cannot filter.
 //#include "bilinear.wgsl"
 
-@group(0) @binding(30) var source: texture_2d<f32>; // light, and 1 where there is surface
+@group(0) @binding(30) var source: texture_2d<f32>; // light; alpha is 1 on the surface
 
 fn source_at(uv: vec2f) -> vec4f {
     return load_bilinear(source, uv);
 }
 
-// Between two texels of a row; whole numbers are texel centres.
+// Light between two texels of a row; integers are texel centres.
 fn source_between(at: vec2f) -> vec4f {
     let most = vec2i(textureDimensions(source)) - 1;
     let left = vec2i(vec2f(floor(at.x), at.y));

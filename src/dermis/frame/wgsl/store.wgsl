@@ -1,6 +1,6 @@
-// Light stored to a level, in the format of its texture.
+// Light stored to a pyramid level, in the format of its texture.
 //#if STORED_HALVES
-// Light stored as halves.
+// Half floats.
 //#include "halves.wgsl"
 
 @group(0) @binding(32) var stored: texture_storage_2d<rgba16float, write>;
@@ -9,7 +9,7 @@ fn store(at: vec2u, light: vec4f) {
     textureStore(stored, at, rounded_to_halves(light));
 }
 //#else
-// Light stored as 32-bit floats.
+// 32-bit floats.
 
 @group(0) @binding(32) var stored: texture_storage_2d<rgba32float, write>;
 

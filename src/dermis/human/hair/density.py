@@ -19,20 +19,17 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, between, corners
 
 HEAD_AXIS_Z = -72.0
-"""Of the axis around which the hairline is told [mm]."""
-_SEQUENCE_STEPS = np.array([0.7548776662, 0.5698402909])  # of places that fill a square evenly
-_SCALP_BOTTOM_Y = -80.0  # of the hair of the head [mm]
-_HAIRLINE_FADE_MM = (-3.0, 11.0)  # beside the hairline, between which hair gets as dense as it is
-_LIP_FADE_MM = (1.5, 4.5)  # beside the lips, between which the beard does
-_BEARD_FADE = (0.25, 0.75)  # amount of the zones between which it does
-_HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # waves of the hairline [rad/mm]
+"""Position of the vertical axis around which the hairline is defined [mm]."""
+_SEQUENCE_STEPS = np.array([0.7548776662, 0.5698402909])  # of a low-discrepancy sequence in the unit square
+_SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
+_HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
+_LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density of the beard rises
+_BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the beard rises
+_HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the ragged hairline [rad/mm]
 
-_SCALP_MARGIN_MM = 25.0  # the hairline, to where quads may have a little hair
-_HAIR_MARGIN_MM, _BROW_MARGIN_MM = (
-    25.0,
-    8.0,
-)  # quads with hairs and those around brows, where skin still counts
-_MIN_BEARD = 0.02  # amount of the zones from which on quads may have a beard
+_SCALP_MARGIN_MM = 25.0  # below the hairline, for quads that may have hair
+_HAIR_MARGIN_MM, _BROW_MARGIN_MM = 25.0, 8.0  # around hairy quads, for skin that hair may touch
+_MIN_BEARD = 0.02  # zone amount above which quads may have a beard
 
 
 class HairDensity(NamedTuple):
@@ -43,8 +40,8 @@ class HairDensity(NamedTuple):
     near : (p,) control points of quads on which any may grow
     """
 
-    amount: Callable[[Doubles], Doubles]
-    near: NDArray[np.bool_]
+    relative: Callable[[Doubles], Doubles]
+    candidates: NDArray[np.bool_]
 
 
 def sample_roots(
@@ -59,7 +56,7 @@ def sample_roots(
     corner_points = corners(control_mesh, quad)
     counts = np.floor(per_cm2 * quad_areas_cm2(control_mesh, quad) + rng.random(len(quad))).astype(np.int64)
     starts, chance = rng.random((len(quad), 2)), rng.random(int(counts.sum()))
-    near = hair_density.near[corner_points].any(axis=1)
+    near = hair_density.candidates[corner_points].any(axis=1)
     which = np.repeat(np.flatnonzero(near), counts[near])
     ends = np.cumsum(counts)[near]
     number = np.arange(len(which)) + np.repeat(ends - np.cumsum(counts[near]), counts[near])
@@ -67,7 +64,7 @@ def sample_roots(
     place = starts.take(which, axis=0) + step[:, None] * _SEQUENCE_STEPS
     place -= np.floor(place)
     values = average_points().T.take(corner_points.T.take(which, axis=1), axis=1)
-    kept = np.flatnonzero(chance.take(number) < hair_density.amount(between(place, values).T))
+    kept = np.flatnonzero(chance.take(number) < hair_density.relative(between(place, values).T))
     return Roots(quad.take(which.take(kept)).astype(np.int32), place.take(kept, axis=0).astype(np.float32))
 
 
@@ -86,18 +83,17 @@ def scalp_density(recession: float) -> HairDensity:
     column = _amount_column("hair")
     receding = zone_table(recession)[:, column] != zone_table()[:, column]
 
-    def amount(places: Doubles) -> Doubles:
+    def relative(places: Doubles) -> Doubles:
         above = height_above_hairline(places, recession)
-        soft = np.flatnonzero(
-            (above > _HAIRLINE_FADE_MM[0] - len(_HAIRLINE_WAVES))
-            & (above < _HAIRLINE_FADE_MM[1] + len(_HAIRLINE_WAVES))
-        )
-        above[soft] += sum(np.sin(places[soft, :3] @ wave) for wave in _HAIRLINE_WAVES)
-        fraction = smoothstep(*_HAIRLINE_FADE_MM, above) * (places[:, 1] > _SCALP_BOTTOM_Y)
+        low, high = _HAIRLINE_FADE_MM
+        margin = len(_HAIRLINE_WAVES)
+        near = np.flatnonzero((above > low - margin) & (above < high + margin))
+        above[near] += sum(np.sin(places[near, :3] @ wave) for wave in _HAIRLINE_WAVES)
+        fraction = smoothstep(low, high, above) * (places[:, 1] > _SCALP_BOTTOM_Y)
         thinned = _sum_zones("hair", zone_table(recession)[receding], places)
         return np.asarray(fraction * np.clip(1.0 + thinned, 0.0, 1.0))
 
-    return HairDensity(amount, _scalp_candidates())
+    return HairDensity(relative, _scalp_candidates())
 
 
 def beard_density() -> HairDensity:
@@ -137,10 +133,10 @@ def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
 def _sum_zones(name: str, rows: Floats, places: Doubles) -> Doubles:
     """Sum (n,) of an amount of zones, see zones.csv."""
     column, found = _amount_column(name), np.zeros(len(places))
-    left = np.abs(places[:, 0]), places[:, 1], places[:, 2]
+    mirrored = np.abs(places[:, 0]), places[:, 1], places[:, 2]
     for zone in rows[rows[:, column] != 0.0].astype(np.float64):
-        away = sum(((left[c] - zone[c]) * zone[4 + c]) ** 2 for c in range(3))
-        found += zone[column] * np.exp(-away)
+        distance2 = sum(((mirrored[c] - zone[c]) * zone[4 + c]) ** 2 for c in range(3))
+        found += zone[column] * np.exp(-distance2)
     return found
 
 
@@ -151,12 +147,12 @@ def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
 
     mesh = root_finder.mesh
     corner_points = corners(mesh, _hairy_quads(mesh))
-    near = np.zeros(len(root_finder.drawn.positions), bool)
+    near = np.zeros(len(root_finder.subdivided_mesh.positions), bool)
     hairy = _scalp_candidates() | _beard_candidates() if bearded else _scalp_candidates()
     places = corner_points[hairy[corner_points].any(axis=1)], corners(mesh, root_finder.brow_grid_roots.quad)
-    for points, reach in zip(places, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
-        tree = cKDTree(root_finder.points_mm[np.unique(points)])
-        near |= tree.query(root_finder.drawn.positions, distance_upper_bound=reach)[0] < reach
+    for subset, reach in zip(places, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
+        tree = cKDTree(root_finder.points_mm[np.unique(subset)])
+        near |= tree.query(root_finder.subdivided_mesh.positions, distance_upper_bound=reach)[0] < reach
     return np.flatnonzero(near)
 
 
@@ -167,10 +163,9 @@ def _amount_column(name: str) -> int:
 @cache
 def average_points() -> Doubles:
     """(p, 4) of control points their place on the average person, and how far inside the lips [mm]."""
-    places, average_points = average_surface()
-    return np.asfortranarray(
-        np.column_stack([places, average_points[:, BORDER_FIELDS.index("lips")]]), np.float64
-    )
+    points_mm, distances = average_surface()
+    lips = distances[:, BORDER_FIELDS.index("lips")]
+    return np.asfortranarray(np.column_stack([points_mm, lips]), np.float64)
 
 
 @cache
@@ -181,8 +176,7 @@ def _hairless_quads() -> Index:
 
 
 def _hairy_quads(control_mesh: Mesh) -> Index:
-    skin = np.array([one.kind == "skin" for one in control_mesh.materials])[
-        control_mesh.material[control_mesh.quads[:, 0]]
-    ]
+    is_skin = np.array([material.kind == "skin" for material in control_mesh.materials])
+    skin = is_skin[control_mesh.material[control_mesh.quads[:, 0]]]
     skin[_hairless_quads()] = False
     return np.flatnonzero(skin)

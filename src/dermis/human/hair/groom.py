@@ -65,7 +65,7 @@ def _shuffle(strands: Strands, seed: int) -> Strands:
 def _brows(
     surface: GrowthSurface, root_finder: RootFinder, look: HairLook, rngs: list[np.random.Generator]
 ) -> Iterator[HairGroup]:
-    """Yield the left and the right brow, which are computed together as each array operation has a fixed cost."""
+    """Yield the left and the right brow, computed together as array operations have a fixed cost."""
     roots, parameters = [], []
     for side, rng in zip(SIDES, rngs, strict=True):
         u, v, x, y = brows.sample_positions(rng)

@@ -25,24 +25,24 @@ from dermis.mesh.strands import Roots, corners, weights
 
 # Artist's values on the average person [mm].
 _WHORL_CENTRE = np.array([9.0, 86.0, -131.0])
-_WHORL_MM = 24.0  # around it hair turns in a spiral
-_PARTING_X = 31.0  # of the line from which short hair is swept to the other side
+_WHORL_MM = 24.0  # radius of the spiral
+_PARTING_X = 31.0  # of the parting of short hair
 _PARTING_WIDTH_MM = 9.0
-_LEVEL_TILT = 0.15  # of the levels of length, higher in front
+_LEVEL_TILT = 0.15  # of the levels of equal length, higher in front
 _CROPPED_RISE, _BEARD_RISE = (0.95, 0.75), (0.85, 0.35)  # of root and tip [rad]
-_SHORT_RISE, _TOP_RISE = (0.5, -0.05), (0.55, -0.35)  # at the sides, and by how much more on top
-_TUFT_MM = 2.2  # between tufts
-_MIN_HEIGHT_MM = 0.35  # the skin
-_HEAD_RADIUS_MM = 85.0  # radius
+_SHORT_RISE, _TOP_RISE = (0.5, -0.05), (0.55, -0.35)  # at the sides, and its increase on top
+_TUFT_MM = 2.2  # size of the cells in which tips form tufts
+_MIN_HEIGHT_MM = 0.35  # above the skin
+_HEAD_RADIUS_MM = 85.0
 _EPSILON = np.float32(1e-9)
 MAX_PER_CM2 = 200.0
-"""Hairs of the densest heads."""
+"""Density of the densest hair of the head [1/cm2]."""
 BEARD_PER_CM2 = 60.0
-"""Hairs of beards."""
-_HAIR_RADIUS_MM, _BEARD_RADIUS_MM = 0.034, 0.048  # radius of a hair
-_TIP_RADIUS_FACTOR = 0.6  # of that, at the tip
+"""Density of beards [1/cm2]."""
+_HAIR_RADIUS_MM, _BEARD_RADIUS_MM = 0.034, 0.048
+_TIP_RADIUS_FACTOR = 0.6  # of the radius
 _STRAIGHT_KNOTS, _CURVED_KNOTS, _COILED_KNOTS = 5, 7, 9
-_COIL_CURL = 0.5  # curl from which on there are coils
+_COIL_CURL = 0.5  # curl above which hair coils
 _LONG_BEARD_MM = 8.0
 
 
@@ -165,9 +165,9 @@ def grow_hair(
     hair, around = surface.root_frames(roots), corners(surface.control_mesh, roots.quad)
     point, near = compacted(around)
     root_mm = surface.points_mm[point]
-    project, normals = surface.skin.project(root_mm)
+    base_mm, normals = surface.skin.project(root_mm)
     offsets = _trace_guides(
-        surface.skin, root_mm, project, normals, comb(average_points()[point, :3], normals), knots
+        surface.skin, root_mm, base_mm, normals, comb(average_points()[point, :3], normals), knots
     )
     t, normal = np.linspace(0.0, 1.0, knots)[:, None], hair.frame_vectors[2]
     found = _vary_directions(_interpolate_guides(weights(roots.place), near, offsets), normal, variation, rng)
@@ -182,35 +182,35 @@ def grow_hair(
 
 
 def _trace_guides(
-    skin: SkinSurface, root_mm: Doubles, project: Doubles, normal: Doubles, guide: GuideShape, knots: int
+    skin: SkinSurface, root_mm: Doubles, base_mm: Doubles, normal: Doubles, guide: GuideShape, knots: int
 ) -> Doubles:
     """(g, k, 3) ways from roots to knots, over the skin [mm].
 
     root_mm, foot, normal : (g, 3) with what `SkinSurface.project` says of them
     """
-    off = root_mm - project  # as far as the skin of few vertices is from the surface
+    root_offset = root_mm - base_mm  # distance of the control points from the smooth surface
     directions, height, step = guide.directions, np.zeros(len(root_mm)), guide.length_mm / (knots - 1)
     found = [np.zeros_like(root_mm)]
     for k in range(1, knots):
         rise = guide.rise + (guide.last_rise - guide.rise) * (k - 0.5) / (knots - 1)
         height = np.maximum(height + step * np.sin(rise), _MIN_HEIGHT_MM)
         directions = tangent_directions(directions, normal)
-        project, normal = skin.project(project + (step * np.cos(rise))[:, None] * directions)
-        found.append(project + off + height[:, None] * normal - root_mm)
+        base_mm, normal = skin.project(base_mm + (step * np.cos(rise))[:, None] * directions)
+        found.append(base_mm + root_offset + height[:, None] * normal - root_mm)
     return np.stack(found, axis=1)
 
 
-def _interpolate_guides(share: Doubles, near: NDArray[np.int64], offsets: Doubles) -> Floats:
+def _interpolate_guides(weight: Doubles, guide_index: NDArray[np.int64], offsets: Doubles) -> Floats:
     """(k, 3, n) means of guides' ways.
 
     share, near : (n, 4) of which guides
     """
     from scipy.sparse import csr_array
 
-    first = np.arange(0, share.size + 1, share.shape[1])
-    shares = csr_array((share.ravel().astype(np.float32), near.ravel(), first), (len(share), len(offsets)))
-    found = shares @ offsets.reshape(len(offsets), -1).astype(np.float32)
-    return np.ascontiguousarray(found.T).reshape(*offsets.shape[1:], len(share))
+    first = np.arange(0, weight.size + 1, weight.shape[1])
+    entries = weight.ravel().astype(np.float32), guide_index.ravel(), first
+    found = csr_array(entries, (len(weight), len(offsets))) @ offsets.reshape(len(offsets), -1).astype(np.float32)
+    return np.ascontiguousarray(found.T).reshape(*offsets.shape[1:], len(weight))
 
 
 def _vary_directions(
@@ -218,16 +218,14 @@ def _vary_directions(
 ) -> Floats:
     """Turned about the skin's normal, each as a whole, leaning more or less, and longer or shorter."""
     n = offsets.shape[-1]
-    angle, lean = (
-        variation.angle_deviation * rng.standard_t(4, size=n),
-        1.0 + variation.angle_deviation * rng.normal(size=n),
-    )
+    angle = variation.angle_deviation * rng.standard_t(4, size=n)
+    lean = 1.0 + variation.angle_deviation * rng.normal(size=n)
     length = np.clip(1.0 + variation.length_deviation * rng.normal(size=n), 0.35, 1.2)
-    stay, turn = length * np.cos(angle), length * np.sin(angle)
-    stay, turn, rise = (one.astype(np.float32) for one in (stay, turn, length * lean - stay))
-    found: Floats = turn * crosses(normal, offsets)
+    along, aside = length * np.cos(angle), length * np.sin(angle)
+    along, aside, rise = (one.astype(np.float32) for one in (along, aside, length * lean - along))
+    found: Floats = aside * crosses(normal, offsets)
     found += (rise * dots(offsets, normal))[:, None] * normal
-    found += stay * offsets
+    found += along * offsets
     return found
 
 
@@ -237,19 +235,19 @@ def _form_tufts(
     """Draw tips to those of a few, in tufts."""
     places = np.ascontiguousarray(root_mm.T)
     cell = np.zeros(len(root_mm), np.int64)
-    for at in np.floor(places / _TUFT_MM).astype(np.int64):
-        at -= at.min()
-        cell *= at.max() + 1
-        cell += at
-    hair = np.empty(cell.max() + 1, np.int64)
-    hair[cell] = np.arange(len(cell))  # one of those in each
-    which = hair[cell]
-    drawn = (strength * rng.uniform(0.3, 1.0, len(root_mm)) * t**1.3).astype(np.float32)
-    apart = offsets.take(which, axis=-1)
-    apart -= offsets
-    apart += (places.take(which, axis=-1) - places).astype(np.float32)
-    apart *= drawn[:, None]
-    offsets += apart
+    for coordinate in np.floor(places / _TUFT_MM).astype(np.int64):
+        coordinate -= coordinate.min()
+        cell *= coordinate.max() + 1
+        cell += coordinate
+    leader = np.empty(cell.max() + 1, np.int64)
+    leader[cell] = np.arange(len(cell))  # one hair of each cell
+    leader = leader[cell]
+    pull = (strength * rng.uniform(0.3, 1.0, len(root_mm)) * t**1.3).astype(np.float32)
+    difference = offsets.take(leader, axis=-1)
+    difference -= offsets
+    difference += (places.take(leader, axis=-1) - places).astype(np.float32)
+    difference *= pull[:, None]
+    offsets += difference
 
 
 def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple[Doubles, Floats]]:
@@ -257,8 +255,8 @@ def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple
     fade = np.minimum(2 * t, 1.0)
     for waves in (0.5, 1.1):
         for shape in (np.sin(2 * np.pi * waves * t), np.cos(2 * np.pi * waves * t) - 1.0):
-            strength = rng.random((3, len(size)), np.float32) - np.float32(0.5)
-            yield np.sqrt(2.0) / waves * fade * shape, strength * size
+            amplitude = rng.random((3, len(size)), np.float32) - np.float32(0.5)
+            yield np.sqrt(2.0) / waves * fade * shape, amplitude * size
 
 
 def _coils(tips: Floats, t: Doubles, variation: HairVariation, rng: np.random.Generator) -> Floats:
@@ -269,19 +267,19 @@ def _coils(tips: Floats, t: Doubles, variation: HairVariation, rng: np.random.Ge
     side -= dots(side, along) * along
     side /= np.maximum(np.sqrt(dots(side, side)), _EPSILON)
     step = 2 * np.pi * t[1] * variation.coils * rng.uniform(0.8, 1.2, n)
-    turn = np.asarray(2 * np.pi * rng.random(n))
+    phase = np.asarray(2 * np.pi * rng.random(n))
     radius = variation.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
-    x, y = ((radius * one)[:, None].astype(np.float32) for one in _rotating_sines(turn, step, len(t)))
+    x, y = ((radius * one)[:, None].astype(np.float32) for one in _sine_sequence(phase, step, len(t)))
     return np.asarray(x * side + y * crosses(along, side))
 
 
-def _rotating_sines(turn: Doubles, step: Doubles, knots: int) -> tuple[Doubles, Doubles]:
+def _sine_sequence(angle: Doubles, step: Doubles, knots: int) -> tuple[Doubles, Doubles]:
     """Cosines and sines (k, n) of angles (n,) that grow by equal steps, of which only the first are taken."""
-    x, y = np.empty((knots, len(turn))), np.empty((knots, len(turn)))
-    x[0], y[0], more, across = np.cos(turn), np.sin(turn), np.cos(step), np.sin(step)
+    x, y = np.empty((knots, len(angle))), np.empty((knots, len(angle)))
+    x[0], y[0], cosine, sine = np.cos(angle), np.sin(angle), np.cos(step), np.sin(step)
     for k in range(1, knots):
-        x[k] = x[k - 1] * more - y[k - 1] * across
-        y[k] = y[k - 1] * more + x[k - 1] * across
+        x[k] = x[k - 1] * cosine - y[k - 1] * sine
+        y[k] = y[k - 1] * cosine + x[k - 1] * sine
     return x, y
 
 
@@ -289,8 +287,8 @@ def _lift_above_skin(offsets: Floats, normal: Floats, t: Floats) -> Floats:
     """Lifted where a knot would be in the skin, taken as round as a head."""
     height = dots(offsets, normal)
     flat2 = dots(offsets, offsets) - height**2
-    least = _MIN_HEIGHT_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_RADIUS_MM)
-    offsets += np.maximum(least - height, 0.0)[:, None] * normal
+    min_height = _MIN_HEIGHT_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_RADIUS_MM)
+    offsets += np.maximum(min_height - height, 0.0)[:, None] * normal
     return offsets
 
 
@@ -305,32 +303,33 @@ def scalp_hair(surface: GrowthSurface, look: HairLook, recession: float) -> list
     """The hair of the head; none for a bald one."""
     if look.style == "none" or look.density == 0.0:
         return []
-    rng, drawn = np.random.default_rng((look.seed, 3)), surface.hair_fraction * (22.0 + 53.0 * look.density)
-    roots = density.sample_roots(surface.control_mesh, density.scalp_density(recession), drawn, rng)
+    rng = np.random.default_rng((look.seed, 3))
+    strands_per_cm2 = surface.hair_fraction * (22.0 + 53.0 * look.density)
+    roots = density.sample_roots(surface.control_mesh, density.scalp_density(recession), strands_per_cm2, rng)
     comb = partial(comb_scalp, look=look, recession=recession)
     hair, offsets = grow_hair(surface, roots, comb, knot_count(look), _scalp_variation(look), rng)
-    return [_hair_group(hair, offsets, drawn, MAX_PER_CM2 * look.density, _HAIR_RADIUS_MM, rng)]
+    hairs_per_cm2 = MAX_PER_CM2 * look.density
+    return [_hair_group(hair, offsets, strands_per_cm2, hairs_per_cm2, _HAIR_RADIUS_MM, rng)]
 
 
 def beard_hair(surface: GrowthSurface, look: HairLook) -> list[HairGroup]:
     """The beard; none for a shaved one."""
     if look.beard_mm == 0.0:
         return []
-    rng, drawn = np.random.default_rng((look.seed, 4)), surface.hair_fraction * BEARD_PER_CM2
-    roots = density.sample_roots(surface.control_mesh, density.beard_density(), drawn, rng)
+    rng, strands_per_cm2 = np.random.default_rng((look.seed, 4)), surface.hair_fraction * BEARD_PER_CM2
+    roots = density.sample_roots(surface.control_mesh, density.beard_density(), strands_per_cm2, rng)
     tight = max(look.curl - _COIL_CURL, 0.0) * 2
     variation = HairVariation(0.3, 0.22, 0.2, 0.05 + 0.1 * look.curl, 0.5 * tight, 1.5)
-    hair, offsets = grow_hair(
-        surface, roots, partial(comb_beard, look=look), knot_count(look), variation, rng
-    )
-    return [_hair_group(hair, offsets, drawn, BEARD_PER_CM2, _BEARD_RADIUS_MM, rng)]
+    comb = partial(comb_beard, look=look)
+    hair, offsets = grow_hair(surface, roots, comb, knot_count(look), variation, rng)
+    return [_hair_group(hair, offsets, strands_per_cm2, BEARD_PER_CM2, _BEARD_RADIUS_MM, rng)]
 
 
 def _hair_group(
     hair: RootFrames,
     offsets: Floats,
-    drawn: float,
-    true: float,
+    strands_per_cm2: float,
+    hairs_per_cm2: float,
     radius_mm: float,
     rng: np.random.Generator,
 ) -> HairGroup:
@@ -339,16 +338,17 @@ def _hair_group(
     ways : (k, 3, n) from `grow_hair`
     drawn, true : how many are made and how many there are on a square centimetre
     """
-    hairs_per_strand, (knots, _, n) = true / drawn, offsets.shape
+    hairs_per_strand, (knots, _, n) = hairs_per_cm2 / strands_per_cm2, offsets.shape
     radius = np.tile((hairs_per_strand * radius_mm * rng.uniform(0.8, 1.2, (n, 1))).astype(np.float32), knots)
     radius[:, -1] *= np.float32(_TIP_RADIUS_FACTOR)
     steps = np.diff(offsets, axis=0)
     length = np.sqrt(dots(steps, steps)).sum(axis=0, dtype=np.float64)
-    area = float(np.mean(2.0 * radius.mean(axis=1) * length))  # seen from the side; halved as hair leans
-    seen = np.empty((n, knots, 3), np.float32)
+    area = float(np.mean(2.0 * radius.mean(axis=1) * length))  # of one strand from the side; halved below, as hair is inclined
+    local = np.empty((n, knots, 3), np.float32)
     for c in range(3):
-        seen[..., c] = dots(offsets, hair.frame_vectors[c]).T
-    return HairGroup(hair.roots, seen, radius, 1.0, hairs_per_strand, 0.5 * area * drawn / 100.0)
+        local[..., c] = dots(offsets, hair.frame_vectors[c]).T
+    cover = 0.5 * area * strands_per_cm2 / 100.0
+    return HairGroup(hair.roots, local, radius, 1.0, hairs_per_strand, cover)
 
 
 def _scalp_variation(look: HairLook) -> HairVariation:

@@ -63,8 +63,13 @@ class RootFinder:
     drawn : the mesh as it is drawn, of the same person
     """
 
-    def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles, subdivided: Mesh) -> None:
-        self.mesh, self.points_mm, self.subdivided, self._eyes_mm = mesh, points_mm, subdivided, eyes_mm
+    def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles, subdivided_mesh: Mesh) -> None:
+        self.mesh, self.points_mm, self.subdivided_mesh, self._eyes_mm = (
+            mesh,
+            points_mm,
+            subdivided_mesh,
+            eyes_mm,
+        )
         self._lid_edges: dict[tuple[tuple[int, ...], float], _LidEdge] = {}
 
     def front_roots(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:

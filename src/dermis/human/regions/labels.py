@@ -144,7 +144,7 @@ def _labels_from_map(labels: NDArray[np.uint8], atlas: Atlas, name: str) -> NDAr
 def _labels_from_landmarks(head: Head, atlas: Atlas, places: Landmarks) -> NDArray[np.uint8]:
     corners = warp_to_average(head, places, head.mesh.positions.astype(np.float64))
     points = atlas.interpolate(head.mesh, corners)[atlas.coverage]
-    return classify_surface(points, average_skin().quads(points))
+    return classify_surface(points, average_skin().nearest_quads(points))
 
 
 def _labels_of_human(head: Head, atlas: Atlas) -> NDArray[np.uint8]:

@@ -1,1 +1,1 @@
-"""The human's skin: pigments, marks and relief, as numbers that the frame paints maps from."""
+"""Skin of the human: pigments, marks and relief, as the parameters from which the frame paints maps."""

@@ -1,4 +1,4 @@
-"""Places and amounts of the skin of a face, and what expressions change: folds and blood."""
+"""Tables of the face: zones of skin, hairline, folds, and their changes with expressions."""
 
 from __future__ import annotations
 
@@ -25,33 +25,26 @@ MOVEMENTS = (
     "flush",
     "pressed",
 )
-"""Those that deepen folds, see folds.csv, then those that move blood."""
+"""Facial movements: first those that deepen folds, see folds.csv, then those that move blood."""
 FOLD_MOVEMENTS = MOVEMENTS.index("flush")
-"""How many deepen folds."""
+"""Number of movements that deepen folds."""
 ZONE_AMOUNTS = (
     "blood", "melanin", "strength", "roughness", "pores", "furrows",
     "sun", "level", "around", "hair", "beard", "veins",
 )  # fmt: skip
-"""What zones change, see zones.csv."""
+"""Quantities that zones change, see zones.csv."""
 HAIRLINE_STEP_DEGREES = 2
-"""Angle between the heights of `hairline_heights`."""
+"""Angle between samples of `hairline_heights` [degrees]."""
 _HAIRLINE_SAMPLES = 180 // HAIRLINE_STEP_DEGREES + 1
 _SAMPLES_PER_SEGMENT = 4
 _CACHE_SIZE = 32  # tables of receding hair
-_CROWN = "crown"  # zone that thin hair leaves
-_TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = (
-    22.0,
-    16.0,
-)  # by which hair recedes at most, there and all over the forehead
-_TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = (
-    33.0,
-    15.0,
-    38.0,
-)  # where these are and how wide [degrees]
+_CROWN = "crown"  # zone where hair thins first
+_TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = 22.0, 16.0  # maximum recession of the hairline
+_TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38.0  # from the front
 
 
 def movement_weights(names: tuple[str, ...], weights: Floats) -> Floats:
-    """(m,) how far each movement is made, 0 to 1.
+    """Return the strength (m,) of each movement, 0 to 1.
 
     names, weights : of a rig's targets
     """
@@ -60,7 +53,7 @@ def movement_weights(names: tuple[str, ...], weights: Floats) -> Floats:
 
 @cache
 def _movement_matrix(names: tuple[str, ...]) -> Floats:
-    """(m, t) of each target in each movement."""
+    """Return the contribution (m, t) of each target to each movement."""
     table = np.zeros((len(MOVEMENTS), len(names)), np.float32)
     for row in read_rows(__package__, "movements"):
         if row["target"] in names:
@@ -70,7 +63,7 @@ def _movement_matrix(names: tuple[str, ...]) -> Floats:
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def zone_table(recession: float = 0.0) -> Floats:
-    """(k, 20) of each zone its centre and 0, one over its radii and 0 [mm], and its amounts.
+    """Return a row (k, 20) for each zone: centre and 0, inverse radii [1/mm] and 0, and its amounts.
 
     recession : see `SkinLook`
     """
@@ -87,9 +80,9 @@ def zone_table(recession: float = 0.0) -> Floats:
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def hairline_heights(recession: float = 0.0) -> Floats:
-    """(91,) height of the edge of the hair, by the angle from the front [mm].
+    """Return the height (91,) of the hairline by the angle from the front [mm].
 
-    recession : see `SkinLook`; hair leaves the temples first
+    recession : see `SkinLook`; it starts at the temples
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -102,12 +95,12 @@ def hairline_heights(recession: float = 0.0) -> Floats:
 
 
 class Folds(NamedTuple):
-    """Curves of straight pieces on the left half of the average person.
+    """Polylines of folds on the left half of the average person's face.
 
-    knots : (k, 4) of all curves [mm], and how far along their curve each is, from 0 to 1
-    curves : (c, 8) centre and radius of a ball around each, its width, its depth in a young and in an old
-        face [mm], and the number of the movement that deepens it, from 1; 0 for none
-    first : (c + 1,) where each curve begins
+    knots : (k, 4) of all folds [mm], with their position along the fold, 0 to 1
+    curves : (c, 8) centre and radius of a bounding sphere, width, depth in a young and in an old face [mm],
+        and the number of the movement that deepens the fold, from 1; 0 for none
+    first : (c + 1,) start of each fold in `knots`
     """
 
     knots: Floats
@@ -117,7 +110,7 @@ class Folds(NamedTuple):
 
 @cache
 def fold_curves() -> Folds:
-    """The folds of the face."""
+    """Return the folds of the face."""
     knots, curves = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
     for _, group in groupby(read_rows(__package__, "folds"), key=lambda row: row["fold"]):
         rows = list(group)
@@ -136,19 +129,19 @@ def fold_curves() -> Folds:
 
 @cache
 def table_sizes() -> dict[str, int]:
-    """How many zones, folds, knots and edges there are; found without the libraries that draw curves."""
+    """Return the numbers of zones, folds, knots and hairline samples, without importing SciPy."""
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
     knots = sum(map(_sample_count, lengths))
     return {"zones": len(zone_table()), "folds": len(lengths), "knots": knots, "edges": _HAIRLINE_SAMPLES}
 
 
 def _sample_count(knots: int) -> int:
-    """Places on a curve through so many knots."""
+    """Return the number of samples of a curve through so many knots."""
     return _SAMPLES_PER_SEGMENT * (knots - 1) + 1
 
 
 def _spline_points(knots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places on the smooth curve through some, several from each to the next."""
+    """Return samples of the smooth curve through the knots."""
     from scipy.interpolate import CubicSpline
 
     place = np.arange(len(knots))

@@ -1,4 +1,4 @@
-"""The look of a skin: pigments and texture, and looks drawn at random."""
+"""Look of the skin: pigments and texture, typical or sampled at random."""
 
 from __future__ import annotations
 
@@ -14,40 +14,69 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
 RANGES = {"seed": (0, 2**32 - 1)}
-"""Least and greatest values of fields that do not go from 0 to 1."""
-# Artist's values; that melanin differs so much between peoples, and how it is spread, is common knowledge.
+"""Ranges of the fields whose range is not 0 to 1."""
+# Artist's values.
 _MELANIN = {"african": 0.19, "asian": 0.024, "caucasian": 0.010}
 _EUMELANIN = {"african": 0.85, "asian": 0.7, "caucasian": 0.65}
 _FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
 _IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
-_MELANIN_LOG_DEVIATION = 0.42  # standard deviation of the melanin's logarithm within a people
-_EUMELANIN_STEP = 0.05  # of eumelanin: people share tables of colours
+_MELANIN_LOG_DEVIATION = 0.42  # standard deviation of log melanin within an ancestry
+_EUMELANIN_STEP = 0.05  # rounding, so that people share colour tables
 _AGE_SPOTS_FROM = 45.0
-_MAX_AGE_FOLDS = 1.0  # of `age` at 90
+_MAX_AGE_FOLDS = 1.0  # `age` of the look at an age of 90
 
 
 @dataclass(frozen=True)
 class SkinLook:
-    """Pigments and texture of a skin.
+    """Pigments and texture of the skin.
 
-    melanin : share of the epidermis' volume that is melanosomes, as a mean over the head, 0 to 1 [-]
-    eumelanin : share of the melanosomes that hold eumelanin, 0 to 1 [-]
-    blood : share of the dermis' volume that is blood, as a mean over the head, 0 to 1 [-]
-    oxygen : share of the haemoglobin that carries oxygen, 0 to 1 [-]
-    redness : how much more blood is where faces are red than elsewhere, 0 to 1; 0.5 is usual [-]
-    freckles : from none to a face full of them, 0 to 1 [-]
-    moles : from none to many, 0 to 1 [-]
-    spots : of age, where the sun shines, 0 to 1 [-]
-    tan : how much darker skin is that the sun has seen than that under clothes, 0 to 1 [-]
-    veins : how much they shine through at temples, lids and neck, 0 to 1 [-]
-    stubble : shadow of the shaved hair of the head, from bald to dark, 0 to 1 [-]
-    recession : how far that hair has left temples, forehead and crown, 0 to 1 [-]
-    beard : shadow of a shaved beard, 0 to 1 [-]
-    oil : how much the skin shines, 0 to 1 [-]
-    age : depth of folds and lines, from youth to old age, 0 to 1 [-]
-    seed : which spots and lines, any integer from 0
+    The epidermis has the default thickness; absorption depends on melanin times thickness.
 
-    The epidermis is as thick as the default skin's; absorption goes with melanin times thickness.
+    Parameters
+    ----------
+    melanin : float
+        Volume fraction of melanosomes in the epidermis, mean over the head, 0 to 1 [-].
+    eumelanin : float
+        Fraction of eumelanin in the melanosomes, 0 to 1 [-].
+    blood : float
+        Volume fraction of blood in the dermis, mean over the head, 0 to 1 [-].
+    oxygen : float
+        Oxygen saturation, 0 to 1 [-].
+    redness : float
+        Additional blood in the naturally red parts of the face, 0 to 1; 0.5 is typical [-].
+    freckles : float
+        Density of freckles, 0 to 1 [-].
+    moles : float
+        Density of moles, 0 to 1 [-].
+    spots : float
+        Density of age spots on parts exposed to the sun, 0 to 1 [-].
+    tan : float
+        Darkening of parts exposed to the sun, 0 to 1 [-].
+    veins : float
+        Visibility of veins at temples, lids and neck, 0 to 1 [-].
+    stubble : float
+        Shadow of the shaved hair of the head, 0 to 1 [-].
+    recession : float
+        Recession of the hair at temples, forehead and crown, 0 to 1 [-].
+    beard : float
+        Shadow of a shaved beard, 0 to 1 [-].
+    oil : float
+        Shininess, 0 to 1 [-].
+    age : float
+        Depth of folds and lines, from youth to old age, 0 to 1 [-].
+    seed : int
+        Seed of the pattern of spots and lines, 0 to 2**32 - 1.
+
+    Raises
+    ------
+    DermisError
+        For values out of range.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.SkinLook(freckles=0.8).freckles
+    0.8
     """
 
     melanin: float = DEFAULT_SKIN.melanin
@@ -72,9 +101,9 @@ class SkinLook:
 
 
 class Demographics(NamedTuple):
-    """What of a person its skin goes with.
+    """Ancestry, sex and age of a person, on which the typical look depends.
 
-    african, asian, caucasian : shares of the ancestries that add up to 1
+    african, asian, caucasian : fractions of the ancestries, with a sum of 1
     sex : 0 female, 1 male
     age : [years]
     """
@@ -86,13 +115,13 @@ class Demographics(NamedTuple):
     age: float
 
     def weighted_mean(self, values: dict[str, float]) -> float:
-        """Of values by ancestry."""
+        """Return the mean of values by ancestry."""
         african, asian, caucasian = (values[name] for name in ("african", "asian", "caucasian"))
         return self.african * african + self.asian * asian + self.caucasian * caucasian
 
 
 def typical_skin(demographics: Demographics) -> SkinLook:
-    """The skin that goes with a person: by ancestry, age and sex."""
+    """Return the typical skin by ancestry, age and sex."""
     old = (demographics.age - YOUNG) / (OLD - YOUNG)
     lines = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD - _AGE_SPOTS_FROM)
     return SkinLook(
@@ -112,7 +141,7 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 
 
 def typical_eyes(demographics: Demographics) -> EyeLook:
-    """The eyes that go with a person: brown, lighter the more of the ancestry is European."""
+    """Return the typical eyes: brown, lighter with more European ancestry."""
     return EyeLook(
         eumelanin=demographics.weighted_mean(_IRIS),
         redness=0.15 + 0.2 * (demographics.age - YOUNG) / (OLD - YOUNG),
@@ -120,7 +149,7 @@ def typical_eyes(demographics: Demographics) -> EyeLook:
 
 
 def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:
-    """Eyes at random around the usual ones: among Europeans of all colours."""
+    """Return random eyes around the typical ones: of all colours for European ancestry."""
     typical = typical_eyes(demographics)
     spread = 0.08 + 0.28 * demographics.caucasian
     eumelanin = _clamp(typical.eumelanin + spread * rng.normal(), 0.0, 1.0)
@@ -129,7 +158,7 @@ def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook
 
 
 def sample_skin(rng: np.random.Generator, demographics: Demographics) -> SkinLook:
-    """A skin at random around the usual one, by numbers that are always drawn in the same order."""
+    """Return random skin around the typical one; random numbers are always drawn in the same order."""
     typical = typical_skin(demographics)
     n = rng.normal(size=8)
     freckled = float(rng.beta(0.4, 3.0)) * (1.0 - min(typical.melanin / 0.1, 1.0))

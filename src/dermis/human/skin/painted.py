@@ -1,4 +1,4 @@
-"""Maps of skin painted by a look, and the mean colours of face and lips."""
+"""Maps of skin painted from a look, and mean colours of face and lips."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.skin_colours import ColourTable, colour_table
 
 LIP_EPIDERMIS_MM = 0.03
-"""What stands over the blood of the lips, which shows through more than elsewhere [mm]."""
-_LOCK = Lock()  # the frame and the painting ask for the same table at the same time
+"""Thickness of the epidermis of the lips, which is thinner than elsewhere [mm]."""
+_LOCK = Lock()  # two threads may request the same table
 MIN_SIDE, MAX_SIDE = 256, 4096
 """Sides of painted maps [texels]."""
 
 
 def skin_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
-    """Colour of skin by its shares of melanin and of blood."""
+    """Return the table of skin colours by fractions of melanin and blood."""
     with _LOCK:
         return _cached_colour_table(eumelanin, oxygen, epidermis_mm)
 
@@ -34,13 +34,13 @@ def _cached_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -
 
 
 def mean_colour(look: SkinLook) -> NDArray[np.float64]:
-    """(3,) colour of the skin of usual places, linear Rec. 709 [-]."""
+    """Return the colour (3,) of skin with mean pigments, linear Rec. 709 [-]."""
     table = skin_colour_table(look.eumelanin, look.oxygen, DEFAULT_SKIN.epidermis_mm)
     return np.asarray(table.read(np.array([look.melanin]), np.array([look.blood]))[0])
 
 
 def face_and_lip_colours(look: SkinLook) -> NDArray[np.float32]:
-    """(2, n, n, 3) colours of the face's skin and of the lips', as `ColourTable` has them."""
+    """Return the colours (2, n, n, 3) of face and lips, laid out as in `ColourTable`."""
     thick = DEFAULT_SKIN.epidermis_mm, LIP_EPIDERMIS_MM
     both = [skin_colour_table(look.eumelanin, look.oxygen, mm).skin_colour_table for mm in thick]
     return np.stack(both).astype(np.float32)
@@ -48,7 +48,7 @@ def face_and_lip_colours(look: SkinLook) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, repr=False)
 class PaintedMaps(Maps):
-    """Maps that the device paints by a look; those that are given replace what it paints.
+    """Maps that the device paints from a look; given maps replace painted ones.
 
     look : pigments and texture of the skin
     """
@@ -58,10 +58,10 @@ class PaintedMaps(Maps):
 
     @property
     def rough(self) -> bool:
-        """Whether the roughness comes from a map: it does."""
+        """Return whether there is a roughness map, which is always painted."""
         return True
 
     @cached_property
     def mean_colour(self) -> NDArray[np.float64] | None:
-        """(3,) of the skin of usual places [-]."""
+        """Return the mean colour (3,) of the skin, linear Rec. 709 [-]."""
         return super().mean_colour if self.colour is not None else mean_colour(self.look)

@@ -1,4 +1,4 @@
-"""The surface that skin is painted on: the average person, on whom every place of the body is known."""
+"""Surface of the average person, on which the patterns of the skin are defined."""
 
 from __future__ import annotations
 
@@ -18,16 +18,19 @@ from dermis.mesh.rig import Stencils
 Floats = NDArray[np.float32]
 
 BORDER_FIELDS = ("lips", "mouth", "lids")
-"""Distances from borders [mm]: of the lips, positive inside; of the mouth, negative inside; of the lids,
-negative where they face the eye."""
+"""Signed distances to borders [mm]: of the lips, positive inside; of the mouth, negative inside; of the
+eyelids, negative on the side of the eye."""
 _UNIT_MM = 0.01
 _LID_DISTANCES_MM = -2.0, -0.6  # of the first columns of lid_rings.csv
-_CREST_LIMITS_MM = 0.15, 0.8  # least and most of the third
+_CREST_LIMITS_MM = 0.15, 0.8  # of the third column
 
 
 @cache
 def average_surface() -> tuple[Floats, Floats]:
-    """(p, 3) the average person's control points, and (p, 3) the fields there, see `BORDER_FIELDS` [mm]."""
+    """Return the average person's control points (p, 3) and their border distances (p, 3) [mm].
+
+    The distances are those listed in `BORDER_FIELDS`.
+    """
     points_mm, fields = _load_array("places"), _load_array("fields")
     rings = lid_rings()
     fields[rings[..., :2], 2] = _LID_DISTANCES_MM
@@ -37,7 +40,7 @@ def average_surface() -> tuple[Floats, Floats]:
 
 @cache
 def lid_rings() -> NDArray[np.int64]:
-    """(2, r, 4) control points of the left and the right eye's lids, see human/lid_rings.csv."""
+    """Return the control points (2, r, 4) of the left and the right eye's lids, see human/lid_rings.csv."""
     left = float_columns(read_rows("dermis.human", "lid_rings"), "wall edge crest skin").astype(np.int64)
     points_mm = _load_array("places")
     mirrored = points_mm[left.ravel()] * np.array([-1.0, 1.0, 1.0], np.float32)
@@ -58,11 +61,11 @@ _LOCK = Lock()
 
 @dataclass(frozen=True, eq=False)
 class PaintedSurface:
-    """A human's triangles of skin, as painted_surface.wgsl reads them.
+    """Skin triangles of a human's mesh, as painted_surface.wgsl reads them.
 
-    vertices : (v, 12) uv, place and normal on the average person, fields, and the binary logarithm of the mm
-        in a unit of uv
-    triangles : (t, 4) corners, and 1 where one of the sides is a chart's border
+    vertices : (v, 12) uv, position and normal on the average person, border distances, and the binary
+        logarithm of the mm per unit of uv
+    triangles : (t, 4) corners, and 1 if a side is the border of a chart
     """
 
     vertices: Floats
@@ -70,14 +73,14 @@ class PaintedSurface:
 
     @property
     def count(self) -> int:
-        """Of the triangles."""
+        """Return the number of triangles."""
         return len(self.triangles)
 
 
 def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
-    """What is painted of a human's mesh; the same for all people with its layout.
+    """Return the skin triangles of a human's mesh; cached, as they are equal for all people with its layout.
 
-    stencils : which its points are refined by, if they are
+    stencils : of the subdivision of its points, if any
     """
     key = mesh.layout_key
     with _LOCK:
@@ -109,7 +112,7 @@ def _build_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
 
 
 def _log_mm_per_uv(uv: Floats, points_mm: Floats, triangles: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(v,) binary logarithm of the mm in a unit of uv around each vertex."""
+    """Return the binary logarithm of the mm per unit of uv around each vertex (v,)."""
     areas = triangle_areas(points_mm[triangles].astype(np.float64))
     a, b, c = (uv[triangles[:, k]].astype(np.float64) for k in range(3))
     ab, ac = b - a, c - a

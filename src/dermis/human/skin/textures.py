@@ -1,4 +1,4 @@
-"""Random textures of skin: noises, scattered dots, and a tile of fine relief."""
+"""Random textures of skin: gradient noises, scattered dots, and a tile of fine relief."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from numpy.typing import NDArray
 
 NoiseSpace = Literal["body", "lip", "level", "ring"]
 NOISE_SPACES: tuple[NoiseSpace, ...] = ("body", "lip", "level", "ring")
-"""What noise is a function of: the place on the body; that with x bent along the creases of the lips; with y
-bent along the lines of the forehead; and the distance from the eye with x and y."""
+"""Domains of noise: position on the body; position with x warped along the creases of the lips; with y warped
+along the lines of the forehead; distance from the eye with x and y."""
 NoiseRegion = Literal["all", "lips", "lines", "furrows", "folds", "veins", "hairline"]
 NOISE_REGIONS: tuple[NoiseRegion, ...] = ("all", "lips", "lines", "furrows", "folds", "veins", "hairline")
-"""Where noise shows: all over, on lips, fine lines, these or folds, folds, veins, or at the hairline."""
+"""Regions of noise: everywhere, lips, fine lines, lines and folds, folds, veins, hairline."""
 _OCTAVE_ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
-"""From each size of a fractal to the next: their lattices never line up."""
+"""Rotation between octaves of a fractal, so that their lattices do not align."""
 _OCTAVE_SCALE = 0.49
 ZONE_BORDER_NOISES = 2
-"""How many of the first noises, of a single octave, bend the borders of zones."""
+"""Number of the first noises, with a single octave, that warp the borders of zones."""
 TILE_SIDE = 512
-"""Of the tile [texels]."""
+"""Side of the tile of fine relief [texel]."""
 TILE_LENGTH_MM = 32.0
-"""Its length on the skin [mm]."""
+"""Length of the tile on the skin [mm]."""
 MAX_HEIGHT_MM = 0.2
-"""Full scale of its heights [mm]."""
+"""Full scale of the heights of the tile [mm]."""
 
 
 class Noise(NamedTuple):
-    """A texture of about -1 to 1, by gradient noise.
+    """Gradient noise with values of about -1 to 1.
 
-    blob_mm : size of its blobs along the three axes of its space [mm]
-    gain, octaves : of a fractal: strength of each size over that of the one before, and how many
-    fades : whether it is left out where texels cannot show it
-    ground : where it shows; elsewhere it is not made
+    feature_mm : size of its features along the axes of its space [mm]
+    gain, octaves : of a fractal sum: ratio of the amplitudes of consecutive octaves, and their number
+    antialiased : whether octaves finer than a texel are left out
+    region : where it is used; it is not evaluated elsewhere
     """
 
     name: str
@@ -60,7 +60,7 @@ def _isotropic(
     return Noise(name, (feature_mm, feature_mm, feature_mm), "body", gain, octaves, antialiased, region)
 
 
-# Artist's values [mm]. Those that bend a space come before the ones in it, and those that bend zones first.
+# Artist's values [mm]. Noises that warp zones come first, and those that warp a space before those in it.
 NOISES = (
     _isotropic("wander-x", 17.0),
     _isotropic("wander-y", 17.0),
@@ -94,11 +94,11 @@ NOISES = (
 
 
 class DotLayer(NamedTuple):
-    """Round soft dots, one in each cell of a lattice at most.
+    """Layer of soft round dots, at most one in each cell of a lattice.
 
     spacing_mm : of the cells [mm]
-    smallest, largest : radius, up to 0.5 [of the spacing]
-    ragged : by how much their edges are bent [mm]
+    min_radius, max_radius : up to 0.5 [fraction of the spacing]
+    edge_warp_mm : amplitude of the noise that distorts the outlines [mm]
     """
 
     name: str
@@ -119,11 +119,11 @@ DOT_LAYERS = (  # artist's values
 
 @cache
 def noise_table() -> NDArray[np.float32]:
-    """(n, 16) a row for each octave of each noise, as spot.wgsl reads it.
+    """Return a row (n, 16) for each octave of each noise, as spot.wgsl reads it.
 
-    Three rows of the matrix from its space to its lattice [1/mm], each with a number behind it: which size of
-    texel shows it [mm], 0 for any; its strength; its seed. Then which noise it belongs to, which space, and
-    where it shows.
+    Three rows of the matrix from the space of the noise to its lattice [1/mm], each followed by one number:
+    the texel size that resolves the octave [mm], 0 for any; its amplitude; its seed. Then indices of the
+    noise, its space and its region.
     """
     rows = list(_octave_rows())
     table = np.zeros((len(rows), 16), np.float32)
@@ -150,13 +150,16 @@ def _octave_rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int
 
 
 def dot_table() -> NDArray[np.float32]:
-    """(d, 4) spacing [mm], radii [of the spacing] and raggedness [mm]."""
+    """Return a row (d, 4) for each layer of dots: spacing [mm], radii and edge warp [mm].
+
+    The radii are fractions of the spacing.
+    """
     return np.array([dots[1:] for dots in DOT_LAYERS], np.float32)
 
 
 @cache
 def detail_heights_mm() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(SIDE, SIDE) heights of pores and of furrows; they go on over the edges [mm]."""
+    """Return the heights (TILE_SIDE, TILE_SIDE) of pores and of furrows, as periodic tiles [mm]."""
     from PIL import Image
 
     file = resources.files("dermis.human").joinpath("data", "detail.png")
@@ -167,7 +170,10 @@ def detail_heights_mm() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 @cache
 def detail_slopes() -> NDArray[np.float32]:
-    """(SIDE, SIDE, 4) slopes of pores along +u and down, and of furrows; it goes on over the edges [-]."""
+    """Return the slopes (TILE_SIDE, TILE_SIDE, 4) of pores along +u and down, and of furrows [-].
+
+    The tile is periodic.
+    """
     heights = np.stack(detail_heights_mm(), axis=-1)
     per_mm = np.float32(TILE_SIDE / TILE_LENGTH_MM / 2)
     across, down = (per_mm * (np.roll(heights, -1, axis) - np.roll(heights, 1, axis)) for axis in (1, 0))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles, Index
-from dermis.base.progress import preparing
+from dermis.base.progress import logged_step
 from dermis.mesh import eyeball
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, globe, plane_mm
@@ -43,7 +43,7 @@ class _Shape(NamedTuple):
     scale: float
 
 
-@preparing("fitting the eyes")
+@logged_step("fitting the eyes")
 def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | None = None) -> Head:
     """The head with the package's eyes where its file calls something eyes that is two balls.
 

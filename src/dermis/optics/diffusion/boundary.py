@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
-Diffuse = Literal["polynomial", "exact"]
+DiffuseIntegral = Literal["polynomial", "exact"]
 
 
 def normal_reflectance(eta: float) -> float:
-    """Share of perpendicular light that the surface reflects [-]."""
+    """Return the Fresnel reflectance at normal incidence [-]."""
     return ((eta - 1.0) / (eta + 1.0)) ** 2
 
 
 def fresnel(cosine: ArrayLike, eta: float) -> Floats:
-    """Reflectance of unpolarised light by incident cosine [-].
+    """Return the Fresnel reflectance of unpolarised light by incident cosine [-].
 
     cosine : of the angle of incidence, 0 to 1
-    eta : index of the far side over that of the near side; under 1 for light on its way out
+    eta : index of the far side over that of the near side; less than 1 for light that leaves the medium
 
     Source: [Born1999] section 1.5.
     """
@@ -35,7 +35,7 @@ def fresnel(cosine: ArrayLike, eta: float) -> Floats:
 
 @cache
 def internal_moment(order: int, eta: float, nodes: int = 64) -> float:
-    """Moment of the internal reflectance: integral of F(mu) mu^order over cosines 0 to 1 [-].
+    """Return the moment of the internal reflectance: integral of F(mu) mu^order over cosines 0 to 1 [-].
 
     Source: [dEonIrving2011] section 3.
     """
@@ -43,17 +43,17 @@ def internal_moment(order: int, eta: float, nodes: int = 64) -> float:
         return 0.0
     critical = np.sqrt(1.0 - 1.0 / eta**2)
     x, w = np.polynomial.legendre.leggauss(nodes)
-    # F has a square-root edge at the critical angle; substituting the transmitted cosine removes it.
+    # F has a square-root singularity at the critical angle; substituting the transmitted cosine removes it.
     t = 0.5 * (x + 1.0)
     mu = np.sqrt(critical**2 + (t / eta) ** 2)
     inside = fresnel(np.minimum(mu, 1.0), 1.0 / eta) * mu**order * t / (eta**2 * mu)
     return float(critical ** (order + 1) / (order + 1) + 0.5 * w @ inside)
 
 
-def diffuse_reflectance(eta: float, kind: Diffuse = "polynomial") -> float:
-    """Share of diffuse light that the surface reflects back inside, F_dr [-].
+def diffuse_reflectance(eta: float, kind: DiffuseIntegral = "polynomial") -> float:
+    """Return the internal reflectance of the surface for diffuse light, F_dr [-].
 
-    kind : the polynomial that the published models use, or the exact integral
+    kind : the polynomial used by the published models, or the exact integral
 
     Source: [Egan1973]; as printed in [Jensen2001].
     """
@@ -64,8 +64,8 @@ def diffuse_reflectance(eta: float, kind: Diffuse = "polynomial") -> float:
     return -1.4399 / eta**2 + 0.7099 / eta + 0.6681 + 0.0636 * eta
 
 
-def mismatch(eta: float, kind: Diffuse = "polynomial") -> float:
-    """Factor A = (1 + F_dr) / (1 - F_dr) of the diffusion boundary condition; 1 when matched [-].
+def boundary_mismatch(eta: float, kind: DiffuseIntegral = "polynomial") -> float:
+    """Return A = (1 + F_dr) / (1 - F_dr) of the diffusion boundary condition; 1 if index-matched [-].
 
     Source: [Jensen2001] section 2.3.
     """

@@ -1,7 +1,7 @@
-"""Diffusion through a stack with fluence and flux continuous at each interface.
+"""Diffusion in layered media, with continuous fluence and flux at each interface.
 
-In the Hankel domain each layer obeys D phi'' - D q^2 phi = -S(z). From the bottom up the recursion carries
-the boundary condition that all layers below impose: D phi' = W - Z phi at the lower face.
+In the Hankel domain each layer satisfies D phi'' - D q^2 phi = -S(z). A recursion from bottom to top
+propagates the boundary condition imposed by all layers below: D phi' = W - Z phi at the lower face.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from dermis.optics.media import Floats, Layer, Medium
 Source = Literal["beam", "point"]
 
 
-class _Sheet(NamedTuple):
-    """A layer, or the part of one above or below a point source."""
+class _Sublayer(NamedTuple):
+    """Layer, or the part of a layer above or below a point source."""
 
     layer: Layer
     thickness_mm: float | Floats
-    beam: Floats  # what is left of the light where the sheet begins
-    point: Floats  # power of a point source on its lower face
+    beam: Floats  # fraction of the unscattered beam at its upper face
+    point: Floats  # power of the point source on its lower face
 
 
 class _Face(NamedTuple):
@@ -31,8 +31,11 @@ class _Face(NamedTuple):
     W: Floats
 
 
-class _Passage(NamedTuple):
-    """What carries the fluence from a sheet's upper to its lower face; all 0 below which nothing is."""
+class _Descent(NamedTuple):
+    """Coefficients that give the fluence at the lower face of a sublayer from that at its upper face.
+
+    All are 0 for the semi-infinite sublayer at the bottom.
+    """
 
     E: Floats | float = 0.0
     rho: Floats | float = 0.0
@@ -45,99 +48,103 @@ class _Passage(NamedTuple):
         return np.asarray(fluence * across + (self.beta * (1.0 - self.E * across) + self.lower))
 
 
-def respond(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> tuple[Floats, Floats]:
-    """Hankel transforms of R(r) and T(r) per power that entered, (n, c) each, by frequency s > 0 [-].
+def solve(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> tuple[Floats, Floats]:
+    """Return the Hankel transforms of R(r) and T(r) at frequencies s > 0, (n, c) each [-].
 
-    A : boundary mismatch against the air; inner faces are index-matched [-]
-    source : "beam" has light scatter first all along the beam: R(r) grows like a logarithm at its centre;
-        "point" puts it all one mean free path deep: R(r) is finite
+    R(r) and T(r) are per power that enters.
+
+    A : boundary mismatch with air; internal interfaces are index-matched [-]
+    source : "beam" distributes first scattering along the beam, with a logarithmic singularity of R(r) at its
+        centre; "point" puts it one mean free path deep, with finite R(r)
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
-    return _respond(frequency, _sheets(medium, source), medium.channels, A)
+    return _solve_sublayers(frequency, _sublayers(medium, source), medium.channels, A)
 
 
-def reflect(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> Floats:
-    """The first of `respond` alone, in less time."""
-    return _climbed(frequency, _sheets(medium, source), medium.channels, A)[0] / (2.0 * A)
+def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> Floats:
+    """Return the transform of R(r) of `solve`, without computing that of T(r)."""
+    return _solve_upwards(frequency, _sublayers(medium, source), medium.channels, A)[0] / (2.0 * A)
 
 
-def respond_sheets(
+def solve_thicknesses(
     frequency: ArrayLike, layer: Layer, thickness_mm: Floats, A: float
 ) -> tuple[Floats, Floats]:
-    """`respond` of layers that are as thick as n numbers say, each by itself: (n, m, c) by m frequencies."""
+    """Return `solve` of single layers of n thicknesses, (n, m, c) at m frequencies."""
     ones = np.ones(len(layer.sigma_a))
-    sheet = _Sheet(layer, thickness_mm[:, None, None], ones, np.zeros_like(ones))
-    return _respond(frequency, [sheet], len(ones), A)
+    sublayer = _Sublayer(layer, thickness_mm[:, None, None], ones, np.zeros_like(ones))
+    return _solve_sublayers(frequency, [sublayer], len(ones), A)
 
 
-def _respond(frequency: ArrayLike, sheets: list[_Sheet], channels: int, A: float) -> tuple[Floats, Floats]:
-    """`respond` of sheets, topmost first."""
-    fluence, passages = _climbed(frequency, sheets, channels, A)
+def _solve_sublayers(
+    frequency: ArrayLike, sublayers: list[_Sublayer], channels: int, A: float
+) -> tuple[Floats, Floats]:
+    """Return `solve` of sublayers, topmost first."""
+    fluence, descents = _solve_upwards(frequency, sublayers, channels, A)
     R = fluence / (2.0 * A)
-    for passage in passages:
-        fluence = passage.down(fluence)
+    for descent in descents:
+        fluence = descent.down(fluence)
     return R, fluence / (2.0 * A)
 
 
-def _climbed(
-    frequency: ArrayLike, sheets: list[_Sheet], channels: int, A: float
-) -> tuple[Floats, list[_Passage]]:
-    """The fluence on top, and the ways down through the sheets."""
+def _solve_upwards(
+    frequency: ArrayLike, sublayers: list[_Sublayer], channels: int, A: float
+) -> tuple[Floats, list[_Descent]]:
+    """Return the fluence at the surface, and the coefficients for the way down through the sublayers."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channels))
-    face, passages = _Face(zero + 1.0 / (2.0 * A), zero), list[_Passage]()
-    for sheet in reversed(sheets):
-        face, passage = _climb(s, sheet, face)
-        passages.insert(0, passage)
-    return np.asarray(2.0 * A * face.W / (1.0 + 2.0 * A * face.Z)), passages
+    face, descents = _Face(zero + 1.0 / (2.0 * A), zero), list[_Descent]()
+    for sublayer in reversed(sublayers):
+        face, descent = _propagate_up(s, sublayer, face)
+        descents.insert(0, descent)
+    return np.asarray(2.0 * A * face.W / (1.0 + 2.0 * A * face.Z)), descents
 
 
-def _climb(s: Floats, sheet: _Sheet, below: _Face) -> tuple[_Face, _Passage]:
-    """The condition at a sheet's upper face from that at its lower one."""
-    layer, d = sheet.layer, sheet.thickness_mm
+def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, _Descent]:
+    """Return the boundary condition at a sublayer's upper face from that at its lower face."""
+    layer, d = sublayer.layer, sublayer.thickness_mm
     D, sigma_t = layer.D, layer.sigma_t_prime
     q = np.sqrt(layer.sigma_tr**2 + s**2)
-    source = layer.sigma_s_prime * sheet.beam / D
-    slope = source / (sigma_t + q)  # of a particular solution that is 0 at the upper face
+    source = layer.sigma_s_prime * sublayer.beam / D
+    slope = source / (sigma_t + q)  # of the particular solution that is 0 at the upper face
     if np.all(np.isinf(d)):
-        return _Face(D * q, D * slope), _Passage()
+        return _Face(D * q, D * slope), _Descent()
     E = np.exp(-q * d)
     gap = np.abs(sigma_t - q)
     near = np.where(gap * d < 1e-8, d, -np.expm1(-gap * d) / np.where(gap > 0.0, gap, 1.0))
     lower = source * np.exp(-np.minimum(q, sigma_t) * d) * near / (sigma_t + q)
     lower_slope = slope * E - sigma_t * lower
     rho = (D * q - below.Z) / (D * q + below.Z)
-    W = below.W + sheet.point  # a source on the face makes the flux jump
+    W = below.W + sublayer.point  # the flux jumps at a source on the face
     beta = (W - below.Z * lower - D * lower_slope) / (D * q + below.Z)
     common = 1.0 / (1.0 + E**2 * rho)
     face = _Face(D * q * (1.0 - E**2 * rho) * common, 2.0 * D * q * beta * E * common + D * slope)
     # phi at the lower face is a E + b + P, with a = (phi0 - beta E) common and b = a E rho + beta.
-    return face, _Passage(E, rho, common, beta, lower)
+    return face, _Descent(E, rho, common, beta, lower)
 
 
-def _sheets(medium: Medium, source: Source) -> list[_Sheet]:
-    return list(_beam(medium) if source == "beam" else _split(medium))
+def _sublayers(medium: Medium, source: Source) -> list[_Sublayer]:
+    return list(_beam_sublayers(medium) if source == "beam" else _point_sublayers(medium))
 
 
-def _beam(medium: Medium) -> Iterator[_Sheet]:
+def _beam_sublayers(medium: Medium) -> Iterator[_Sublayer]:
     depth = np.zeros(medium.channels)
     for layer in medium.layers:
-        yield _Sheet(layer, layer.thickness_mm, np.exp(-depth), np.zeros(medium.channels))
+        yield _Sublayer(layer, layer.thickness_mm, np.exp(-depth), np.zeros(medium.channels))
         depth = depth + layer.sigma_t_prime * layer.thickness_mm
 
 
-def _split(medium: Medium) -> Iterator[_Sheet]:
-    """The layers, each in two sheets; a source lies where the beam's optical depth is one."""
+def _point_sublayers(medium: Medium) -> Iterator[_Sublayer]:
+    """Yield each layer in two sublayers; the source is where the beam's optical depth is one."""
     depth = np.zeros(medium.channels)
-    nothing = np.zeros(medium.channels)
+    zero = np.zeros(medium.channels)
     for i, layer in enumerate(medium.layers):
         d, sigma_t = layer.thickness_mm, layer.sigma_t_prime
         deep = depth + sigma_t * d >= 1.0
-        # A slab thinner than that has its source in the middle of its last layer, rather than nowhere.
+        # A thinner slab has its source in the middle of its last layer.
         here = (depth < 1.0) & (deep | (i == len(medium.layers) - 1))
         middle = 0.5 * d if np.isfinite(d) else 1.0
         above = np.where(here & deep, (1.0 - depth) / sigma_t, middle)
-        yield _Sheet(layer, above, nothing, np.where(here, layer.alpha_prime, 0.0))
-        yield _Sheet(layer, d - above, nothing, nothing)
+        yield _Sublayer(layer, above, zero, np.where(here, layer.alpha_prime, 0.0))
+        yield _Sublayer(layer, d - above, zero, zero)
         depth = depth + sigma_t * d

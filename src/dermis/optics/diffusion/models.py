@@ -1,4 +1,4 @@
-"""A medium's diffusion profile under each diffusion model, and known errors of the models."""
+"""Diffusion profiles of media by model, and known errors of the models."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.base.errors import refuse
-from dermis.base.tables import numbers, read_rows
+from dermis.base.tables import float_columns, read_rows
 from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
-from dermis.optics.diffusion.boundary import mismatch, normal_reflectance
+from dermis.optics.diffusion.boundary import boundary_mismatch, normal_reflectance
 from dermis.optics.diffusion.multipole import Clamp
-from dermis.optics.fits.targets import Rings
+from dermis.optics.fits.targets import RingTarget
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats, Medium
 from dermis.optics.radial import (
-    NOTABLE_SHARE,
+    NOTABLE_FRACTION,
     TINY,
     RadialProfile,
-    enclosed,
-    light_beyond,
+    enclosed_energy,
+    missing_light_warnings,
     radius_grid,
     resample,
     ring_edges,
@@ -38,28 +38,28 @@ SOURCES: dict[Model, tuple[str, ...]] = {
     "layered": ("Kienle1998", "Farrell1992", "Haskell1994"),
     "layered-point": ("Kienle1998", "Haskell1994"),
 }
-_ABSORBING = 0.9  # reduced albedo under which the dipole is off by more than a tenth
-_NOTABLE_NEGATIVE = 0.005  # of the total
+_ABSORBING = 0.9  # reduced albedo below which the error of the dipole exceeds 10 %
+_NOTABLE_NEGATIVE = 0.005  # fraction of the total
 
 
 def diffusion_profile(
     medium: Medium, model: Model = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
 ) -> RadialProfile:
-    """R(r) of a medium.
+    """Return R(r) of a medium by a diffusion model.
 
     medium : stack of layers
-    model : "dipole" and "better-dipole" take one half-space; the others take any stack
-    clamp : where the multipole puts the source of a thin layer
-    rgb : (3, c) weights from wavelengths to linear Rec. 709; the result then has three channels, per
-        incident power
+    model : "dipole" and "better-dipole" require one half-space; the others accept any stack
+    clamp : position of the multipole's source in thin layers
+    rgb : (3, c) weights from wavelengths to linear Rec. 709; the result then has three channels, per incident
+        power
 
-    Raises DermisError when the model cannot take the medium.
+    Raises DermisError when the model is not valid for the medium.
 
     Source: see `SOURCES`.
     """
-    grid, values, total = _spread(medium, model, clamp, rgb)
+    grid, values, total = _sampled_profile(medium, model, clamp, rgb)
     edges, radius = ring_edges(), radius_grid()
-    ring_energy = np.diff(enclosed(edges, grid, values), axis=0)
+    ring_energy = np.diff(enclosed_energy(edges, grid, values), axis=0)
     return RadialProfile(
         name=medium.name,
         model=model,
@@ -69,89 +69,95 @@ def diffusion_profile(
         edges_mm=edges,
         ring_energy=ring_energy,
         incident=rgb is not None,
-        warnings=(*_doubts(medium, model, clamp), *_flaws(total, ring_energy)),
+        warnings=(*_medium_warnings(medium, model, clamp), *_result_warnings(total, ring_energy)),
         sources=(*medium.sources, *SOURCES[model]),
     )
 
 
 def diffusion_rings(
     medium: Medium, model: Model = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
-) -> Rings:
-    """The rings of `diffusion_profile` alone, for fits of many media."""
-    grid, values, total = _spread(medium, model, clamp, rgb)
+) -> RingTarget:
+    """Return the ring energies of `diffusion_profile` alone, for fits of many media."""
+    grid, values, total = _sampled_profile(medium, model, clamp, rgb)
     edges = ring_edges()
-    return Rings(edges, np.diff(enclosed(edges, grid, values), axis=0), total)
+    return RingTarget(edges, np.diff(enclosed_energy(edges, grid, values), axis=0), total)
 
 
-def _spread(medium: Medium, model: Model, clamp: Clamp, rgb: Floats | None) -> tuple[Floats, Floats, Floats]:
-    """Radii (n,) [mm], R(r) there (n, c) [1/mm2] and its total (c,) [-]."""
+def _sampled_profile(
+    medium: Medium, model: Model, clamp: Clamp, rgb: Floats | None
+) -> tuple[Floats, Floats, Floats]:
+    """Return radii (n,) [mm], R(r) at these radii (n, c) [1/mm2], and the total reflectance (c,) [-]."""
     if model in ("dipole", "better-dipole"):
-        _need_half_space(medium, model)
-    closed = rgb is None and len(medium.layers) == 1 and model in ("dipole", "multipole")
-    if closed or model == "better-dipole":
+        _check_half_space(medium, model)
+    closed_form = rgb is None and len(medium.layers) == 1 and model in ("dipole", "multipole")
+    if closed_form or model == "better-dipole":
         grid = np.geomspace(1e-6, 1e3, 1500)
-        values = _pointwise(medium, model, clamp, grid)
+        values = _closed_form(medium, model, clamp, grid)
         values = values if rgb is None else values @ rgb.T
     else:
         grid = hankel.radii()
-        spread = transform(medium, model, clamp, hankel.frequencies())
-        values = hankel.to_radius(spread if rgb is None else spread @ rgb.T)
+        transform = hankel_transform(medium, model, clamp, hankel.frequencies())
+        values = hankel.inverse_transform(transform if rgb is None else transform @ rgb.T)
     if model == "better-dipole":
-        total = enclosed(grid[-1:], grid, values)[0]
+        total = enclosed_energy(grid[-1:], grid, values)[0]
     else:
-        total = transform(medium, model, clamp, hankel.STILL)[0]
+        total = hankel_transform(medium, model, clamp, hankel.ZERO_FREQUENCY)[0]
     if rgb is not None:
         entering = 1.0 - normal_reflectance(medium.eta)
         values, total = entering * values, entering * total @ rgb.T
-    near = (grid > 1e-7) & (grid < 1e3)  # beyond, the numbers are noise
-    return grid[near], values[near], total
+    inside = (grid > 1e-7) & (grid < 1e3)  # the rest is numerical noise
+    return grid[inside], values[inside], total
 
 
-def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> Floats:
-    """Hankel transform of R(r) by frequency s > 0 [1/mm], (n, c) [-]."""
+def hankel_transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> Floats:
+    """Return the Hankel transform of R(r) at frequencies s > 0 [1/mm], (n, c) [-]."""
     if model in ("layered", "layered-point"):
-        A = mismatch(medium.eta, "exact")
+        A = boundary_mismatch(medium.eta, "exact")
         source: layered_diffusion.Source = "beam" if model == "layered" else "point"
-        return layered_diffusion.reflect(frequency, medium, A, source)
-    return multipole.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
+        return layered_diffusion.solve_reflectance(frequency, medium, A, source)
+    return multipole.stack_response(frequency, medium, boundary_mismatch(medium.eta), clamp).R_above
 
 
-def _need_half_space(medium: Medium, model: Model) -> None:
+def _check_half_space(medium: Medium, model: Model) -> None:
     if len(medium.layers) > 1 or not medium.semi_infinite:
         last = f"the last {medium.layers[-1].thickness_mm:g} mm thick"
-        came = f"{medium.name} has {len(medium.layers)} layers, {last}"
-        refuse(f"model {model}", "one semi-infinite layer", came, "Take the model multipole or layered")
+        actual = f"{medium.name} has {len(medium.layers)} layers, {last}"
+        refuse(f"model {model}", "one semi-infinite layer", actual, "Use the model multipole or layered")
 
 
-def _pointwise(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) -> Floats:
+def _closed_form(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) -> Floats:
     layer = medium.layers[0]
     if model == "better-dipole":
-        return dipole.better_reflectance(radius_mm, layer, medium.eta)
+        return dipole.better_dipole_reflectance(radius_mm, layer, medium.eta)
     if model == "dipole":
-        return dipole.reflectance(radius_mm, layer, mismatch(medium.eta))
-    return multipole.reflectance(radius_mm, multipole.slabs_of(medium, mismatch(medium.eta), clamp)[0])
+        return dipole.reflectance(radius_mm, layer, boundary_mismatch(medium.eta))
+    return multipole.reflectance(
+        radius_mm, multipole.layer_slabs(medium, boundary_mismatch(medium.eta), clamp)[0]
+    )
 
 
-def _doubts(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
-    """Warnings of what in the medium the model handles badly."""
-    found = []
+def _medium_warnings(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
+    """Return warnings about properties of the medium for which the model is inaccurate."""
+    warnings = []
     for number, layer in enumerate(medium.layers, 1):
         thin = layer.thickness_mm < layer.mean_free_path_mm
         if model == "multipole" and thin.any():
-            lost = "its source lies below it, light is lost"
-            what = lost if clamp == "none" else "its source is moved into it"
-            found.append(f"layer {number} ({layer.name}) is thinner than a reduced mean free path: {what}")
-    worst = float(_early_albedo(medium).min())
+            lost = "its source is below it and light is lost"
+            effect = lost if clamp == "none" else "its source is moved into it"
+            warnings.append(
+                f"layer {number} ({layer.name}) is thinner than a reduced mean free path: {effect}"
+            )
+    worst = float(_first_event_albedo(medium).min())
     if worst < _ABSORBING:
-        found.append(
+        warnings.append(
             f"the first mean free path absorbs (reduced albedo down to {worst:.2f}): at 0.5 the total of "
-            "layered diffusion is off by 14 %, the dipole's by 37 %"
+            "layered diffusion has an error of 14 %, that of the dipole 37 %"
         )
-    return found
+    return warnings
 
 
-def _early_albedo(medium: Medium) -> Floats:
-    """Share of the beam's first events within a mean free path that scatter it, (c,) [-]."""
+def _first_event_albedo(medium: Medium) -> Floats:
+    """Return the fraction of first events within one mean free path that are scattering, (c,) [-]."""
     depth, scattered = np.zeros(medium.channels), np.zeros(medium.channels)
     for layer in medium.layers:
         events = np.minimum(layer.sigma_t_prime * layer.thickness_mm, 1.0 - depth)
@@ -159,29 +165,29 @@ def _early_albedo(medium: Medium) -> Floats:
     return scattered / depth
 
 
-def _flaws(total: Floats, ring_energy: Floats) -> Sequence[str]:
-    """Warnings of what in the result is unphysical, or missing from the rings."""
-    found = light_beyond(total, ring_energy)
+def _result_warnings(total: Floats, ring_energy: Floats) -> Sequence[str]:
+    """Return warnings about unphysical results and light missing from the rings."""
+    warnings = missing_light_warnings(total, ring_energy)
     if (total < 0.0).any():
-        found.append(f"a total reflectance is negative: {np.round(total, 4).tolist()}")
+        warnings.append(f"a total reflectance is negative: {np.round(total, 4).tolist()}")
     size = np.maximum(np.abs(total), TINY)
     negative = float((-np.minimum(ring_energy, 0.0).sum(axis=0) / size).max())
     if negative > _NOTABLE_NEGATIVE:
-        found.append(
+        warnings.append(
             f"R(r) is negative at some radii, {negative:.1%} of a channel's total: layers too thin for the "
-            "model, or colours outside Rec. 709. No Gaussian follows it there"
+            "model, or colours outside Rec. 709. No sum of Gaussians fits it there"
         )
     surplus = float(((ring_energy.sum(axis=0) - total) / size).max())
-    if surplus > NOTABLE_SHARE:
-        found.append(f"R(r) holds {surplus:.0%} more light than the total: it is finer than its numbers")
-    return found
+    if surplus > NOTABLE_FRACTION:
+        warnings.append(f"R(r) has {surplus:.0%} more light than the total: its radii are too coarse")
+    return warnings
 
 
-def through_gaussians(profile: GaussianSum, thickness_mm: ArrayLike) -> Floats:
-    """What the profile itself lets through from an evenly lit far side, (n, 3) [-].
+def gaussian_transmittance(profile: GaussianSum, thickness_mm: ArrayLike) -> Floats:
+    """Return the transmittance of a slab lit uniformly from behind, by its profile alone, (n, 3) [-].
 
-    A Gaussian at a distance of sqrt(r^2 + d^2) is exp(-d^2 / 2v) G(v, r), v being the variance: each weight
-    falls by that factor.
+    At a distance of sqrt(r^2 + d^2), a Gaussian G(v, r) of variance v is exp(-d^2 / 2v) G(v, r): each weight
+    is reduced by this factor.
 
     Source: [dEonLuebke2007] section 14.5.
     """
@@ -189,48 +195,52 @@ def through_gaussians(profile: GaussianSum, thickness_mm: ArrayLike) -> Floats:
     return np.asarray(np.exp(-(d**2) / (2.0 * profile.variance_mm2)) @ profile.weight)
 
 
-def through_slab(
+def slab_transmittance(
     medium: Medium, thickness_mm: ArrayLike, model: Literal["layered", "multipole"] = "layered"
 ) -> Floats:
-    """Transmittance of the medium cut at each thickness, per power that enters, (n, c) [-].
+    """Return the transmittance of slabs of a medium by thickness, per power that enters, (n, c) [-].
 
-    model : layered diffusion lets what meets no event pass, by the reduced extinction; the multipole
-        scatters all light at one depth, and errs where a cut leaves a layer thinner than a mean free path
+    model : layered diffusion includes unscattered light, attenuated by the reduced extinction; the multipole
+        scatters all light at one depth, and is inaccurate for layers thinner than a mean free path
 
     Source: [DonnerJensen2005] eq. 7, 8 for the multipole.
     """
-    found = []
+    transmittances = []
     for thickness in np.atleast_1d(np.asarray(thickness_mm, dtype=np.float64)):
-        slab = cut(medium, float(thickness))
+        slab = truncated_medium(medium, float(thickness))
         if model == "layered":
             depth = sum(layer.sigma_t_prime * layer.thickness_mm for layer in slab.layers)
-            straight = (1.0 - normal_reflectance(medium.eta)) * np.exp(-depth)
-            diffuse = layered_diffusion.respond(hankel.STILL, slab, mismatch(medium.eta, "exact"))[1][0]
-            found.append(diffuse + straight)
+            unscattered = (1.0 - normal_reflectance(medium.eta)) * np.exp(-depth)
+            diffuse = layered_diffusion.solve(
+                hankel.ZERO_FREQUENCY, slab, boundary_mismatch(medium.eta, "exact")
+            )[1][0]
+            transmittances.append(diffuse + unscattered)
         else:
-            found.append(multipole.respond(hankel.STILL, slab, mismatch(medium.eta)).T_down[0])
-    return np.stack(found)
+            transmittances.append(
+                multipole.stack_response(hankel.ZERO_FREQUENCY, slab, boundary_mismatch(medium.eta)).T_down[0]
+            )
+    return np.stack(transmittances)
 
 
-def cut(medium: Medium, thickness_mm: float) -> Medium:
-    """The medium's upper part, or all of it if it is thinner, with air below [mm]."""
+def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
+    """Return the upper part of a medium down to a depth [mm], with air below; all of it if it is thinner."""
     if not 0.0 < thickness_mm < np.inf:
-        refuse("thickness", "a length above 0 mm", f"{thickness_mm:g} came", "Correct it")
-    kept, left = [], thickness_mm
+        refuse("thickness", "a length above 0 mm", f"got {thickness_mm:g}", "Correct it")
+    layers, remaining_mm = [], thickness_mm
     for layer in medium.layers:
-        kept.append(replace(layer, thickness_mm=min(layer.thickness_mm, left)))
-        left -= layer.thickness_mm
-        if left <= 0.0:
+        layers.append(replace(layer, thickness_mm=min(layer.thickness_mm, remaining_mm)))
+        remaining_mm -= layer.thickness_mm
+        if remaining_mm <= 0.0:
             break
-    return replace(medium, layers=tuple(kept))
+    return replace(medium, layers=tuple(layers))
 
 
 @dataclass(frozen=True)
 class ModelError:
-    """Error of a model in the light that leaves through rings, against photons [-].
+    """Error of a model in the ring energies, relative to Monte Carlo [-].
 
-    least, most : (3,) for red, green and blue; the same where it was measured on the tissue itself
-    tissues : what it was measured on
+    least, most : (3,) smallest and largest error over the tissues, in red, green and blue
+    tissues : on which the error was measured
     """
 
     least: Floats
@@ -239,28 +249,28 @@ class ModelError:
 
 
 def known_error(model: str, tissue: str = "") -> ModelError | None:
-    """The error of a model on a tissue, or over all that it was measured on; None for one that never was.
+    """Return the error of a model for a tissue, or over all measured tissues; None if it was never measured.
 
-    tissue : its name, empty for any
+    tissue : name of a tissue, empty for any
     """
-    found = {name: error for (name, of), error in _table().items() if of == model}
-    if tissue in found:
-        found = {tissue: found[tissue]}
-    if not found:
+    by_tissue = {name: error for (name, key), error in _error_table().items() if key == model}
+    if tissue in by_tissue:
+        by_tissue = {tissue: by_tissue[tissue]}
+    if not by_tissue:
         return None
-    errors = np.array(list(found.values()))
-    return ModelError(errors.min(axis=0), errors.max(axis=0), tuple(found))
+    errors = np.array(list(by_tissue.values()))
+    return ModelError(errors.min(axis=0), errors.max(axis=0), tuple(by_tissue))
 
 
-def counted_error(radial: RadialProfile, photons: RadialProfile) -> ModelError:
-    """The error of a profile by photons counted for it."""
-    miss = ((radial.ring_energy - photons.ring_energy) ** 2).sum(axis=0)
-    error = np.sqrt(miss / (photons.ring_energy**2).sum(axis=0))
+def error_against_photons(radial: RadialProfile, photons: RadialProfile) -> ModelError:
+    """Return the error of a profile relative to photon counts of the same tissue."""
+    squares = ((radial.ring_energy - photons.ring_energy) ** 2).sum(axis=0)
+    error = np.sqrt(squares / (photons.ring_energy**2).sum(axis=0))
     return ModelError(error, error, (radial.name,))
 
 
 @cache
-def _table() -> dict[tuple[str, str], Floats]:
+def _error_table() -> dict[tuple[str, str], Floats]:
     rows = read_rows("dermis.optics.data", "model_errors")
-    errors = numbers(rows, "red green blue")
+    errors = float_columns(rows, "red green blue")
     return {(row["tissue"], row["model"]): error for row, error in zip(rows, errors, strict=True)}

@@ -1,1 +1,1 @@
-"""Fits of diffusion profiles: sums of Gaussians, Burley's curve and separable kernels."""
+"""Fits of diffusion profiles: sums of Gaussians, Burley's profile and separable kernels."""

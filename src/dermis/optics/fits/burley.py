@@ -1,4 +1,4 @@
-"""The profile of two exponentials that other renderers use, fitted, and in their parameters."""
+"""Burley's profile of two exponentials: fits, and parameters for Unity and Unreal Engine."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.base.errors import refuse
-from dermis.optics.fits.targets import Rings, ring_error
+from dermis.optics.fits.targets import RingTarget, ring_error
 from dermis.optics.media import Floats
 
-_HALF = 1.58  # s r within which half of the light leaves
-_UNITY_SHARE = 0.997
+_HALF_LIGHT = 1.58  # s r within which half of the light leaves
+_UNITY_FRACTION = 0.997
 UNREAL_FACTOR = 0.6
-_UNREAL_SHORTEST_CM = 0.1
+_UNREAL_MIN_DISTANCE_CM = 0.1
 
 
 @dataclass(frozen=True)
 class BurleyProfile:
-    """R(r) = A s (exp(-s r) + exp(-s r / 3)) / (8 pi r).
+    """Diffusion profile R(r) = A s (exp(-s r) + exp(-s r / 3)) / (8 pi r).
 
     albedo : (c,) A, total reflectance [-]
     shape : (c,) s [1/mm]
@@ -31,31 +31,32 @@ class BurleyProfile:
     shape: Floats
 
     def radiant_exitance(self, radius_mm: ArrayLike) -> Floats:
-        """R at distances r > 0 from a pencil of unit power, shape (..., c) [1/mm2]."""
+        """Return R at distances r > 0 from a narrow beam of unit power, (..., c) [1/mm2]."""
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         sr = self.shape * r
         return np.asarray(self.albedo * self.shape * (np.exp(-sr) + np.exp(-sr / 3.0)) / (8.0 * np.pi * r))
 
-    def within(self, radius_mm: ArrayLike) -> Floats:
-        """Share of the light that leaves within distances r, shape (..., c) [-]."""
+    def energy_within(self, radius_mm: ArrayLike) -> Floats:
+        """Return the light that emerges within distances r, (..., c) [-]."""
         sr = self.shape * np.asarray(radius_mm, dtype=np.float64)[..., None]
         return np.asarray(-self.albedo * (np.expm1(-sr) + 3.0 * np.expm1(-sr / 3.0)) / 4.0)
 
     def hankel(self, frequency: ArrayLike) -> Floats:
-        """Integral of 2 pi r R(r) J0(k r) by frequency k [1/mm], shape (..., c) [-]."""
+        """Return the integral of 2 pi r R(r) J0(k r) at frequencies k [1/mm], (..., c) [-]."""
         k = np.asarray(frequency, dtype=np.float64)[..., None]
         s = self.shape
         return np.asarray(self.albedo * s / 4.0 * (1.0 / np.hypot(s, k) + 1.0 / np.hypot(s / 3.0, k)))
 
-    def radius_of(self, share: float) -> Floats:
-        """Radius within which a share of what leaves does leave, (c,) [mm]."""
-        # With t = exp(-s r / 3) what is outside is (t^3 + 3 t) / 4, a cubic that a hyperbolic sine solves.
-        t = 2.0 * np.sinh(np.arcsinh(2.0 * (1.0 - share)) / 3.0)
+    def radius_at_fraction(self, fraction: float) -> Floats:
+        """Return the radius within which a fraction of the emerging light leaves, (c,) [mm]."""
+        # With t = exp(-s r / 3), the fraction outside r is (t^3 + 3 t) / 4; a hyperbolic sine solves this
+        # cubic.
+        t = 2.0 * np.sinh(np.arcsinh(2.0 * (1.0 - fraction)) / 3.0)
         return np.asarray(-3.0 * np.log(t) / self.shape)
 
 
 def shape_factor(albedo: ArrayLike) -> Floats:
-    """s times the mean free path, for light that comes in perpendicularly [-].
+    """Return s times the mean free path for perpendicular incidence [-].
 
     albedo : total reflectance A
 
@@ -66,7 +67,7 @@ def shape_factor(albedo: ArrayLike) -> Floats:
 
 
 def shape_factor_diffuse(albedo: ArrayLike) -> Floats:
-    """s times the diffuse mean free path on the surface, 1 / sigma_tr [-].
+    """Return s times the diffuse mean free path on the surface, 1 / sigma_tr [-].
 
     albedo : total reflectance A
 
@@ -78,10 +79,10 @@ def shape_factor_diffuse(albedo: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class BurleyFit:
-    """A profile of two exponentials and how well it fits.
+    """Fit of Burley's profile with its errors.
 
     error : (c,) E_b over rings [-]
-    energy_error : (c,) total reflectance of the profile over the target's, less 1 [-]
+    energy_error : (c,) total reflectance of the profile over that of the target, minus 1 [-]
     """
 
     profile: BurleyProfile
@@ -89,39 +90,40 @@ class BurleyFit:
     energy_error: Floats
 
 
-def fit_burley(target: Rings) -> BurleyFit:
-    """The profile with the target's energy whose s gives the least error through the rings, per channel."""
+def fit_burley(target: RingTarget) -> BurleyFit:
+    """Return the profile with the target's energy and the smallest error over rings in each channel."""
     shape = np.array([_fit_shape(target.channel(i)) for i in range(len(target.total))])
     profile = BurleyProfile(target.total, shape)
     return BurleyFit(
         profile=profile,
-        error=ring_error(target, np.diff(profile.within(target.edges_mm), axis=0)),
+        error=ring_error(target, np.diff(profile.energy_within(target.edges_mm), axis=0)),
         energy_error=profile.albedo / target.total - 1.0,
     )
 
 
-def _fit_shape(target: Rings) -> float:
+def _fit_shape(target: RingTarget) -> float:
     from scipy.optimize import minimize_scalar
 
     def error(log_shape: float) -> float:
         profile = BurleyProfile(target.total, np.exp(np.array([log_shape])))
-        return float(ring_error(target, np.diff(profile.within(target.edges_mm), axis=0))[0])
+        return float(ring_error(target, np.diff(profile.energy_within(target.edges_mm), axis=0))[0])
 
-    guess = float(np.log(_HALF / target.radius_of([0.5])[0]))
+    guess = float(np.log(_HALF_LIGHT / target.mean_radius_at([0.5])[0]))
     grid = guess + np.linspace(-3.0, 3.0, 25)
     best = int(np.argmin([error(x) for x in grid]))
-    around = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
-    found = minimize_scalar(error, bounds=around, method="bounded", options={"xatol": 1e-10})
-    return float(np.exp(found.x))
+    bracket = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
+    result = minimize_scalar(error, bounds=bracket, method="bounded", options={"xatol": 1e-10})
+    return float(np.exp(result.x))
 
 
 @dataclass(frozen=True)
 class UnityParameters:
-    """A diffusion profile of Unity's HDRP at world scale 1.
+    """Diffusion profile settings of Unity's HDRP at world scale 1.
 
-    scattering_colour : scattering distance 1 / s by its largest channel, linear Rec. 709 [-]
+    scattering_colour : scattering distance 1 / s relative to its largest channel, linear Rec. 709 [-]
     multiplier_mm : the largest scattering distance [mm]
-    max_radius_mm : what the editor then shows: the radius that holds 99.7 % of the widest channel [mm]
+    max_radius_mm : value that the editor displays: the radius with 99.7 % of the light of the widest channel
+        [mm]
     """
 
     scattering_colour: tuple[float, ...]
@@ -130,26 +132,27 @@ class UnityParameters:
 
 
 def unity_parameters(profile: BurleyProfile) -> UnityParameters:
-    """What to enter in Unity; the albedo is left to its base colour.
+    """Return the settings for Unity; the albedo is left to its base colour.
 
-    By its source (DiffusionProfileSettings.cs) s is 1 / (colour times multiplier), in millimetres at scale 1.
+    According to its source (DiffusionProfileSettings.cs), s is 1 / (colour times multiplier), in millimetres
+    at scale 1.
     """
-    _need_colour(profile)
+    _check_rgb(profile)
     distance = 1.0 / profile.shape
     return UnityParameters(
         scattering_colour=tuple((distance / distance.max()).tolist()),
         multiplier_mm=float(distance.max()),
-        max_radius_mm=float(profile.radius_of(_UNITY_SHARE).max()),
+        max_radius_mm=float(profile.radius_at_fraction(_UNITY_FRACTION).max()),
     )
 
 
 @dataclass(frozen=True)
 class UnrealParameters:
-    """A subsurface profile of Unreal Engine 5 with Burley's kernel, for a scene in centimetres.
+    """Subsurface profile settings of Unreal Engine 5 with Burley's kernel, for a scene in centimetres.
 
-    surface_albedo : per channel, linear Rec. 709 [-]
-    mean_free_path_colour : mean free path by the distance, linear Rec. 709 [-]
-    mean_free_path_distance_cm : its largest channel, or the least that the engine keeps [cm]
+    surface_albedo : in each channel, linear Rec. 709 [-]
+    mean_free_path_colour : mean free path relative to the distance, linear Rec. 709 [-]
+    mean_free_path_distance_cm : its largest channel, or the smallest value that the engine accepts [cm]
     world_unit_scale : 1 is life-size [-]
     """
 
@@ -160,16 +163,17 @@ class UnrealParameters:
 
 
 def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
-    """What to enter in Unreal.
+    """Return the settings for Unreal Engine.
 
-    By public copies of its source (SubsurfaceProfile.cpp, BurleyNormalizedSSS.cpp) it turns the mean free
-    path l, colour times distance, into a diffuse one by the ratio of both factors of [ChristensenBurley2015]
-    over 0.6, and that into s by `shape_factor_diffuse`: in all, s = 0.6 `shape_factor` / l. Its kernel takes
-    a tenth of the millimetres as scene units, so that scale 1 is life-size for centimetres.
+    According to public copies of its source (SubsurfaceProfile.cpp, BurleyNormalizedSSS.cpp), the engine
+    converts the mean free path l, colour times distance, to a diffuse mean free path by the ratio of both
+    factors of [ChristensenBurley2015] divided by 0.6, and that to s by `shape_factor_diffuse`: together, s =
+    0.6 `shape_factor` / l. Its kernel uses a tenth of the millimetres as scene units, so that scale 1 is
+    life-size for centimetres.
     """
-    _need_colour(profile)
+    _check_rgb(profile)
     mean_free_path = 0.1 * UNREAL_FACTOR * shape_factor(profile.albedo) / profile.shape
-    distance = max(float(mean_free_path.max()), _UNREAL_SHORTEST_CM)
+    distance = max(float(mean_free_path.max()), _UNREAL_MIN_DISTANCE_CM)
     return UnrealParameters(
         surface_albedo=tuple(profile.albedo.tolist()),
         mean_free_path_colour=tuple((mean_free_path / distance).tolist()),
@@ -177,6 +181,11 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     )
 
 
-def _need_colour(profile: BurleyProfile) -> None:
+def _check_rgb(profile: BurleyProfile) -> None:
     if profile.shape.shape != (3,):
-        refuse("engine parameters", "red, green and blue", f"{profile.shape.size} channels came", "Fit three")
+        refuse(
+            "engine parameters",
+            "red, green and blue",
+            f"got {profile.shape.size} channels",
+            "Fit three channels",
+        )

@@ -1,4 +1,4 @@
-"""Fits of sums of Gaussians to a diffusion profile, alone or shared by several."""
+"""Fits of sums of Gaussians to one diffusion profile, or to several with shared variances."""
 
 from __future__ import annotations
 
@@ -10,35 +10,38 @@ from typing import Literal
 import numpy as np
 
 from dermis.base.errors import refuse
-from dermis.optics.fits.targets import Points, Rings
-from dermis.optics.fits.variable_projection import STILL, Design, Fit, descend
-from dermis.optics.gaussians import WIDEST_MM2, GaussianSum
+from dermis.base.renamed import renamed_keywords
+from dermis.optics.fits.targets import PointTarget, RingTarget
+from dermis.optics.fits.variable_projection import TOLERANCE, Design, Fit, minimise
+from dermis.optics.gaussians import MAX_VARIANCE_MM2, GaussianSum
 from dermis.optics.media import Floats
 
-Target = Points | Rings
-MOST_TERMS = 8
-# Shares of the light within the narrowest and the widest Gaussian: from one of these every profile tried so
-# far reached the least error that any start leads to.
+Target = PointTarget | RingTarget
+MAX_TERMS = 8
+# Fractions of the light within the standard deviations of the narrowest and the widest Gaussian. For all
+# tested profiles, one of these starts leads to the smallest error that any start leads to.
 _STARTS = ((0.02, 0.99), (0.1, 0.999), (0.02, 0.9), (0.1, 0.6), (0.001, 0.99))
-# Of a fit that begins near: its rings are within 0.06 % of the brightest one of where it ends in the long
-# run, and its error within 0.0001.
-_STILL_NEAR = 3e-6
-_STIFFNESS = 1e4  # of the energy's equation against the others'; squared, it bounds the energy's error
+# For fits that start from a similar fit: ring energies differ from those of the converged fit by at most 0.06
+# % of the brightest ring, and errors by at most 0.0001.
+_INITIAL_FIT_TOLERANCE = 3e-6
+_STIFFNESS = (
+    1e4  # weight of the energy equation relative to the others; its square bounds the error of the energy
+)
 SHARED_TERMS = 6
-"""Gaussians of profiles that share them: as many as one profile alone has."""
+"""Number of Gaussians that several profiles share, the same as for one profile."""
 _EDGES_MM = np.concatenate([[0.0], np.geomspace(1e-3, 60.0, 93)])
-_KEPT = 8
+_CACHED_FITS = 8
 _Table = tuple[str, bytes, bytes, int]
 
 
 @dataclass(frozen=True)
 class GaussianFit:
-    """A sum of Gaussians and how well it fits.
+    """Fit of a sum of Gaussians with its errors.
 
     profile : the sum
-    error : (c,) relative root mean square error, pointwise E or E_b over rings [-]
-    energy_error : (c,) total reflectance of the sum over the target's, less 1 [-]
-    kind : which error it is
+    error : (c,) relative root-mean-square error, pointwise E or E_b over rings [-]
+    energy_error : (c,) total reflectance of the sum over that of the target, minus 1 [-]
+    kind : kind of the error
     shared : whether all channels use the same Gaussians
     """
 
@@ -49,37 +52,38 @@ class GaussianFit:
     shared: bool
 
 
+@renamed_keywords(near="initial")
 def fit_gaussians(
     target: Target,
     terms: int,
     *,
     shared: bool = True,
     keep_energy: bool = False,
-    near: GaussianSum | None = None,
+    initial: GaussianSum | None = None,
     name: str = "fit",
 ) -> GaussianFit:
-    """The sum of Gaussians that fits a profile best.
+    """Return the sum of Gaussians with the smallest error.
 
     target : R(r) at points, or light through rings
     terms : Gaussians in each channel, 1 to 8
-    shared : the same variances in all channels, chosen for the root mean square of their errors; else
-        each channel has its own, and weights of 0 for the others'
+    shared : use the same variances in all channels, chosen for the root mean square of their errors;
+        otherwise each channel has its own variances, and weights of 0 for those of the others
     keep_energy : make the weights sum to the target's total
-    near : the fit of a similar profile to start from: several times faster, but not always the best fit
+    initial : fit of a similar profile to start from: several times faster, but not always the best fit
     name : of the resulting profile
 
-    Raises DermisError when the terms are too few or many, or when Gaussians cannot follow the profile.
+    Raises DermisError for an invalid number of terms, and for profiles that Gaussians cannot fit.
 
     Source: [dEonLuebke2007] section 14.4 for the error that is minimised.
     """
-    if not 1 <= terms <= MOST_TERMS:
-        refuse("terms of a fit", f"1 to {MOST_TERMS} Gaussians", f"{terms} came", "Choose another number")
+    if not 1 <= terms <= MAX_TERMS:
+        refuse("terms of a fit", f"1 to {MAX_TERMS} Gaussians", f"got {terms}", "Choose another number")
     groups = [target] if shared else [target.channel(i) for i in range(len(target.total))]
     fits = [
-        _fit_group(group, terms, keep_energy, _variances(near, None if shared else i, terms))
+        _fit_group(group, terms, keep_energy, _variances_of_fit(initial, None if shared else i, terms))
         for i, group in enumerate(groups)
     ]
-    profile = _union(fits, name)
+    profile = _merged(fits, name)
     return GaussianFit(
         profile=profile,
         error=target.error(profile.variance_mm2, profile.weight),
@@ -89,42 +93,46 @@ def fit_gaussians(
     )
 
 
-def _fit_group(target: Target, terms: int, keep_energy: bool, near: Floats | None) -> tuple[Floats, Floats]:
-    """Variances (k,) and weights (k, c) that all channels of the target share."""
+def _fit_group(
+    target: Target, terms: int, keep_energy: bool, initial: Floats | None
+) -> tuple[Floats, Floats]:
+    """Return variances (k,) that all channels of the target share, and weights (k, c)."""
     norm = np.linalg.norm(target.samples, axis=0)
-    design, samples = _conserve(target) if keep_energy else (target.design, target.samples)
+    design, samples = _with_energy_equation(target) if keep_energy else (target.design, target.samples)
     bounds = _bounds(target)
 
-    def run(start: Floats, still: float = STILL) -> Fit:
-        return descend(design, samples / norm, np.clip(start, *bounds), bounds, still)
+    def run(start: Floats, tolerance: float = TOLERANCE) -> Fit:
+        return minimise(design, samples / norm, np.clip(start, *bounds), bounds, tolerance)
 
-    best = None if near is None else run(np.log(near), _STILL_NEAR)
-    if best is None or not best.weight.any(axis=1).all():  # a Gaussian that died may live from elsewhere
-        best = min((run(start) for start in _starts(target, terms)), key=lambda fit: fit.cost)
+    best = None if initial is None else run(np.log(initial), _INITIAL_FIT_TOLERANCE)
+    if (
+        best is None or not best.weight.any(axis=1).all()
+    ):  # a Gaussian of weight 0 may be used from another start
+        best = min((run(start) for start in _initial_variances(target, terms)), key=lambda fit: fit.cost)
     weight = best.weight * norm
     if not weight.any(axis=0).all():
-        came = "no weights of 0 or more come near it"
-        refuse(f"{target.kind} target", "a profile that Gaussians can follow", came, "Look at its numbers")
+        actual = "no weights of 0 or more fit it"
+        refuse(f"{target.kind} target", "a profile that Gaussians can fit", actual, "Check its numbers")
     if keep_energy:
         weight *= target.total / weight.sum(axis=0)
-    alive = weight.any(axis=1)
-    return np.exp(best.log_variance[alive]), weight[alive]
+    used = weight.any(axis=1)
+    return np.exp(best.log_variance[used]), weight[used]
 
 
-def _starts(target: Target, terms: int) -> list[Floats]:
-    ends = [np.log(target.radius_of(shares) ** 2 / 2.0) for shares in _STARTS]
+def _initial_variances(target: Target, terms: int) -> list[Floats]:
+    ends = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _STARTS]
     return [np.linspace(low, high, terms) for low, high in ends]
 
 
 def _bounds(target: Target) -> tuple[float, float]:
-    """Of log variances: half the first radius, to the last."""
-    radius = target.radius_mm if isinstance(target, Points) else target.edges_mm[1:]
-    return float(2.0 * np.log(radius[0] / 2.0)), float(np.log(min(radius[-1] ** 2, WIDEST_MM2)))
+    """Return the limits of the log variance: from half the first radius to the last radius."""
+    radius = target.radius_mm if isinstance(target, PointTarget) else target.edges_mm[1:]
+    return float(2.0 * np.log(radius[0] / 2.0)), float(np.log(min(radius[-1] ** 2, MAX_VARIANCE_MM2)))
 
 
-def _conserve(target: Target) -> tuple[Design, Floats]:
-    """The design and samples with one more equation, a stiff one: the weights sum to the total."""
-    width = target.radius_of([0.5]) ** 2 / 2.0
+def _with_energy_equation(target: Target) -> tuple[Design, Floats]:
+    """Return design and samples with one more, strongly weighted equation: the weights sum to the total."""
+    width = target.mean_radius_at([0.5]) ** 2 / 2.0
     stiffness = _STIFFNESS * float(np.linalg.norm(target.design(width)[0]))
 
     def design(variance_mm2: Floats) -> tuple[Floats, Floats]:
@@ -135,67 +143,69 @@ def _conserve(target: Target) -> tuple[Design, Floats]:
     return design, np.vstack([stiffness * target.total, target.samples])
 
 
-def _variances(near: GaussianSum | None, channel: int | None, terms: int) -> Floats | None:
-    """The variances to start from, when they are as many as wanted."""
-    if near is None:
+def _variances_of_fit(initial: GaussianSum | None, channel: int | None, terms: int) -> Floats | None:
+    """Return the variances of a similar fit to start from, or None if their number differs."""
+    if initial is None:
         return None
-    used = near.weight.any(axis=1) if channel is None else near.weight[:, channel] > 0.0
-    return near.variance_mm2[used] if used.sum() == terms else None
+    used = initial.weight.any(axis=1) if channel is None else initial.weight[:, channel] > 0.0
+    return initial.variance_mm2[used] if used.sum() == terms else None
 
 
-def _union(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
-    """One sum of all the groups' Gaussians, equal variances merged."""
-    variance, place = np.unique(np.concatenate([v for v, _ in fits]), return_inverse=True)
+def _merged(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
+    """Return one sum with the Gaussians of all groups, in which equal variances are merged."""
+    variance, index = np.unique(np.concatenate([v for v, _ in fits]), return_inverse=True)
     channels = sum(w.shape[1] for _, w in fits)
     weight = np.zeros((len(variance), channels))
     row = channel = 0
     for v, w in fits:
-        rows = place[row : row + len(v)]
+        rows = index[row : row + len(v)]
         np.add.at(weight[:, channel : channel + w.shape[1]], rows, w)
         row, channel = row + len(v), channel + w.shape[1]
     return GaussianSum(name, variance, weight)
 
 
 def single_gaussian(profile: GaussianSum) -> GaussianSum:
-    """One Gaussian for all channels with each channel's total, of least squares over the plane.
+    """Fit one Gaussian with each channel's total to a profile, by least squares over the plane.
 
-    Its width follows light maps that were blurred once [Borshukov2003; Green2004].
+    It represents light maps blurred once [Borshukov2003; Green2004].
     """
     from scipy.optimize import minimize_scalar
 
-    def at(log_variance: float) -> GaussianSum:
+    def candidate(log_variance: float) -> GaussianSum:
         return GaussianSum(
-            f"{profile.name}, one blur", np.exp([log_variance]), profile.albedo[None], profile.counted
+            f"{profile.name}, one blur", np.exp([log_variance]), profile.albedo[None], profile.from_photons
         )
 
     def misfit(log_variance: float) -> float:
-        one = at(log_variance)
-        return float((one.inner(one) - 2 * one.inner(profile)).sum())
+        gaussian = candidate(log_variance)
+        return float((gaussian.inner_product(gaussian) - 2 * gaussian.inner_product(profile)).sum())
 
     ends = np.log(profile.variance_mm2[[0, -1]])
-    return at(minimize_scalar(misfit, bounds=(ends[0] - 1e-6, ends[1] + 1e-6), method="bounded").x)
+    return candidate(minimize_scalar(misfit, bounds=(ends[0] - 1e-6, ends[1] + 1e-6), method="bounded").x)
 
 
 def shared_gaussians(profiles: Sequence[GaussianSum], terms: int = SHARED_TERMS) -> tuple[GaussianSum, ...]:
-    """The profiles as sums of the same Gaussians; those that share theirs already are taken as they are.
+    """Fit several profiles with the same Gaussians; profiles that already share them are returned unchanged.
 
-    Each keeps its total. Relative root mean square errors over rings: `shared_errors`.
+    Totals are preserved. `shared_errors` returns the errors of the fit.
     """
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
         return tuple(profiles)
-    fitted = _fitted(tuple(map(_table, profiles)), terms)
-    return tuple(replace(one, counted=own.counted) for one, own in zip(fitted, profiles, strict=True))
+    fitted = _fit_shared(tuple(map(_table, profiles)), terms)
+    return tuple(
+        replace(one, from_photons=own.from_photons) for one, own in zip(fitted, profiles, strict=True)
+    )
 
 
 def shared_errors(profiles: Sequence[GaussianSum], shared: Sequence[GaussianSum]) -> Floats:
-    """(p, 3) E_b of each profile and channel: how far the shared sums are from what they stand for [-]."""
+    """Return the error E_b of each shared sum relative to its profile, by profile and channel, (p, 3) [-]."""
     pairs = zip(profiles, shared, strict=True)
     return np.array([_rings([one]).error(other.variance_mm2, other.weight) for one, other in pairs])
 
 
-@lru_cache(_KEPT)
-def _fitted(tables: tuple[_Table, ...], terms: int) -> tuple[GaussianSum, ...]:
+@lru_cache(_CACHED_FITS)
+def _fit_shared(tables: tuple[_Table, ...], terms: int) -> tuple[GaussianSum, ...]:
     profiles = [
         GaussianSum(name, np.frombuffer(variance), np.frombuffer(weight).reshape(-1, channels))
         for name, variance, weight, channels in tables
@@ -212,7 +222,7 @@ def _table(profile: GaussianSum) -> _Table:
     return profile.name, profile.variance_mm2.tobytes(), profile.weight.tobytes(), profile.weight.shape[1]
 
 
-def _rings(profiles: Sequence[GaussianSum]) -> Rings:
-    """Light through rings, channels of all profiles side by side."""
-    within = np.hstack([one.within(_EDGES_MM) for one in profiles])
-    return Rings(_EDGES_MM, np.diff(within, axis=0), np.hstack([one.albedo for one in profiles]))
+def _rings(profiles: Sequence[GaussianSum]) -> RingTarget:
+    """Return ring energies with the channels of all profiles side by side."""
+    within = np.hstack([one.energy_within(_EDGES_MM) for one in profiles])
+    return RingTarget(_EDGES_MM, np.diff(within, axis=0), np.hstack([one.albedo for one in profiles]))

@@ -1,4 +1,4 @@
-"""Separable kernels a(x) a(y), applied in two passes: not round, and judged as such."""
+"""Separable kernels a(x) a(y), applied in two passes; they are not radially symmetric."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.optics.fits.targets import Rings, ring_error
+from dermis.optics.fits.targets import RingTarget, ring_error
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 
 SECTORS = 16
-"""Equal sectors of a quarter turn into which each ring is cut."""
+"""Number of equal sectors of a quarter circle into which each ring is divided."""
 
 _NODES = 8
-_STARTS = ((0.3, 0.9), (0.1, 0.6))  # shares of the light within the near and the far Gaussian
+_STARTS = ((0.3, 0.9), (0.1, 0.6))  # fractions of the light within the narrow and the wide Gaussian
 
 
 @dataclass(frozen=True)
 class SeparableKernel:
-    """Light spreads by A a(x) a(y), a(x) = sum of weight * exp(-x^2 / 2v) / sqrt(2 pi v).
+    """Kernel A a(x) a(y) with a(x) = sum of weight * exp(-x^2 / 2v) / sqrt(2 pi v).
 
     albedo : (c,) A, total reflectance [-]
-    variance_mm2 : (k, c) narrow to wide [mm2]
+    variance_mm2 : (k, c) from narrow to wide [mm2]
     weight : (k, c), sums to 1 in each channel [-]
 
     Source: [Jimenez2015].
@@ -33,34 +33,36 @@ class SeparableKernel:
     variance_mm2: Floats
     weight: Floats
 
-    def line(self, offset_mm: ArrayLike) -> Floats:
-        """a(x) of one pass, shape (..., c) [1/mm]."""
+    def line_profile(self, offset_mm: ArrayLike) -> Floats:
+        """Return a(x) of one pass, (..., c) [1/mm]."""
         x = np.asarray(offset_mm, dtype=np.float64)[..., None, None]
         v = self.variance_mm2
         return np.asarray((self.weight * np.exp(-(x**2) / (2.0 * v)) / np.sqrt(2.0 * np.pi * v)).sum(axis=-2))
 
-    def one_side(self, offset_mm: ArrayLike) -> Floats:
-        """Integral of a(x) from 0 to an offset, shape (..., c), up to 1/2 [-]."""
+    def half_line_integral(self, offset_mm: ArrayLike) -> Floats:
+        """Return the integral of a(x) from 0 to an offset, (..., c), at most 1/2 [-]."""
         from scipy.special import erf
 
         x = np.asarray(offset_mm, dtype=np.float64)[..., None, None]
         return np.asarray(0.5 * (self.weight * erf(x / np.sqrt(2.0 * self.variance_mm2))).sum(axis=-2))
 
-    def cells(self, edges_mm: Floats) -> Floats:
-        """Light through the sectors of rings, (n, m, c): all four quarters in one, m = `SECTORS` [-].
+    def sector_energy(self, edges_mm: Floats) -> Floats:
+        """Return the light through sectors of rings, with all four quarters added, (n, SECTORS, c) [-].
 
         edges_mm : (n + 1,) of the rings
         """
         channels = zip(self.variance_mm2.T, self.weight.T, strict=True)
-        return np.asarray(self.albedo * np.stack([_cells(edges_mm, v, w) for v, w in channels], axis=2))
+        return np.asarray(
+            self.albedo * np.stack([_sector_fractions(edges_mm, v, w) for v, w in channels], axis=2)
+        )
 
 
 @dataclass(frozen=True)
 class SeparableFit:
-    """A separable kernel and how well it fits.
+    """Separable kernel with its errors.
 
-    error : (c,) E_b over the cells of rings and sectors [-]
-    energy_error : (c,) total reflectance of the kernel over the target's, less 1 [-]
+    error : (c,) E_b over sectors of rings [-]
+    energy_error : (c,) total reflectance of the kernel over that of the target, minus 1 [-]
     """
 
     kernel: SeparableKernel
@@ -68,10 +70,10 @@ class SeparableFit:
     energy_error: Floats
 
 
-def preintegrate(profile: GaussianSum) -> SeparableKernel:
-    """The kernel whose one pass is the profile seen from its side, the integral of R over y.
+def preintegrated_kernel(profile: GaussianSum) -> SeparableKernel:
+    """Return the kernel whose one pass is the integral of the profile R over y.
 
-    It is exact where light changes along x or y alone.
+    It is exact where light varies along x or y alone.
 
     Source: [Jimenez2015].
     """
@@ -79,38 +81,38 @@ def preintegrate(profile: GaussianSum) -> SeparableKernel:
     return SeparableKernel(profile.albedo, variance, profile.weight / profile.albedo)
 
 
-def judge(kernel: SeparableKernel, target: Rings) -> SeparableFit:
-    """A kernel with its errors against a profile."""
-    error = ring_error(target, kernel.cells(target.edges_mm))
+def evaluate_kernel(kernel: SeparableKernel, target: RingTarget) -> SeparableFit:
+    """Return a kernel with its errors relative to a profile."""
+    error = ring_error(target, kernel.sector_energy(target.edges_mm))
     return SeparableFit(kernel, error, kernel.albedo / target.total - 1.0)
 
 
-def fit_separable(target: Rings) -> SeparableFit:
-    """The kernel of two Gaussians, near and far, with the target's energy and the least error, per channel.
+def fit_separable(target: RingTarget) -> SeparableFit:
+    """Return the kernel of two Gaussians with the target's energy and the smallest error in each channel.
 
-    Source: [Jimenez2015], the model made for artists.
+    Source: [Jimenez2015], the artist-friendly model.
     """
-    found = np.stack([_fit_channel(target.channel(i)) for i in range(len(target.total))], axis=1)
-    share, log_variance = found[0], found[1:]
+    parameters = np.stack([_fit_channel(target.channel(i)) for i in range(len(target.total))], axis=1)
+    fraction, log_variance = parameters[0], parameters[1:]
     order = np.argsort(log_variance, axis=0)
-    weight = np.take_along_axis(np.stack([share, 1.0 - share]), order, axis=0)
+    weight = np.take_along_axis(np.stack([fraction, 1.0 - fraction]), order, axis=0)
     variance = np.exp(np.take_along_axis(log_variance, order, axis=0))
-    return judge(SeparableKernel(target.total, variance, weight), target)
+    return evaluate_kernel(SeparableKernel(target.total, variance, weight), target)
 
 
-def _fit_channel(target: Rings) -> Floats:
-    """Share of the first Gaussian and the log variances of both, (3,)."""
+def _fit_channel(target: RingTarget) -> Floats:
+    """Return the weight of the first Gaussian and the log variances of both, (3,)."""
     from scipy.optimize import least_squares
 
     scale = np.sqrt(SECTORS) / np.linalg.norm(target.energy)
 
     def residual(x: Floats) -> Floats:
-        cells = _cells(target.edges_mm, np.exp(x[1:]), np.array([x[0], 1.0 - x[0]]))
+        cells = _sector_fractions(target.edges_mm, np.exp(x[1:]), np.array([x[0], 1.0 - x[0]]))
         return np.asarray(scale * (target.total * cells - target.energy / SECTORS).ravel())
 
     edges = target.edges_mm
     low, high = 2.0 * np.log(edges[1] / 4.0), 2.0 * np.log(edges[-1])
-    starts = [np.log(target.radius_of(shares) ** 2 / 2.0) for shares in _STARTS]
+    starts = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _STARTS]
     bounds = ([0.0, low, low], [1.0, high, high])
     fits = [
         least_squares(residual, np.append(0.5, np.clip(start, low, high)), bounds=bounds, xtol=1e-10)
@@ -119,25 +121,25 @@ def _fit_channel(target: Rings) -> Floats:
     return np.asarray(min(fits, key=lambda fit: float(fit.cost)).x)
 
 
-def _cells(edges_mm: Floats, variance: Floats, weight: Floats) -> Floats:
-    """Shares of a(x) a(y) for one channel, (n, m)."""
+def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Floats:
+    """Return the fractions of a(x) a(y) in the sectors of rings for one channel, (n, m)."""
     cells = np.zeros((len(edges_mm) - 1, SECTORS))
     for i in range(len(variance)):
-        cells += weight[i] ** 2 * _elliptic(edges_mm, variance[i], variance[i])
+        cells += weight[i] ** 2 * _elliptic_sectors(edges_mm, variance[i], variance[i])
         for j in range(i):
-            crossed = _elliptic(edges_mm, variance[i], variance[j])
+            crossed = _elliptic_sectors(edges_mm, variance[i], variance[j])
             cells += weight[i] * weight[j] * (crossed + crossed[:, ::-1])
     return cells
 
 
-def _elliptic(edges_mm: Floats, along: float, across: float) -> Floats:
-    """Shares of a Gaussian with these variances in x and y, (n, m)."""
+def _elliptic_sectors(edges_mm: Floats, along: float, across: float) -> Floats:
+    """Return the fractions of a Gaussian with variances `along` x and `across` y in sectors, (n, m)."""
     x, w = np.polynomial.legendre.leggauss(_NODES)
     theta = np.linspace(0.0, 0.5 * np.pi, SECTORS + 1)
-    # The angle on the circle that the ellipse is stretched from: equal shares of it hold equal light.
+    # Angle on the circle before it is stretched to the ellipse: equal angles contain equal light.
     phi = np.arctan2(np.sqrt(along) * np.sin(theta), np.sqrt(across) * np.cos(theta))
     half = 0.5 * np.diff(phi)[:, None]
     node = phi[:-1, None] + half * (1.0 + x)
-    reach = along * np.cos(node) ** 2 + across * np.sin(node) ** 2
-    within = -np.expm1(-(edges_mm[:, None, None] ** 2) / (2.0 * reach))
+    variance = along * np.cos(node) ** 2 + across * np.sin(node) ** 2
+    within = -np.expm1(-(edges_mm[:, None, None] ** 2) / (2.0 * variance))
     return np.asarray(np.diff((within * half * w).sum(axis=2), axis=0) * 2.0 / np.pi)

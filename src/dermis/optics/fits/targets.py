@@ -1,4 +1,4 @@
-"""Targets of a fit, by which it is also judged: R(r) at points, or the light through rings."""
+"""Targets of fits: R(r) at points, or the light through rings."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from dermis.optics.media import Floats
 
 
 @dataclass(frozen=True)
-class Points:
+class PointTarget:
     """R(r) at radii, for profiles that are finite at their centre.
 
-    radius_mm : (n,) increasing, best log-spaced from 1e-4 to 60 [mm]
+    radius_mm : (n,) increasing, preferably log-spaced from 1e-4 to 60 [mm]
     reflectance : (n, c) R(r) in c channels [1/mm2]
-    total : (c,) light that leaves at all radii together [-]
+    total : (c,) light that emerges at all radii [-]
     """
 
     radius_mm: Floats
@@ -29,54 +29,55 @@ class Points:
     kind: ClassVar[Literal["pointwise"]] = "pointwise"
 
     def __post_init__(self) -> None:
+        """Check the arrays."""
         _check(self.kind, self.radius_mm, self.reflectance, self.total)
         if not self.radius_mm[0] > 0.0:
-            refuse("radii of a profile", "numbers above 0", f"{self.radius_mm[0]:g} came", "Leave it out")
+            refuse("radii of a profile", "numbers above 0", f"got {self.radius_mm[0]:g}", "Leave it out")
 
     @cached_property
     def _root(self) -> Floats:
-        # The trapezoidal rule in log r converges fast here: r^2 R^2 dies out at both ends.
+        # The trapezoidal rule in log r converges fast because r^2 R^2 vanishes at both ends.
         steps = np.diff(np.log(self.radius_mm))
         dlog = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
         return np.asarray(self.radius_mm * np.sqrt(dlog))
 
     @cached_property
     def samples(self) -> Floats:
-        """Values whose squares sum to the integral of r R^2, (n, c)."""
+        """Return values whose squares sum to the integral of r R^2, (n, c)."""
         return self._root[:, None] * self.reflectance
 
     def design(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
-        """What a unit Gaussian adds to the samples, and its slope by the log of its variance, (n, k) each."""
+        """Return the samples of unit Gaussians and their derivatives by log variance, (n, k) each."""
         u = self.radius_mm[:, None] ** 2 / (2.0 * variance_mm2)
-        bells = self._root[:, None] * np.exp(-u) / (2.0 * np.pi * variance_mm2)
-        return bells, bells * (u - 1.0)
+        gaussians = self._root[:, None] * np.exp(-u) / (2.0 * np.pi * variance_mm2)
+        return gaussians, gaussians * (u - 1.0)
 
     def error(self, variance_mm2: Floats, weight: Floats) -> Floats:
-        """E = sqrt(integral of r (fit - R)^2 / integral of r R^2) of a sum of Gaussians, (c,) [-].
+        """Return E = sqrt(integral of r (fit - R)^2 / integral of r R^2) of a sum of Gaussians, (c,) [-].
 
         Source: [dEonLuebke2007] section 14.4.
         """
         residual = self.design(variance_mm2)[0] @ weight - self.samples
         return np.asarray(np.sqrt((residual**2).sum(axis=0) / (self.samples**2).sum(axis=0)))
 
-    def radius_of(self, share: Sequence[float]) -> Floats:
-        """Radii within which the channels' mean share of the light leaves, increasing [mm]."""
+    def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
+        """Return radii within which fractions of the channels' mean light emerge, increasing [mm]."""
         rate = self._root[:, None] ** 2 * np.abs(self.reflectance)
-        return _quantiles(share, self.radius_mm, rate)
+        return _quantiles(fractions, self.radius_mm, rate)
 
-    def channel(self, index: int) -> Points:
-        """One channel alone."""
-        keep = slice(index, index + 1)
-        return Points(self.radius_mm, self.reflectance[:, keep], self.total[keep])
+    def channel(self, index: int) -> PointTarget:
+        """Return the target of one channel."""
+        channel = slice(index, index + 1)
+        return PointTarget(self.radius_mm, self.reflectance[:, channel], self.total[channel])
 
 
 @dataclass(frozen=True)
-class Rings:
-    """Light through a disc and the rings around it, for profiles that go to infinity at their centre too.
+class RingTarget:
+    """Light through a disc and the rings around it, also for profiles that are infinite at their centre.
 
-    edges_mm : (n + 1,) increasing, best 0 and then log-spaced [mm]
+    edges_mm : (n + 1,) increasing, preferably 0 and then log-spaced [mm]
     energy : (n, c) light through each ring in c channels [-]
-    total : (c,) light that leaves at all radii together [-]
+    total : (c,) light that emerges at all radii [-]
     """
 
     edges_mm: Floats
@@ -86,40 +87,41 @@ class Rings:
     kind: ClassVar[Literal["annulus"]] = "annulus"
 
     def __post_init__(self) -> None:
+        """Check the arrays."""
         _check(self.kind, self.edges_mm[1:], self.energy, self.total)
         if not 0.0 <= self.edges_mm[0] < self.edges_mm[1]:
-            refuse("edges of rings", "numbers that increase from 0", f"{self.edges_mm[:2]} came", "Sort them")
+            refuse("edges of rings", "numbers that increase from 0", f"got {self.edges_mm[:2]}", "Sort them")
 
     @property
     def samples(self) -> Floats:
-        """Values whose squares the error sums, (n, c)."""
+        """Return the values whose squared errors are summed, (n, c)."""
         return self.energy
 
     def design(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
-        """What a unit Gaussian adds to the samples, and its slope by the log of its variance, (n, k) each."""
+        """Return the samples of unit Gaussians and their derivatives by log variance, (n, k) each."""
         u = self.edges_mm[:, None] ** 2 / (2.0 * variance_mm2)
-        fall = np.exp(-u)
-        return -np.diff(fall, axis=0), -np.diff(u * fall, axis=0)
+        outside = np.exp(-u)
+        return -np.diff(outside, axis=0), -np.diff(u * outside, axis=0)
 
     def error(self, variance_mm2: Floats, weight: Floats) -> Floats:
-        """`ring_error` of a sum of Gaussians, (c,) [-]."""
+        """Return `ring_error` of a sum of Gaussians, (c,) [-]."""
         return ring_error(self, self.design(variance_mm2)[0] @ weight)
 
-    def radius_of(self, share: Sequence[float]) -> Floats:
-        """Radii within which the channels' mean share of the light leaves, increasing [mm]."""
-        return _quantiles(share, self.edges_mm[1:], np.abs(self.energy))
+    def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
+        """Return radii within which fractions of the channels' mean light emerge, increasing [mm]."""
+        return _quantiles(fractions, self.edges_mm[1:], np.abs(self.energy))
 
-    def channel(self, index: int) -> Rings:
-        """One channel alone."""
-        keep = slice(index, index + 1)
-        return Rings(self.edges_mm, self.energy[:, keep], self.total[keep])
+    def channel(self, index: int) -> RingTarget:
+        """Return the target of one channel."""
+        channel = slice(index, index + 1)
+        return RingTarget(self.edges_mm, self.energy[:, channel], self.total[channel])
 
 
-def ring_error(target: Rings, energy: Floats) -> Floats:
-    """E_b = sqrt(sum of (fit - energy)^2 / sum of energy^2), the number that all fits share, (c,) [-].
+def ring_error(target: RingTarget, energy: Floats) -> Floats:
+    """Return E_b = sqrt(sum of (fit - energy)^2 / sum of energy^2), the error common to all fits, (c,) [-].
 
-    energy : (n, c) of a round kernel through each ring, or (n, m, c) of any kernel through the m equal
-        sectors of each ring
+    energy : (n, c) of a radially symmetric kernel through each ring, or (n, m, c) of any kernel through the m
+        equal sectors of each ring
     """
     cells = energy if energy.ndim == 3 else energy[:, None]
     m = cells.shape[1]
@@ -127,23 +129,23 @@ def ring_error(target: Rings, energy: Floats) -> Floats:
     return np.asarray(np.sqrt(m * (residual**2).sum(axis=(0, 1)) / (target.energy**2).sum(axis=0)))
 
 
-def _quantiles(share: Sequence[float], radius_mm: Floats, rate: Floats) -> Floats:
-    within = np.cumsum(rate / rate.sum(axis=0), axis=0).mean(axis=1)
-    return np.asarray(np.interp(share, within, radius_mm))
+def _quantiles(fractions: Sequence[float], radius_mm: Floats, rate: Floats) -> Floats:
+    cumulative = np.cumsum(rate / rate.sum(axis=0), axis=0).mean(axis=1)
+    return np.asarray(np.interp(fractions, cumulative, radius_mm))
 
 
 def _check(kind: str, radius_mm: Floats, values: Floats, total: Floats) -> None:
-    place = f"{kind} target"
+    culprit = f"{kind} target"
     if values.ndim != 2 or radius_mm.shape != values.shape[:1] or total.shape != values.shape[1:]:
-        came = f"{radius_mm.shape}, {values.shape} and {total.shape} came"
-        refuse(place, "arrays of n, n x c and c numbers", came, "Correct the arrays")
+        actual = f"got {radius_mm.shape}, {values.shape} and {total.shape}"
+        refuse(culprit, "arrays of n, n x c and c numbers", actual, "Correct the arrays")
     if not (np.isfinite(radius_mm).all() and np.isfinite(values).all() and np.isfinite(total).all()):
-        refuse(place, "finite numbers", "NaN or infinity came", "Correct the arrays")
+        refuse(culprit, "finite numbers", "got NaN or infinity", "Correct the arrays")
     if len(radius_mm) < 2 or not (np.diff(radius_mm) > 0.0).all():
-        refuse(place, "two or more increasing radii", "they do not increase", "Sort them")
+        refuse(culprit, "two or more increasing radii", "they do not increase", "Sort them")
     dark = [i for i in range(values.shape[1]) if not (values[:, i].any() and total[i] > 0.0)]
     if dark:
         peak, sum_ = values[:, dark[0]].max(), total[dark[0]]
-        came = f"channel {dark[0]} holds {peak:.3g} at most and {sum_:.3g} in all"
-        remedy = "Leave it out, or take another model, another skin or more photons"
-        refuse(place, "light in every channel", came, remedy)
+        actual = f"channel {dark[0]} has a maximum of {peak:.3g} and a sum of {sum_:.3g}"
+        advice = "Leave it out, or use another model, another skin or more photons"
+        refuse(culprit, "light in every channel", actual, advice)

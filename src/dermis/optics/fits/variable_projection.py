@@ -1,4 +1,4 @@
-"""Least squares over the variances of Gaussians, with the best weights solved for at each step.
+"""Nonlinear least squares over the variances of Gaussians, with optimal weights at each step.
 
 Source: [GolubPereyra1973] with the slopes of [Kaufman1975], steps after [Marquardt1963], extrapolated as in
 [Anderson1965].
@@ -14,16 +14,21 @@ import numpy as np
 from dermis.optics.media import Floats
 
 Design = Callable[[Floats], tuple[Floats, Floats]]
-_MOST_STEPS = 100
-_LONGEST_STEP = 1.0
-STILL = 1e-7
-"""Share of the cost that a step must save for another one."""
-_HOPELESS = 1e8
+_MAX_STEPS = 100
+_MAX_STEP = 1.0
+TOLERANCE = 1e-7
+"""Relative decrease of the cost below which the descent stops."""
+_MAX_DAMPING = 1e8
 _BLOCK = 512
 
 
 class Fit(NamedTuple):
-    """Log variances (k,), weights (k, c), the sum of squared residuals, and what the next step needs."""
+    """Fitted Gaussians, and the derivatives for the next step.
+
+    log_variance, weight : (k,) and (k, c)
+    cost : sum of squared residuals
+    gradient, curvature : (k,) and (k, k) derivatives of the cost by log variance
+    """
 
     log_variance: Floats
     weight: Floats
@@ -32,34 +37,39 @@ class Fit(NamedTuple):
     curvature: Floats
 
 
-def descend(
-    design: Design, samples: Floats, log_variance: Floats, bounds: tuple[float, float], still: float = STILL
+def minimise(
+    design: Design,
+    samples: Floats,
+    log_variance: Floats,
+    bounds: tuple[float, float],
+    tolerance: float = TOLERANCE,
 ) -> Fit:
-    """The local minimum that descent from a start reaches.
+    """Return the local minimum that the descent from a start reaches.
 
-    design : what a unit Gaussian of each variance adds to the samples, and its slope by log variance
+    design : contribution of unit Gaussians of given variances to the samples, and its derivative by log
+        variance
     samples : (n, c)
     log_variance : (k,) start
     bounds : of the log variances
-    still : share of the cost that a step must save for another one
+    tolerance : relative decrease of the cost below which the descent stops
     """
     fit = _project(design, samples, log_variance)
-    damping, before = 1e-2, None
-    for _ in range(_MOST_STEPS):
+    damping, previous = 1e-2, None
+    for _ in range(_MAX_STEPS):
         step = _step(fit, damping)
-        onwards = step if before is None else _extrapolated(fit.log_variance, step, *before)
-        trial = _project(design, samples, np.clip(fit.log_variance + onwards, *bounds))
+        update = step if previous is None else _extrapolated(fit.log_variance, step, *previous)
+        trial = _project(design, samples, np.clip(fit.log_variance + update, *bounds))
         if trial.cost < fit.cost:
-            settled = fit.cost - trial.cost < still * fit.cost
-            before = fit.log_variance, step
+            converged = fit.cost - trial.cost < tolerance * fit.cost
+            previous = fit.log_variance, step
             fit, damping = trial, max(damping / 5.0, 1e-12)
-            if settled:
+            if converged:
                 break
-        elif before is not None:
-            before = None
+        elif previous is not None:
+            previous = None
         else:
             damping = max(4.0 * damping, 1e-6)
-            if damping > _HOPELESS:
+            if damping > _MAX_DAMPING:
                 break
     return fit
 
@@ -68,42 +78,43 @@ def _step(fit: Fit, damping: float) -> Floats:
     scale = fit.curvature.diagonal()
     damped = fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
     step = -np.linalg.lstsq(damped, fit.gradient, rcond=None)[0]
-    return np.asarray(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
+    return np.asarray(np.clip(step, -_MAX_STEP, _MAX_STEP))
 
 
-def _extrapolated(place: Floats, step: Floats, last_place: Floats, last_step: Floats) -> Floats:
-    """The step to where steps would vanish if they went on changing as they did from the last place.
+def _extrapolated(position: Floats, step: Floats, last_position: Floats, last_step: Floats) -> Floats:
+    """Return the step to where steps would vanish if they continued to change as since the last position.
 
-    Without the residuals' own curvature each step goes the same small share of the way: a dozen become one.
+    The curvature of the residuals is neglected, so steps converge linearly: extrapolation replaces a dozen of
+    them.
     """
     change = step - last_step
     size = float(change @ change)
-    share = float(step @ change) / size if size > 0.0 else 0.0
-    onwards = step - share * (place - last_place + change)
-    return np.asarray(np.clip(onwards, -_LONGEST_STEP, _LONGEST_STEP))
+    factor = float(step @ change) / size if size > 0.0 else 0.0
+    extrapolated = step - factor * (position - last_position + change)
+    return np.asarray(np.clip(extrapolated, -_MAX_STEP, _MAX_STEP))
 
 
 def _project(design: Design, samples: Floats, log_variance: Floats) -> Fit:
-    """The best weights of 0 or more for these variances."""
+    """Return the fit with optimal non-negative weights for given variances."""
     columns, slopes = design(np.exp(log_variance))
     k = len(log_variance)
     size = np.linalg.norm(columns, axis=0)
-    # All that follows lives in the space of these few columns: one factorisation serves every channel.
-    small = triangle(np.hstack([columns / size, slopes / size, samples]))
+    # One QR factorisation reduces the problem of all channels to the space of these few columns.
+    reduced = qr_factor(np.hstack([columns / size, slopes / size, samples]))
     weight = np.zeros((k, samples.shape[1]))
     cost, gradient, curvature = 0.0, np.zeros(k), np.zeros((k, k))
-    for i, sample in enumerate(small.T[2 * k :]):
-        weight[:, i], residual, jacobian = _solve_channel(small[:, :k], small[:, k : 2 * k], sample)
+    for i, sample in enumerate(reduced.T[2 * k :]):
+        weight[:, i], residual, jacobian = _solve_channel(reduced[:, :k], reduced[:, k : 2 * k], sample)
         cost += float(residual @ residual)
         gradient += jacobian.T @ residual
         curvature += jacobian.T @ jacobian
     return Fit(log_variance, weight / size[:, None], cost, gradient, curvature)
 
 
-def triangle(tall: Floats) -> Floats:
-    """The factor R of a QR factorisation, by blocks of rows.
+def qr_factor(tall: Floats) -> Floats:
+    """Return the factor R of a QR factorisation, computed by blocks of rows.
 
-    For a whole tall matrix BLAS starts threads that wait longer than they work.
+    For tall matrices BLAS would start threads that cost more than they save.
     """
     blocks = np.array_split(tall, -(-len(tall) // _BLOCK))
     factors = [np.asarray(np.linalg.qr(block, mode="r")) for block in blocks]
@@ -114,8 +125,8 @@ def _solve_channel(columns: Floats, slopes: Floats, sample: Floats) -> tuple[Flo
     from scipy.optimize import nnls
 
     weight: Floats = nnls(columns, sample)[0]
-    lit = weight > 0.0
-    Q, R = np.linalg.qr(columns[:, lit])
-    weight[lit] = np.linalg.solve(R, Q.T @ sample)  # some versions of nnls square the condition number
+    positive = weight > 0.0
+    Q, R = np.linalg.qr(columns[:, positive])
+    weight[positive] = np.linalg.solve(R, Q.T @ sample)  # some versions of nnls square the condition number
     jacobian = slopes * weight
     return weight, columns @ weight - sample, jacobian - Q @ (Q.T @ jacobian)

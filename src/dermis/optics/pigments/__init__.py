@@ -1,1 +1,1 @@
-"""Skin from pigments: spectra of melanin and blood, and the media that they give."""
+"""Skin made of pigments: spectra of melanin and blood, and the resulting media."""

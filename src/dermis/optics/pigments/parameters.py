@@ -1,6 +1,6 @@
-"""What a skin of pigments is made of: the default skin, and skins by name.
+"""Parameters of a skin made of pigments: the default skin, and named skins.
 
-Nothing else states a default of these numbers; without NumPy, so that help texts can show them quickly.
+All defaults of these numbers are here; NumPy is not imported, so that help texts appear quickly.
 """
 
 from __future__ import annotations
@@ -11,26 +11,27 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from dermis.base.errors import refuse
-from dermis.base.quantities import number
+from dermis.base.quantities import checked_number
 
 Structure = Literal["dj2006", "donner2008", "biospec"]
 DEFAULT_STRUCTURE: Final[Structure] = "dj2006"
-_SHARES = "melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "oiliness"
+_FRACTIONS = "melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "oiliness"
 _EPIDERMIS_MM = 1e-3, 2.0
-"""From less than a cell to a callous heel."""
+"""Thinnest and thickest epidermis: less than a cell, and a callous heel [mm]."""
 
 
 @dataclass(frozen=True)
 class SkinParameters:
-    """Pigments and thickness of a skin; its defaults are those of the whole package.
+    """Pigments and epidermal thickness of a skin.
 
-    melanin : share of the epidermis' volume that is melanosomes, 0 to 1 [-]
-    eumelanin : share of the melanosomes that hold eumelanin, the rest holds pheomelanin, 0 to 1 [-]
-    blood : share of the dermis' volume that is blood, 0 to 1 [-]
-    oxygen : share of the haemoglobin that carries oxygen, 0 to 1 [-]
-    epidermis_mm : thickness of the epidermis, an artist's value within what is measured, 0.05 to 0.1 [mm]
-    epidermal_blood : share of the epidermis' volume that is blood, in "donner2008" only, 0 to 1 [-]
-    oiliness : gain of the surface's reflection (rho_s), 0 to 1; nothing below the surface depends on it [-]
+    melanin : fraction of the epidermal volume that is melanosomes, 0 to 1 [-]
+    eumelanin : fraction of melanosomes with eumelanin; the rest have pheomelanin, 0 to 1 [-]
+    blood : fraction of the dermal volume that is blood, 0 to 1 [-]
+    oxygen : fraction of oxygenated haemoglobin, 0 to 1 [-]
+    epidermis_mm : thickness of the epidermis; the default is an artist's choice, measured values are 0.05 to
+        0.1 [mm]
+    epidermal_blood : fraction of the epidermal volume that is blood, in "donner2008" only, 0 to 1 [-]
+    oiliness : factor rho_s of the surface reflection, 0 to 1, without effect below the surface [-]
 
     Source: [DonnerJensen2006, DonnerJensen2006a]; [Donner2008] for blood in the epidermis.
     """
@@ -44,13 +45,14 @@ class SkinParameters:
     oiliness: float = 0.3
 
     def __post_init__(self) -> None:
-        for name in _SHARES:
-            number(_option(name), getattr(self, name), 0.0, 1.0, "a share")
-        number(_option("epidermis_mm"), self.epidermis_mm, *_EPIDERMIS_MM, "mm")
+        """Check the ranges of all fields."""
+        for name in _FRACTIONS:
+            checked_number(_option(name), getattr(self, name), 0.0, 1.0, "a fraction")
+        checked_number(_option("epidermis_mm"), self.epidermis_mm, *_EPIDERMIS_MM, "mm")
         if self.melanin + self.epidermal_blood > 1.0:
             both = f"{_option('melanin')} and {_option('epidermal_blood')}"
-            came = f"{self.melanin:g} and {self.epidermal_blood:g} came"
-            refuse(both, "at most 1 together", came, "Lower one")
+            actual = f"got {self.melanin:g} and {self.epidermal_blood:g}"
+            refuse(both, "at most 1 together", actual, "Lower one")
 
 
 def _option(name: str) -> str:
@@ -58,7 +60,7 @@ def _option(name: str) -> str:
 
 
 def _published(melanin: float, eumelanin: float, blood: float) -> SkinParameters:
-    """A skin of [DonnerJensen2006a] with the oxygen and the thickness of public code's scene."""
+    """Return a skin of [DonnerJensen2006a] with oxygenation and thickness from a public implementation."""
     return SkinParameters(melanin, eumelanin, blood, oxygen=0.75, epidermis_mm=0.25)
 
 
@@ -72,4 +74,4 @@ SKINS: Final[Mapping[str, SkinParameters]] = MappingProxyType(
         "dark": _published(0.5, 0.7, 0.05),
     }
 )
-"""The default, and the three skins of [DonnerJensen2006a]; of light that meets the last, 2 % return."""
+"""Skins by name: the default and the three skins of [DonnerJensen2006a]."""

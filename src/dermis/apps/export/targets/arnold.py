@@ -8,53 +8,53 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.apps.export.fitting import fit_d, homogeneous
+from dermis.apps.export.fitting import fit_burley_width, fit_homogeneous_medium
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import ParameterTable, Row, Rows, floats, numbers_of
-from dermis.optics.curve import Curve
-from dermis.optics.half_space import albedo_of, half_space
+from dermis.apps.export.target import JsonTarget, Parameter, Parameters, floats, get_numbers
+from dermis.optics.cumulative_profile import CumulativeProfile
+from dermis.optics.half_space import half_space, tabulated_albedo
 from dermis.optics.media import Floats
 
 _COLOUR, _RADIUS, _SCALE = "subsurface_color", "subsurface_radius", "subsurface_scale"
-_MM_PER_CM, _DARKEST = 10.0, 1e-3
+_MM_PER_CM, _MIN_ALBEDO = 10.0, 1e-3
 
 
-class Arnold(ParameterTable):
+class Arnold(JsonTarget):
     """The random walk of standard_surface, for a scene in centimetres."""
 
     name = "arnold"
     title = "Arnold"
     versions = ("7",)
-    wrong = (
-        "How colour becomes the albedo of a scattering inside the renderer is not published: this is by a "
-        "walk counted here. One medium cannot hold layers."
+    limitations = (
+        "How the renderer converts a colour to a scattering albedo is not published; tabulated random walks of "
+        "this package are used instead. A single medium cannot represent layers."
     )
 
-    def parameters(self, subject: Subject, version: str) -> Rows:
+    def parameters(self, subject: Subject, version: str) -> Parameters:
         """Mean free paths of the homogeneous medium that shows the colour and is nearest to the profile."""
-        colour = subject.colour(_DARKEST)
-        return _rows(colour, homogeneous(subject.curve, colour, "walk").mfp_mm)
+        colour = subject.clipped_albedo(_MIN_ALBEDO)
+        return _parameters(colour, fit_homogeneous_medium(subject.curve, colour, "walk").mfp_mm)
 
-    def naive(self, subject: Subject, version: str) -> Rows:
+    def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """The width of a fitted lobe as the radius."""
-        return _rows(subject.colour(_DARKEST), fit_d(subject.curve))
+        return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
-    def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
+    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """The walk of the colour's albedo; a white curve is shown with the head's colours by its map."""
-        path = _MM_PER_CM * np.array(numbers_of(rows, _RADIUS)) * numbers_of(rows, _SCALE)
-        colour = np.array(numbers_of(rows, _COLOUR))
-        walk = half_space("walk", albedo_of("walk", colour), path)
-        return walk.with_energy(walk.energy / subject.colour(_DARKEST) * subject.curve.energy)
+        path = _MM_PER_CM * np.array(get_numbers(parameters, _RADIUS)) * get_numbers(parameters, _SCALE)
+        colour = np.array(get_numbers(parameters, _COLOUR))
+        curve = half_space("walk", tabulated_albedo("walk", colour), path)
+        return curve.with_energy(curve.energy / subject.clipped_albedo(_MIN_ALBEDO) * subject.curve.energy)
 
 
-def _rows(colour: Floats, path_mm: Floats) -> Rows:
+def _parameters(colour: Floats, path_mm: Floats) -> Parameters:
     return (
-        Row("subsurface", 1.0, "-", "all of the diffuse light is scattered below the surface"),
-        Row("subsurface_type", "randomwalk", "-", "not diffusion, which has another curve"),
-        Row(_COLOUR, floats(colour), "-", "diffuse reflectance"),
-        Row(_RADIUS, floats(path_mm / _MM_PER_CM), "cm", "mean free path"),
-        Row(_SCALE, 1.0, "-", "units of the scene in a cm: 0.01 where it is in metres"),
-        Row("subsurface_anisotropy", 0.0, "-", "scattering alike to all directions"),
+        Parameter("subsurface", 1.0, "-", "all diffuse light is scattered below the surface"),
+        Parameter("subsurface_type", "randomwalk", "-", "not diffusion, whose profile differs"),
+        Parameter(_COLOUR, floats(colour), "-", "diffuse reflectance"),
+        Parameter(_RADIUS, floats(path_mm / _MM_PER_CM), "cm", "mean free path"),
+        Parameter(_SCALE, 1.0, "-", "scene units per cm: 0.01 for a scene in metres"),
+        Parameter("subsurface_anisotropy", 0.0, "-", "isotropic scattering"),
     )
 
 

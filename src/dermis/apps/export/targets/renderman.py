@@ -8,52 +8,54 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.apps.export.fitting import fit_d, lobe
+from dermis.apps.export.fitting import fit_burley_width, burley_curve
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import ParameterTable, Row, Rows, floats, numbers_of
-from dermis.optics.curve import Curve
+from dermis.apps.export.target import JsonTarget, Parameter, Parameters, floats, get_numbers
+from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import shape_factor_diffuse
 from dermis.optics.media import Floats
 
 _COLOUR, _UNIT = "subsurfaceColor", "unitLength"
-_PATH, _COLOUR_OF_PATH = "subsurfaceDmfp", "subsurfaceDmfpColor"
-_DARKEST = 1e-3
+_PATH, _PATH_COLOUR = "subsurfaceDmfp", "subsurfaceDmfpColor"
+_MIN_ALBEDO = 1e-3
 
 
-class RenderMan(ParameterTable):
+class RenderMan(JsonTarget):
     """Burley's model of PxrSurface (subsurfaceType 4), for a scene in millimetres."""
 
     name = "renderman"
     title = "RenderMan"
     versions = ("26",)
-    wrong = (
-        "The curve of the model is not published in closed form: this is that of its authors' paper. Its "
-        "path traced and multiple models have others."
+    limitations = (
+        "The model has no published closed form; the profile of its authors' paper is used. The path-traced and "
+        "multiple models differ."
     )
 
-    def parameters(self, subject: Subject, version: str) -> Rows:
+    def parameters(self, subject: Subject, version: str) -> Parameters:
         """Diffuse mean free paths of the fitted lobes."""
-        albedo = subject.colour(_DARKEST)
-        return _rows(albedo, fit_d(subject.curve) * shape_factor_diffuse(albedo))
+        albedo = subject.clipped_albedo(_MIN_ALBEDO)
+        return _parameters(albedo, fit_burley_width(subject.curve) * shape_factor_diffuse(albedo))
 
-    def naive(self, subject: Subject, version: str) -> Rows:
+    def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """The width of the lobe as if it were the diffuse mean free path."""
-        return _rows(subject.colour(_DARKEST), fit_d(subject.curve))
+        return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
-    def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
+    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """The lobe of the paper."""
-        path = np.array(numbers_of(rows, _PATH)) * numbers_of(rows, _COLOUR_OF_PATH) * numbers_of(rows, _UNIT)
-        return lobe(path / shape_factor_diffuse(numbers_of(rows, _COLOUR)), subject.curve.energy)
+        path, path_colour, unit, colour = (
+            np.array(get_numbers(parameters, name)) for name in (_PATH, _PATH_COLOUR, _UNIT, _COLOUR)
+        )
+        return burley_curve(path * path_colour * unit / shape_factor_diffuse(colour), subject.curve.energy)
 
 
-def _rows(albedo: Floats, path_mm: Floats) -> Rows:
+def _parameters(albedo: Floats, path_mm: Floats) -> Parameters:
     longest = float(path_mm.max())
     return (
-        Row("subsurfaceGain", 1.0, "-", "all of the diffuse light is scattered below the surface"),
-        Row(_COLOUR, floats(albedo), "-", "diffuse reflectance A"),
-        Row(_PATH, longest, "mm", "diffuse mean free path, s(A) d, of the widest channel"),
-        Row(_COLOUR_OF_PATH, floats(path_mm / longest), "-", "it by the widest, no gamma"),
-        Row(_UNIT, 1.0, "-", "units of the scene in a mm: 0.1 where it is in cm"),
+        Parameter("subsurfaceGain", 1.0, "-", "all diffuse light is scattered below the surface"),
+        Parameter(_COLOUR, floats(albedo), "-", "diffuse reflectance A"),
+        Parameter(_PATH, longest, "mm", "largest diffuse mean free path, s(A) d, of the channels"),
+        Parameter(_PATH_COLOUR, floats(path_mm / longest), "-", "each channel's relative to that, no gamma"),
+        Parameter(_UNIT, 1.0, "-", "scene units per mm: 0.1 for a scene in cm"),
     )
 
 

@@ -20,10 +20,10 @@ from dermis.apps.inverse.fitting.placement import place_by_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
 from dermis.apps.inverse.fitting.solve import ROBUST, Problem, certainty_of, solve, tint
 from dermis.apps.inverse.fitting.unknowns import UNKNOWNS, Point, tangents, usual_point
-from dermis.base.errors import refuse, shown_value
-from dermis.base.quantities import number, numbers, whole_number
+from dermis.base.errors import format_value, refuse
+from dermis.base.quantities import checked_array, checked_integer, checked_number
 from dermis.frame.renderer import Renderer
-from dermis.human.skin.painted import colours
+from dermis.human.skin.painted import skin_colour_table
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.optics.media import Floats
 from dermis.scene.settings import Settings
@@ -76,8 +76,8 @@ class InitialGuess:
         self._lights = len(below)
         pigments = frames.scene.skin.pigments
         assert pigments is not None
-        held = pigments.given()
-        self._table = colours(held["eumelanin"], held["oxygen"], held["epidermis_mm"])
+        held = pigments.overrides()
+        self._table = skin_colour_table(held["eumelanin"], held["oxygen"], held["epidermis_mm"])
 
     def best(self, count: int) -> Point:
         """Return the best point with `count` suns."""
@@ -156,13 +156,13 @@ def fit(
     `dermis.Renderer`.
     """
     began = time.perf_counter()
-    whole_number("suns", suns, 0, 2)
-    exposure = number("exposure", exposure, 1e-6, 1e6, "20 stops either way")
-    noise, robust = number("noise", noise, 1e-4, 1.0), number("robust", robust, 0.5, 1e12)
+    checked_integer("suns", suns, 0, 2)
+    exposure = checked_number("exposure", exposure, 1e-6, 1e6, "20 stops either way")
+    noise, robust = checked_number("noise", noise, 1e-4, 1.0), checked_number("robust", robust, 0.5, 1e12)
     given = _white(white)
     scale = given * exposure
     whole = read_photograph(photo)
-    small = whole.within(whole_number("side", side, 32, 1024, "pixels"))
+    small = whole.within(checked_integer("side", side, 32, 1024, "pixels"))
     subject = subject_of(head, camera)
     if landmarks is not None:
         subject = place_by_landmarks(subject, landmarks, whole.size)
@@ -170,7 +170,7 @@ def fit(
         size=small.size, atlas=atlas, shadow_size=SHADOWS, samples=4, strands=False, technique="texture-space"
     )
     with TemporaryDirectory() as folder:
-        frames = Frames(Renderer(adapter, depth=2), subject.scene, settings, Path(folder))
+        frames = Frames(Renderer(adapter, cache_size=2), subject.scene, settings, Path(folder))
         tried = _find_skin(frames, small)
         problem = Problem(frames, small.linear[frames.mask] / scale, noise, white == "specular", robust)
         state, slopes = solve(problem, _start(problem, tried, suns), told)
@@ -202,8 +202,8 @@ def _find_skin(frames: Frames, photo: Photograph) -> Point:
     frames.find_mask(tried, photo.trusted)
     frames.mask &= photo.linear.max(axis=2) > 0.0
     if frames.mask.sum() < _LEAST_PIXELS:
-        came = f"{int(frames.mask.sum())} pixels of it are neither clipped nor black"
-        refuse("photo", "skin where the head is", came, "Check camera and exposure, or take a larger side")
+        actual = f"{int(frames.mask.sum())} pixels of it are neither clipped nor black"
+        refuse("photo", "skin where the head is", actual, "Check camera and exposure, or take a larger side")
     return tried
 
 
@@ -221,8 +221,8 @@ def _white(white: White) -> Floats:
     """Return the given white (3,), green 1."""
     if isinstance(white, str):
         if white != "specular":
-            came = f"{shown_value(white)} came"
-            refuse("white", '"specular" or red, green and blue', came, "Write white=(1, 1, 1)")
+            actual = f"got {format_value(white)}"
+            refuse("white", '"specular" or red, green and blue', actual, "Write white=(1, 1, 1)")
         return np.ones(3)
-    found = numbers("white", white, (3,), 0.01, 100.0)
+    found = checked_array("white", white, (3,), 0.01, 100.0)
     return np.asarray(found / found[1], np.float64)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.light_basis import BASIS, panorama
 from dermis.apps.inverse.fitting.unknowns import Point, suns_of, with_skin
-from dermis.base.atomic_write import replacing
-from dermis.frame.rendered import Rendered
+from dermis.base.atomic_write import atomic_file
+from dermis.frame.rendered_frame import RenderedFrame
 from dermis.frame.renderer import Renderer
 from dermis.images.hdr import encode_exr
 from dermis.optics.media import Floats
@@ -102,7 +102,7 @@ class Frames:
 
     def _environment(self, name: str, radiance: Floats) -> Environment:
         path = self.folder / f"{name}.exr"
-        with replacing(path) as trial:
+        with atomic_file(path) as trial:
             trial.write_bytes(encode_exr(np.repeat(radiance[..., None], 3, axis=2).astype(np.float32)))
         return Environment(name=str(path))
 
@@ -112,7 +112,7 @@ class Frames:
     def _image(self, scene: Scene, view: str) -> Floats:
         return np.asarray(self._draw(scene, view).linear()[self.mask], np.float64)
 
-    def _draw(self, scene: Scene, view: str, outputs: tuple[str, ...] = ()) -> Rendered:
+    def _draw(self, scene: Scene, view: str, outputs: tuple[str, ...] = ()) -> RenderedFrame:
         self.drawn += 1
         return self.renderer.draw(scene, self.settings, timed=False, view=view, outputs=outputs)
 

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.base.errors import refuse, shown_value
+from dermis.base.errors import format_value, refuse
 from dermis.human.person import Human
 from dermis.human.skin.painted import PaintedMaps
 from dermis.images.colour import decode_srgb_levels
-from dermis.images.io import Picture, read_image
+from dermis.images.io import EmbeddedPicture, read_image
 from dermis.mesh.head import Head
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL
 from dermis.scene.camera import Camera
+from dermis.scene.conversions import as_head
 from dermis.scene.files import head_table, load_camera, load_scene
-from dermis.scene.given import given_head
-from dermis.scene.heads import is_person, person_of
+from dermis.scene.heads import is_person_name, load_person
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
@@ -55,20 +55,20 @@ class Photograph:
         return Photograph(_averaged(self.linear, size), _averaged(self.trusted[..., None], size)[..., 0])
 
 
-def read_photograph(given: str | Path | Picture | ArrayLike) -> Photograph:
+def read_photograph(given: str | Path | EmbeddedPicture | ArrayLike) -> Photograph:
     """Return the photograph of a file (PNG, JPEG or TIFF in sRGB; EXR and HDR linear) or of pixels.
 
     given : a file, (h, w, 3) bytes in sRGB, or floats, linear Rec. 709
 
     Raises DermisError for what is no picture in colour.
     """
-    image = read_image(given) if isinstance(given, str | Path | Picture) else np.asarray(given)
-    name = given if isinstance(given, str | Path | Picture) else "photo"
+    image = read_image(given) if isinstance(given, str | Path | EmbeddedPicture) else np.asarray(given)
+    name = given if isinstance(given, str | Path | EmbeddedPicture) else "photo"
     if image.ndim != 3 or image.shape[2] not in (3, 4) or min(image.shape[:2]) < _LEAST_SIDE:
         expected = f"a picture (h, w, 3) in colour of {_LEAST_SIDE} pixels a side at least"
-        refuse(name, expected, f"shape {image.shape} came", "Save it as RGB")
+        refuse(name, expected, f"got shape {image.shape}", "Save it as RGB")
     if image.dtype.kind != "f" and image.dtype not in (np.uint8, np.uint16):
-        refuse(name, "sRGB bytes or linear floats", f"{image.dtype} came", "Convert it")
+        refuse(name, "sRGB bytes or linear floats", f"got {image.dtype}", "Convert it")
     image = image[..., :3]
     if image.dtype.kind == "f":
         if not np.isfinite(image).all() or image.min() < 0.0 or image.max() <= 0.0:
@@ -122,12 +122,12 @@ def subject_of(given: object, camera: object = None) -> Subject:
         table = head_table(Path(given))
         scene = load_scene(Path(given))[0]
     else:
-        scene = given if isinstance(given, Scene) else Scene(given_head(given))
+        scene = given if isinstance(given, Scene) else Scene(as_head(given))
     if camera is not None:
         scene = replace(scene, camera=_camera(camera, scene.head))  # type: ignore[arg-type]
     person = given if isinstance(given, Human) else _person(scene.head)
     name = scene.head.name
-    if not table and (person is not None or not is_person(name)):
+    if not table and (person is not None or not is_person_name(name)):
         table = {"name": str(Path(name).resolve()) if Path(name).is_file() else name}
     return Subject(_plain(scene), person, table)
 
@@ -136,16 +136,20 @@ def _camera(given: object, head: Head) -> Camera | Callable[[Head], Camera]:
     if isinstance(given, str | os.PathLike):
         return load_camera(str(given), head)
     if not (isinstance(given, Camera) or callable(given)):
-        came = f"{shown_value(given)} came"
-        refuse("camera", "a camera, a preset or a file", came, 'Write camera="portrait", or camera.toml')
+        actual = f"got {format_value(given)}"
+        refuse("camera", "a camera, a preset or a file", actual, 'Write camera="portrait", or camera.toml')
     return given
 
 
 def _person(head: Head) -> Human | None:
     """Return the person of a painted head, with the skin that is painted on it."""
-    if not isinstance(head.maps, PaintedMaps) or head.maps.colour is not None or not is_person(head.name):
+    if (
+        not isinstance(head.maps, PaintedMaps)
+        or head.maps.colour is not None
+        or not is_person_name(head.name)
+    ):
         return None
-    person = replace(person_of(head.name), skin=head.maps.look)
+    person = replace(load_person(head.name), skin=head.maps.look)
     own, there = person.positions_mm, head.control.positions_mm
     same = own.shape == there.shape and np.allclose(own, there, atol=_SAME_MM)
     return person if same else None
@@ -158,6 +162,6 @@ def _plain(scene: Scene) -> Scene:
         look = scene.head.maps.look
         own |= {"eumelanin": look.eumelanin, "oxygen": look.oxygen}
     if scene.skin.pigments is not None:
-        own |= scene.skin.pigments.given()
+        own |= scene.skin.pigments.overrides()
     held = {"profile": SPECTRAL, "pigments": Pigments(**own)}
     return replace(scene, lights=(), environment=None, skin=Skin(**(scene.skin.model_dump() | held)))

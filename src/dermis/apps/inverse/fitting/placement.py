@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.inputs import Subject, subject_of
 from dermis.base.errors import refuse
-from dermis.base.reading import parse_json, read_text, understood
+from dermis.base.reading import parse_json, parsing, read_text
 from dermis.base.tables import parse_rows
 from dermis.human.landmarks.points import LandmarkPoints, landmark_points
 from dermis.human.landmarks.sets import SETS
 from dermis.human.person import Human
-from dermis.human.published import OLD, YOUNG, human_targets
+from dermis.human.makehuman import OLD, YOUNG, human_targets
 from dermis.mesh.head import Head
 from dermis.optics.media import Floats
 from dermis.scene.camera import Camera
@@ -187,21 +187,21 @@ def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[s
     if Path(path).suffix.lower() == ".json":
         name, found = _of_json(path, parse_json(text, path, _EXPECTED), size)
     else:
-        with understood(path, _EXPECTED, KeyError, TypeError, csv.Error):
+        with parsing(path, _EXPECTED, KeyError, TypeError, csv.Error):
             rows = [(row["name"], float(row["x"]), float(row["y"])) for row in parse_rows(text)]
         found = {str(one): np.array([x, y]) for one, x, y in rows}
         name = _BY_COUNT.get(len(found), "")
     if len(found) < _LEAST or not all(np.isfinite(one).all() for one in found.values()):
-        refuse(path, f"{_LEAST} landmarks at least", f"{len(found)} came", "Correct the file")
+        refuse(path, f"{_LEAST} landmarks at least", f"got {len(found)}", "Correct the file")
     if name not in SETS:
         expected = f"as many landmarks as {', '.join(map(str, _BY_COUNT))}, or JSON that names their set"
-        refuse(path, expected, f"{len(found)} came", "Give all of a set")
+        refuse(path, expected, f"got {len(found)}", "Give all of a set")
     return name, found
 
 
 def _of_json(path: str | Path, data: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
     """Return the landmarks of `dermis render --landmarks`, or of MediaPipe as shares of width and height."""
-    with understood(path, _EXPECTED, KeyError, TypeError, IndexError):
+    with parsing(path, _EXPECTED, KeyError, TypeError, IndexError):
         if isinstance(data, Mapping) and isinstance(data.get("landmarks"), Mapping):
             name, rows = next(iter(data["landmarks"].items()))
             return name, {str(row["name"]): np.asarray(row["pixel"], np.float64) for row in rows}

@@ -21,9 +21,9 @@ from dermis.apps.inverse.fitting.unknowns import (
     suns_of,
     with_skin,
 )
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import refuse
-from dermis.human.person_file import write_numbers
+from dermis.human.person_file import write_person_json
 from dermis.images.hdr import encode_exr
 from dermis.images.io import write_image
 from dermis.optics.media import Floats
@@ -138,18 +138,18 @@ def save_fit(folder: Path, found: FitResult) -> list[Path]:
     """
     person, table = found.subject.person, found.subject.table
     if person is None and not table:
-        came = "it came as a head that only its maker knows"
-        refuse("head", "a person by name, or a Human, for a file to name", came, "Fit the Human itself")
+        actual = "it came as a head that only its maker knows"
+        refuse("head", "a person by name, or a Human, for a file to name", actual, "Fit the Human itself")
     written = []
     radiance = panorama(found.strengths[:BASIS])
     if radiance.max() > 0.0:
         written.append(folder / "light.exr")
-        with replacing(written[-1]) as trial:
+        with atomic_file(written[-1]) as trial:
             trial.write_bytes(encode_exr((radiance[..., None] * found.white).astype(np.float32)))
     if person is not None:
         written.append(folder / "person.json")
         look = replace(person.look, melanin=found.values["melanin"], blood=found.values["blood"])
-        write_numbers(written[-1], replace(person, skin=look))
+        write_person_json(written[-1], replace(person, skin=look))
         table = {"name": "person.json"}
     written.append(folder / "scene.toml")
     settings = Settings(size=found.size, exposure=found.exposure)
@@ -158,7 +158,7 @@ def save_fit(folder: Path, found: FitResult) -> list[Path]:
         written.append(folder / f"{name}.png")
         write_image(written[-1], image)
     written.append(folder / SUMMARY)
-    with replacing(written[-1]) as trial:
+    with atomic_file(written[-1]) as trial:
         trial.write_text(json.dumps(found.summary(), indent=2) + "\n", encoding="utf-8")
     return written
 

@@ -16,14 +16,14 @@ from dermis.gpu import (
     ComputeProgram,
     Device,
     MutableBindings,
-    Record,
+    UniformRecord,
     Texture,
-    compiled,
+    cached_program,
     download,
     make_texture,
 )
 from dermis.gpu.program import declared
-from dermis.gpu.textures import texture_from, upload
+from dermis.gpu.textures import texture_from_array, upload
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import SkinParameters
 
@@ -46,7 +46,7 @@ class Unmixer:
         self.device, self.model, self.noise = device, model, noise
         self._table = _table_of(device, model)
         self._found: tuple[Texture, Texture] | None = None
-        self._starts = device.space(8 * _SIDE**2, "first guesses")
+        self._starts = device.storage_buffer(8 * _SIDE**2, "first guesses")
         shader = _program(device, "unmix_start", model)
         frame = CommandList(device, timed=False)
         frame.compute("start", shader, self._bound(shader, 0), (_SIDE, _SIDE))
@@ -60,7 +60,7 @@ class Unmixer:
         made, unsure, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
         for rows in strips(height, width):
             frame = CommandList(self.device, timed=False)
-            strip = texture_from(self.device, _four(colours[rows]), _TEXEL, "colours")
+            strip = texture_from_array(self.device, _four(colours[rows]), _TEXEL, "colours")
             textures = self.record(frame, strip)
             frame.submit()
             shares, left = (download(self.device, texture) for texture in textures)
@@ -99,7 +99,9 @@ def recolour(
     change = shader.record("Change", factors=factors, added=added)
     found = np.empty(residual.shape, np.float32)
     for rows in strips(*made.shape[:2]):
-        first, second = (texture_from(device, _four(one[rows]), _TEXEL, "maps") for one in (made, residual))
+        first, second = (
+            texture_from_array(device, _four(one[rows]), _TEXEL, "maps") for one in (made, residual)
+        )
         size = first.size[:2]
         texture = make_texture(device, size, _TEXEL)
         bound: MutableBindings = {"model": _record(shader, model, 1.0, 0), "table": table, "change": change}
@@ -135,10 +137,10 @@ def _program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
     path = _FOLDER / f"{name}.wgsl"
     constants = declared(path, (), tuple(numbers.items()))
     make = partial(ComputeProgram, device, path, (), constants)
-    return compiled(device, ("unmixing", name), tuple(constants.items()), make)
+    return cached_program(device, ("unmixing", name), tuple(constants.items()), make)
 
 
-def _record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> Record:
+def _record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> UniformRecord:
     numbers = {"usual": model.usual, "spread": model.spread, "noise": noise, "floor": skins.FLOOR}
     believed = {"blood": (skins.USUAL_BLOOD, skins.BLOOD_SPREAD), "darkest": skins.DARKEST}
     return shader.record("Model", span=model.span, steps=steps, **believed, **numbers)

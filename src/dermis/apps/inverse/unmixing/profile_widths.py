@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.unmixing.unmix import Unmixed
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import refuse
 from dermis.images.hdr import encode_exr
 from dermis.optics.fits.gaussian import shared_gaussians
@@ -80,7 +80,7 @@ def save_widths(folder: Path, widths: Widths) -> list[Path]:
     for path, profile in zip(written, widths.profiles, strict=True):
         write_profile(path, profile, {})
     path = folder / f"{MAP}.exr"
-    with replacing(path) as trial:
+    with atomic_file(path) as trial:
         trial.write_bytes(encode_exr(np.dstack([widths.shares, np.zeros_like(widths.shares[..., :1])])))
     return [*written, path]
 

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.errors import refuse, shown_value
+from dermis.base.errors import format_value, refuse
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.skin_colours import colour_table
@@ -95,7 +95,7 @@ def skin_model(skin: SkinParameters = DEFAULT_SKIN, third: Third = "none") -> Sk
     Raises DermisError for another third.
     """
     if third not in get_args(Third):
-        refuse("third", ", ".join(get_args(Third)), f"{shown_value(third)} came", "Take one of them")
+        refuse("third", ", ".join(get_args(Third)), f"got {format_value(third)}", "Take one of them")
     return _model(replace(skin, melanin=0.0, blood=0.0, epidermal_blood=0.0), third)
 
 

@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer, recolour, shading_of
 from dermis.apps.inverse.unmixing.skin_model import SkinModel, Third, skin_model
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import refuse
-from dermis.base.quantities import number
+from dermis.base.quantities import checked_number
 from dermis.formats.maps import colour_map
 from dermis.gpu import Device
 from dermis.gpu.failures import LazyDevice
 from dermis.images.colour import delta_e_2000
 from dermis.images.hdr import encode_exr
-from dermis.images.io import Picture, write_image
+from dermis.images.io import EmbeddedPicture, write_image
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
@@ -89,10 +89,10 @@ def parse_share(option: str, words: str) -> Share:
     try:
         value = float(words[1:] if factor else words)
     except ValueError:
-        refuse(option, "a factor, such as x2, or a median, such as 0.1", f"{words!r} came", "Correct it")
+        refuse(option, "a factor, such as x2, or a median, such as 0.1", f"got {words!r}", "Correct it")
     if factor:
-        return Share(factor=number(option, value, *_FACTORS, "a factor"))
-    return Share(median=number(option, value, 0.0, 1.0, "a share of the volume"))
+        return Share(factor=checked_number(option, value, *_FACTORS, "a factor"))
+    return Share(median=checked_number(option, value, 0.0, 1.0, "a share of the volume"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +181,7 @@ def _spread(values: Floats) -> dict[str, float]:
 
 
 def unmix(
-    picture: str | Path | Picture | ArrayLike,
+    picture: str | Path | EmbeddedPicture | ArrayLike,
     *,
     skin: SkinParameters = DEFAULT_SKIN,
     third: Third = "none",
@@ -203,11 +203,11 @@ def unmix(
     Raises DermisError for what is no picture of colours, numbers that cannot be, and as
     `dermis.gpu.open_device`.
     """
-    noise = number("noise", noise, *_NOISE, "relative to each channel")
+    noise = checked_number("noise", noise, *_NOISE, "relative to each channel")
     model = skin_model(skin, third)
     if third == "shade":
-        refuse("third", '"none" or "oxygen"', "'shade' came", "Set shading=True instead")
-    colours = colour_map(picture) if isinstance(picture, str | Path | Picture) else _array(picture)
+        refuse("third", '"none" or "oxygen"', "got 'shade'", "Set shading=True instead")
+    colours = colour_map(picture) if isinstance(picture, str | Path | EmbeddedPicture) else _array(picture)
 
     def job(device: Device) -> Unmixed:
         light = shading_of(device, colours, skin, noise) if shading else None
@@ -224,9 +224,9 @@ def unmix(
 def _array(colours: ArrayLike) -> Pixels:
     found = np.asarray(colours)
     if found.ndim != 3 or found.shape[2] != 3 or not found.size or found.dtype.kind != "f":
-        came = f"shape {found.shape} and type {found.dtype} came"
-        remedy = "Decode sRGB first, or give the file's name"
-        refuse("colours", "floats (h, w, 3), linear Rec. 709", came, remedy)
+        actual = f"got shape {found.shape} and type {found.dtype}"
+        advice = "Decode sRGB first, or give the file's name"
+        refuse("colours", "floats (h, w, 3), linear Rec. 709", actual, advice)
     if not (np.isfinite(found).all() and found.min() >= 0.0 and found.max() <= 1.0):
         refuse("colours", "reflectances from 0 to 1", "some are outside, or no numbers", "Scale them")
     return found.astype(np.float32, copy=False)
@@ -247,13 +247,13 @@ def save_maps(
     written = []
     for name, values in found.maps().items():
         path = folder / f"{name}.exr"
-        with replacing(path) as trial:
+        with atomic_file(path) as trial:
             trial.write_bytes(encode_exr(values if values.ndim == 3 else values[..., None]))
         written.append(path)
     if recoloured is not None:
         path = folder / ("recoloured.exr" if linear else "recoloured.png")
         write_image(path, recoloured)
         written.append(path)
-    with replacing(folder / SUMMARY) as trial:
+    with atomic_file(folder / SUMMARY) as trial:
         trial.write_text(json.dumps(found.summary(), indent=2) + "\n", encoding="utf-8")
     return [*written, folder / SUMMARY]

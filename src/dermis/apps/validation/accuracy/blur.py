@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import zoom
 
 import dermis
-from dermis.apps.validation.pages import data_file, print_tables, use_tests_folder
+from dermis.apps.validation.pages import data_file, print_tables, add_tests_to_path
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas, cached_atlas
 from dermis.frame.features.atlas import passes as stretched
@@ -41,13 +41,13 @@ if TYPE_CHECKING:
 PROFILE = load_profile("gpu-gems-3")
 Array = NDArray[np.floating]
 Flags = NDArray[np.bool_]
-Choice = Callable[[Array], Flags]
+PointFilter = Callable[[Array], Flags]
 SIZE = 256  # texels along the side, of flat patches
 HUMAN = "heads/makehuman/head_young_male_light.obj"
 RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
 BALL_SIDE, HEAD_SIDE = 320, 1024
 SPACING_MM, WIDTH_MM = 12.0, 6.0  # of bands of light across seams
-LEAST_FACING = 0.4  # cosine between a seam and the light
+MIN_FACING = 0.4  # cosine between a seam and the light
 
 
 def blur(adapter: str = "auto") -> None:
@@ -59,20 +59,20 @@ def blur(adapter: str = "auto") -> None:
 def point_tables(device: Device) -> dict[str, object]:
     """Return the tables of docs/accuracy.md by their names in its template."""
     return {
-        "rows": "\n".join(point_of_light(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
-        "leaning": "\n".join(sheared(device, degrees) for degrees in (90, 80, 60, 45)),
-        "constant": f"{constant_light(device):.1e}",
+        "rows": "\n".join(point_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
+        "leaning": "\n".join(sheared_row(device, degrees) for degrees in (90, 80, 60, 45)),
+        "constant": f"{constant_light_error(device):.1e}",
         "rounding": half_store_rounding(device),
     }
 
 
 def blurred_levels(device: Device, mesh: Mesh, light: Array, stretch: str = "full") -> list[Array]:
     """Return all levels (n, n) of light (n, n) that is blurred on a mesh's atlas."""
-    levels, blur = spread(device, mesh, build_atlas(mesh, len(light)), light[..., None], stretch)
-    return [level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
+    levels, blur = blur_light(device, mesh, build_atlas(mesh, len(light)), light[..., None], stretch)
+    return [resampled_level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
 
 
-def point_of_light(device: Device, texels_per_mm: float) -> str:
+def point_row(device: Device, texels_per_mm: float) -> str:
     """Return errors of a point of light on a flat patch against the analytic sum of Gaussians."""
     profile = load_profile("gpu-gems-3")
     light = np.zeros((SIZE, SIZE), np.float32)
@@ -90,7 +90,7 @@ def point_of_light(device: Device, texels_per_mm: float) -> str:
     return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
 
 
-def sheared(device: Device, degrees: float) -> str:
+def sheared_row(device: Device, degrees: float) -> str:
     """Return principal widths of a point of light where uv axes meet at `degrees`, over the width wanted."""
     flat = plane(SIZE / 3.0)
     lean = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
@@ -111,7 +111,7 @@ def sheared(device: Device, degrees: float) -> str:
     return f"| {degrees:g}° | {' | '.join(cells)} |"
 
 
-def constant_light(device: Device) -> float:
+def constant_light_error(device: Device) -> float:
     """Return the largest deviation of a constant light on a sphere's atlas after all levels."""
     atlas = build_atlas(uv_sphere(100.0), SIZE)
     levels = blurred_levels(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
@@ -120,13 +120,13 @@ def constant_light(device: Device) -> float:
 
 def surface_tables(adapter: str) -> dict[str, str]:
     """Return the tables of curvature and seams by their names in docs/templates/techniques.md."""
-    use_tests_folder()
+    add_tests_to_path()
     renderer = dermis.Renderer(adapter)
-    curved = [first_harmonic(renderer, radius) for radius in RADII_MM]
-    return {"curvature": "\n".join(curved), "seams": "\n".join(seams(renderer))}
+    curved = [harmonic_row(renderer, radius) for radius in RADII_MM]
+    return {"curvature": "\n".join(curved), "seams": "\n".join(seam_rows(renderer))}
 
 
-def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
+def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
     """Return how much the widest Gaussian keeps of light proportional to x on a sphere: map, heat, chords."""
     from atlas_reading import shown
     from cut_meshes import cut_sphere
@@ -134,7 +134,7 @@ def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
     mesh = cut_sphere(radius_mm, 20)
     atlas = build_atlas(mesh, BALL_SIDE, "stitched")
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
-    left = widest(renderer, *spread(renderer.device, mesh, atlas, light))
+    left = widest_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     area = atlas.lit[..., None] / density
     map_share = (area * left * light).sum() / (area * light**2).sum()
@@ -144,7 +144,7 @@ def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
     return f"| {radius_mm:g} | {map_share:.3f} | {np.exp(-v):.3f} | {chords:.3f} |"
 
 
-def spread(
+def blur_light(
     device: Device, mesh: Mesh, atlas: Atlas, light: Array, stretch: str = "full"
 ) -> tuple[PyramidLevels, Blur]:
     """Blur grey light (n, n, 1) on a mesh's atlas by all Gaussians of PROFILE but the narrowest."""
@@ -163,7 +163,7 @@ def spread(
     return levels, blur
 
 
-def level(device: Device, levels: PyramidLevels, blur: Blur, k: int) -> Array:
+def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, k: int) -> Array:
     """Return level k (n, n), read between the texels of its own resolution."""
     halvings = blur.halvings[k]
     layer = download(device, levels.stacks[halvings], layer=k - levels.first[halvings])[..., 0]
@@ -172,69 +172,69 @@ def level(device: Device, levels: PyramidLevels, blur: Blur, k: int) -> Array:
     )
 
 
-def widest(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
+def widest_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
     """Return (n, n, 1) of the widest level."""
-    return level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
+    return resampled_level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
 
 
-def seams(renderer: Renderer) -> list[str]:
+def seam_rows(renderer: Renderer) -> list[str]:
     """Return rows of jumps of scattered light across seams [% of it]: mean and 95th percentile."""
     from cut_meshes import cut_sphere
 
     ball = cut_sphere(30.0, 20)
-    rows = row(renderer, "sphere in six charts", Head("sphere", ball, Maps()), BALL_SIDE, everywhere)
+    rows = seam_row(renderer, "sphere in six charts", Head("sphere", ball, Maps()), BALL_SIDE, all_points)
     own = dermis.load_head("human")
-    rows += row(renderer, "human, neck and back of the head", own, HEAD_SIDE, seen)
-    rows += row(renderer, "human, eye sockets and inside of the mouth", own, HEAD_SIDE, hidden)
+    rows += seam_row(renderer, "human, neck and back of the head", own, HEAD_SIDE, visible_points)
+    rows += seam_row(renderer, "human, eye sockets and inside of the mouth", own, HEAD_SIDE, hidden_points)
     human = dermis.load_head(data_file(HUMAN), unit_mm=100, subdivide=0)
     human = replace(human, maps=Maps())
-    rows += row(renderer, "MakeHuman, neck", human, HEAD_SIDE, at_neck)
-    return rows + row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, behind)
+    rows += seam_row(renderer, "MakeHuman, neck", human, HEAD_SIDE, neck_points)
+    return rows + seam_row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, back_points)
 
 
-def everywhere(places: Array) -> Flags:
+def all_points(places: Array) -> Flags:
     """Choose all places (n, 3) [mm from the head's centre]."""
     return np.ones(len(places), bool)
 
 
-def at_neck(places: Array) -> Flags:
+def neck_points(places: Array) -> Flags:
     """Choose places on the neck and below it."""
     return np.asarray((places[:, 1] < -90.0) & (places[:, 2] < 60.0))
 
 
-def behind(places: Array) -> Flags:
+def back_points(places: Array) -> Flags:
     """Choose places on the back of the head."""
     return np.asarray((places[:, 1] > -90.0) & (places[:, 2] < -30.0))
 
 
-def seen(places: Array) -> Flags:
+def visible_points(places: Array) -> Flags:
     """Choose places of the human's seams that can be seen."""
-    return np.asarray(at_neck(places) | behind(places))
+    return np.asarray(neck_points(places) | back_points(places))
 
 
-def hidden(places: Array) -> Flags:
+def hidden_points(places: Array) -> Flags:
     """Choose places of the human's other seams."""
-    return ~seen(places)
+    return ~visible_points(places)
 
 
-def row(renderer: Renderer, name: str, head: Head, side: int, where: Choice) -> list[str]:
+def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointFilter) -> list[str]:
     """Return one line of the table, a column for each remedy."""
-    one, other = judged(head, where)
+    one, other = seam_sides(head, where)
     cells = []
     for advice in SEAM_METHODS:
-        found = jumps(renderer, banded(head), advice, side, one, other)
+        found = seam_jumps(renderer, striped_scene(head), advice, side, one, other)
         cells.append(f"{100 * found.mean():.1f} / {100 * np.percentile(found, 95):.1f}")
     return [f"| {name} | {len(one.triangle)} | {' | '.join(cells)} |"]
 
 
-def judged(head: Head, where: Choice) -> tuple[Points, Points]:
+def seam_sides(head: Head, where: PointFilter) -> tuple[Points, Points]:
     """Return both sides of the places along seams that face the lights."""
     from atlas_reading import Points, seam_points
 
     mesh = head.mesh
     one, other = seam_points(mesh)
     places = one.on(mesh.positions[mesh.triangles]) - head.centre_mm
-    kept = where(places) & (np.abs(one.on(mesh.normals[mesh.triangles])[:, 2]) > LEAST_FACING)
+    kept = where(places) & (np.abs(one.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING)
     for size in (BALL_SIDE, HEAD_SIDE):
         for layout in ("mesh", "stitched"):
             mapped = cached_atlas(head.topology.mesh, size, layout).mapped
@@ -242,7 +242,7 @@ def judged(head: Head, where: Choice) -> tuple[Points, Points]:
     return Points(one.triangle[kept], one.weights[kept]), Points(other.triangle[kept], other.weights[kept])
 
 
-def banded(head: Head) -> Scene:
+def striped_scene(head: Head) -> Scene:
     """Return a scene with bands of light with sharp ends from front and back, and a little even light."""
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
     places = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), SPACING_MM)
@@ -255,7 +255,7 @@ def banded(head: Head) -> Scene:
     return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
 
 
-def jumps(renderer: Renderer, scene: Scene, advice: str, side: int, one: Points, other: Points) -> Array:
+def seam_jumps(renderer: Renderer, scene: Scene, advice: str, side: int, one: Points, other: Points) -> Array:
     """Return the change of red light from one side of each seam to the other, of the light there."""
     from atlas_reading import lit_at
 

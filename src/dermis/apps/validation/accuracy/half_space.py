@@ -23,35 +23,35 @@ from dermis.scene import Scene, Settings, Skin
 from dermis.scene.heads import load_head
 
 Floats = NDArray[np.float64]
-ETA, ASLANT = 1.4, 0.15  # the cosine of 81 degrees
+ETA, OBLIQUE_COSINE = 1.4, 0.15  # the cosine of 81 degrees
 PHOTONS = 200_000
-FORWARD = 0.8  # mean cosine of real skin's scattering
-_LEAST_WEIGHT = 0.01
-_NODES = 48
+FORWARD_G = 0.8  # mean cosine of real skin's scattering
+_MIN_WEIGHT = 0.01
+_NODE_COUNT = 48
 
 
 def half_space(adapter: str = "auto") -> None:
     """Print the table of reflection by direction, within a minute."""
-    print_lines(table(load_head("lee_perry_smith", subdivide=0), adapter))
+    print_lines(direction_table(load_head("lee_perry_smith", subdivide=0), adapter))
 
 
-def table(head: Head, adapter: str) -> str:
+def direction_table(head: Head, adapter: str) -> str:
     """Return rows for skin1's channels, and for the default skin in the studio."""
     layer = media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
-    forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD) + layer.sigma_s_prime)
-    usual, most = _brighter(head, adapter)
+    forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
+    usual, most = _studio_ratios(head, adapter)
     aslant = f"light from 81° over light from above, index {ETA:g}"
     rows: dict[str, Sequence[float]] = {
-        "light from 81° over light from above, index-matched": [_ratio(one, 1.0) for one in albedo],
-        aslant: [_ratio(one, ETA) for one in albedo],
-        "the same, photons": [_by_photons(one, 0.0, ETA) for one in albedo],
-        f"the same, photons of mean cosine {FORWARD:g}": [_by_photons(one, FORWARD, ETA) for one in forward],
-        f"index-matched, photons of mean cosine {FORWARD:g}": [
-            _by_photons(one, FORWARD, 1.0) for one in forward
+        "light from 81° over light from above, index-matched": [_oblique_ratio(one, 1.0) for one in albedo],
+        aslant: [_oblique_ratio(one, ETA) for one in albedo],
+        "the same, photons": [_monte_carlo_ratio(one, 0.0, ETA) for one in albedo],
+        f"the same, photons of mean cosine {FORWARD_G:g}": [_monte_carlo_ratio(one, FORWARD_G, ETA) for one in forward],
+        f"index-matched, photons of mean cosine {FORWARD_G:g}": [
+            _monte_carlo_ratio(one, FORWARD_G, 1.0) for one in forward
         ],
-        "relative RMSE over all pairs of directions, lambertian": [_errors(one)[0] for one in albedo],
-        "relative RMSE over all pairs of directions, half-space": [_errors(one)[1] for one in albedo],
+        "relative RMSE over all pairs of directions, lambertian": [_direction_errors(one)[0] for one in albedo],
+        "relative RMSE over all pairs of directions, half-space": [_direction_errors(one)[1] for one in albedo],
         "default skin in the studio over lambertian, median": usual,
         "the same, a hundredth of it more than": most,
     }
@@ -61,28 +61,28 @@ def table(head: Head, adapter: str) -> str:
     return "\n".join(lines)
 
 
-def _ratio(albedo: float, eta: float) -> float:
-    aslant, above = directional_reflectance([ASLANT, 1.0], albedo, eta)
+def _oblique_ratio(albedo: float, eta: float) -> float:
+    aslant, above = directional_reflectance([OBLIQUE_COSINE, 1.0], albedo, eta)
     return float(aslant / above)
 
 
-def _errors(albedo: float) -> tuple[float, float]:
+def _direction_errors(albedo: float) -> tuple[float, float]:
     """Return errors of lambertian and of half-space skin over all directions of light and view in air.
 
     The exact radiance below the surface is that of the matched half-space and what the surface throws back,
     again and again.
     """
     critical = float(np.sqrt(1.0 - 1.0 / ETA**2))
-    caught, escaping = _nodes(0.0, critical), _nodes(critical, 1.0)
+    caught, escaping = _gauss_legendre(0.0, critical), _gauss_legendre(critical, 1.0)
     mu, weight = (np.concatenate(both) for both in zip(caught, escaping, strict=True))
     back, flux = _fresnel(mu, ETA), 2.0 * weight * mu
     matched = np.pi * reflected_radiance(mu[None], mu[:, None], albedo)
     inside = np.linalg.solve(np.eye(len(mu)) - matched * flux * back, matched)
-    free = slice(_NODES, None)  # of both light and view
+    free = slice(_NODE_COUNT, None)  # of both light and view
     through, area = (1.0 - back)[free], flux[free] / flux[free].sum()
     exact = inside[free, free] * through[:, None] / ETA**2
     above = float(directional_reflectance(1.0, albedo, ETA))
-    usual = np.outer(through / (area @ through), np.full(_NODES, above))
+    usual = np.outer(through / (area @ through), np.full(_NODE_COUNT, above))
     law = angular_response([above], ETA)
     cosine = np.sqrt(1.0 - ETA**2 * (1.0 - mu[free] ** 2))
     entering = directional_reflectance(cosine, albedo, ETA) / above
@@ -96,13 +96,13 @@ def _errors(albedo: float) -> tuple[float, float]:
     return error(usual), error(made)
 
 
-def _by_photons(albedo: float, mean_cosine: float, eta: float) -> float:
+def _monte_carlo_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
     """Return the share of photons from 81 degrees that come back, over the share of those from above."""
-    aslant, above = (_returned(cosine, albedo, mean_cosine, eta) for cosine in (ASLANT, 1.0))
+    aslant, above = (_reflected_fraction(cosine, albedo, mean_cosine, eta) for cosine in (OBLIQUE_COSINE, 1.0))
     return aslant / above
 
 
-def _returned(cosine: float, albedo: float, mean_cosine: float, eta: float) -> float:
+def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: float) -> float:
     """Return the share of photons that enter a half-space at a cosine in the air that leave it."""
     rng = np.random.default_rng(1)
     depth, weight, given = np.zeros(PHOTONS), np.ones(PHOTONS), 0.0
@@ -114,14 +114,14 @@ def _returned(cosine: float, albedo: float, mean_cosine: float, eta: float) -> f
         down = np.where(depth < 0.0, -down, down)  # thrown back, the way goes on below
         keep = ~through
         depth, down, weight = np.abs(depth[keep]), down[keep], albedo * weight[keep]
-        down = _deflected(down, mean_cosine, rng)
-        lucky = (weight > _LEAST_WEIGHT) | (rng.random(len(weight)) < 0.1)
-        weight = np.where(weight > _LEAST_WEIGHT, weight, 10.0 * weight)
+        down = _scattered_cosines(down, mean_cosine, rng)
+        lucky = (weight > _MIN_WEIGHT) | (rng.random(len(weight)) < 0.1)
+        weight = np.where(weight > _MIN_WEIGHT, weight, 10.0 * weight)
         depth, down, weight = depth[lucky], down[lucky], weight[lucky]
     return given / PHOTONS
 
 
-def _deflected(down: Floats, g: float, rng: np.random.Generator) -> Floats:
+def _scattered_cosines(down: Floats, g: float, rng: np.random.Generator) -> Floats:
     """Return cosines after scattering, by the phase function of [HenyeyGreenstein1941]."""
     chance = rng.random(len(down))
     if g == 0.0:
@@ -140,7 +140,7 @@ def _fresnel(cosine: Floats, eta: float) -> Floats:
     return np.asarray(0.5 * (across**2 + along**2))
 
 
-def _brighter(head: Head, adapter: str) -> tuple[list[float], list[float]]:
+def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
     """Return half-space skin over lambertian in the studio: median and 99th percentile of pixels."""
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 
@@ -153,6 +153,6 @@ def _brighter(head: Head, adapter: str) -> tuple[list[float], list[float]]:
     return middle.tolist(), high.tolist()
 
 
-def _nodes(low: float, high: float) -> tuple[Floats, Floats]:
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+def _gauss_legendre(low: float, high: float) -> tuple[Floats, Floats]:
+    nodes, weights = np.polynomial.legendre.leggauss(_NODE_COUNT)
     return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights

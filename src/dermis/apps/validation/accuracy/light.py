@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import dermis
 from dermis.apps.validation.pages import print_tables
 from dermis.atlas.build import cached_atlas
-from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES, ROUGH, VIEWS
+from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES, ROUGHNESS_COUNT, VIEW_COUNT
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import directions, load_panorama, resample, solid_angles, split_suns
 from dermis.environment.prefilter import (
@@ -32,9 +32,9 @@ from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import Cosines
 from dermis.specular.kelemen import kelemen
 
-MAPS = ("royal_esplanade", "lebombo")
+PANORAMAS = ("royal_esplanade", "lebombo")
 ANGLES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # degrees
-NARROW = 0.25  # roughness below which lobes are summed over finer texels
+FINE_ROUGHNESS = 0.25  # roughness below which lobes are summed over finer texels
 Array = NDArray[np.floating]
 UP = np.array([0.0, 1.0, 0.0])
 
@@ -44,7 +44,7 @@ def light(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def looked_up(layer: Array, towards: Array) -> Array:
+def sample_panorama(layer: Array, towards: Array) -> Array:
     """Return (n, 3) of a layer (h, w, 3) in n directions, interpolated as in the shader."""
     height, width = layer.shape[:2]
     x = (0.5 + np.arctan2(towards[:, 0], -towards[:, 2]) / (2 * np.pi)) * width - 0.5
@@ -76,7 +76,7 @@ def irradiance_error(name: str, count: int = 200) -> float:
     towards, light, made = panorama(name)
     normals = unit(np.random.default_rng(1).normal(size=(count, 3)))
     exact = np.array([np.maximum(towards @ normal, 0) @ light for normal in normals])
-    return float(np.abs(looked_up(made.layers[0], normals) / exact - 1).max())
+    return float(np.abs(sample_panorama(made.layers[0], normals) / exact - 1).max())
 
 
 def reflection_error(name: str, m: float, angle: float, count: int = 320) -> float:
@@ -85,7 +85,7 @@ def reflection_error(name: str, m: float, angle: float, count: int = 320) -> flo
     angle : of the view from the normal [degrees]
     """
     cosine = float(np.cos(np.radians(angle)))
-    towards, light, made = panorama(name, 512 if m < NARROW else 256)
+    towards, light, made = panorama(name, 512 if m < FINE_ROUGHNESS else 256)
     rng = np.random.default_rng(2)
     normals = unit(rng.normal(size=(count, 3)))
     along = unit(np.cross(normals, rng.normal(size=(count, 3))))
@@ -93,9 +93,9 @@ def reflection_error(name: str, m: float, angle: float, count: int = 320) -> flo
     exact = [lobe_sum(towards, light, normal, view, m) for normal, view in zip(normals, views, strict=True)]
     ahead, away = 2 * cosine * normals - views, cosine * along - np.sqrt(1 - cosine**2) * normals
     aside, seen = np.cross(normals, along), np.zeros((count, 3))
-    for x, y, wide, weight in mirror(cosine, m):
+    for x, y, wide, weight in lobe_parameters(cosine, m):
         to = unit(2 * (x * away + y * aside) + (1 - x**2 - y**2) * ahead)
-        seen += weight * reflected(made.layers, to, wide)
+        seen += weight * lobe_radiance(made.layers, to, wide)
     error = directional_albedo(cosine, m) * seen - np.array(exact)
     return float(np.sqrt((error**2).mean()) / np.mean(exact))
 
@@ -110,25 +110,25 @@ def lobe_sum(towards: Array, light: Array, normal: Array, view: Array, m: float)
     return np.asarray((kelemen(angles, m) * n_l[near]) @ light[near])
 
 
-def mirror(cosine: float, m: float) -> Array:
+def lobe_parameters(cosine: float, m: float) -> Array:
     """Return directions, roughness and weight of the round lobes, between the table's nodes."""
-    x = np.sqrt(cosine) * (VIEWS - 1)
-    y = np.interp(np.log(m), np.log(LOBE_TABLE_ROUGHNESSES), np.arange(ROUGH))
-    j, i = min(int(x), VIEWS - 2), min(int(y), ROUGH - 2)
+    x = np.sqrt(cosine) * (VIEW_COUNT - 1)
+    y = np.interp(np.log(m), np.log(LOBE_TABLE_ROUGHNESSES), np.arange(ROUGHNESS_COUNT))
+    j, i = min(int(x), VIEW_COUNT - 2), min(int(y), ROUGHNESS_COUNT - 2)
     rows = isotropic_lobe_table()[i : i + 2, j : j + 2]
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
 
 
-def reflected(layers: Array, towards: Array, m: float) -> Array:
+def lobe_radiance(layers: Array, towards: Array, m: float) -> Array:
     """Return the mean radiance under round lobes."""
     place = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
     low = int(np.clip(place, 0, len(ROUGHNESSES) - 2))
     f = float(np.clip(place - low, 0, 1))
-    near, far = (looked_up(layers[1 + k], towards) for k in (low, low + 1))
+    near, far = (sample_panorama(layers[1 + k], towards) for k in (low, low + 1))
     return np.asarray((1 - f) * near + f * far)
 
 
-def furnace(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -> Array:
+def furnace_extremes(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -> Array:
     """Return least, mean and largest outgoing over incoming radiance of a white head under uniform light."""
     white = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
     skin = Skin.preset("deck-2007").replace(energy=energy)
@@ -140,7 +140,7 @@ def furnace(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -
     return np.array([inside.min(), inside.mean(), inside.max()])
 
 
-def furnaces(renderer: dermis.Renderer) -> str:
+def furnace_rows(renderer: dermis.Renderer) -> str:
     """Return rows of the furnace table."""
     ball = dermis.Head("ball", uv_sphere(115.0), dermis.load_head("lee_perry_smith", subdivide=0).maps)
     ball = replace(ball, maps=replace(ball.maps, normal=None, height=None, specular=None, roughness=None))
@@ -155,7 +155,7 @@ def furnaces(renderer: dermis.Renderer) -> str:
             ("full", "none", "thin"),
             ("full", "baked", "thin"),
         ):
-            least, mean, most = furnace(
+            least, mean, most = furnace_extremes(
                 renderer, head, energy, occlusion=occlusion, transmission=transmission
             )
             cells = f"{name} | {energy} | {occlusion} | {transmission}"
@@ -163,7 +163,7 @@ def furnaces(renderer: dermis.Renderer) -> str:
     return "\n".join(rows)
 
 
-def as_points(light: RectangleLight, side: int = 8) -> list[PointLight]:
+def as_point_lights(light: RectangleLight, side: int = 8) -> list[PointLight]:
     """Return a rectangle as side x side points, each with a shadow map of its own."""
     position, target = np.array(light.position), np.array(light.target)
     distance = float(np.linalg.norm(target - position))
@@ -187,7 +187,7 @@ def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     settings = Settings(size=(384, 384), atlas=256, samples=1, technique="none", shadow_size=1024)
     made, exact = (
-        renderer.draw(Scene(head, lights=lights), settings).linear() for lights in ([light], as_points(light))
+        renderer.draw(Scene(head, lights=lights), settings).linear() for lights in ([light], as_point_lights(light))
     )
     lit = exact.max(axis=-1) > 0
     error = (made - exact)[lit]
@@ -211,15 +211,15 @@ def tables(adapter: str = "auto") -> dict[str, str]:
     renderer = dermis.Renderer(adapter)
     shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]
     return {
-        "irradiance": f"{max(map(irradiance_error, MAPS)):.1e}",
+        "irradiance": f"{max(map(irradiance_error, PANORAMAS)):.1e}",
         "reflections": "\n".join(
             f"| {name} | {m} | "
             + " | ".join(f"{100 * reflection_error(name, m, angle):.1f}" for angle in ANGLES)
             + " |"
-            for name in MAPS
+            for name in PANORAMAS
             for m in (0.15, 0.2, 0.3, 0.45, 0.6)
         ),
-        "furnaces": furnaces(renderer),
+        "furnaces": furnace_rows(renderer),
         "soft_shadows": "\n".join(f"| {rig} | {bias:+.1%} | {rms:.1%} |" for rig, bias, rms in shadows),
         "occlusion": f"{occlusion_error(renderer):.3f}",
         "directions": str(DIRECTIONS),

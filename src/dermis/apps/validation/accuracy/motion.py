@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import dermis
 from dermis.apps.validation.accuracy import blur
-from dermis.apps.validation.pages import DOCS, data_file, fill_page, in_checkout, use_tests_folder
+from dermis.apps.validation.pages import DOCS, data_file, fill_page, require_in_checkout, add_tests_to_path
 from dermis.atlas.build import cached_atlas
 from dermis.formats.maps import load_maps
 from dermis.frame.features.occlusion.baked import bake_occlusion
@@ -26,7 +26,7 @@ from dermis.scene import Environment, Scene, Settings
 from dermis.scene.files import load_camera, load_lights
 
 Points = NDArray[np.float32]
-Open = NDArray[np.float64]
+Floats = NDArray[np.float64]
 PAGE = DOCS / "motion.md"
 SKIN = "heads/makehuman/skins/young_lightskinned_male_diffuse.png"
 PEOPLE = {
@@ -49,9 +49,9 @@ EXPRESSIONS: dict[str, dict[str, float]] = {
 VIEWS = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
 SETTINGS = Settings(size=(384, 384), atlas=1024, samples=4)
 SIDE = 512
-BAKED = Settings(size=(16, 16), atlas=SIDE, samples=1)
-_TRUTH = 1024  # directions, and texels along the side of their depth maps
-_CHANGED = 0.02
+BAKE_SETTINGS = Settings(size=(16, 16), atlas=SIDE, samples=1)
+_REFERENCE_SIZE = 1024  # directions, and texels along the side of their depth maps
+_MIN_CHANGE = 0.02
 
 
 def motion(adapter: str = "auto") -> None:
@@ -59,21 +59,21 @@ def motion(adapter: str = "auto") -> None:
 
     Needs the published heads of MakeHuman in DERMIS_DATA, and the folder tests of a checkout.
     """
-    in_checkout(PAGE)
-    use_tests_folder()
+    require_in_checkout(PAGE)
+    add_tests_to_path()
     renderer = dermis.Renderer(adapter)
     head = Human(age=25).head(load_maps(colour=data_file(SKIN)), "hm08", 0)
     people = {name: person.positions_mm for name, person in PEOPLE.items()}
     fill_page(
         PAGE,
-        expressions="\n".join(expressions(renderer, head, people)),
-        seams="\n".join(seams(renderer, head, people)),
-        occlusions="\n".join(occlusions(renderer, head)),
+        expressions="\n".join(expression_rows(renderer, head, people)),
+        seams="\n".join(seam_rows(renderer, head, people)),
+        occlusions="\n".join(occlusion_table(renderer, head)),
         adapter=renderer.device.adapter.name,
     )
 
 
-def rebuilt(head: Head, points: Points) -> Head:
+def rebuilt_head(head: Head, points: Points) -> Head:
     """Return the head as if it had been loaded in this shape."""
     mesh = head.mesh
     places, kinds = points[mesh.point], (mesh.material, mesh.materials)
@@ -81,7 +81,7 @@ def rebuilt(head: Head, points: Points) -> Head:
     return Head("rebuilt", made, head.maps)
 
 
-def moved(head: Head, person: Points, weights: Mapping[str, float]) -> Points:
+def posed_points(head: Head, person: Points, weights: Mapping[str, float]) -> Points:
     """Return the points of a person with an expression."""
     motion = Pose(weights, positions_mm=person).motion(head.control)
     return head.control.points_mm(motion).astype(np.float32)
@@ -91,7 +91,7 @@ def picture_error(
     renderer: Renderer, head: Head, person: Points, weights: Mapping[str, float], view: str
 ) -> float:
     """Return the relative RMSE of the posed head's picture from that of the rebuilt head."""
-    other = rebuilt(head, moved(head, person, weights))
+    other = rebuilt_head(head, posed_points(head, person, weights))
     lights, camera = VIEWS[view]
     scene = Scene(other, load_lights(lights), load_camera(camera, other))
     here = replace(head)
@@ -102,7 +102,7 @@ def picture_error(
     return float(np.sqrt(((posed - truth) ** 2).mean() / (truth**2).mean()))
 
 
-def expressions(renderer: Renderer, head: Head, people: Mapping[str, Points]) -> Iterator[str]:
+def expression_rows(renderer: Renderer, head: Head, people: Mapping[str, Points]) -> Iterator[str]:
     """Yield lines of the table of expressions: the worst person from the front and from behind."""
     worst = dict.fromkeys(VIEWS, 0.0)
     for name, weights in EXPRESSIONS.items():
@@ -115,38 +115,38 @@ def expressions(renderer: Renderer, head: Head, people: Mapping[str, Points]) ->
     yield f"| **worst** | **{100 * worst['front']:.2f}** | **{100 * worst['back']:.2f}** |"
 
 
-def seams(renderer: Renderer, head: Head, people: Mapping[str, Points]) -> Iterator[str]:
+def seam_rows(renderer: Renderer, head: Head, people: Mapping[str, Points]) -> Iterator[str]:
     """Yield lines of the table of seams: at rest, in expressions, and of other people, posed and rebuilt."""
     resting = head.positions_mm
-    yield _jumps(renderer, "at rest", head, head, None)
+    yield _seam_row(renderer, "at rest", head, head, None)
     for name in ("open jaw", "smile", "puffed cheeks"):
-        shape = rebuilt(head, moved(head, resting, EXPRESSIONS[name]))
-        yield _jumps(renderer, name, head, shape, Pose(EXPRESSIONS[name]))
+        shape = rebuilt_head(head, posed_points(head, resting, EXPRESSIONS[name]))
+        yield _seam_row(renderer, name, head, shape, Pose(EXPRESSIONS[name]))
     for name, person in people.items():
-        shape = rebuilt(head, person)
-        yield _jumps(renderer, f"{name}, by positions", head, shape, Pose(positions_mm=person))
-        yield _jumps(renderer, f"{name}, built anew", shape, shape, None)
+        shape = rebuilt_head(head, person)
+        yield _seam_row(renderer, f"{name}, by positions", head, shape, Pose(positions_mm=person))
+        yield _seam_row(renderer, f"{name}, built anew", shape, shape, None)
 
 
-def _jumps(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose | None) -> str:
+def _seam_row(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose | None) -> str:
     """Return a line: jumps of light across the seams of a posed head; `shape` has the places of its seams."""
     cells = []
-    for where in (blur.at_neck, blur.behind):
-        sides = blur.judged(shape, where)
-        scene = replace(blur.banded(head), pose=pose)
+    for where in (blur.neck_points, blur.back_points):
+        sides = blur.seam_sides(shape, where)
+        scene = replace(blur.striped_scene(head), pose=pose)
         vars(scene.head)["centre_mm"] = shape.centre_mm  # which the bands of light stand around
-        found = blur.jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
+        found = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
         cells.append(f"{100 * found.mean():.1f} / {100 * np.percentile(found, 95):.1f}")
     return f"| {name} | {' | '.join(cells)} |"
 
 
-def occlusions(renderer: Renderer, head: Head) -> Iterator[str]:
+def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
     """Yield lines of the table of ambient occlusion."""
     neck = dict.fromkeys(("neck01", "neck02", "neck03", "head"), (0.0, 15.0, 0.0))
     poses = {name: Pose(EXPRESSIONS[name]) for name in ("open jaw", "smile", "blink", "pucker", "surprise")}
     poses["head turned by 60 degrees"] = Pose(bones=neck)
     shapes = {
-        name: (pose, rebuilt(head, head.control.points_mm(pose.motion(head.control)).astype(np.float32)))
+        name: (pose, rebuilt_head(head, head.control.points_mm(pose.motion(head.control)).astype(np.float32)))
         for name, pose in poses.items()
     }
     yield from occlusion_rows(renderer, head, shapes)
@@ -157,38 +157,38 @@ def occlusion_rows(renderer: Renderer, head: Head, shapes: Mapping[str, tuple[Po
 
     shapes : poses by name, each with the head rebuilt in it
     """
-    scene, fine = Scene(head, environment=Environment(name="uniform")), (_TRUTH, _TRUTH)
-    rest = baked(renderer, head, head, *fine)
+    scene, fine = Scene(head, environment=Environment(name="uniform")), (_REFERENCE_SIZE, _REFERENCE_SIZE)
+    rest = baked_occlusion(renderer, head, head, *fine)
     for name, (pose, shape) in shapes.items():
-        truth, posed = baked(renderer, head, shape, *fine), replace(scene, pose=pose)
-        made = [followed(renderer, posed, which) for which in ("rest", "baked")] + [
-            baked(renderer, head, shape)
+        truth, posed = baked_occlusion(renderer, head, shape, *fine), replace(scene, pose=pose)
+        made = [frame_occlusion(renderer, posed, which) for which in ("rest", "baked")] + [
+            baked_occlusion(renderer, head, shape)
         ]
         own = np.isfinite(truth) & np.isfinite(rest)
-        changed = own & (np.abs(np.where(own, truth - rest, 0.0)) > _CHANGED)
+        changed = own & (np.abs(np.where(own, truth - rest, 0.0)) > _MIN_CHANGE)
         cells = [f"{rms((one - truth)[own]):.3f} / {rms((one - truth)[changed]):.3f}" for one in made]
         yield f"| {name} | {changed.sum() / own.sum():.1%} | {' | '.join(cells)} |"
 
 
-def baked(renderer: Renderer, head: Head, shape: Head, *exactness: int) -> Open:
+def baked_occlusion(renderer: Renderer, head: Head, shape: Head, *exactness: int) -> Floats:
     """Return (n, n) open shares of the head in another shape on its atlas, NaN where there is no surface.
 
     exactness : number of directions and side of depth maps, those of frames when left out
     """
-    inputs = renderer.prepare(Scene(head), BAKED)
+    inputs = renderer.prepare(Scene(head), BAKE_SETTINGS)
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, SIDE, "stitched")
     made = bake_occlusion(renderer.device, shape, atlas, inputs.bindings, texels, SIDE, *exactness)
     return made[:SIDE].astype(float)
 
 
-def followed(renderer: Renderer, scene: Scene, which: str) -> Open:
+def frame_occlusion(renderer: Renderer, scene: Scene, which: str) -> Floats:
     """Return (n, n) open shares that a frame of the scene reads."""
-    settings = BAKED.model_copy(update={"occlusion": which})
+    settings = BAKE_SETTINGS.model_copy(update={"occlusion": which})
     renderer.draw(scene, settings)
     made = cast(Texture, renderer.prepare(scene, settings).bindings["occlusion_map"])
     return download(renderer.device, made)[:SIDE].astype(float)
 
 
-def rms(error: Open) -> float:
+def rms(error: Floats) -> float:
     """Return the root mean square."""
     return float(np.sqrt(np.mean(error**2)))

@@ -31,7 +31,7 @@ MODELS: tuple[tuple[Model, Clamp], ...] = (
     ("layered", "layer"),
     ("layered-point", "layer"),
 )
-THICK_MM = (0.5, 1.0, 2.0, 4.0)
+THICKNESSES_MM = (0.5, 1.0, 2.0, 4.0)
 
 
 def optics() -> None:
@@ -39,7 +39,7 @@ def optics() -> None:
     print_tables(tables())
 
 
-def named(name: str) -> Tissue:
+def tissue_by_name(name: str) -> Tissue:
     """Return a tissue; homogeneous skin under the index of its measurement [Jensen2001]."""
     tissue = load_tissue(name)
     return Tissue(media()[name].with_eta(1.3)) if name.startswith("skin") else tissue
@@ -47,10 +47,10 @@ def named(name: str) -> Tissue:
 
 def models_table() -> str:
     """Return total and ring errors of each model for each tissue."""
-    return "\n".join(row for name in TISSUES for row in _rows(name, named(name)))
+    return "\n".join(row for name in TISSUES for row in _model_rows(name, tissue_by_name(name)))
 
 
-def _rows(name: str, tissue: Tissue) -> Iterator[str]:
+def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
     photons = PHOTONS if tissue.rgb is None else SPECTRAL_PHOTONS
     truth = monte_carlo_profile(tissue.medium, tissue.rgb, photons, seed=1)
     assert truth.total_error is not None
@@ -91,7 +91,7 @@ def fits_table() -> str:
     """Return errors of fits of each kind to the layered profiles, through rings."""
     rows = []
     for name in TISSUES:
-        profile = named(name).profile()
+        profile = tissue_by_name(name).profile()
         rings = profile.rings()
         cells = [_percent(fit_gaussians(rings, n).error, sign=False) for n in (2, 4, 6, 8)]
         cells += [_percent(fit(rings).error, sign=False) for fit in (fit_burley, fit_separable)]
@@ -109,7 +109,7 @@ def pointwise_table() -> str:
         ("dj3", "multipole", "layer"),
         ("dj3", "layered-point", "layer"),
     ):
-        profile = named(name).profile(model, clamp)  # type: ignore[arg-type]
+        profile = tissue_by_name(name).profile(model, clamp)  # type: ignore[arg-type]
         free, kept = (fit_gaussians(profile.points(), 6, keep_energy=keep) for keep in (False, True))
         label = f"{name}, {model}" + (", source as printed" if clamp == "none" else "")
         cells = [
@@ -125,9 +125,9 @@ def transmission_table() -> str:
     """Return light through a thickness, by Gaussians, slabs and photons."""
     rows = []
     for name in ("skin1", "dj3"):
-        tissue = named(name)
+        tissue = tissue_by_name(name)
         sum_ = fit_gaussians(tissue.profile().rings(), 6).profile
-        for thickness in THICK_MM:
+        for thickness in THICKNESSES_MM:
             slab = truncated_medium(tissue.medium, thickness)
             runs = trace_medium(slab, PHOTONS // 4, seed=2)
             truth = np.array([run.total_transmittance + run.unscattered_transmittance for run in runs])
@@ -138,11 +138,11 @@ def transmission_table() -> str:
                 slab_transmittance(tissue.medium, [thickness], "multipole")[0],
                 gaussian_transmittance(sum_, [thickness])[0],
             ]
-            rows.append(f"| {name} | {thickness:g} mm | {' | '.join(map(_row, ways))} |")
+            rows.append(f"| {name} | {thickness:g} mm | {' | '.join(map(_cells, ways))} |")
     return "\n".join(rows)
 
 
-def shape_against_the_table(profile: RadialProfile) -> Floats:
+def error_against_published_sum(profile: RadialProfile) -> Floats:
     """Return E between a white-normalised profile and the published six Gaussians, per channel."""
     r, log_r = profile.radius_mm[:, None], np.log(profile.radius_mm)
     table = load_profile("gpu-gems-3").radiant_exitance(profile.radius_mm)
@@ -150,14 +150,14 @@ def shape_against_the_table(profile: RadialProfile) -> Floats:
     return np.sqrt(miss / np.trapezoid((r * table) ** 2, log_r, axis=0))
 
 
-def table_note() -> str:
+def published_errors() -> str:
     """Return the errors of the printed layers against the published sum."""
     ways: tuple[tuple[str, Model, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),
         ("layered diffusion of a point source", "layered-point", "layer"),
     )
-    errors = [shape_against_the_table(load_tissue("dj3").profile(model, clamp)) for _, model, clamp in ways]
+    errors = [error_against_published_sum(load_tissue("dj3").profile(model, clamp)) for _, model, clamp in ways]
     return ", ".join(
         f"{way[0]} {_percent(error, sign=False)}" for way, error in zip(ways, errors, strict=True)
     )
@@ -171,7 +171,7 @@ def tables() -> dict[str, str]:
         "fits": fits_table(),
         "pointwise": pointwise_table(),
         "transmission": transmission_table(),
-        "published": table_note(),
+        "published": published_errors(),
         "photons": f"{PHOTONS:,}",
         "spectral_photons": f"{SPECTRAL_PHOTONS:,}",
     }
@@ -181,5 +181,5 @@ def _percent(values: Floats, sign: bool = True) -> str:
     return " ".join(f"{100 * value:+.1f}" if sign else f"{100 * value:.1f}" for value in values) + " %"
 
 
-def _row(values: Floats) -> str:
+def _cells(values: Floats) -> str:
     return " ".join(f"{value:.3f}" for value in values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dermis.apps.validation.accuracy import beside_cycles, blur, light, optics, slabs, specular, thin
+from dermis.apps.validation.accuracy import cycles_comparison as beside_cycles, blur, light, optics, slabs, specular, thin
 from dermis.apps.validation.pages import DOCS, fill_page
 from dermis.gpu import open_device
 

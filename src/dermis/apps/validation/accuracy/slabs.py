@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import dermis
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
-from dermis.apps.validation.accuracy.thin import scattered
+from dermis.apps.validation.accuracy.thin import scattered_light
 from dermis.apps.validation.pages import print_tables
 from dermis.mesh.primitives import wedge
 from dermis.optics import slabs as adding_doubling
@@ -31,11 +31,11 @@ from dermis.optics.slabs import anisotropic_response
 from dermis.scene import Skin
 
 Array = NDArray[np.float64]
-THICK_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
+THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 DEGREES = (0.0, 40.0, 60.0, 80.0)
 PHOTONS = 100_000
-FORWARD = 0.8  # mean cosine of real flesh
-BODIES = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
+FORWARD_G = 0.8  # mean cosine of real flesh
+MEDIA = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
 
 
 def slabs(adapter: str = "auto") -> None:
@@ -43,7 +43,7 @@ def slabs(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def exact(body: Medium, thickness: float, g: float = 0.0) -> Array:
+def exact_response(body: Medium, thickness: float, g: float = 0.0) -> Array:
     """Return (2, angles, 3) shares of entering light that leave scattered, on the near side and the far one.
 
     g : mean cosine of scattering; the body's coefficients are reduced
@@ -58,12 +58,12 @@ def exact(body: Medium, thickness: float, g: float = 0.0) -> Array:
     return made
 
 
-def drawn(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
+def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
     """Return the same (2, angles, 3) of the frame."""
     mesh, made = wedge(60.0, thickness, thickness), np.empty((2, len(DEGREES), 3))
     for k, angle in enumerate(np.radians(DEGREES)):
         way = np.array([np.sin(angle), 0.0, np.cos(angle)])
-        places, normals, leaving = scattered(renderer, mesh, way, skin, 256)
+        places, normals, leaving = scattered_light(renderer, mesh, way, skin, 256)
         inner = np.abs(places[:, :2]).max(axis=1) < 8.0
         for side in (0, 1):
             facing = inner & ((2 * side - 1) * normals[:, 2] > 0.9)
@@ -71,7 +71,7 @@ def drawn(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
     return made
 
 
-def skins(body: Medium, folder: str) -> dict[str, Skin]:
+def skins_by_direction(body: Medium, folder: str) -> dict[str, Skin]:
     """Return lambertian skin and half-spaces of a medium, in its own colour."""
     file = Path(folder) / f"{body.name}_{body.eta:g}.toml"
     write_profile(
@@ -82,48 +82,48 @@ def skins(body: Medium, folder: str) -> dict[str, Skin]:
     return {way: Skin(direction=way, **usual) for way in ("lambertian", "half-space")}  # type: ignore[arg-type]
 
 
-def table(renderer: dermis.Renderer) -> str:
+def error_rows(renderer: dermis.Renderer) -> str:
     """Return rows of relative errors, root mean square over directions and channels."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for name, eta in BODIES:
+        for name, eta in MEDIA:
             body = media()[name].with_eta(eta)
-            for way, skin in skins(body, folder).items():
-                for thickness in THICK_MM:
-                    cells = _beside(drawn(renderer, skin, thickness), exact(body, thickness))
+            for way, skin in skins_by_direction(body, folder).items():
+                for thickness in THICKNESSES_MM:
+                    cells = _error_cells(rendered_response(renderer, skin, thickness), exact_response(body, thickness))
                     rows.append(f"| {name}, index {eta:g} | {way} | {thickness:g} mm | {cells} |")
     return "\n".join(rows)
 
 
-def forward_table(renderer: dermis.Renderer) -> str:
+def forward_error_rows(renderer: dermis.Renderer) -> str:
     """Return rows of half-space skin against slabs of forward scattering, without and with `anisotropy`."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for name, eta in BODIES:
+        for name, eta in MEDIA:
             body = media()[name].with_eta(eta)
-            plain = skins(body, folder)["half-space"]
-            for g in (0.0, FORWARD):
+            plain = skins_by_direction(body, folder)["half-space"]
+            for g in (0.0, FORWARD_G):
                 skin = plain.model_copy(update={"anisotropy": g})
-                for thickness in THICK_MM:
-                    cells = _beside(drawn(renderer, skin, thickness), exact(body, thickness, FORWARD))
+                for thickness in THICKNESSES_MM:
+                    cells = _error_cells(rendered_response(renderer, skin, thickness), exact_response(body, thickness, FORWARD_G))
                     rows.append(f"| {name}, index {eta:g} | {g:g} | {thickness:g} mm | {cells} |")
     return "\n".join(rows)
 
 
-def forward_directions_table() -> str:
+def forward_direction_rows() -> str:
     """Return errors of radiance below skin1's surface over all pairs of directions, forward scattering."""
     rows = []
-    for g in (0.0, FORWARD):
+    for g in (0.0, FORWARD_G):
         cells = []
         for eta in (1.0, 1.4):
             albedos = media()["skin1"].layers[0].alpha_prime
-            cells.append(" ".join(f"{_pairs_error(float(one), eta, g):.3f}" for one in albedos))
+            cells.append(" ".join(f"{_direction_pairs_error(float(one), eta, g):.3f}" for one in albedos))
         rows.append(f"| anisotropy {g:g} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
 
-def _pairs_error(albedo: float, eta: float, g: float) -> float:
-    a, share, exact = adding_doubling.half_space_radiance(albedo, eta, adding_doubling.NODES, FORWARD)
+def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
+    a, share, exact = adding_doubling.half_space_radiance(albedo, eta, adding_doubling.NODES, FORWARD_G)
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
     law = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, g)
     table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, DIRECTION_ROWS), law.relative_reflectance[:, 0])
@@ -135,7 +135,7 @@ def _pairs_error(albedo: float, eta: float, g: float) -> float:
     return float(np.sqrt((weight * (made - exact) ** 2).sum() / (weight * exact**2).sum()))
 
 
-def _beside(made: Array, truth: Array) -> str:
+def _error_cells(made: Array, truth: Array) -> str:
     """Return error and red light by direction, of the far side and of the near one."""
     flux, cells = np.sqrt(np.cos(np.radians(DEGREES)))[:, None], []
     for side in (1, 0):
@@ -145,15 +145,15 @@ def _beside(made: Array, truth: Array) -> str:
     return " | ".join(cells)
 
 
-def forward() -> str:
+def forward_rows() -> str:
     """Return rows of red light from above through slabs of forward and isotropic scattering, by photons."""
     rows = []
     for eta in (1.0, 1.4):
         layer = media()["skin1"].layers[0]
         absorbed, scattered = float(layer.sigma_a[0]), float(layer.sigma_s_prime[0])
-        for thickness in THICK_MM:
+        for thickness in THICKNESSES_MM:
             cells = []
-            for g in (0.0, FORWARD):
+            for g in (0.0, FORWARD_G):
                 flesh = ScatteringLayer(absorbed, scattered / (1.0 - g), thickness, g, eta)
                 run = trace_slab([flesh], PHOTONS).per_entering
                 cells += [f"{run.total_transmittance:.3f}", f"{run.unscattered_transmittance:.3f}"]
@@ -166,8 +166,8 @@ def tables(adapter: str = "auto") -> dict[str, str]:
     """Return the tables by their names in the page's template."""
     renderer = dermis.Renderer(adapter)
     return {
-        "slab_errors": table(renderer),
-        "slab_forward": forward(),
-        "slab_forward_errors": forward_table(renderer),
-        "forward_directions": forward_directions_table(),
+        "slab_errors": error_rows(renderer),
+        "slab_forward": forward_rows(),
+        "slab_forward_errors": forward_error_rows(renderer),
+        "forward_directions": forward_direction_rows(),
     }

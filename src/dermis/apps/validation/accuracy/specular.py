@@ -17,14 +17,14 @@ from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
 VIEWS = (np.arange(200) + 0.5) / 200
-LAWS = {
+ENERGY_MODELS = {
     "none": ENERGY["none"],
     "published": ENERGY["published"],
     "divided by π, light thrown back inside lost": EnergyModel(1.0, returned=False),
     "full": ENERGY["full"],
 }
 SKINS = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
-DENSE = (96, 96)
+REFERENCE_NODES = (96, 96)
 
 
 def specular() -> None:
@@ -46,7 +46,7 @@ def albedo_rows() -> str:
     for name, model in MODELS.items():
         if name == "kelemen-direct":
             continue
-        dense = directional_albedo(c, m, model.lobe, nodes=DENSE)
+        dense = directional_albedo(c, m, model.lobe, nodes=REFERENCE_NODES)
         ms = 1e3 * min(timeit.repeat(partial(albedo_table.__wrapped__, name), number=1, repeat=5))
         errors = (directional_albedo(c, m, model.lobe), read_albedo(name, c, m)[..., 0])
         cells = [f"{100 * np.abs(one / dense - 1).max():.1g} %" for one in errors]
@@ -78,7 +78,7 @@ def furnace_rows() -> str:
     """Return rows of the furnace for each energy model."""
     return "\n".join(
         f"| {name} | {' | '.join(furnace_cell(law, m, rho_s) for m, rho_s in SKINS)} |"
-        for name, law in LAWS.items()
+        for name, law in ENERGY_MODELS.items()
     )
 
 

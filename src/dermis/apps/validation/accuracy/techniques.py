@@ -9,11 +9,11 @@ import dermis
 from dermis.apps.truths.half_space import directional_albedo
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.validation.accuracy import blur, half_space, texture_space
-from dermis.apps.validation.comparisons.compare import Comparison, Row, compare
+from dermis.apps.validation.comparisons.compare import Comparison, ComparisonRow, compare
 from dermis.apps.validation.comparisons.report import cells
-from dermis.apps.validation.comparisons.scenes import ModelName, comparison_scene, usual_region
-from dermis.apps.validation.comparisons.truths import Truth
-from dermis.apps.validation.pages import DOCS, fill_page, in_checkout, use_tests_folder
+from dermis.apps.validation.comparisons.scenes import ModelName, comparison_scene, default_region
+from dermis.apps.validation.comparisons.references import ReferenceImage
+from dermis.apps.validation.pages import DOCS, fill_page, require_in_checkout, add_tests_to_path
 from dermis.frame.surface_points import irradiance_at, surface_points
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -25,14 +25,14 @@ from dermis.scene.techniques import TECHNIQUES
 
 PAGE = DOCS / "techniques.md"
 Floats = NDArray[np.floating]
-LIGHTS = {"front": 64, "back": 256, "laser": 256}  # paths through each pixel
+SAMPLES_BY_LIGHT = {"front": 64, "back": 256, "laser": 256}  # paths through each pixel
 SETTINGS = Settings(size=(256, 256), atlas=1024)
-HEAD = "|  | technique | relative RMSE | FLIP | energy ratio | ms |\n|---|---|---|---|---|---|"
+TABLE_HEADER = "|  | technique | relative RMSE | FLIP | energy ratio | ms |\n|---|---|---|---|---|---|"
 
-DIRECTIONS = """|  |  |  | relative RMSE | in red, green, blue | FLIP | energy ratio | in red, green, blue |
+DIRECTION_HEADER = """|  |  |  | relative RMSE | in red, green, blue | FLIP | energy ratio | in red, green, blue |
 |---|---|---|---|---|---|---|---|"""
 BALL = Head("ball", uv_sphere(100.0, 512, 256), Maps())
-ON_BALL = {"front": 64, "back": 64}  # paths through each pixel
+BALL_SAMPLES = {"front": 64, "back": 64}  # paths through each pixel
 
 
 def techniques(adapter: str = "auto") -> None:
@@ -41,25 +41,25 @@ def techniques(adapter: str = "auto") -> None:
     Needs the sample data, Mitsuba and the folder tests of a checkout. Traced paths are kept on disk, so only
     the first run takes long.
     """
-    in_checkout(PAGE)
-    use_tests_folder()
+    require_in_checkout(PAGE)
+    add_tests_to_path()
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     parts: dict[str, str] = {}
     traced: dict[str, dict[str, Comparison]] = {}
     for medium in ("skin1", "skin2"):
         parts[f"traced_{medium}"], made = table(head, "path-traced", medium, adapter)
-        parts[f"floor_{medium}"], traced[medium] = floor(head, medium, made["front"], adapter), made
-    parts["direction"] = by_direction(head, LIGHTS, SETTINGS, adapter)
-    parts["counted"] = counted(head, traced, adapter)
-    parts["half_space"] = half_space.table(head, adapter)
+        parts[f"floor_{medium}"], traced[medium] = albedo_rows(head, medium, made["front"], adapter), made
+    parts["direction"] = by_direction(head, SAMPLES_BY_LIGHT, SETTINGS, adapter)
+    parts["counted"] = profile_model_rows(head, traced, adapter)
+    parts["half_space"] = half_space.direction_table(head, adapter)
     parts["integral"], _ = table(head, "surface-integral", "skin1", adapter, "layered")
     parts["heat"], _ = table(head, "heat", "skin1", adapter, "layered")
-    parts["heat"] += "\n" + finer_heat(head, adapter)
+    parts["heat"] += "\n" + fine_atlas_row(head, adapter)
     parts |= texture_space.tables(head, SETTINGS, adapter) | blur.surface_tables(adapter)
     fill_page(PAGE, adapter=made["front"].adapter, **parts)
 
 
-def line(first: str, row: Row) -> str:
+def table_line(first: str, row: ComparisonRow) -> str:
     """Return a line of a table."""
     return f"| {first} | " + " | ".join(cells(row)) + " |"
 
@@ -71,9 +71,9 @@ def table(
 
     model : of the medium's profile
     """
-    rows, made = [HEAD], {}
-    for light, samples in LIGHTS.items():
-        region = "ear" if against == "heat" else usual_region(light)
+    rows, made = [TABLE_HEADER], {}
+    for light, samples in SAMPLES_BY_LIGHT.items():
+        region = "ear" if against == "heat" else default_region(light)
         techniques = ("none", "gpu-gems-3", "texture-space") if against == "heat" else TECHNIQUES.names
         made[light] = compare(
             head,
@@ -87,33 +87,33 @@ def table(
             samples=samples,
             adapter=adapter,
         )
-        rows += [line(light, row) for row in made[light].rows]
+        rows += [table_line(light, row) for row in made[light].rows]
     return "\n".join(rows), made
 
 
-def finer_heat(head: Head, adapter: str) -> str:
+def fine_atlas_row(head: Head, adapter: str) -> str:
     """Return a row of the laser's stripe against heat on an atlas of 2048."""
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
     made = compare(
         head, "heat", only, light="laser", region="ear", settings=settings, model="layered", adapter=adapter
     )
-    return line("laser, atlas 2048", made.rows[0])
+    return table_line("laser, atlas 2048", made.rows[0])
 
 
-def counted(head: Head, traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
+def profile_model_rows(head: Head, traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
     """Return rows against path tracing, by the model of the medium's profile.
 
     traced : comparisons with counted photons' profiles, by medium and light
     """
     rows, techniques = [], ("texture-space", "screen-space")
-    for light, samples in LIGHTS.items():
+    for light, samples in SAMPLES_BY_LIGHT.items():
         for medium, by_photons in traced.items():
             layered = compare(
                 head,
                 "path-traced",
                 techniques,
                 light=light,
-                region=usual_region(light),
+                region=default_region(light),
                 medium=medium,
                 model="layered",
                 settings=SETTINGS,
@@ -128,16 +128,16 @@ def counted(head: Head, traced: dict[str, dict[str, Comparison]], adapter: str) 
     return "\n".join(rows)
 
 
-def _error_and_energy(made: Comparison, row: Row) -> str:
+def _error_and_energy(made: Comparison, row: ComparisonRow) -> str:
     """Return the error, and energy in red, green and blue."""
-    _, energy = by_channel(made.images[row.technique], made.truth, made.truth.mask)
+    _, energy = errors_by_channel(made.images[row.technique], made.truth, made.truth.mask)
     return f"{row.relrmse:.4f} | {energy}"
 
 
-def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
+def albedo_rows(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
     """Return errors under the front light of lambertian skin with a half-space's albedo by direction."""
     renderer = dermis.Renderer(adapter)
-    scene = comparison_scene(head, "front", usual_region("front"), "gpu-gems-3")
+    scene = comparison_scene(head, "front", default_region("front"), "gpu-gems-3")
     seen = surface_points(renderer, scene, SETTINGS)
     mesh = head.mesh
 
@@ -156,16 +156,16 @@ def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
     entered = irradiance_at(renderer, scene, SETTINGS, seen.triangle, seen.barycentric)
     image = np.zeros((*seen.mask.shape, 3))
     image[seen.mask] = entered * albedo / np.pi
-    error, energy = by_channel(image, traced.truth, traced.truth.mask & seen.mask)
+    error, energy = errors_by_channel(image, traced.truth, traced.truth.mask & seen.mask)
     return f"relative RMSE {error} and energy {energy} in red, green and blue"
 
 
 def by_direction(head: Head, lights: dict[str, int], settings: Settings, adapter: str) -> str:
     """Return the table of texture space with lambertian and half-space skin, on a head and on a ball."""
-    lines = [DIRECTIONS]
+    lines = [DIRECTION_HEADER]
     for light, samples in lights.items():
-        lines += _direction_rows(head, light, usual_region(light), samples, settings, adapter)
-    for light, samples in ON_BALL.items():
+        lines += _direction_rows(head, light, default_region(light), samples, settings, adapter)
+    for light, samples in BALL_SAMPLES.items():
         lines += _direction_rows(
             BALL, light, "ear", samples, settings.model_copy(update={"size": (96, 96)}), adapter
         )
@@ -193,13 +193,13 @@ def _direction_rows(
                 adapter=adapter,
             )
             _, error, flip, energy, _ = cells(made.rows[0])
-            errors, energies = by_channel(made.images["texture-space"], made.truth, made.truth.mask)
+            errors, energies = errors_by_channel(made.images["texture-space"], made.truth, made.truth.mask)
             figures = (error, errors, flip, energy, energies)
             lines.append(f"| {place}{light} | {medium} | {direction} | " + " | ".join(figures) + " |")
     return lines
 
 
-def by_channel(image: Floats, truth: Truth, mask: NDArray[np.bool_]) -> list[str]:
+def errors_by_channel(image: Floats, truth: ReferenceImage, mask: NDArray[np.bool_]) -> list[str]:
     """Return relative RMSE and energy ratio, in red, green and blue."""
     parts = [(image[..., c], truth.image[..., c], mask, truth.variance[..., c]) for c in range(3)]
     measures = (relative_rmse, energy_ratio)

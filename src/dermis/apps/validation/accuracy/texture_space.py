@@ -10,16 +10,9 @@ from numpy.typing import NDArray
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.truths.radial_table import GaussianSum as Profile
 from dermis.apps.truths.surface_integral import integrate_exitance
-from dermis.apps.validation.comparisons.compare import subject_of
-from dermis.apps.validation.comparisons.scenes import usual_region
-from dermis.apps.validation.comparisons.truths import (
-    Subject,
-    Truth,
-    heat_around,
-    irradiance_samples,
-    positions,
-    surface_integral,
-)
+from dermis.apps.validation.comparisons.compare import comparison_subject
+from dermis.apps.validation.comparisons.scenes import default_region
+from dermis.apps.validation.comparisons.references import ComparisonSubject, ReferenceImage, surface_heat_around, irradiance_samples, hit_positions, surface_integral
 from dermis.frame.surface_points import surface_points
 from dermis.human.regions.labels import known_landmarks
 from dermis.mesh.head import Head
@@ -30,9 +23,9 @@ Floats = NDArray[np.float64]
 LIGHTS = ("front", "back", "laser")
 ATLASES = (512, 1024, 2048)
 RADIUS_MM = 14.0
-LEAST_EVEN = 1e-3
-LEAST_MM2 = 1.0  # of Gaussians for which the surface and straight lines differ
-PLACES: dict[str, dict[str, tuple[str, ...]]] = {
+MIN_UNIFORM = 1e-3
+MIN_VARIANCE_MM2 = 1.0  # of Gaussians for which the surface and straight lines differ
+LANDMARKS_BY_REGION: dict[str, dict[str, tuple[str, ...]]] = {
     "front": {
         "closed lid": ("left inner eye corner", "left outer eye corner"),
         "ear": ("left ear top", "left ear lobe", "left tragus"),
@@ -49,29 +42,29 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
     """Return the tables by their names in docs/templates/techniques.md."""
     found: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
     for light in LIGHTS:
-        with subject_of(head, light, usual_region(light), "skin1", settings, adapter, "layered") as subject:
-            straight, even = surface_integral(subject, 0), even_light(subject)
-            fair = replace(straight, image=straight.image / np.maximum(even, LEAST_EVEN))
-            found["by_atlas"] += by_atlas(subject, straight, fair, light)
-            found["zero_width"].append(zero_width(subject, light))
-            found["places"] += places(subject, straight, light) if light in PLACES else []
+        with comparison_subject(head, light, default_region(light), "skin1", settings, adapter, "layered") as subject:
+            straight, even = surface_integral(subject, 0), uniform_light(subject)
+            fair = replace(straight, image=straight.image / np.maximum(even, MIN_UNIFORM))
+            found["by_atlas"] += atlas_rows(subject, straight, fair, light)
+            found["zero_width"].append(zero_width_row(subject, light))
+            found["places"] += region_rows(subject, straight, light) if light in LANDMARKS_BY_REGION else []
             if light == "front":
-                found["even"].append(mean_and_high(even[straight.mask]))
+                found["even"].append(mean_and_percentile(even[straight.mask]))
     return {name: "\n".join(rows) for name, rows in found.items()}
 
 
-def drawn(subject: Subject, technique: str, **changes: object) -> Floats:
+def render_technique(subject: ComparisonSubject, technique: str, **changes: object) -> Floats:
     """Return linear radiance at one sample a pixel without interreflection, as the truths have it."""
     alike = {"technique": technique, "samples": 1, "interreflection": False}
     chosen = subject.settings.model_dump() | alike | changes
     return subject.renderer.draw(subject.scene, Settings(**chosen)).linear().astype(np.float64)
 
 
-def by_atlas(subject: Subject, straight: Truth, fair: Truth, light: str) -> list[str]:
+def atlas_rows(subject: ComparisonSubject, straight: ReferenceImage, fair: ReferenceImage, light: str) -> list[str]:
     """Return rows of texture space by the size of its map, compared with no scattering, by two truths."""
-    none, rows = drawn(subject, "none"), []
+    none, rows = render_technique(subject, "none"), []
     for side in ATLASES:
-        image, cells = drawn(subject, "texture-space", atlas=side), [light, str(side)]
+        image, cells = render_technique(subject, "texture-space", atlas=side), [light, str(side)]
         for truth in (straight, fair):
             error, most = (relative_rmse(one, truth.image, truth.mask).value for one in (image, none))
             energy = energy_ratio(image, truth.image, truth.mask).value
@@ -80,43 +73,43 @@ def by_atlas(subject: Subject, straight: Truth, fair: Truth, light: str) -> list
     return rows
 
 
-def zero_width(subject: Subject, light: str) -> str:
+def zero_width_row(subject: ComparisonSubject, light: str) -> str:
     """Return the error of the truth's sampling: a profile of no width against the light that enters."""
     narrow = GaussianSum("narrow", np.array([0.05**2]), np.ones((1, 3)))
     truth = surface_integral(replace(subject, profile=narrow), 0)
-    entered = drawn(subject, "none") / subject.profile.albedo
+    entered = render_technique(subject, "none") / subject.profile.albedo
     pair = (entered, truth.image, truth.mask)
     return f"| {light} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
 
 
-def even_light(subject: Subject) -> Floats:
+def uniform_light(subject: ComparisonSubject) -> Floats:
     """Return (h, w, 3) of the integral of light that is 1 everywhere; 1 beside the head."""
     lit = irradiance_samples(subject)
     evenly = replace(lit, irradiance=np.ones_like(lit.irradiance))
     seen = surface_points(subject.renderer, subject.scene, subject.settings)
     profile = Profile(subject.profile.weight / subject.profile.albedo, subject.profile.variance_mm2)
     image = np.ones((*seen.mask.shape, 3))
-    image[seen.mask] = integrate_exitance(positions(subject, seen), evenly, profile)
+    image[seen.mask] = integrate_exitance(hit_positions(subject, seen), evenly, profile)
     return image
 
 
-def mean_and_high(even: Floats) -> str:
+def mean_and_percentile(even: Floats) -> str:
     """Return the mean and 95th percentile by channel."""
     pairs = zip(even.mean(axis=0), np.percentile(even, 95, axis=0), strict=True)
     return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)
 
 
-def places(subject: Subject, straight: Truth, light: str) -> list[str]:
+def region_rows(subject: ComparisonSubject, straight: ReferenceImage, light: str) -> list[str]:
     """Return rows of the error by place, and how much of it a perfect map would leave."""
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None
-    none, ours = drawn(subject, "none"), drawn(subject, "texture-space")
-    on_map = drawn(subject, "texture-space", transmission="none")
+    none, ours = render_technique(subject, "none"), render_technique(subject, "texture-space")
+    on_map = render_technique(subject, "texture-space", transmission="none")
     lit, total = irradiance_samples(subject), ((ours - straight.image)[straight.mask] ** 2).sum()
     rows = []
-    for place, names in PLACES[light].items():
+    for place, names in LANDMARKS_BY_REGION[light].items():
         middle = tuple(np.mean([landmarks[name] for name in names], axis=0))
-        heat = heat_around(subject, middle, RADIUS_MM, lit, LEAST_MM2)
+        heat = surface_heat_around(subject, middle, RADIUS_MM, lit, MIN_VARIANCE_MM2)
         share = ((ours - straight.image)[heat.mask] ** 2).sum() / total
         pixels = heat.mask.sum() / straight.mask.sum()
         errors = [

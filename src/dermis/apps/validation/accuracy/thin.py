@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import dermis
-from dermis.apps.truths import surface_integral
-from dermis.apps.truths.irradiance_samples import MeshPoints
+from dermis.apps.truths.irradiance_samples import MeshPoints, sample_irradiance
+from dermis.apps.truths.radial_table import GaussianSum as ReferenceProfile
+from dermis.apps.truths.surface_integral import integrate_exitance
 from dermis.apps.validation.pages import print_tables
 from dermis.gpu import download
 from dermis.mesh.head import Head
@@ -24,14 +25,14 @@ from dermis.scene import Scene, Settings, Skin
 from dermis.scene.lights import DirectionalLight
 
 Array = NDArray[np.float64]
-Choice = Callable[[Array, Array], NDArray[np.bool_]]  # of places by their positions and normals
+PointFilter = Callable[[Array, Array], NDArray[np.bool_]]  # of places by their positions and normals
 MATTE = Skin(albedo="profile", rho_s=0.0)
 PROFILE = load_profile("gpu-gems-3")
 BLURRED = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
-THICK_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
+THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
 ANGLES = (5.0, 10.0, 20.0, 30.0, 45.0)
 ATLAS = 1024
-EAR_MM = 66.0  # the scan's ears lie farther from its middle
+EAR_DISTANCE_MM = 66.0  # the scan's ears lie farther from its middle
 
 
 def thin(adapter: str = "auto") -> None:
@@ -39,7 +40,7 @@ def thin(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def scattered(
+def scattered_light(
     renderer: dermis.Renderer, mesh: Mesh, way: Array, skin: Skin, atlas: int, **chosen: str
 ) -> tuple[Array, Array, Array]:
     """Return (n, 3) places, normals and light of a mesh's texels, lit from one side without shadows.
@@ -60,7 +61,7 @@ def scattered(
     return places, normals, download(renderer.device, inputs.resources.scattered)[own][:, :3].astype(float)
 
 
-def summed(mesh: Mesh, way: Array, places: Array, spacing: float) -> Array:
+def integrated_light(mesh: Mesh, way: Array, places: Array, spacing: float) -> Array:
     """Return light at places by the profile of straight-line distance, summed over the surface."""
 
     def light(at: MeshPoints) -> Array:
@@ -68,17 +69,17 @@ def summed(mesh: Mesh, way: Array, places: Array, spacing: float) -> Array:
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         return np.repeat(np.maximum(normals @ -way, 0.0)[:, None], 3, axis=1)
 
-    profile = surface_integral.GaussianSum(BLURRED.weight, BLURRED.variance_mm2)
-    samples = surface_integral.sample_irradiance(mesh, light, spacing)
-    return surface_integral.integrate_exitance(places, samples, profile, 0.002)
+    profile = ReferenceProfile(BLURRED.weight, BLURRED.variance_mm2)
+    samples = sample_irradiance(mesh, light, spacing)
+    return integrate_exitance(places, samples, profile, 0.002)
 
 
-def slabs(renderer: dermis.Renderer) -> str:
+def slab_rows(renderer: dermis.Renderer) -> str:
     """Return light through slabs far from their rim, as the frame has it and as the profile says."""
     rows = []
-    for thickness in THICK_MM:
+    for thickness in THICKNESSES_MM:
         way = np.array([0.0, 0.0, 1.0])
-        places, normals, light = scattered(
+        places, normals, light = scattered_light(
             renderer, wedge(60.0, thickness, thickness), way, MATTE, 256, transmission="thin"
         )
         inner = (normals[:, 2] > 0.9) & (np.abs(places[:, :2]).max(axis=1) < 12.0)
@@ -88,14 +89,14 @@ def slabs(renderer: dermis.Renderer) -> str:
     return "\n".join(rows)
 
 
-def across_air(mesh: Mesh, way: Array, places: Array, normals: Array) -> Array:
+def light_across_air(mesh: Mesh, way: Array, places: Array, normals: Array) -> Array:
     """Return the red light of the sum whose straight path crosses air."""
 
     def light(at: MeshPoints) -> Array:
         turned = at.interpolate(mesh, mesh.normals)
         return np.repeat(np.maximum(turned @ -way, 0.0)[:, None], 3, axis=1)
 
-    samples = surface_integral.sample_irradiance(mesh, light, 0.5)
+    samples = sample_irradiance(mesh, light, 0.5)
     corners = samples.positions[samples.triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(across, axis=1)
@@ -114,11 +115,11 @@ def across_air(mesh: Mesh, way: Array, places: Array, normals: Array) -> Array:
     return total
 
 
-def compared(
+def comparison_cells(
     renderer: dermis.Renderer,
     mesh: Mesh,
     way: Array,
-    chosen: Choice,
+    chosen: PointFilter,
     atlas: int,
     spacing: float,
     *,
@@ -130,19 +131,19 @@ def compared(
     """
     cells = []
     for transmission in ("none", "thin"):
-        places, normals, light = scattered(renderer, mesh, way, MATTE, atlas, transmission=transmission)
+        places, normals, light = scattered_light(renderer, mesh, way, MATTE, atlas, transmission=transmission)
         some = np.flatnonzero(chosen(places, normals))
         some = np.random.default_rng(5).permutation(some)[:3000]
-        exact, red = summed(mesh, way, places[some], spacing)[:, 0], light[some, 0]
+        exact, red = integrated_light(mesh, way, places[some], spacing)[:, 0], light[some, 0]
         error = red - exact
         cells += [f"{red.sum() / exact.sum():.3f}", f"{np.sqrt((error**2).mean() / (exact**2).mean()):.1%}"]
     if air:
-        inside = exact - across_air(mesh, way, places[some], normals[some])
+        inside = exact - light_across_air(mesh, way, places[some], normals[some])
         cells.append(f"{red.sum() / inside.sum():.3f}")
     return " | ".join(cells)
 
 
-def wedges(renderer: dermis.Renderer) -> str:
+def wedge_rows(renderer: dermis.Renderer) -> str:
     """Return rows of red light on the dark face of wedges lit from behind, within 15 mm of their edge."""
     rows = []
     for angle in ANGLES:
@@ -152,12 +153,12 @@ def wedges(renderer: dermis.Renderer) -> str:
             dark = normals @ [-np.sin(np.radians(half)), 0.0, np.cos(np.radians(half))] > 0.99
             return np.asarray(dark & (places[:, 0] < -15.0) & (np.abs(places[:, 1]) < 15.0))
 
-        cells = compared(renderer, mesh, np.array([0.0, 0.0, 1.0]), near, 512, 0.7, air=False)
+        cells = comparison_cells(renderer, mesh, np.array([0.0, 0.0, 1.0]), near, 512, 0.7, air=False)
         rows.append(f"| {angle:g}° | {cells} |")
     return "\n".join(rows)
 
 
-def ears(renderer: dermis.Renderer) -> str:
+def ear_rows(renderer: dermis.Renderer) -> str:
     """Return rows of red light on the dark side of heads' ears, lit from behind and from the front."""
     rows = []
     for name in ("lee_perry_smith", "human"):
@@ -170,10 +171,10 @@ def ears(renderer: dermis.Renderer) -> str:
                 places: Array, normals: Array, way: Array = way, centre: Array = centre
             ) -> NDArray[np.bool_]:
                 local = places - centre
-                ear = (np.abs(local[:, 0]) > EAR_MM) & (np.abs(local[:, 1]) < 45.0)
+                ear = (np.abs(local[:, 0]) > EAR_DISTANCE_MM) & (np.abs(local[:, 1]) < 45.0)
                 return np.asarray(ear & (normals @ way > 0.3))
 
-            cells = compared(renderer, mesh, way, dark, ATLAS, 1.5, air=True)
+            cells = comparison_cells(renderer, mesh, way, dark, ATLAS, 1.5, air=True)
             rows.append(f"| {name} | {side} | {cells} |")
     return "\n".join(rows)
 
@@ -182,7 +183,7 @@ def tables(adapter: str = "auto") -> dict[str, str]:
     """Return the tables by their names in the page's template."""
     renderer = dermis.Renderer(adapter)
     return {
-        "thin_slabs": slabs(renderer),
-        "thin_wedges": wedges(renderer),
-        "thin_ears": ears(renderer),
+        "thin_slabs": slab_rows(renderer),
+        "thin_wedges": wedge_rows(renderer),
+        "thin_ears": ear_rows(renderer),
     }

@@ -22,11 +22,11 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 GPU_GEMS_3 = "gpu-gems-3"
-FRAGMENTS = "published-fragments"
+FRAGMENT_TECHNIQUE = "published-fragments"
 """The passes of 2007 in the graphics pipeline; `GPU_GEMS_3` has the same in compute."""
-_SWAY_MM = 2.0
-_LEAST_WEIGHT = 1e-3
-_TURN_DEGREES = 25.0  # between one round of the studio's lights and the next
+_SHIFT_MM = 2.0
+_MIN_WEIGHT = 1e-3
+_RIG_ROTATION_DEGREES = 25.0  # between one round of the studio's lights and the next
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Preset:
     subdivide: tuple[int, ...]
     targets: tuple[int, ...] = (52,)
     environment: tuple[str, ...] = ("uniform",)
-    technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENTS)
+    technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENT_TECHNIQUE)
 
     def cases(self) -> list[Case]:
         """Return the usual frame, then the others."""
@@ -110,7 +110,7 @@ PRESETS: dict[str, Preset] = {
 }
 
 
-def settings_of(case: Case) -> Settings:
+def case_settings(case: Case) -> Settings:
     """Return the settings of a case."""
     return Settings(
         size=case.image,
@@ -120,7 +120,7 @@ def settings_of(case: Case) -> Settings:
     )
 
 
-def scenes_of(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
+def case_scenes(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
     """Return the case at `count` moments: camera, lights and a moving head are never in the same place twice.
 
     folder : for the profile's file
@@ -128,28 +128,28 @@ def scenes_of(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
     skin, camera = Skin(profile=str(_profile_file(case.gaussians, folder))), portrait(head)
     lights = _lights(case.lights)
     around = Environment(name=case.environment) if case.environment else None
-    head = rigged(head, case.targets) if case.targets else head
+    head = with_test_rig(head, case.targets) if case.targets else head
     scenes = []
     for k in range(count):
-        sway = _SWAY_MM * math.sin(1.0 + k)
-        moved = [light.model_copy(update={"position": _aside(light.position, sway)}) for light in lights]
-        eye = camera.model_copy(update={"position": _aside(camera.position, sway)})
-        pose = pose_at(head, k) if case.targets else None
+        sway = _SHIFT_MM * math.sin(1.0 + k)
+        moved = [light.model_copy(update={"position": _shifted(light.position, sway)}) for light in lights]
+        eye = camera.model_copy(update={"position": _shifted(camera.position, sway)})
+        pose = test_pose(head, k) if case.targets else None
         scenes.append(Scene(head, tuple(moved), eye, skin, around, pose))
     return scenes
 
 
-def _aside(place: tuple[float, float, float], sway: float) -> tuple[float, float, float]:
+def _shifted(place: tuple[float, float, float], sway: float) -> tuple[float, float, float]:
     return place[0] + sway, place[1], place[2]
 
 
 def _lights(count: int) -> list[PointLight]:
     """Return the studio's spots, then the same ones turned about the head."""
     rig = [light for light in studio() if isinstance(light, PointLight)]
-    return [_turned(rig[k % len(rig)], _TURN_DEGREES * (k // len(rig))) for k in range(count)]
+    return [_rotated(rig[k % len(rig)], _RIG_ROTATION_DEGREES * (k // len(rig))) for k in range(count)]
 
 
-def _turned(light: PointLight, degrees: float) -> PointLight:
+def _rotated(light: PointLight, degrees: float) -> PointLight:
     x, y, z = light.position
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     return light.model_copy(update={"position": (c * x + s * z, y, c * z - s * x)})
@@ -157,44 +157,44 @@ def _turned(light: PointLight, degrees: float) -> PointLight:
 
 def _profile_file(count: int, folder: Path) -> Path:
     path = folder / f"{count}.csv"
-    profile = with_terms(load_profile("gpu-gems-3"), count)
+    profile = with_gaussian_count(load_profile("gpu-gems-3"), count)
     rows = np.column_stack([profile.variance_mm2, profile.weight])
     lines = [",".join(repr(float(number)) for number in row) for row in rows]
     path.write_text("\n".join(["variance_mm2,red,green,blue", *lines]) + "\n", encoding="utf-8")
     return path
 
 
-def with_terms(profile: GaussianSum, count: int) -> GaussianSum:
+def with_gaussian_count(profile: GaussianSum, count: int) -> GaussianSum:
     """Return a stand-in with `count` Gaussians, the same albedo and the same widest Gaussian."""
     if count == len(profile.variance_mm2):
         return profile
     known = np.log(profile.variance_mm2)
     wanted = np.linspace(known[0], known[-1], count) if count > 1 else known[-1:]
-    channels = [np.interp(wanted, known, channel) + _LEAST_WEIGHT for channel in profile.weight.T]
+    channels = [np.interp(wanted, known, channel) + _MIN_WEIGHT for channel in profile.weight.T]
     weight = np.stack(channels, axis=1)
     weight *= profile.albedo / weight.sum(axis=0)
     return GaussianSum(f"{count} Gaussians", np.exp(wanted), weight)
 
 
-BONES = 4
-_SHARE = 1 / 6  # of the points that a target moves, as faces' own targets do
+BONE_COUNT = 4
+_TARGET_FRACTION = 1 / 6  # of the points that a target moves, as faces' own targets do
 _LIFT_MM = 2.0
-_BONE_TURN_DEGREES = 4.0
+_BONE_ROTATION_DEGREES = 4.0
 
 Doubles = NDArray[np.float64]
 
 
-def rigged(head: Head, targets: int) -> Head:
+def with_test_rig(head: Head, targets: int) -> Head:
     """Return the head with morph targets all over it, and bones one above the other instead of its own."""
     points = head.positions_mm.astype(np.float64)
     rig = replace(head.control, targets=_targets(points, targets), skeleton=_skeleton(points))
     return replace(head, rig=rig)
 
 
-def pose_at(head: Head, moment: int) -> Pose:
+def test_pose(head: Head, moment: int) -> Pose:
     """Return a pose in which every target and every bone has moved since the moment before."""
     weights = {name: 0.5 + 0.5 * math.sin(k + 0.3 * moment) for k, name in enumerate(head.targets)}
-    turn = [_BONE_TURN_DEGREES * math.sin(0.2 * moment + k) for k in range(BONES)]
+    turn = [_BONE_ROTATION_DEGREES * math.sin(0.2 * moment + k) for k in range(BONE_COUNT)]
     bones = {name: (0.3 * angle, angle, 0.0) for name, angle in zip(head.bones, turn, strict=True)}
     return Pose(weights, bones)
 
@@ -202,7 +202,7 @@ def pose_at(head: Head, moment: int) -> Pose:
 def _targets(points: Doubles, count: int) -> MorphTargets:
     """Return smooth lifts, each of a sixth of the points around one of them."""
     middles = points[np.linspace(0, len(points) - 1, count).astype(int)]
-    nearest = max(1, int(_SHARE * len(points)))
+    nearest = max(1, int(_TARGET_FRACTION * len(points)))
     moved, deltas = [], []
     for middle in middles:
         away = np.linalg.norm(points - middle, axis=1)
@@ -219,15 +219,15 @@ def _targets(points: Doubles, count: int) -> MorphTargets:
 def _skeleton(points: Doubles) -> Skeleton:
     """Return bones in a row upwards; a point follows the two beside it."""
     low, high = points[:, 1].min(), points[:, 1].max()
-    step = (high - low) / BONES
-    local, bind = np.tile(np.eye(4), (2, BONES, 1, 1))
-    local[:, 1, 3] = [low, *([step] * (BONES - 1))]
-    bind[:, 1, 3] = -(low + step * np.arange(BONES))
-    place = np.clip((points[:, 1] - low) / step, 0.0, BONES - 1.001)
+    step = (high - low) / BONE_COUNT
+    local, bind = np.tile(np.eye(4), (2, BONE_COUNT, 1, 1))
+    local[:, 1, 3] = [low, *([step] * (BONE_COUNT - 1))]
+    bind[:, 1, 3] = -(low + step * np.arange(BONE_COUNT))
+    place = np.clip((points[:, 1] - low) / step, 0.0, BONE_COUNT - 1.001)
     below = place.astype(np.int32)
     bone, weight = np.zeros((len(points), 4), np.int32), np.zeros((len(points), 4), np.float32)
     bone[:, 0], bone[:, 1] = below, below + 1
     weight[:, 1] = place - below
     weight[:, 0] = 1.0 - weight[:, 1]
-    parent = np.arange(-1, BONES - 1, dtype=np.int32)
-    return Skeleton(tuple(f"bone {k}" for k in range(BONES)), parent, local, bind, np.eye(4), bone, weight)
+    parent = np.arange(-1, BONE_COUNT - 1, dtype=np.int32)
+    return Skeleton(tuple(f"bone {k}" for k in range(BONE_COUNT)), parent, local, bind, np.eye(4), bone, weight)

@@ -20,16 +20,16 @@ from dermis.gpu import CommandList, ComputeProgram, Device, Texture, download, m
 from dermis.gpu.textures import FORMAT_BYTES, texel_bytes
 
 _MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
-_CORNERS, _PLACE = 16, 16  # bytes of a triangle's corners and of a vertex' position in the tables
-_LISTED = 16  # bytes of a texel in the list of a gutter
-_TEXEL = 4  # bytes of where a source is
-_BILINEAR = 4  # texels that a lookup between texels reads
+_TRIANGLE_BYTES, _VERTEX_BYTES = 16, 16  # bytes of a triangle's corners and of a vertex' position in the tables
+_GUTTER_ENTRY_BYTES = 16  # bytes of a texel in the list of a gutter
+_INDEX_BYTES = 4  # bytes of where a source is
+_BILINEAR_TEXELS = 4  # texels that a lookup between texels reads
 _SIDE, _SIDE_ON_CPU = 4096, 1024  # beyond what caches hold
-_COPIES, _REPEATS, _WARMING = 8, 5, 20
+_COPIES, _REPEATS, _WARMUP_REPEATS = 8, 5, 20
 
 
 @dataclass(frozen=True)
-class Moved:
+class FrameTraffic:
     """A frame's inputs, and how much of them there is.
 
     texels : of the atlas that show the surface
@@ -45,16 +45,16 @@ class Moved:
     vertices: int
 
 
-def moved_by(device: Device, inputs: FrameInputs, vertices: int) -> Moved:
+def frame_traffic(device: Device, inputs: FrameInputs, vertices: int) -> FrameTraffic:
     """Return the counts after a frame was drawn."""
     texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
     seen = np.count_nonzero(download(device, inputs.resources.post.picture.bytes)[..., 3])
     maps, layers = inputs.resources.shadow_maps.texture, range(len(inputs.shadow_views.clips))
     shadowing = sum(int(np.count_nonzero(download(device, maps, layer=layer))) for layer in layers)
-    return Moved(inputs, int(texels), int(seen), shadowing, vertices)
+    return FrameTraffic(inputs, int(texels), int(seen), shadowing, vertices)
 
 
-def stage_bytes(moved: Moved) -> dict[str, float]:
+def stage_bytes(moved: FrameTraffic) -> dict[str, float]:
     """Return bytes by stage: inputs read once and results written once, in the formats in use.
 
     Where others are not needed, only texels with surface and pixels that show the head count. Repeated reads
@@ -63,10 +63,10 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
     inputs, picture = moved.inputs, moved.inputs.resources.post.picture
     pixels, shadow = picture.size[0] * picture.size[1], inputs.resources.shadow_maps.texture
     samples = inputs.settings.samples * texel_bytes(inputs.resources.visibility.texture)
-    geometry = _CORNERS * inputs.resources.head.triangles + _PLACE * moved.vertices
+    geometry = _TRIANGLE_BYTES * inputs.resources.head.triangles + _VERTEX_BYTES * moved.vertices
     looked_up = len(inputs.shadow_views.clips) * texel_bytes(shadow)
     radiance = texel_bytes(picture.radiance)
-    shaded = moved.seen * (looked_up + texel_bytes(inputs.resources.scattered)) + _maps(inputs, moved.seen)
+    shaded = moved.seen * (looked_up + texel_bytes(inputs.resources.scattered)) + _map_bytes(inputs, moved.seen)
     found: dict[str, float] = {
         "shadows": moved.shadowing * texel_bytes(shadow) + geometry,
         "visibility": moved.seen * samples + geometry,
@@ -78,7 +78,7 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
     return (found | _scattering_bytes(moved, looked_up)) if inputs.blurs else found
 
 
-def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
+def _scattering_bytes(moved: FrameTraffic, looked_up: int) -> dict[str, float]:
     """Return bytes of the stages that light the atlas and spread the light."""
     inputs, texels, levels = moved.inputs, moved.texels, moved.inputs.resources.diffusion.levels
     blur = inputs.blurs[0]
@@ -86,16 +86,16 @@ def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
     blurred = [texels * FORMAT_BYTES[levels.texel] / 4**halved for halved in blur.halvings[1:]]
     found: dict[str, float] = {
         "irradiance": texels * (SURFACE_BYTES + looked_up) + entered,
-        "diffuse": entered + sum(blurred[:-1]) + sum(blurred) + _surface_of_blurs(inputs, texels),
+        "diffuse": entered + sum(blurred[:-1]) + sum(blurred) + _blur_surface_bytes(inputs, texels),
         "combine": sum(blurred) + texels * texel_bytes(inputs.resources.scattered),
     }
     if thin := inputs.layouts[0].translucency:
-        found["translucency"] = _through(thin, levels, blur)
+        found["translucency"] = _translucency_bytes(thin, levels, blur)
         found["combine"] += thin.pairs.transmitted.size[0] * thin.pairs.transmitted.size[1] * texel_bytes(thin.pairs.transmitted)
     return found
 
 
-def _surface_of_blurs(inputs: FrameInputs, texels: int) -> float:
+def _blur_surface_bytes(inputs: FrameInputs, texels: int) -> float:
     """Return bytes that blurs read of the surface: stretch, the extent of the chart, and gutters.
 
     The passes of 2007 blur the stretch map along with the light instead.
@@ -110,24 +110,24 @@ def _surface_of_blurs(inputs: FrameInputs, texels: int) -> float:
         maps = (sheets[halved].resources[name] for name in ("stretch_map", "reach_map"))
         moved += sum(map(texel_bytes, maps)) * texels / 4**halved
         if blur.edge == "repeated" and (gutter := sheets[source].gutter):
-            moved += gutter.size * (1 + 2 * FORMAT_BYTES[levels.texel] / _LISTED)
+            moved += gutter.size * (1 + 2 * FORMAT_BYTES[levels.texel] / _GUTTER_ENTRY_BYTES)
     return moved
 
 
-def _through(thin: Translucency, levels: PyramidLevels, blur: Blur) -> float:
+def _translucency_bytes(thin: Translucency, levels: PyramidLevels, blur: Blur) -> float:
     """Bytes of translucency: pairs and their texels, the light of the sources, and the light that leaves.
 
     Slabs ask for the light at the sources by its direction too, so for the surface there.
     """
     pairs, halved = thin.pairs, blur.halvings[blur.profile_levels[1 + thin.source_level]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
-    lists = thin.weights.size + pairs.receiver_ranges.size + (_TEXEL + SURFACE_BYTES * thin.uses_tables) * sources
+    lists = thin.weights.size + pairs.receiver_ranges.size + (_INDEX_BYTES + SURFACE_BYTES * thin.uses_tables) * sources
     level = (levels.size >> halved) ** 2
-    read = min(_BILINEAR * sources, level) * FORMAT_BYTES[levels.texel]
+    read = min(_BILINEAR_TEXELS * sources, level) * FORMAT_BYTES[levels.texel]
     return float(lists + read + receivers * texel_bytes(thin.pairs.transmitted))
 
 
-def _maps(inputs: FrameInputs, most: int) -> int:
+def _map_bytes(inputs: FrameInputs, most: int) -> int:
     """Return bytes of the head's maps that `most` points read, a texel each."""
     textures = [cast(Texture, inputs.bindings[name]) for name in _MAPS]
     return sum(texel_bytes(one) * min(most, one.size[0] * one.size[1]) for one in textures)
@@ -142,7 +142,7 @@ def copy_rate(device: Device) -> float:
     side = _SIDE_ON_CPU if software else _SIDE
     program = ComputeProgram(device, Path(__file__).parent / "copy.wgsl")
     textures = [make_texture(device, (side, side), "rgba32float") for _ in range(2)]
-    times = [_copy(device, program, textures) for _ in range(_REPEATS + (0 if software else _WARMING))]
+    times = [_copy(device, program, textures) for _ in range(_REPEATS + (0 if software else _WARMUP_REPEATS))]
     moved = 2 * _COPIES * side * side * texel_bytes(textures[0])
     return moved / (1e-3 * statistics.median(times[-_REPEATS:]))
 

@@ -34,7 +34,7 @@ from dermis.optics.gaussians import MAX_GAUSSIANS
 _FOLDER = Path(__file__).parent
 
 
-class Fragments(GpuGems3):
+class FragmentPasses(GpuGems3):
     """Lights the atlas, blurs and adds up in render passes; the same up to the rounding of halves."""
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
@@ -56,7 +56,7 @@ class Fragments(GpuGems3):
             graph.repeat(stretch.draw_stretch, layout.head, layout.atlas)
             surface_texels.draw(graph, layout)
             self._light(graph, layout, inputs.light_constants, made.diffusion.levels.layer(0), blur.scale)
-            self.fill(graph, made.diffusion.levels, layout.atlas, blur)
+            self.blur_levels(graph, made.diffusion.levels, layout.atlas, blur)
             thin = layout.translucency
             if thin:
                 translucency_weights.draw_weights(graph, thin)
@@ -73,11 +73,11 @@ class Fragments(GpuGems3):
             )
         return made.scattered
 
-    def shader(self, device: Device, constants: Constants) -> RenderProgram:
+    def blur_program(self, device: Device, constants: Constants) -> RenderProgram:
         """Return the program of the pass along one axis."""
-        return _program(device, "gpu_gems_3_fragment.wgsl", constants, [HALVES, HALVES])
+        return _fragment_program(device, "gpu_gems_3_fragment.wgsl", constants, [HALVES, HALVES])
 
-    def run(
+    def draw_blur(
         self,
         graph: Recorder,
         shader: ComputeProgram | RenderProgram,
@@ -92,7 +92,7 @@ class Fragments(GpuGems3):
     def _light(
         self, graph: Graph, layout: LitAtlas, constants: Constants, into: TextureOrView, scale: float
     ) -> None:
-        shader = _program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALVES])
+        shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALVES])
         bound = {
             **layout.bindings,
             "surfaces": layout.surfaces,
@@ -109,7 +109,7 @@ class Fragments(GpuGems3):
         through: Texture | None,
         lost: Texture | None,
     ) -> None:
-        shader = _program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOATS])
+        shader = _fragment_program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOATS])
         padded = np.zeros((MAX_GAUSSIANS, 4), np.float32)
         padded[: len(blur.weight), :3] = blur.weight / blur.scale
         padded[0, 3] = 1.0
@@ -123,7 +123,7 @@ class Fragments(GpuGems3):
         graph.fill("combine", shader, bound, [into])
 
 
-def _program(device: Device, name: str, constants: Constants, targets: list[str]) -> RenderProgram:
+def _fragment_program(device: Device, name: str, constants: Constants, targets: list[str]) -> RenderProgram:
     def make() -> RenderProgram:
         path, folders = _FOLDER / name, shader_folders()
         chosen = program_constants(device, path, folders, constants)
@@ -132,4 +132,4 @@ def _program(device: Device, name: str, constants: Constants, targets: list[str]
     return cached_program(device, (name, registry_version()), constants, make)
 
 
-FRAGMENTS = Fragments()
+FRAGMENT_PASSES = FragmentPasses()

@@ -6,7 +6,7 @@ import statistics
 import time
 from pathlib import Path
 
-from dermis.apps.validation.pages import Figures
+from dermis.apps.validation.pages import JsonObject
 from dermis.frame.features.surface.record import surface_constants
 from dermis.frame.programs import shader_folders
 from dermis.gpu import CommandList, ComputeProgram, Device, make_texture
@@ -18,7 +18,7 @@ from dermis.specular.fresnel import FRESNEL, SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
 
 _REPEATS = 5
-_WARMING_S = 0.5  # a GPU that was idle runs at a fraction of its clock rate
+_WARMUP_S = 0.5  # a GPU that was idle runs at a fraction of its clock rate
 _SHADER = Path(__file__).with_suffix(".wgsl")
 
 
@@ -46,7 +46,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
         "sums": make_texture(device, (side, side), "r32float"),
     }
     started = time.perf_counter()
-    while time.perf_counter() - started < _WARMING_S:
+    while time.perf_counter() - started < _WARMUP_S:
         _pass_ms(device, programs[0], bound, side)
     rounds = [[_pass_ms(device, one, bound, side) for one in programs] for _ in range(_REPEATS)]
     loop, *taken = (statistics.median(times) for times in zip(*rounds, strict=True))
@@ -56,7 +56,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     }
 
 
-def _pass_ms(device: Device, program: ComputeProgram, bound: Figures, side: int) -> float:
+def _pass_ms(device: Device, program: ComputeProgram, bound: JsonObject, side: int) -> float:
     """Return the time of one pass by the device's clock, or by the wall's without timestamps [ms]."""
     frame = CommandList(device)
     started = time.perf_counter()

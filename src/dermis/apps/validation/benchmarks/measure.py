@@ -9,9 +9,9 @@ from dataclasses import asdict, dataclass
 from itertools import cycle, islice
 from pathlib import Path
 
-from dermis.apps.validation.benchmarks.cases import FRAGMENTS, Case, scenes_of, settings_of
-from dermis.apps.validation.benchmarks.floor import moved_by, stage_bytes
-from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
+from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, Case, case_scenes, case_settings
+from dermis.apps.validation.benchmarks.floor import frame_traffic, stage_bytes
+from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES as AS_FRAGMENTS
 from dermis.frame.renderer import Renderer
 from dermis.gpu.command_list import Timing
 from dermis.gpu.failures import gpu_failures
@@ -23,7 +23,7 @@ from dermis.scene.techniques import TECHNIQUES
 
 
 @dataclass(frozen=True)
-class Effort:
+class FrameCounts:
     """How many frames are drawn.
 
     warming : before any is measured: a GPU that was idle runs at a fraction of its clock rate
@@ -37,20 +37,20 @@ class Effort:
     timed: int = 9
     row: int = 100
 
-    def within(self, seconds: float, frame_ms: float) -> Effort:
+    def within(self, seconds: float, frame_ms: float) -> FrameCounts:
         """Return the same with fewer frames, where these would take longer at `frame_ms` each."""
         frames = self.warming + 2 * self.row + 2 * self.timed * (1 + self.between)
         share = min(1.0, 1e3 * seconds / (frame_ms * frames))
         wanted = asdict(self).items()
-        return Effort(**{name: min(count, max(1, int(share * count))) for name, count in wanted})
+        return FrameCounts(**{name: min(count, max(1, int(share * count))) for name, count in wanted})
 
 
-ON_CPU = Effort(warming=0, between=0, timed=3, row=3)
-_PATIENCE_S = 30.0  # for the frames of one case
+CPU_FRAME_COUNTS = FrameCounts(warming=0, between=0, timed=3, row=3)
+_MAX_CASE_S = 30.0  # for the frames of one case
 
 
 @dataclass(frozen=True)
-class Row:
+class BenchmarkRow:
     """The measurements of one case; medians.
 
     triangles : of the head
@@ -79,42 +79,42 @@ class Row:
         return self.gpu_ms["total"] / self.floor_ms["total"]
 
 
-def measure(renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, effort: Effort) -> Row:
+def measure_case(renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, effort: FrameCounts) -> BenchmarkRow:
     """Draw the case many times, camera and lights moved each time; fewer times when that would take long.
 
     rate : bytes per second that a copy moves
 
     Raises DermisError for frames that the device cannot hold.
     """
-    with gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS):
-        return _measured(renderer, case, head, folder, rate, effort)
+    with gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
+        return _measure_case(renderer, case, head, folder, rate, effort)
 
 
-def _measured(renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, effort: Effort) -> Row:
-    settings = settings_of(case)
-    first, *others = scenes_of(case, head, folder, max(effort.row, effort.timed, 2))
+def _measure_case(renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, effort: FrameCounts) -> BenchmarkRow:
+    settings = case_settings(case)
+    first, *others = case_scenes(case, head, folder, max(effort.row, effort.timed, 2))
     scenes = cycle([*others, first])
     renderer.draw(first, settings)
-    effort = effort.within(_PATIENCE_S, row_ms(renderer, scenes, 1, settings))
-    row_ms(renderer, scenes, effort.warming, settings)
-    frame_ms = row_ms(renderer, scenes, effort.row, settings) / effort.row
+    effort = effort.within(_MAX_CASE_S, sequence_ms(renderer, scenes, 1, settings))
+    sequence_ms(renderer, scenes, effort.warming, settings)
+    frame_ms = sequence_ms(renderer, scenes, effort.row, settings) / effort.row
     gpu_ms = stage_ms(renderer, scenes, settings, effort)
-    python_ms, image_ms = _around(renderer, scenes, settings, effort)
-    moved = moved_by(renderer.device, renderer.prepare(first, settings), len(head.mesh.positions))
-    return Row(
+    python_ms, image_ms = _host_times_ms(renderer, scenes, settings, effort)
+    moved = frame_traffic(renderer.device, renderer.prepare(first, settings), len(head.mesh.positions))
+    return BenchmarkRow(
         case,
         renderer.device.adapter.name,
         len(head.mesh.triangles),
         frame_ms,
         gpu_ms,
-        _floor(stage_bytes(moved), gpu_ms, rate),
+        _floor_ms(stage_bytes(moved), gpu_ms, rate),
         python_ms,
         image_ms,
         allocated_bytes() / 1e6,
     )
 
 
-def row_ms(renderer: Renderer, scenes: Iterator[Scene], count: int, settings: Settings) -> float:
+def sequence_ms(renderer: Renderer, scenes: Iterator[Scene], count: int, settings: Settings) -> float:
     """Return the time of frames that follow each other without a pause, until the last one is done [ms].
 
     scenes : each differs from the one before, so that nothing is kept that camera and lights change
@@ -125,11 +125,11 @@ def row_ms(renderer: Renderer, scenes: Iterator[Scene], count: int, settings: Se
             renderer.draw(scene, settings, timed=False)
         renderer.device.wait()
 
-    return _lasted_ms(draw)
+    return _elapsed_ms(draw)
 
 
 def stage_ms(
-    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: Effort
+    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: FrameCounts
 ) -> dict[str, float]:
     """Median device time of each stage, and of the whole frame as "total" [ms]; scenes as in `row_ms`."""
     software = renderer.device.adapter.kind == "CPU"
@@ -137,14 +137,14 @@ def stage_ms(
     drawn: dict[Timing, list[dict[str, float]]] = {way: [] for way in ways}
     for _ in range(effort.timed):
         for way in ways:
-            row_ms(renderer, scenes, effort.between, settings)
+            sequence_ms(renderer, scenes, effort.between, settings)
             drawn[way].append(renderer.draw(next(scenes), settings, timed=way).gpu_ms or {})
     found = {stage: statistics.median(one[stage] for one in drawn[True]) for stage in drawn[True][0]}
     return found | {"total": statistics.median(one["total"] for one in drawn[ways[-1]])}
 
 
-def _around(
-    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: Effort
+def _host_times_ms(
+    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: FrameCounts
 ) -> tuple[float, float]:
     """Return medians of Python's time before a frame, and of fetching its image [ms]."""
     before, after = [], []
@@ -155,17 +155,17 @@ def _around(
         before.append(1e3 * (time.perf_counter() - started))
         if k < effort.timed:
             renderer.device.wait()
-            after.append(_lasted_ms(rendered.srgb8))
+            after.append(_elapsed_ms(rendered.srgb8))
     return statistics.median(before), statistics.median(after)
 
 
-def _lasted_ms(work: Callable[[], object]) -> float:
+def _elapsed_ms(work: Callable[[], object]) -> float:
     started = time.perf_counter()
     work()
     return 1e3 * (time.perf_counter() - started)
 
 
-def _floor(moved: dict[str, float], gpu_ms: dict[str, float], rate: float) -> dict[str, float]:
+def _floor_ms(moved: dict[str, float], gpu_ms: dict[str, float], rate: float) -> dict[str, float]:
     """Return floor of each stage that was drawn, and "total" [ms]."""
     floor = {stage: 1e3 * moved[stage] / rate for stage in gpu_ms if stage in moved}
     return floor | {"total": sum(floor.values())}

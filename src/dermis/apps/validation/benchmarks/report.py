@@ -11,10 +11,10 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
-from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3, Case
-from dermis.apps.validation.benchmarks.measure import Row
+from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, GPU_GEMS_3, Case
+from dermis.apps.validation.benchmarks.measure import BenchmarkRow
 from dermis.apps.validation.benchmarks.run import Benchmark
-from dermis.apps.validation.pages import Figures
+from dermis.apps.validation.pages import JsonObject
 from dermis.base.atomic_write import atomic_file
 from dermis.base.extras import import_extra
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def as_json(made: Benchmark) -> Figures:
+def as_json(made: Benchmark) -> JsonObject:
     """Return the benchmark as one JSON-ready object; times in ms."""
     return {
         "head": made.head,
@@ -35,29 +35,29 @@ def as_json(made: Benchmark) -> Figures:
         "seconds": made.seconds,
         "copy_gb_s": made.copied / 1e9,
         "published_ratio": made.ratio(GPU_GEMS_3),
-        "published_fragments_ratio": made.ratio(FRAGMENTS),
-        "rows": [_row(row) for row in made.rows],
-        "left_out": [{**_case(one.case), "reason": one.reason} for one in made.left_out],
+        "published_fragments_ratio": made.ratio(FRAGMENT_TECHNIQUE),
+        "rows": [_row_json(row) for row in made.rows],
+        "left_out": [{**_case_json(one.case), "reason": one.reason} for one in made.left_out],
     }
 
 
-def _case(case: Case) -> Figures:
+def _case_json(case: Case) -> JsonObject:
     return asdict(case) | {"image": list(case.image)}
 
 
-def _row(row: Row) -> Figures:
-    told = {**_case(row.case), **asdict(row), "floor_ratio": row.floor_ratio}
+def _row_json(row: BenchmarkRow) -> JsonObject:
+    told = {**_case_json(row.case), **asdict(row), "floor_ratio": row.floor_ratio}
     del told["case"]
     return told
 
 
-_OTHERS = {GPU_GEMS_3: "2007, compute [ms]", FRAGMENTS: "2007, fragments [ms]"}
-_CASE = ("image", "atlas", "Gaussians", "lights", "around", "targets", "triangles", "technique")
-_TIMES = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms]", "image out [ms]")
-COLUMNS = (*_CASE, *_TIMES, "memory [MB]")
+_PUBLISHED_COLUMNS = {GPU_GEMS_3: "2007, compute [ms]", FRAGMENT_TECHNIQUE: "2007, fragments [ms]"}
+_CASE_COLUMNS = ("image", "atlas", "Gaussians", "lights", "around", "targets", "triangles", "technique")
+_TIME_COLUMNS = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms]", "image out [ms]")
+COLUMNS = (*_CASE_COLUMNS, *_TIME_COLUMNS, "memory [MB]")
 
 
-def cells(row: Row) -> tuple[str, ...]:
+def cells(row: BenchmarkRow) -> tuple[str, ...]:
     """Return a row's figures as text, in the order of COLUMNS."""
     case, device = row.case, (row.gpu_ms["total"], row.floor_ms["total"], row.floor_ratio)
     return (
@@ -69,7 +69,7 @@ def cells(row: Row) -> tuple[str, ...]:
         str(case.targets or "-"),
         str(row.triangles),
         case.technique,
-        *map(plain, (row.frame_ms, *device, row.python_ms, row.image_ms)),
+        *map(three_digits, (row.frame_ms, *device, row.python_ms, row.image_ms)),
         f"{row.memory_mb:.0f}",
     )
 
@@ -79,30 +79,30 @@ def stage_table(made: Benchmark) -> list[tuple[str, ...]]:
     if made.usual is None:
         return []
     usual = made.usual
-    others = {title: row.gpu_ms for name, title in _OTHERS.items() if (row := made.row_of(name))}
+    others = {title: row.gpu_ms for name, title in _PUBLISHED_COLUMNS.items() if (row := made.row_of(name))}
     table = [("stage", "device [ms]", "floor [ms]", "ratio", *others)]
     for stage, ms in usual.gpu_ms.items():
         floor = usual.floor_ms.get(stage)
-        known = (plain(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
-        theirs = (plain(times[stage]) if stage in times else "-" for times in others.values())
-        table.append((stage, plain(ms), *known, *theirs))
+        known = (three_digits(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
+        theirs = (three_digits(times[stage]) if stage in times else "-" for times in others.values())
+        table.append((stage, three_digits(ms), *known, *theirs))
     return table
 
 
 def published_text(made: Benchmark) -> str:
     """Return a sentence with the relative time of the passes of 2007, if that was measured."""
-    names = {GPU_GEMS_3: "as compute", FRAGMENTS: "as fragments"}
+    names = {GPU_GEMS_3: "as compute", FRAGMENT_TECHNIQUE: "as fragments"}
     found = {said: made.ratio(name) for name, said in names.items()}
     told = [f"{ratio:.2f} times as long {said}" for said, ratio in found.items() if ratio is not None]
     return f"With the passes of 2007 it takes {' and '.join(told)}." if told else ""
 
 
-def left_out_lines(made: Benchmark) -> list[str]:
+def skipped_lines(made: Benchmark) -> list[str]:
     """Return lines about cases that could not be measured, with reasons."""
-    return [f"left out: {_told(one.case)}: {one.reason}" for one in made.left_out]
+    return [f"left out: {_case_text(one.case)}: {one.reason}" for one in made.left_out]
 
 
-def _told(case: Case) -> str:
+def _case_text(case: Case) -> str:
     width, height = case.image
     sizes = f"{width}x{height}, atlas {case.atlas}, {case.gaussians} Gaussians, {case.lights} lights"
     around = f", environment {case.environment}" if case.environment else ""
@@ -129,7 +129,7 @@ def write_report(path: Path, made: Benchmark) -> None:
         summary=html.escape(summary(made)),
         published=published_text(made),
         rows=_table([COLUMNS, *(cells(row) for row in made.rows)]),
-        left_out="".join(f"<p>{html.escape(line)}</p>" for line in left_out_lines(made)),
+        left_out="".join(f"<p>{html.escape(line)}</p>" for line in skipped_lines(made)),
         stages=_table(stage_table(made)),
         bars=stage_bars(made.usual) if made.usual else "",
         scaling=scaling(made),
@@ -148,7 +148,7 @@ def _table(lines: Sequence[tuple[str, ...]]) -> str:
 
 
 _TEXT, _TOTAL, _FLOOR = "#c8c8d0", "#e8a87c", "#6fb3b8"
-_AXES: dict[str, tuple[str, Callable[[Row], float]]] = {
+_AXES: dict[str, tuple[str, Callable[[BenchmarkRow], float]]] = {
     "image": ("image [megapixel]", lambda row: row.case.image[0] * row.case.image[1] / 1e6),
     "atlas": ("side of the atlas [texel]", lambda row: row.case.atlas),
     "gaussians": ("Gaussians", lambda row: row.case.gaussians),
@@ -157,7 +157,7 @@ _AXES: dict[str, tuple[str, Callable[[Row], float]]] = {
 }
 
 
-def plain(number: float) -> str:
+def three_digits(number: float) -> str:
     """Return three significant digits without an exponent."""
     return f"{number:.0f}" if number >= 1000 else f"{number:.3g}"
 
@@ -175,14 +175,14 @@ def scaling(made: Benchmark) -> str:
         axes.plot(across, [row.gpu_ms["total"] for row in rows], "o-", color=_TOTAL, label="device", ms=4)
         axes.plot(across, [row.floor_ms["total"] for row in rows], "s--", color=_FLOOR, label="floor", ms=3)
         axes.set(xlabel=label, xscale="log", yscale="log")
-        _marks(axes.xaxis, across)
-        _marks(axes.yaxis, None)
+        _set_ticks(axes.xaxis, across)
+        _set_ticks(axes.yaxis, None)
     panels[0].set_ylabel("ms a frame")
     panels[0].legend(frameon=False, labelcolor=_TEXT, fontsize=8)
     return _svg(figure)
 
 
-def stage_bars(row: Row) -> str:
+def stage_bars(row: BenchmarkRow) -> str:
     """Return the device time of each stage and its floor as bars, as SVG text."""
     names = [stage for stage in row.gpu_ms if stage != "total"]
     figure, (axes,) = _figure(width=7.0, height=0.34 * len(names) + 0.9, columns=1)
@@ -211,13 +211,13 @@ def _figure(width: float, height: float, columns: int) -> tuple[Figure, list[Axe
     return figure, panels
 
 
-def _marks(axis: Axis, places: list[float] | None) -> None:
+def _set_ticks(axis: Axis, places: list[float] | None) -> None:
     """Label an axis with plain numbers at the measured places, or at round ones."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
     axis.set_major_locator(FixedLocator(places) if places else LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: three_digits(value)))
 
 
 def _svg(figure: Figure) -> str:

@@ -15,18 +15,18 @@ from typing import Any
 
 from dermis.apps.validation.benchmarks.cases import Case
 from dermis.apps.validation.benchmarks.floor import copy_rate
-from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, Row, measure
+from dermis.apps.validation.benchmarks.measure import CPU_FRAME_COUNTS, FrameCounts, BenchmarkRow, measure_case
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.heads import load_head
 
 _LIBRARIES = ("dermis", "wgpu", "numpy")
-Progress = Callable[[int, int], None]
+ProgressCallback = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class SkippedCase:
     """A case that could not be measured, and why."""
 
     case: Case
@@ -49,15 +49,15 @@ class Benchmark:
     date: str
     copied: float
     seconds: float
-    rows: tuple[Row, ...]
-    left_out: tuple[LeftOut, ...] = ()
+    rows: tuple[BenchmarkRow, ...]
+    left_out: tuple[SkippedCase, ...] = ()
 
     @property
-    def usual(self) -> Row | None:
+    def usual(self) -> BenchmarkRow | None:
         """The frame from which all others differ in one thing; None when it could not be measured."""
         return next((row for row in self.rows if not row.case.varies), None)
 
-    def row_of(self, technique: str) -> Row | None:
+    def row_of(self, technique: str) -> BenchmarkRow | None:
         """Return the usual frame by another technique; None when it was not measured."""
         found = (row for row in self.rows if row.case.varies == "technique")
         return next((row for row in found if row.case.technique == technique), None)
@@ -68,11 +68,11 @@ class Benchmark:
         return other.gpu_ms["total"] / self.usual.gpu_ms["total"] if other and self.usual else None
 
 
-def run(
+def run_benchmark(
     cases: list[Case],
     head: str = "human",
     adapter: str = "auto",
-    progress: Progress | None = None,
+    progress: ProgressCallback | None = None,
     options: Mapping[str, Any] = MappingProxyType({}),
 ) -> Benchmark:
     """Measure the cases one after another.
@@ -86,7 +86,7 @@ def run(
     renderer = Renderer(adapter)
     device = renderer.device
     rate = copy_rate(device)
-    rows, left_out = _all_of(
+    rows, left_out = _measure_cases(
         cases, partial(load_head, head, **options), renderer, rate, progress or (lambda done, of: None)
     )
     if not rows:
@@ -104,21 +104,21 @@ def run(
     )
 
 
-def _all_of(
-    cases: list[Case], load: Callable[..., Head], renderer: Renderer, rate: float, progress: Progress
-) -> tuple[list[Row], list[LeftOut]]:
+def _measure_cases(
+    cases: list[Case], load: Callable[..., Head], renderer: Renderer, rate: float, progress: ProgressCallback
+) -> tuple[list[BenchmarkRow], list[SkippedCase]]:
     """Return the cases that could be measured, and the others."""
-    effort = ON_CPU if renderer.device.adapter.kind == "CPU" else Effort()
+    effort = CPU_FRAME_COUNTS if renderer.device.adapter.kind == "CPU" else FrameCounts()
     subdivided = lru_cache(1)(lambda levels: load(subdivide=levels))
-    rows: list[Row] = []
-    left_out: list[LeftOut] = []
+    rows: list[BenchmarkRow] = []
+    left_out: list[SkippedCase] = []
     subdivided(cases[0].subdivide)  # a missing head is an error of all cases
     with tempfile.TemporaryDirectory() as folder:
         for done, case in enumerate(cases):
             progress(done, len(cases))
             try:
-                rows.append(measure(renderer, case, subdivided(case.subdivide), Path(folder), rate, effort))
+                rows.append(measure_case(renderer, case, subdivided(case.subdivide), Path(folder), rate, effort))
             except DermisError as fault:
-                left_out.append(LeftOut(case, str(fault)))
+                left_out.append(SkippedCase(case, str(fault)))
                 renderer.clear_cache()  # frees what was made before it failed
     return rows, left_out

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, ModelName, medium_scene
-from dermis.apps.validation.comparisons.truths import TRUTHS, Subject, Truth, check_seen
+from dermis.apps.validation.comparisons.references import REFERENCES, ComparisonSubject, ReferenceImage, check_visible
 from dermis.base.errors import refuse
 from dermis.frame.renderer import Renderer
 from dermis.frame.surface_points import surface_points
@@ -22,11 +22,11 @@ from dermis.scene.skin import DirectionName, Skin
 from dermis.scene.sources import scattering_sources
 
 Floats = NDArray[np.float64]
-_SHOWN_PERCENTILE = 99.0
+_WHITE_PERCENTILE = 99.0
 
 
 @dataclass(frozen=True)
-class ParameterRow:
+class ComparisonRow:
     """A technique's figures, with standard errors where the truth is noisy.
 
     relrmse, relrmse_se : root mean square error over the root mean square of the truth [-]
@@ -54,15 +54,15 @@ class Comparison:
 
     title: str
     adapter: str
-    truth: Truth
+    truth: ReferenceImage
     against: str
-    rows: tuple[ParameterRow, ...]
+    rows: tuple[ComparisonRow, ...]
     images: dict[str, Floats]
 
     @property
     def exposure(self) -> float:
         """Factor that makes the truth's bright parts nearly white."""
-        bright = np.percentile(self.truth.image[self.truth.mask], _SHOWN_PERCENTILE)
+        bright = np.percentile(self.truth.image[self.truth.mask], _WHITE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
     def shown(self, image: Floats) -> Floats:
@@ -97,13 +97,13 @@ def compare(
 
     Raises DermisError for unknown names, pictures without the head, and what the truth cannot do.
     """
-    check_choices(against, light, region, medium)
+    check_names(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
-    with load_subject(head, light, region, medium, settings, adapter, model) as subject:
-        check_seen(surface_points(subject.renderer, subject.scene, settings).mask)
+    with comparison_subject(head, light, region, medium, settings, adapter, model) as subject:
+        check_visible(surface_points(subject.renderer, subject.scene, settings).mask)
         report(f"truth: {against}")
-        truth = TRUTHS[against](subject, samples)
-        check_seen(truth.mask)
+        truth = REFERENCES[against](subject, samples)
+        check_visible(truth.mask)
         skin = Skin(**(subject.scene.skin.model_dump() | {"direction": direction or truth.direction}))
         judged = replace(subject, scene=replace(subject.scene, skin=skin))
         images, ms = {}, {}
@@ -116,11 +116,11 @@ def compare(
         f", {skin.direction} skin, profile by {'photons' if subject.profile.from_photons else 'diffusion'}"
     )
     made = Comparison(title, name, truth, against, (), images)
-    return replace(made, rows=tuple(_row(made, technique, ms[technique]) for technique in techniques))
+    return replace(made, rows=tuple(_comparison_row(made, technique, ms[technique]) for technique in techniques))
 
 
 @contextmanager
-def load_subject(
+def comparison_subject(
     head: Head,
     light: str,
     region: str,
@@ -128,17 +128,17 @@ def load_subject(
     settings: Settings,
     adapter: str,
     model: ModelName | None = None,
-) -> Iterator[Subject]:
+) -> Iterator[ComparisonSubject]:
     """Provide the subject of a comparison within the context; arguments as of `compare`."""
     body = media()[medium].with_eta(1.0)
     with medium_scene(head, light, region, body, model) as (scene, profile):
-        yield Subject(Renderer(adapter), scene, profile, body, settings)
+        yield ComparisonSubject(Renderer(adapter), scene, profile, body, settings)
 
 
-def check_choices(against: str, light: str, region: str, medium: str) -> None:
+def check_names(against: str, light: str, region: str, medium: str) -> None:
     """Raises DermisError for unknown names; cheap, so call it before long work."""
     choices: dict[str, tuple[str, Collection[str]]] = {
-        "against": (against, TRUTHS),
+        "against": (against, REFERENCES),
         "light": (light, LIGHTS),
         "region": (region, REGIONS),
         "medium": (medium, media()),
@@ -148,7 +148,7 @@ def check_choices(against: str, light: str, region: str, medium: str) -> None:
             refuse(f"--{option}", f"one of {', '.join(known)}", f"got {chosen!r}", "Choose one of them")
 
 
-def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, float]:
+def _render(subject: ComparisonSubject, technique: str, truth: ReferenceImage) -> tuple[Floats, float]:
     """Linear radiance of a technique, and the device time of its frame at four samples a pixel [ms]."""
     without: dict[str, object] = {} if truth.through else {"transmission": "none"}
     without |= {} if truth.between else {"interreflection": False}
@@ -159,14 +159,14 @@ def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, flo
     return image, (timed.gpu_ms or {"total": timed.frame_ms})["total"]
 
 
-def _row(made: Comparison, technique: str, ms: float) -> ParameterRow:
+def _comparison_row(made: Comparison, technique: str, ms: float) -> ComparisonRow:
     from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 
     truth, image = made.truth, made.images[technique]
     error = relative_rmse(image, truth.image, truth.mask, truth.variance)
     energy = energy_ratio(image, truth.image, truth.mask, truth.variance)
     perceived = _flip(made.shown(image), made.shown(truth.image), truth.mask)
-    return ParameterRow(technique, made.against, *error, perceived, *energy, ms)
+    return ComparisonRow(technique, made.against, *error, perceived, *energy, ms)
 
 
 def _flip(image: Floats, truth: Floats, mask: NDArray[np.bool_]) -> float | None:
@@ -177,13 +177,13 @@ def _flip(image: Floats, truth: Floats, mask: NDArray[np.bool_]) -> float | None
     return flip(image, truth, mask).mean if find_spec("flip_evaluator") else None
 
 
-_TRUTHS = {
+_REFERENCE_SOURCES = {
     "surface-integral": ("JensenBuhler2002", "Turk1992"),
     "heat": ("PinkallPolthier1993", "BobenkoSpringborn2007", "Fisher2007", "SharpCrane2020", "Bank1985"),
     "path-traced": ("Jakob2022", "Miller2019", "Welford1962"),
     "cycles": ("ChristensenBurley2015",),
 }
-_DIFFERENCE = "Andersson2020"
+_FLIP_SOURCE = "Andersson2020"
 
 
 def comparison_sources(against: str, techniques: Iterable[str]) -> tuple[str, ...]:
@@ -191,7 +191,7 @@ def comparison_sources(against: str, techniques: Iterable[str]) -> tuple[str, ..
 
     against : of `truths.TRUTHS`
     """
-    keys = [*_TRUTHS[against], _DIFFERENCE]
+    keys = [*_REFERENCE_SOURCES[against], _FLIP_SOURCE]
     for technique in techniques:
         keys += scattering_sources(Settings.model_validate({"technique": technique}))
     return tuple(dict.fromkeys(keys))

@@ -13,7 +13,7 @@ from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import PathTraced, Variant
 from dermis.apps.truths.person.path_traced import path_trace_person
 from dermis.apps.truths.person.person import SkinTextures
-from dermis.apps.validation.comparisons.truths import check_seen
+from dermis.apps.validation.comparisons.references import check_visible
 from dermis.base.errors import refuse
 from dermis.environment.panorama import UNIFORM
 from dermis.frame.renderer import Renderer
@@ -30,12 +30,12 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
-_COVERED = 0.999  # share of a pixel
-_SHOWN_PERCENTILE = 98.0
+_FULL_COVERAGE = 0.999  # share of a pixel
+_WHITE_PERCENTILE = 98.0
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class PersonComparison:
     """A view of a person by the frame and by path tracing, and how far they are apart.
 
     ours, truth : (h, w, 3) linear radiance
@@ -59,7 +59,7 @@ class Pair:
     @property
     def exposure(self) -> float:
         """Factor that makes the truth's bright parts nearly white."""
-        bright = np.percentile(self.truth[self.mask], _SHOWN_PERCENTILE)
+        bright = np.percentile(self.truth[self.mask], _WHITE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
     def shown(self, image: Floats) -> NDArray[np.uint8]:
@@ -79,7 +79,7 @@ def compare_person(
     atlas: int = 2048,
     use_cache: bool = True,
     progress: Callable[[int, int], None] | None = None,
-) -> Pair:
+) -> PersonComparison:
     """Draw a view of a person by the frame and by path tracing.
 
     paint : what the frame shows on it, see `paint_of`
@@ -94,14 +94,14 @@ def compare_person(
     if name not in VIEWS:
         refuse("view", f"one of {', '.join(VIEWS)}", f"got {name!r}", "Choose one of them")
     settings = Settings(size=(side, side), atlas=atlas, samples=4)
-    scene, wanted = scene_of(head, VIEWS[name]), round(samples * VIEWS[name].times)
-    truth = traced(renderer, scene, paint, settings.size, wanted, use_cache, progress)
-    mask = truth.mask > _COVERED
-    check_seen(mask)
-    return pair_of(name, drawn(renderer, scene, settings), truth, mask)
+    scene, wanted = view_scene(head, VIEWS[name]), round(samples * VIEWS[name].times)
+    truth = trace_view(renderer, scene, paint, settings.size, wanted, use_cache, progress)
+    mask = truth.mask > _FULL_COVERAGE
+    check_visible(mask)
+    return comparison_of(name, render_frame(renderer, scene, settings), truth, mask)
 
 
-def drawn(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
+def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
     """Return (h, w, 3) linear radiance by the frame, drawn twice as large and averaged.
 
     More samples of a pixel would do as well, but on software adapters many samples of many large lights end
@@ -113,7 +113,7 @@ def drawn(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
     return np.asarray(image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3)))
 
 
-def traced(
+def trace_view(
     renderer: Renderer,
     scene: Scene,
     paint: SkinTextures,
@@ -136,10 +136,10 @@ def traced(
     )
 
 
-def pair_of(name: str, ours: Floats, truth: PathTraced, mask: NDArray[np.bool_]) -> Pair:
+def comparison_of(name: str, ours: Floats, truth: PathTraced, mask: NDArray[np.bool_]) -> PersonComparison:
     """Return both pictures with their figures."""
     image, variance = truth.image.astype(np.float64), truth.variance.astype(np.float64)
-    return Pair(
+    return PersonComparison(
         name,
         ours,
         image,
@@ -154,9 +154,9 @@ def pair_of(name: str, ours: Floats, truth: PathTraced, mask: NDArray[np.bool_])
 
 
 _SOFTBOX_MM = 500.0
-EYE_MM = 30.0
+EYE_FRAME_MM = 30.0
 """Height of the pictures of an eye."""
-_LIPS_MM, _EAR_MM = 72.0, 120.0
+_LIPS_FRAME_MM, _EAR_FRAME_MM = 72.0, 120.0
 
 
 @dataclass(frozen=True)
@@ -175,32 +175,32 @@ class View:
     times: float = 1.0
 
 
-def at_eye(head: Head) -> Camera:
+def eye_camera(head: Head) -> Camera:
     """Return the left eye from the front, 30 mm of it."""
-    x, y, z = _eye_mm(head)
-    return Camera(position=(x, y, z + 500.0), target=(x, y, z), frame_mm=EYE_MM)
+    x, y, z = _eye_position_mm(head)
+    return Camera(position=(x, y, z + 500.0), target=(x, y, z), frame_mm=EYE_FRAME_MM)
 
 
-def at_eye_beside(head: Head) -> Camera:
+def eye_side_camera(head: Head) -> Camera:
     """Return the left eye from its outer side."""
-    x, y, z = _eye_mm(head)
-    return Camera(position=(x + 380.0, y, z + 330.0), target=(x, y, z), frame_mm=EYE_MM)
+    x, y, z = _eye_position_mm(head)
+    return Camera(position=(x + 380.0, y, z + 330.0), target=(x, y, z), frame_mm=EYE_FRAME_MM)
 
 
-def at_lips(head: Head) -> Camera:
+def lips_camera(head: Head) -> Camera:
     """Return the mouth from a little to the left."""
-    x, y, z = head.frontmost(0.0, _mouth_mm(head))
-    return Camera(position=(x + 120.0, y, z + 500.0), target=(x, y - 4.0, z), frame_mm=_LIPS_MM)
+    x, y, z = head.frontmost(0.0, _mouth_height_mm(head))
+    return Camera(position=(x + 120.0, y, z + 500.0), target=(x, y - 4.0, z), frame_mm=_LIPS_FRAME_MM)
 
 
-def behind_ear(head: Head) -> Camera:
+def behind_ear_camera(head: Head) -> Camera:
     """Return the left ear from behind."""
     usual = PRESETS["ear"](head)
     x, y, z = usual.target
-    return Camera(position=(x + 430.0, y + 10.0, z - 430.0), target=(x - 8.0, y, z), frame_mm=_EAR_MM)
+    return Camera(position=(x + 430.0, y + 10.0, z - 430.0), target=(x - 8.0, y, z), frame_mm=_EAR_FRAME_MM)
 
 
-def _eye_mm(head: Head) -> tuple[float, float, float]:
+def _eye_position_mm(head: Head) -> tuple[float, float, float]:
     """Return the left eye's apex, from the head's centre."""
     if head.eyes is None:
         return head.frontmost(30.0, 0.0)
@@ -208,7 +208,7 @@ def _eye_mm(head: Head) -> tuple[float, float, float]:
     return float(x), float(y), float(z)
 
 
-def _mouth_mm(head: Head) -> float:
+def _mouth_height_mm(head: Head) -> float:
     """Return the height of the mouth: where upper and lower teeth meet, in the mean."""
     names = [material.part for material in head.mesh.materials]
     teeth = [names.index(part) for part in ("upper teeth", "lower teeth") if part in names]
@@ -222,11 +222,11 @@ VIEWS: dict[str, View] = {
     "portrait": View(from_front, "studio"),
     "three-quarter": View(three_quarter, "studio"),
     "profile": View(side, "studio"),
-    "eye": View(at_eye, "window", times=2.0),
-    "eye from its side": View(at_eye_beside, "window", times=2.0),
-    "lips and teeth": View(at_lips, "studio", "smile-with-teeth"),
+    "eye": View(eye_camera, "window", times=2.0),
+    "eye from its side": View(eye_side_camera, "window", times=2.0),
+    "lips and teeth": View(lips_camera, "studio", "smile-with-teeth"),
     "cheek": View(at_cheek, "studio"),
-    "ear from behind": View(behind_ear, "studio"),
+    "ear from behind": View(behind_ear_camera, "studio"),
     "portrait, window": View(from_front, "window"),
     "portrait, esplanade": View(from_front, "royal_esplanade"),
     "three-quarter, lebombo": View(three_quarter, "lebombo"),
@@ -234,16 +234,16 @@ VIEWS: dict[str, View] = {
 PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
 
 
-def scene_of(head: Head, view: View) -> Scene:
+def view_scene(head: Head, view: View) -> Scene:
     """Return a head in a view, in lights with a size: no path through a cornea finds a point light."""
     given = {"camera": view.camera(head), "pose": None if view.pose is None else Pose(expression(view.pose))}
     if view.light in PANORAMAS:
         return Scene(head, environment=Environment(name=view.light), **given)  # type: ignore[arg-type]
-    lights = tuple(softbox(light) for light in preset_lights(view.light))
+    lights = tuple(as_softbox(light) for light in preset_lights(view.light))
     return Scene(head, lights=lights, **given)  # type: ignore[arg-type]
 
 
-def softbox(light: Light) -> Light:
+def as_softbox(light: Light) -> Light:
     """Return a light from a point as a softbox in its place; any other as it is."""
     if type(light) is RectangleLight or not isinstance(light, PointLight) or hasattr(light, "radius_mm"):
         return light
@@ -257,12 +257,12 @@ def softbox(light: Light) -> Light:
 
 
 Mask = NDArray[np.bool_]
-_PUPIL_MM = 4.0  # around the middle: what tells where the pupil is
-_INNER_MM, _OUTER_MM = 2.6, 5.0  # ring of the iris, as seen from the front
-_BRIGHT = 1.6  # over the median of the ring: highlights
+_PUPIL_RADIUS_MM = 4.0  # around the middle: what tells where the pupil is
+_IRIS_INNER_MM, _IRIS_OUTER_MM = 2.6, 5.0  # ring of the iris, as seen from the front
+_HIGHLIGHT_FACTOR = 1.6  # over the median of the ring: highlights
 
 
-class IrisFound(NamedTuple):
+class IrisErrors(NamedTuple):
     """Of ours against the truth.
 
     right, down : how far the truth's pupil lies from ours [pixel]
@@ -277,7 +277,7 @@ class IrisFound(NamedTuple):
     beside: Estimate
 
 
-def iris_of(pair: Pair, frame_mm: float) -> IrisFound:
+def iris_errors(pair: PersonComparison, frame_mm: float) -> IrisErrors:
     """Return the figures of a picture with an eye in its middle, seen from the front.
 
     frame_mm : height of the picture
@@ -288,23 +288,23 @@ def iris_of(pair: Pair, frame_mm: float) -> IrisFound:
     along = (np.arange(side) + 0.5 - 0.5 * side) * frame_mm / side
     x, y = np.meshgrid(along, along)
     off = np.hypot(x, y)
-    ring = (off > _INNER_MM) & (off < _OUTER_MM)
-    dull = _dull(ours, ring) & _dull(truth, ring)
-    right, down = _shift(ours, truth, noise, dull & (off < _PUPIL_MM))
+    ring = (off > _IRIS_INNER_MM) & (off < _IRIS_OUTER_MM)
+    dull = _without_highlights(ours, ring) & _without_highlights(truth, ring)
+    right, down = _image_shift(ours, truth, noise, dull & (off < _PUPIL_RADIUS_MM))
     ring &= dull
-    whole, left, beside = (_ratio(ours, truth, noise, ring & part) for part in (off > 0, x < 0, x >= 0))
-    return IrisFound(right, down, whole, left, beside)
+    whole, left, beside = (_brightness_ratio(ours, truth, noise, ring & part) for part in (off > 0, x < 0, x >= 0))
+    return IrisErrors(right, down, whole, left, beside)
 
 
-def _dull(image: Floats, ring: Mask) -> Mask:
+def _without_highlights(image: Floats, ring: Mask) -> Mask:
     """Return (h, w) pixels off highlights; a mean over neighbours tells them in a noisy picture."""
     from scipy.ndimage import gaussian_filter
 
     smooth = gaussian_filter(image, 2.0)
-    return np.asarray(smooth < _BRIGHT * np.median(smooth[ring]))
+    return np.asarray(smooth < _HIGHLIGHT_FACTOR * np.median(smooth[ring]))
 
 
-def _shift(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> tuple[Estimate, Estimate]:
+def _image_shift(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> tuple[Estimate, Estimate]:
     """Return the shift of the truth to the right of and below ours, fitted along with its brightness."""
     down, right = (np.asarray(slope) for slope in np.gradient(ours))
     columns = np.stack([ours[part], -right[part], -down[part], np.ones(int(part.sum()))], axis=-1)
@@ -314,7 +314,7 @@ def _shift(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> tuple[Esti
     return Estimate(x / gain, float(error[1])), Estimate(y / gain, float(error[2]))
 
 
-def _ratio(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> Estimate:
+def _brightness_ratio(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> Estimate:
     total = float(truth[part].sum())
     ratio = float(ours[part].sum()) / total
     return Estimate(ratio, ratio * float(np.sqrt(noise[part].sum())) / total)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.metrics import MID_GREY, signed_difference
-from dermis.apps.validation.comparisons.compare import Comparison, Row, comparison_sources
+from dermis.apps.validation.comparisons.compare import Comparison, ComparisonRow, comparison_sources
 from dermis.base.atomic_write import atomic_file
 from dermis.images.codecs import encode_png
 
@@ -42,7 +42,7 @@ def write_report(path: Path, made: Comparison) -> None:
         trial.write_text(page, encoding="utf-8")
 
 
-def cells(row: Row) -> tuple[str, ...]:
+def cells(row: ComparisonRow) -> tuple[str, ...]:
     """Return a row's figures as text, with standard errors where there are any."""
     flip = "-" if row.flip is None else f"{row.flip:.3f}"
     return (
@@ -58,13 +58,13 @@ def _with_error(value: float, error: float) -> str:
     return f"{value:.4f}" + (f" ± {error:.4f}" if error > 0 else "")
 
 
-def _table(rows: tuple[Row, ...]) -> str:
+def _table(rows: tuple[ComparisonRow, ...]) -> str:
     head = "".join(f"<th>{name}</th>" for name in _COLUMNS)
     body = ["".join(f"<td>{html.escape(cell)}</td>" for cell in cells(row)) for row in rows]
     return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 
-def _figures(made: Comparison, row: Row) -> str:
+def _figures(made: Comparison, row: ComparisonRow) -> str:
     image, truth = made.images[row.technique], made.truth
     difference = signed_difference(
         np.maximum(made.exposure * image, 0.0), np.maximum(made.exposure * truth.image, 0.0)

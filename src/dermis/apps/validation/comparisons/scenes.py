@@ -25,59 +25,59 @@ from dermis.scene.skin import Skin
 
 _WHITE = (3.14, 3.14, 3.14)
 _NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, from the head's centre [mm]
-_EARS_MM = 60.0  # above and below the centre; farther below, shoulders are wider
+_EAR_RANGE_MM = 60.0  # above and below the centre; farther below, shoulders are wider
 
 
-def _front(head: Head) -> tuple[Light, ...]:
+def _front_lights(head: Head) -> tuple[Light, ...]:
     """Return a key light from the upper left, whose shadow edges cross the face."""
     return (SpotLight(position=(450.0, 350.0, 750.0), irradiance=_WHITE),)
 
 
-def _back(head: Head) -> tuple[Light, ...]:
+def _back_lights(head: Head) -> tuple[Light, ...]:
     """Return a lamp behind the left ear."""
-    ear = _ear(head)
+    ear = _ear_position(head)
     return (SpotLight(position=(ear[0] + 150.0, 60.0, -600.0), target=ear, irradiance=(12.0, 12.0, 12.0)),)
 
 
-def _laser(head: Head) -> tuple[Light, ...]:
+def _laser_lights(head: Head) -> tuple[Light, ...]:
     """Return a vertical sheet of light over the cheek and the ear's front edge."""
-    ear = _ear(head)
+    ear = _ear_position(head)
     place = (ear[0] - 12.0, ear[1], ear[2])
     return (StripeLight(direction=(-0.55, 0.0, -1.0), position=place, irradiance=(30.0, 30.0, 30.0)),)
 
 
-LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {"front": _front, "back": _back, "laser": _laser}
+LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {"front": _front_lights, "back": _back_lights, "laser": _laser_lights}
 
 
-def _ear(head: Head) -> tuple[float, float, float]:
+def _ear_position(head: Head) -> tuple[float, float, float]:
     """Return the outermost point of the head's left half at the height of its ears."""
     places = head.mesh.positions - head.centre_mm
     off = np.abs(places[:, 1])
-    beside = places[off <= max(_EARS_MM, float(off.min()))]
+    beside = places[off <= max(_EAR_RANGE_MM, float(off.min()))]
     x, y, z = (float(c) for c in beside[beside[:, 0].argmax()])
     return (x, y, z)
 
 
-def _at_ear(head: Head) -> Camera:
-    x, y, z = _ear(head)
+def _ear_camera(head: Head) -> Camera:
+    x, y, z = _ear_position(head)
     return Camera(position=(x + 420.0, y + 20.0, z + 420.0), target=(x - 8.0, y, z), frame_mm=95.0)
 
 
-def _at_cheek(head: Head) -> Camera:
+def _cheek_camera(head: Head) -> Camera:
     spot = head.frontmost(40.0, -35.0)
     return Camera(position=(spot[0] + 250.0, spot[1], spot[2] + 300.0), target=spot, frame_mm=90.0)
 
 
-def _at_nose(head: Head) -> Camera:
+def _nose_camera(head: Head) -> Camera:
     return Camera(position=(_NOSE[0], _NOSE[1], 900.0), target=_NOSE, frame_mm=90.0)
 
 
 REGIONS: dict[str, Callable[[Head], Camera]] = {
     "portrait": portrait,
     "three-quarter": three_quarter,
-    "ear": _at_ear,
-    "cheek": _at_cheek,
-    "nose": _at_nose,
+    "ear": _ear_camera,
+    "cheek": _cheek_camera,
+    "nose": _nose_camera,
 }
 
 
@@ -97,14 +97,14 @@ def medium_scene(
     head: Head, light: str, region: str, body: Medium, model: ModelName | None = None
 ) -> Iterator[tuple[Scene, GaussianSum]]:
     """Provide `comparison_scene` with a medium's profile, a file within the context, and the profile."""
-    profile = gaussians_of(body, model)
+    profile = medium_gaussians(body, model)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "profile.toml"
         write_profile(file, profile, {"model": COUNTED_MODEL if profile.from_photons else "layered"})
         yield comparison_scene(head, light, region, str(file)), profile
 
 
-def usual_region(light: str) -> str:
+def default_region(light: str) -> str:
     """Return the region in which a light's effect is largest."""
     return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")
 
@@ -114,7 +114,7 @@ ModelName = Literal["counted", "layered", "montecarlo"]
 _PHOTONS = 2_000_000  # a channel
 
 
-def gaussians_of(body: Medium, model: ModelName | None = None) -> GaussianSum:
+def medium_gaussians(body: Medium, model: ModelName | None = None) -> GaussianSum:
     """Return six Gaussians for a medium.
 
     model : by default tables of photons where there are some, else layered diffusion

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from dermis.apps.export.fitting import burley_curve, fit_burley_width
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import load_subject
-from dermis.apps.export.target import numbers_of
+from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.babylon.target import WIDTH_ERROR, spiral_samples
-from dermis.apps.validation.pages import RESULTS, Figures, chromium_page, write_figures
+from dermis.apps.validation.pages import RESULTS, JsonObject, chromium_page, write_results
 from dermis.base.errors import refuse
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 PAGE = Path(__file__).with_name("babylon.html")
 FIGURES = RESULTS / "engines_babylon.json"
 LIBRARY = "DERMIS_BABYLON"
-SIDE, PIXELS, LEVEL = 640, 14.0, 0.9  # of the canvas; in the widest d; radiance of what is lit
-TURNS = 5
+CANVAS_SIDE, PIXELS_PER_WIDTH, LIT_RADIANCE = 640, 14.0, 0.9  # of the canvas; in the widest d; radiance of what is lit
+DIRECTION_COUNT = 5
 Floats = NDArray[np.floating]
 
 
@@ -44,38 +44,38 @@ def babylon_library() -> Path:
 
 
 @contextmanager
-def opened(library: Path) -> Iterator[Page]:
+def babylon_page(library: Path) -> Iterator[Page]:
     """Open the page with the library loaded."""
-    with chromium_page(SIDE) as page:
+    with chromium_page(CANVAS_SIDE) as page:
         page.goto(PAGE.as_uri())
         page.add_script_tag(path=str(library / "babylonjs" / "babylon.js"))
         yield page
 
 
-def radiance(page: Page, colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
+def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
     """Return (SIDE, SIDE, 3) radiance of the canvas over that of lit parts, rows from below."""
     told = {"colour": list(map(float, colour)), "metersPerUnit": metres, "pixel": pixel, "turn": turn}
     data = base64.b64decode(page.evaluate("(told) => drawEdge(told)", told))
-    levels = np.frombuffer(data, np.uint8).reshape(SIDE, SIDE, 4)[..., :3]
-    return levels / (255.0 * LEVEL)
+    levels = np.frombuffer(data, np.uint8).reshape(CANVAS_SIDE, CANVAS_SIDE, 4)[..., :3]
+    return levels / (255.0 * LIT_RADIANCE)
 
 
-def predicted(colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
+def predicted_radiance(colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
     """Return the same by the shader's samples, rounded to pixels; metersPerUnit is of scenes in mm."""
     r, angle, weight = spiral_samples(colour)
     across = WIDTH_ERROR * 1e-3 * r / metres / pixel
     right, upwards = np.round(across * np.cos(angle)), np.round(across * np.sin(angle))
-    middle = np.arange(SIDE) + 0.5 - 0.5 * SIDE
-    told = np.zeros((SIDE, SIDE, 3))
+    middle = np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE
+    told = np.zeros((CANVAS_SIDE, CANVAS_SIDE, 3))
     for one in range(len(r)):
         x, y = middle[None, :] + right[one], middle[:, None] + upwards[one]
         told += (x * np.cos(turn) + y * np.sin(turn) > 0.0)[..., None] * weight[one]
     return told
 
 
-def along(picture: Floats, pixel: float, turn: float, at_mm: Floats, half_mm: float) -> Floats:
+def edge_profile(picture: Floats, pixel: float, turn: float, at_mm: Floats, half_mm: float) -> Floats:
     """Return means (n, 3) at distances from the edge, of a strip across it."""
-    middle = (np.arange(SIDE) + 0.5 - 0.5 * SIDE) * pixel
+    middle = (np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE) * pixel
     x, y = middle[None, :], middle[:, None]
     away, beside = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
     strip = np.abs(beside) < half_mm
@@ -86,18 +86,18 @@ def along(picture: Floats, pixel: float, turn: float, at_mm: Floats, half_mm: fl
     return np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
 
 
-def measured(page: Page, colour: Floats, metres: float, shown_d: Floats) -> Figures:
+def edge_responses(page: Page, colour: Floats, metres: float, shown_d: Floats) -> JsonObject:
     """Return edge responses over all turns: measured, by the samples, and of true lobes of widths d.
 
     metres : metersPerUnit of a scene in mm
     """
     widest = float(shown_d.max())
-    pixel = widest / PIXELS
+    pixel = widest / PIXELS_PER_WIDTH
     at = np.arange(-84, 85) * pixel  # 6 d
     found, told, worst = [], [], 0.0
-    for turn in np.arange(TURNS) * 2.0 * np.pi / TURNS + 0.1:
-        pictures = radiance(page, colour, metres, pixel, turn), predicted(colour, metres, pixel, turn)
-        two = [along(picture, pixel, turn, at, 3.0 * widest) for picture in pictures]
+    for turn in np.arange(DIRECTION_COUNT) * 2.0 * np.pi / DIRECTION_COUNT + 0.1:
+        pictures = measured_radiance(page, colour, metres, pixel, turn), predicted_radiance(colour, metres, pixel, turn)
+        two = [edge_profile(picture, pixel, turn, at, 3.0 * widest) for picture in pictures]
         worst = max(worst, float(np.abs(two[0] - two[1]).max()))
         found.append(two[0])
         told.append(two[1])
@@ -112,13 +112,13 @@ def measured(page: Page, colour: Floats, metres: float, shown_d: Floats) -> Figu
         "x_mm": np.round(at[keep], 4).tolist(),
         "edge": np.round(mean[keep], 4).tolist(),
         "predicted": np.round(by_samples[keep], 4).tolist(),
-        "measured_less_predicted": _largest(mean - by_samples, near),
+        "measured_less_predicted": _max_by_channel(mean - by_samples, near),
         "measured_less_predicted_in_one_direction": round(worst, 4),
-        "measured_less_lobes": _largest(mean - true, near),
+        "measured_less_lobes": _max_by_channel(mean - true, near),
     }
 
 
-def _largest(difference: Floats, near: NDArray[np.bool_]) -> list[float]:
+def _max_by_channel(difference: Floats, near: NDArray[np.bool_]) -> list[float]:
     return [round(float(x), 4) for x in np.abs(difference * near).max(axis=0)]
 
 
@@ -130,16 +130,16 @@ def fitted_widths(at: Floats, edge: Floats) -> list[float]:
     return [round(float(x), 4) for x in tried[off.argmin(axis=0)]]
 
 
-def exported(page: Page, name: str) -> Figures:
+def exported_skin(page: Page, name: str) -> JsonObject:
     """Return the figures of a skin with its exported parameters, also against its profile."""
     subject, target = load_subject(name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.resolve_version(None))
-    colour = np.array(numbers_of(rows, "subSurface.scatteringDiffusionProfile"))
-    metres = 1e-3 * numbers_of(rows, "subSurfaceConfiguration.metersPerUnit")[0]
-    told = measured(page, colour, metres, fit_burley_width(subject.curve))
+    colour = np.array(get_numbers(rows, "subSurface.scatteringDiffusionProfile"))
+    metres = 1e-3 * get_numbers(rows, "subSurfaceConfiguration.metersPerUnit")[0]
+    told = edge_responses(page, colour, metres, fit_burley_width(subject.curve))
     x, edge = np.array(told["x_mm"]), np.array(told["edge"])
     near = np.abs(x)[:, None] <= 6.0 * fit_burley_width(subject.curve)
-    return told | {"measured_less_profile": _largest(edge - subject.curve.edge_response(x), near)}
+    return told | {"measured_less_profile": _max_by_channel(edge - subject.curve.edge_response(x), near)}
 
 
 def babylon() -> None:
@@ -148,20 +148,20 @@ def babylon() -> None:
     DERMIS_BABYLON names the folder that npm has installed the package babylonjs into. Chromium draws with its
     software WebGL.
     """
-    with opened(babylon_library()) as page:
+    with babylon_page(babylon_library()) as page:
         plain = {
-            name: measured(page, np.array(colour), 1e-3, WIDTH_ERROR / np.array(colour))
+            name: edge_responses(page, np.array(colour), 1e-3, WIDTH_ERROR / np.array(colour))
             for name, colour in {
                 "white": (1, 1, 1),
                 "grey": (0.5, 0.5, 0.5),
                 "coloured": (1, 0.5, 0.25),
             }.items()
         }
-        skins = {name: exported(page, name) for name in ("skin1", "skin2", "dj3")}
+        skins = {name: exported_skin(page, name) for name in ("skin1", "skin2", "dj3")}
         told = {
             "engine": "babylonjs " + page.evaluate("BABYLON.Engine.Version"),
-            "turns": TURNS,
+            "turns": DIRECTION_COUNT,
             "samples": 40,
         }
     told |= {"noise": 0.002, "plain": plain, "skins": skins}
-    write_figures(FIGURES, told)
+    write_results(FIGURES, told)

@@ -16,8 +16,8 @@ from dermis.apps.export.fitting import curve_error, fit_burley_width
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
-from dermis.apps.validation.engines.heads import TEXELS, Floats, compared, drawn, rendered
-from dermis.apps.validation.pages import DOCS, RESULTS, Figures, read_figures, write_figures
+from dermis.apps.validation.engines.heads import TEXELS, Floats, compare_pictures, render_ours, render_cycles
+from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, read_results, write_results
 from dermis.base.console import print_lines
 from dermis.images.colour import encode_srgb
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -28,13 +28,13 @@ SCRIPT = Path(__file__).with_name("blender_script.py")
 Part = Literal["edges", "heads", "picture"]
 SKINS = "skin1", "skin2", "dj3"
 METHODS = "random-walk-skin", "random-walk", "burley"
-BINS, EACH, ROWS = 12, 8, 8  # from -6 d to 6 d; columns of pixels in each, and rows of them
-SAMPLES = {"burley": 512}
-USUAL_SAMPLES = 1024
-SEEDS = 2  # pictures of each channel, whose difference tells the noise
-SIDE, PATHS, SHOTS = 192, 32, 2  # of heads
-SHOWN, SHOWN_SAMPLES = 320, 48
-METHODS_OF = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
+BIN_COUNT, COLUMNS_PER_BIN, ROW_COUNT = 12, 8, 8  # from -6 d to 6 d; columns of pixels in each, and rows of them
+SAMPLES_BY_METHOD = {"burley": 512}
+DEFAULT_SAMPLES = 1024
+SEED_COUNT = 2  # pictures of each channel, whose difference tells the noise
+HEAD_SIDE, HEAD_SAMPLES, HEAD_SEED_COUNT = 192, 32, 2  # of heads
+PICTURE_SIDE, PICTURE_SAMPLES = 320, 48
+METHODS_BY_VERSION = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
 TASK = BlenderTask("Cycles", "to render a half-lit plane", "See the message of Blender in brackets")
 
 
@@ -52,42 +52,42 @@ def blender(python_45: Path, python_52: Path, *parts: Part) -> None:
     """
     pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
     parts = parts or get_args(Part)
-    found: Figures = read_figures(FIGURES) if FIGURES.exists() else {}
-    found["columns_in_d"] = columns().reshape(BINS, EACH).mean(axis=1).tolist()
+    found: JsonObject = read_results(FIGURES) if FIGURES.exists() else {}
+    found["columns_in_d"] = column_positions().reshape(BIN_COUNT, COLUMNS_PER_BIN).mean(axis=1).tolist()
     if "edges" in parts:
-        found["edges"] = list(edges(pythons))
-        write_figures(FIGURES, found)
+        found["edges"] = list(measure_edges(pythons))
+        write_results(FIGURES, found)
     if "heads" in parts:
-        found["heads"] = list(heads(pythons))
-        write_figures(FIGURES, found)
+        found["heads"] = list(measure_heads(pythons))
+        write_results(FIGURES, found)
     if "picture" in parts:
-        picture(pythons)
+        write_picture(pythons)
 
 
-def edges(pythons: dict[str, Path]) -> Iterator[Figures]:
+def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
     """Yield the edge response of each skin by each method in each version."""
     for version, python in pythons.items():
         for method in METHODS:
             for name in SKINS:
-                yield edge(python, version, method, name)
+                yield measure_edge(python, version, method, name)
                 print_lines(f"{version} {method} {name}")
 
 
-def columns() -> Floats:
+def column_positions() -> Floats:
     """Return (BINS EACH,) distances of columns of pixels from the edge, in d."""
-    return 12.0 * (np.arange(BINS * EACH) + 0.5) / (BINS * EACH) - 6.0
+    return 12.0 * (np.arange(BIN_COUNT * COLUMNS_PER_BIN) + 0.5) / (BIN_COUNT * COLUMNS_PER_BIN) - 6.0
 
 
-def edge(python: Path, version: str, method: str, name: str) -> Figures:
+def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObject:
     """Return the figures of one skin: measured, predicted and true."""
     subject, target = load_subject(name), TARGET.with_variant(method)
     rows, d = target.parameters(subject, version), fit_burley_width(subject.curve)
     shown = target.predicted_curve(rows, subject, version)
     typed = target.predicted_curve(target.naive_parameters(subject, version), subject, version)
-    samples = SAMPLES.get(method, USUAL_SAMPLES)
+    samples = SAMPLES_BY_METHOD.get(method, DEFAULT_SAMPLES)
     passes = [
-        {"channel": c, "width_m": 12e-3 * d[c], "size": [BINS * EACH, ROWS], "samples": samples, "seed": k}
-        for k in range(SEEDS)
+        {"channel": c, "width_m": 12e-3 * d[c], "size": [BIN_COUNT * COLUMNS_PER_BIN, ROW_COUNT], "samples": samples, "seed": k}
+        for k in range(SEED_COUNT)
         for c in range(3)
     ]
     with TemporaryDirectory() as place:
@@ -96,9 +96,9 @@ def edge(python: Path, version: str, method: str, name: str) -> Figures:
         (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
         run_blender(python, SCRIPT, [str(folder)], 3600.0, TASK)
         done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
-    seen = np.array([[done["columns"][3 * k + c] for c in range(3)] for k in range(SEEDS)])[..., 0]
-    means = seen.reshape(SEEDS, 3, BINS, EACH).mean(axis=-1)
-    wanted, true = (binned(curve, d) for curve in (shown, subject.curve))
+    seen = np.array([[done["columns"][3 * k + c] for c in range(3)] for k in range(SEED_COUNT)])[..., 0]
+    means = seen.reshape(SEED_COUNT, 3, BIN_COUNT, COLUMNS_PER_BIN).mean(axis=-1)
+    wanted, true = (binned_response(curve, d) for curve in (shown, subject.curve))
     lit = (means.mean(axis=0) * wanted).sum(axis=1) / (wanted**2).sum(axis=1)
     measured = means.mean(axis=0) / lit[:, None]
     noise = np.abs(means[0] - means[1]) / (2.0 * lit[:, None])
@@ -106,7 +106,7 @@ def edge(python: Path, version: str, method: str, name: str) -> Figures:
         "version": done["version"],
         "method": method,
         "skin": name,
-        "samples": SEEDS * EACH * ROWS * samples,
+        "samples": SEED_COUNT * COLUMNS_PER_BIN * ROW_COUNT * samples,
         "d_mm": d.round(4).tolist(),
         "measured": measured.round(4).tolist(),
         "predicted": wanted.round(4).tolist(),
@@ -119,38 +119,38 @@ def edge(python: Path, version: str, method: str, name: str) -> Figures:
     }
 
 
-def binned(curve: CumulativeProfile, d_mm: Floats) -> Floats:
+def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
     """Return the (3, BINS) edge response of a curve, averaged as the columns are."""
-    each = [curve.edge_response(columns() * d_mm[c])[:, c].reshape(BINS, EACH).mean(axis=1) for c in range(3)]
+    each = [curve.edge_response(column_positions() * d_mm[c])[:, c].reshape(BIN_COUNT, COLUMNS_PER_BIN).mean(axis=1) for c in range(3)]
     return np.array(each)
 
 
-def heads(pythons: dict[str, Path]) -> Iterator[Figures]:
+def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
     """Yield outlines and colours of the head without hair, which both draw differently, by each method."""
-    subject = load_subject("human").painted(TEXELS, "auto")
+    subject = load_subject("human").with_painted_maps(TEXELS, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)
     bald = replace(subject, scene=replace(subject.scene, head=head))
-    ours = drawn(bald, SIDE)
+    ours = render_ours(bald, HEAD_SIDE)
     for version, python in pythons.items():
-        for method in METHODS_OF[version]:
-            pictures = rendered(bald, method, version, python, SIDE, PATHS, SHOTS)
+        for method in METHODS_BY_VERSION[version]:
+            pictures = render_cycles(bald, method, version, python, HEAD_SIDE, HEAD_SAMPLES, HEAD_SEED_COUNT)
             found = {
                 "version": version,
                 "method": method,
-                "samples": SHOTS * PATHS,
-                **compared(ours, np.stack(pictures)),
+                "samples": HEAD_SEED_COUNT * HEAD_SAMPLES,
+                **compare_pictures(ours, np.stack(pictures)),
             }
             print_lines(str(found))
             yield found
 
 
-def picture(pythons: dict[str, Path]) -> None:
+def write_picture(pythons: dict[str, Path]) -> None:
     """Write a picture of ours beside Cycles of each version, with hair."""
-    subject = load_subject("human").painted(TEXELS, "auto")
-    seen = [drawn(subject, SHOWN)]
+    subject = load_subject("human").with_painted_maps(TEXELS, "auto")
+    seen = [render_ours(subject, PICTURE_SIDE)]
     for version, python in pythons.items():
-        seen += rendered(subject, METHODS_OF[version][0], version, python, SHOWN, SHOWN_SAMPLES, 1)
+        seen += render_cycles(subject, METHODS_BY_VERSION[version][0], version, python, PICTURE_SIDE, PICTURE_SAMPLES, 1)
     shown = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in seen]
     levels = encode_srgb(np.clip(np.concatenate(shown, axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=88)

@@ -19,7 +19,7 @@ with suppress(ImportError):  # which only Blender's Python has
     import bpy  # type: ignore[import-not-found,unused-ignore]
     from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
 
-SIDE_M, CARD_M = 1.0, 0.002  # of the plane, and above it the card that shades half of it
+SIDE_M, CARD_HEIGHT_M = 1.0, 0.002  # of the plane, and above it the card that shades half of it
 
 
 def main(folder: Path) -> None:
@@ -33,7 +33,7 @@ def main(folder: Path) -> None:
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Specular IOR Level"].default_value = 0.0  # the edge below the surface alone
     rectangle(skin, material, -SIDE_M, SIDE_M, 0.0)
-    card = rectangle(skin, black(), -SIDE_M, 0.0, CARD_M)
+    card = rectangle(skin, black_material(), -SIDE_M, 0.0, CARD_HEIGHT_M)
     card.visible_camera = False
     sun = bpy.data.lights.new("sun", "SUN")
     sun.energy, sun.angle = 1.0, 0.0
@@ -49,13 +49,13 @@ def main(folder: Path) -> None:
     asked = json.loads((folder / "passes.json").read_text(encoding="utf-8"))
     columns = []
     for k, one in enumerate(asked):
-        show_channel(shader, skin.DESCRIBED, one.pop("channel"))
-        columns.append(columns_of(skin, camera, folder / f"{k}.exr", **one))
+        set_channel(shader, skin.DESCRIBED, one.pop("channel"))
+        columns.append(column_radiance(skin, camera, folder / f"{k}.exr", **one))
     done = {"version": bpy.app.version_string, "columns": columns}
     (folder / "done.json").write_text(json.dumps(done), encoding="utf-8")
 
 
-def show_channel(shader: Any, described: dict[str, Any], channel: int) -> None:
+def set_channel(shader: Any, described: dict[str, Any], channel: int) -> None:
     """Give all three channels the colour and the radius of one: paths then all serve it."""
     shader.inputs["Base Color"].default_value = (*[described["colour"][channel]] * 3, 1.0)
     shader.inputs["Subsurface Radius"].default_value = [described["inputs"]["Subsurface Radius"][channel]] * 3
@@ -69,7 +69,7 @@ def rectangle(skin: Any, material: Any, left: float, right: float, height: float
     return skin.add_object("rectangle", mesh)
 
 
-def black() -> Any:
+def black_material() -> Any:
     material = bpy.data.materials.new("black")
     material.use_nodes = True
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
@@ -78,7 +78,7 @@ def black() -> Any:
     return material
 
 
-def columns_of(skin: Any, camera: Any, path: Path, width_m: float, size: list[int], **given: int) -> Any:
+def column_radiance(skin: Any, camera: Any, path: Path, width_m: float, size: list[int], **given: int) -> Any:
     """Return mean radiance of each column of a picture of the plane so wide, across the edge of the light."""
     camera.ortho_scale = width_m
     scene = bpy.context.scene

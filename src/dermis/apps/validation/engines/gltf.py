@@ -6,19 +6,19 @@ from dermis.apps.export.fitting import curve_error
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARGET
 from dermis.apps.export.targets.gltf.volume import fit_volume, volume_curve
-from dermis.apps.validation.pages import RESULTS, Figures, write_figures
+from dermis.apps.validation.pages import RESULTS, JsonObject, write_results
 
 FIGURES = RESULTS / "engines_gltf.json"
 SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"
 VERSION = TARGET.versions[-1]
 
 
-def figures_of(name: str) -> Figures:
+def skin_results(name: str) -> JsonObject:
     """Return a skin's fitted parameters and their errors, also of values typed in, and of A as the colour."""
     subject = load_subject(name)
     volume = fit_volume(subject.curve, subject.albedo)
     coloured = volume_curve(volume._replace(multiscatter=subject.curve.energy))
-    found: Figures = {
+    found: JsonObject = {
         "albedo": [round(float(x), 4) for x in subject.curve.energy],
         "multiscatter": [round(float(x), 4) for x in volume.multiscatter],
         "mean_free_path_mm": [round(float(x), 4) for x in volume.mean_free_path_mm],
@@ -36,5 +36,5 @@ def figures_of(name: str) -> Figures:
 
 def gltf() -> None:
     """Compute the errors of skins by glTF's draft; writes benchmarks/results/engines_gltf.json."""
-    figures = {"version": VERSION, "draft": DRAFT, "skins": {name: figures_of(name) for name in SKINS}}
-    write_figures(FIGURES, figures, 4)
+    figures = {"version": VERSION, "draft": DRAFT, "skins": {name: skin_results(name) for name in SKINS}}
+    write_results(FIGURES, figures, 4)

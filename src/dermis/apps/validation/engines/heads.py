@@ -23,7 +23,7 @@ from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.truths.metrics import relative_rmse
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
 from dermis.apps.validation.engines.babylon import LIBRARY, babylon_library
-from dermis.apps.validation.pages import DOCS, RESULTS, Figures, chromium_page, in_checkout, write_figures
+from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, chromium_page, require_in_checkout, write_results
 from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import decode_srgb, encode_srgb
@@ -33,13 +33,13 @@ from dermis.scene.settings import Settings
 
 FIGURES, PICTURE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
 TEXELS, SIDE = 1024, 256
-CYCLES_SAMPLES, MITSUBA_SAMPLES, PASSES = 64, 256, 2
+CYCLES_SAMPLES, MITSUBA_SAMPLES, SEED_COUNT = 64, 256, 2
 LIGHTS = (
     DirectionalLight(direction=(0.8, -0.5, -0.7), irradiance=(3.4, 3.3, 3.1)),
     DirectionalLight(direction=(-0.9, -0.2, -0.3), irradiance=(0.8, 0.85, 0.95)),
 )
-LIT = 0.25  # of the mean: what is darker lies in shadow
-BRIGHT, GROWN = 0.75, 9  # radiance of highlights, white skin being 1, and pixels across that they spoil
+LIT_THRESHOLD = 0.25  # of the mean: what is darker lies in shadow
+HIGHLIGHT_RADIANCE, HIGHLIGHT_MARGIN_PX = 0.75, 9  # radiance of highlights, white skin being 1, and pixels across that they spoil
 Floats = NDArray[np.float64]
 
 
@@ -50,40 +50,40 @@ def heads() -> None:
     names Pythons with bpy 4.5 and 5.2, separated by a comma; DERMIS_BABYLON a folder that npm has installed
     babylonjs into. Needs Mitsuba.
     """
-    in_checkout(PICTURE.parent)
-    subject = load_subject("human").painted(TEXELS, "auto")
+    require_in_checkout(PICTURE.parent)
+    subject = load_subject("human").with_painted_maps(TEXELS, "auto")
     assert subject.head is not None and subject.scene is not None
     bald = replace(subject.head, hair=None, strands=None)
     subject = replace(subject, scene=replace(subject.scene, head=bald, lights=LIGHTS))
-    ours = drawn(subject, SIDE)
+    ours = render_ours(subject, SIDE)
     shown, rows = [ours], []
-    for name, draw in programs(subject, ours).items():
+    for name, draw in available_renderers(subject, ours).items():
         pictures = np.stack(draw())
-        found = {"program": name, **compared(ours, pictures)}
+        found = {"program": name, **compare_pictures(ours, pictures)}
         print_lines(str(found))
         shown.append(pictures.mean(axis=0))
         rows.append(found)
-        write_figures(FIGURES, {"heads": rows}, 4)
-    levels = encode_srgb(np.clip(np.concatenate([on_grey(one) for one in shown], axis=1), 0.0, 1.0))
+        write_results(FIGURES, {"heads": rows}, 4)
+    levels = encode_srgb(np.clip(np.concatenate([over_grey(one) for one in shown], axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=90)
 
 
-def programs(subject: Subject, ours: Floats) -> dict[str, Callable[[], list[Floats]]]:
+def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[], list[Floats]]]:
     """Return the programs that are here, each with a function that draws linear pictures (h, w, 4)."""
     found: dict[str, Callable[[], list[Floats]]] = {}
     named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
     for version, python in zip(("4.5", "5.2"), named, strict=False):
-        found[f"Cycles {version}"] = lambda version=version, python=python: rendered(  # type: ignore[misc]
-            subject, "random-walk-skin", version, Path(python), SIDE, CYCLES_SAMPLES, PASSES
+        found[f"Cycles {version}"] = lambda version=version, python=python: render_cycles(  # type: ignore[misc]
+            subject, "random-walk-skin", version, Path(python), SIDE, CYCLES_SAMPLES, SEED_COUNT
         )
     if os.environ.get(LIBRARY):
         library = babylon_library()
-        found["Babylon.js 9.28"] = lambda: [in_babylon(subject, library, ours)] * 2
-    found["Mitsuba 3"] = lambda: in_mitsuba(subject, ours)
+        found["Babylon.js 9.28"] = lambda: [render_babylon(subject, library, ours)] * 2
+    found["Mitsuba 3"] = lambda: render_mitsuba(subject, ours)
     return found
 
 
-def in_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
+def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
     """Return the exported page's canvas in Chromium as linear light, with the alpha of ours."""
     with TemporaryDirectory() as place, chromium_page(SIDE) as page:
         file = Path(place) / "head.html"
@@ -96,30 +96,30 @@ def in_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
     return np.dstack([light, np.where(light.any(axis=-1), ours[..., 3], 0.0)])
 
 
-def in_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
+def render_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
     """Return the exported scene by several seeds, with the alpha of ours."""
     mi = load_mitsuba()
     with TemporaryDirectory() as place, mitsuba_variant(mi, "scalar_rgb"):
         folder = Path(place) / "head"
         export_skin(subject, "mitsuba", folder)
         scene = mi.load_file(str(folder / "scene.xml"), width=SIDE, height=SIDE, samples=MITSUBA_SAMPLES)
-        seen = [np.array(mi.render(scene, seed=k, spp=MITSUBA_SAMPLES))[..., :3] for k in range(PASSES)]
+        seen = [np.array(mi.render(scene, seed=k, spp=MITSUBA_SAMPLES))[..., :3] for k in range(SEED_COUNT)]
     return [np.dstack([one, ours[..., 3]]).astype(np.float64) for one in seen]
 
 
-def on_grey(picture: Floats) -> Floats:
+def over_grey(picture: Floats) -> Floats:
     """Return a picture (h, w, 4) over black before a grey wall."""
     return np.asarray(picture[..., :3] * (picture[..., 3:] > 0) + 0.05 * (1.0 - picture[..., 3:]))
 
 
-def drawn(subject: Subject, side: int) -> Floats:
+def render_ours(subject: Subject, side: int) -> Floats:
     """Return (h, w, 4) of ours, linear."""
     assert subject.scene is not None
     settings = Settings(size=(side, side), atlas=TEXELS, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
 
 
-def rendered(
+def render_cycles(
     subject: Subject, method: str, version: str, python: Path, side: int, samples: int, seeds: int
 ) -> list[Floats]:
     """Return (h, w, 4) of Cycles, linear, for each of as many seeds."""
@@ -139,7 +139,7 @@ def rendered(
     return found
 
 
-def compared(ours: Floats, theirs: Floats) -> Figures:
+def compare_pictures(ours: Floats, theirs: Floats) -> JsonObject:
     """Return outline, colours and errors of another program's pictures.
 
     theirs : (seeds, h, w, 4)
@@ -149,9 +149,9 @@ def compared(ours: Floats, theirs: Floats) -> Figures:
     apart = max(distance_transform_edt(~b)[a].max(), distance_transform_edt(~a)[b].max())
     whole = (ours[..., 3] > 0.999) & (mean[..., 3] > 0.999)
     light = ours[..., :3].mean(axis=-1)
-    lit = whole & (light > LIT * light[whole].mean())
-    bright = (ours[..., :3].max(axis=-1) > BRIGHT) | (mean[..., :3].max(axis=-1) > BRIGHT)
-    matte = whole & ~maximum_filter(bright, GROWN)
+    lit = whole & (light > LIT_THRESHOLD * light[whole].mean())
+    bright = (ours[..., :3].max(axis=-1) > HIGHLIGHT_RADIANCE) | (mean[..., :3].max(axis=-1) > HIGHLIGHT_RADIANCE)
+    matte = whole & ~maximum_filter(bright, HIGHLIGHT_MARGIN_PX)
     errors = [relative_rmse(ours[..., :3], mean[..., :3], on, variance[..., :3]) for on in (whole, matte)]
     return {
         "side": ours.shape[0],

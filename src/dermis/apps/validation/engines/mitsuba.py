@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.fitting import fit_burley_width
 from dermis.apps.export.subject import Subject, load_subject
-from dermis.apps.export.target import numbers_of
+from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.mitsuba.scene import (
     BOUNDARIES,
     Boundary,
@@ -25,7 +25,7 @@ from dermis.apps.export.targets.mitsuba.scene import (
 from dermis.apps.export.targets.mitsuba.target import TARGET
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
-from dermis.apps.validation.pages import RESULTS, Figures, write_figures
+from dermis.apps.validation.pages import RESULTS, JsonObject, write_results
 from dermis.optics.cumulative_profile import CumulativeProfile
 
 Floats = NDArray[np.float64]
@@ -36,13 +36,13 @@ SKINS: dict[str, tuple[Boundary, ...]] = {
     "dj3": ("matched", "smooth"),
 }
 """Skins with the surfaces under which each is measured."""
-_REACH, _PIXELS, _PASSES, _INSIDE = 3.0, 8, 8, 16
-_LAMP_D = 0.01  # height of the lamp, by d
-_PLANE_D = 500.0
-_BLACK = 1e-9
+_HALF_WIDTH_D, _PIXEL_COUNT, _PASS_COUNT, _SUBSAMPLES = 3.0, 8, 8, 16
+_LAMP_HEIGHT_D = 0.01  # height of the lamp, by d
+_PLANE_HALF_SIDE_D = 500.0
+_BLACK_ALBEDO = 1e-9
 
 
-def plane(
+def half_lit_plane(
     mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, *, black: bool = False
 ) -> MitsubaObject:
     """Return the plane z = 0, lit where x > 0, seen along the normal within `_REACH` d of the edge.
@@ -50,14 +50,14 @@ def plane(
     The camera looks from under the surface where that sends light on along the normal anyway.
     """
     turn = mi.ScalarTransform4f
-    size, height = _PLANE_D * d_mm, _LAMP_D * d_mm
-    albedo = (_BLACK,) * 3 if black else medium.albedo
+    size, height = _PLANE_HALF_SIDE_D * d_mm, _LAMP_HEIGHT_D * d_mm
+    albedo = (_BLACK_ALBEDO,) * 3 if black else medium.albedo
     inside = mi.load_dict(medium_description(IsotropicMedium(medium.sigma_t, albedo)))
     below = boundary != "rough"
     eye = -1e-3 * height if below else 0.5 * height
     over = turn().translate([size, 0.0, height]).rotate([1, 0, 0], 180).scale([size, size, 1.0])
-    look = turn().look_at([0, 0, eye], [0, 0, -1], [0, 1, 0]).scale([_REACH * d_mm, _REACH * d_mm, 1.0])
-    film = {"type": "hdrfilm", "width": _PIXELS, "height": 1, "pixel_format": "rgb"}
+    look = turn().look_at([0, 0, eye], [0, 0, -1], [0, 1, 0]).scale([_HALF_WIDTH_D * d_mm, _HALF_WIDTH_D * d_mm, 1.0])
+    film = {"type": "hdrfilm", "width": _PIXEL_COUNT, "height": 1, "pixel_format": "rgb"}
     sensor = {
         "type": "orthographic",
         "near_clip": 1e-9,
@@ -80,32 +80,32 @@ def plane(
     )
 
 
-def measured(
+def measured_edge(
     mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, samples: int
 ) -> tuple[Floats, Floats, float]:
     """Return the edge response at the pixels, its standard errors, and what leaves far inside the light."""
-    built = plane(mi, medium, boundary, d_mm)
-    each = samples // _PASSES
-    seen = np.array([np.array(mi.render(built, spp=each, seed=k))[0].mean(axis=1) for k in range(_PASSES)])
+    built = half_lit_plane(mi, medium, boundary, d_mm)
+    each = samples // _PASS_COUNT
+    seen = np.array([np.array(mi.render(built, spp=each, seed=k))[0].mean(axis=1) for k in range(_PASS_COUNT)])
     if boundary == "rough":  # what the surface itself reflects
-        bare = plane(mi, medium, boundary, d_mm, black=True)
+        bare = half_lit_plane(mi, medium, boundary, d_mm, black=True)
         lit = np.array(mi.render(bare, spp=samples, seed=99))[0].mean(axis=1)
-        seen -= np.where(np.arange(_PIXELS) >= _PIXELS // 2, lit[_PIXELS // 2 :].mean(), 0.0)
+        seen -= np.where(np.arange(_PIXEL_COUNT) >= _PIXEL_COUNT // 2, lit[_PIXEL_COUNT // 2 :].mean(), 0.0)
     # The two sides of the edge add up to the whole, everywhere.
     both = seen + seen[:, ::-1]
     whole = float(both.mean())
     response = 0.5 + 0.5 * (seen - seen[:, ::-1]) / whole
-    return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASSES), whole
+    return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASS_COUNT), whole
 
 
-def over_pixels(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
+def pixel_averages(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
     """Return a curve's edge response as the mean over each pixel."""
-    edges = np.linspace(-_REACH, _REACH, _PIXELS + 1) * d_mm
-    at = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(_INSIDE) + 0.5) / _INSIDE
+    edges = np.linspace(-_HALF_WIDTH_D, _HALF_WIDTH_D, _PIXEL_COUNT + 1) * d_mm
+    at = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(_SUBSAMPLES) + 0.5) / _SUBSAMPLES
     return np.asarray(curve.edge_response(at)[..., channel].mean(axis=1))
 
 
-def one(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> Figures:
+def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> JsonObject:
     """Return the figures of a skin under a surface: differences in red, green and blue."""
     target = TARGET.with_variant(boundary)
     version = target.resolve_version(None)
@@ -115,17 +115,17 @@ def one(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> Figu
         key: [] for key in ("predicted", "exported", "noise", "rms", "energy", "edge")
     }
     for c in range(3):
-        sigma, albedo = (numbers_of(rows, name)[c] for name in ("sigma_t", "albedo"))
+        sigma, albedo = (get_numbers(rows, name)[c] for name in ("sigma_t", "albedo"))
         medium = IsotropicMedium((sigma,) * 3, (albedo,) * 3)
-        found, error, whole = measured(mi, medium, boundary, float(d[c]), samples)
-        fault = found - over_pixels(shown, c, float(d[c]))
+        found, error, whole = measured_edge(mi, medium, boundary, float(d[c]), samples)
+        fault = found - pixel_averages(shown, c, float(d[c]))
         measures["predicted"].append(float(np.abs(fault).max()))
-        measures["exported"].append(float(np.abs(found - over_pixels(subject.curve, c, float(d[c]))).max()))
+        measures["exported"].append(float(np.abs(found - pixel_averages(subject.curve, c, float(d[c]))).max()))
         measures["noise"].append(float(error.mean()))
         measures["rms"].append(float(np.sqrt((fault**2).mean())))
         # Radiance seen from inside is larger by the index squared.
         measures["energy"].append(whole / (BOUNDARIES[boundary] ** 2 if boundary != "rough" else 1.0))
-        measures["edge"].append([float(value) for value in found[_PIXELS // 2 :]])
+        measures["edge"].append([float(value) for value in found[_PIXEL_COUNT // 2 :]])
     return {"skin": subject.name, "boundary": boundary, "d_mm": [float(x) for x in d], **measures}
 
 
@@ -146,8 +146,8 @@ def mitsuba(*, samples: int = 32000, output: Path = FIGURES, variant: str = "sca
     with mitsuba_variant(mi, variant):
         for name, boundaries in SKINS.items():
             subject = load_subject(name)
-            found += [one(mi, subject, boundary, samples) for boundary in boundaries]
-    half = _PIXELS // 2
-    at = [(k + 0.5) * _REACH / half for k in range(half)]
-    how = {"mitsuba": mi.__version__, "samples": samples, "pixels": _PIXELS, "at_d": at}
-    write_figures(output, {**how, "edges": found}, 4)
+            found += [measure_skin(mi, subject, boundary, samples) for boundary in boundaries]
+    half = _PIXEL_COUNT // 2
+    at = [(k + 0.5) * _HALF_WIDTH_D / half for k in range(half)]
+    how = {"mitsuba": mi.__version__, "samples": samples, "pixels": _PIXEL_COUNT, "at_d": at}
+    write_results(output, {**how, "edges": found}, 4)

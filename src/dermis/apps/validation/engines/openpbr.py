@@ -11,23 +11,23 @@ from numpy.typing import ArrayLike
 from dermis.apps.export.fitting import curve_error
 from dermis.apps.export.run import evaluate_export, export_skin
 from dermis.apps.export.subject import load_subject
-from dermis.apps.export.target import numbers_of
+from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.openpbr import target as openpbr_target
 from dermis.apps.export.targets.openpbr.materials import OPEN_PBR
 from dermis.apps.export.targets.openpbr.target import fitted_path_mm, materialx_profile
 from dermis.apps.export.targets.pbrt import target as pbrt_target
-from dermis.apps.validation.pages import RESULTS, Figures, read_figures, write_figures
+from dermis.apps.validation.pages import RESULTS, JsonObject, read_results, write_results
 from dermis.base.console import print_lines
 from dermis.base.extras import import_extra
 
 FIGURES = RESULTS / "engines_openpbr.json"
 SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"
-_NODES_OF_MATERIALX = "MissingShaderIdInRegistry"  # of a plug-in that usd-core comes without
+_MISSING_PLUGIN_ERROR = "MissingShaderIdInRegistry"  # of a plug-in that usd-core comes without
 
 
-def figures() -> Figures:
+def skin_errors() -> JsonObject:
     """Return by skin: radii, and errors as meant, as typed in, and read as a profile."""
-    found: Figures = {}
+    found: JsonObject = {}
     for name in SKINS:
         subject = load_subject(name)
         walk = evaluate_export(subject, openpbr_target.TARGET, "1.1.1")
@@ -35,15 +35,15 @@ def figures() -> Figures:
         profile_error_text = curve_error(subject.curve, materialx_profile(fitted_path_mm(subject), subject))
         found[name] = {
             "model": subject.model,
-            "d_mm": numbers(walk.d_mm),
+            "d_mm": float_list(walk.d_mm),
             "openpbr": {
-                "radius_mm": numbers(openpbr_target.row_radii_mm(walk.rows, OPEN_PBR)),
+                "radius_mm": float_list(openpbr_target.parameter_radii_mm(walk.parameters, OPEN_PBR)),
                 "error": walk.error.as_json(),
                 "naive": walk.naive_error.as_json(),
                 "as_a_profile": profile_error_text.as_json(),
             },
             "pbrt": {
-                "mfp_mm": numbers(numbers_of(beam.rows, "mfp")),
+                "mfp_mm": float_list(get_numbers(beam.parameters, "mfp")),
                 "error": beam.error.as_json(),
                 "naive": beam.naive_error.as_json(),
             },
@@ -51,7 +51,7 @@ def figures() -> Figures:
     return found
 
 
-def checked() -> Figures:
+def validate_files() -> JsonObject:
     """Return what the libraries find in documents and stages, and their versions."""
     MaterialX = import_extra("MaterialX", "checking its files")
     import_extra("pxr", "checking USD")
@@ -73,16 +73,16 @@ def checked() -> Figures:
         "valid": document.validate()[0],
         "usd": ".".join(map(str, Usd.GetVersion()[1:])),
         "validators": len(validators),
-        "errors": sorted(set(errors) - {_NODES_OF_MATERIALX}),
+        "errors": sorted(set(errors) - {_MISSING_PLUGIN_ERROR}),
     }
 
 
-def numbers(values: ArrayLike) -> list[float]:
+def float_list(values: ArrayLike) -> list[float]:
     """Return plain numbers."""
     return [float(one) for one in np.ravel(values)]
 
 
-def table(found: Figures) -> list[str]:
+def error_table(found: JsonObject) -> list[str]:
     """Return a table of the largest error of an edge for each reading."""
     lines = [
         "| skin | radius [mm] | OpenPBR's walk | dmfp typed in | read as a profile | pbrt | dmfp typed in |",
@@ -102,5 +102,5 @@ def openpbr() -> None:
 
     Needs the packages usd-core and MaterialX. No renderer of these runs here.
     """
-    write_figures(FIGURES, {"libraries": checked(), "skins": figures()}, 4)
-    print_lines(*table(read_figures(FIGURES)["skins"]))
+    write_results(FIGURES, {"libraries": validate_files(), "skins": skin_errors()}, 4)
+    print_lines(*error_table(read_results(FIGURES)["skins"]))

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.cycles import CyclesPass, Method, cycles_passes
 from dermis.apps.truths.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
-from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
-from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
-from dermis.apps.validation.comparisons.scenes import medium_scene, usual_region
+from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, GPU_GEMS_3
+from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES as AS_FRAGMENTS
+from dermis.apps.validation.comparisons.scenes import medium_scene, default_region
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
@@ -27,7 +27,7 @@ METHODS: tuple[Method, ...] = ("random-walk", "burley")
 
 
 @dataclass(frozen=True)
-class Way:
+class RenderVariant:
     """One of our ways to draw skin: technique, atlas, and how skin returns light."""
 
     technique: str
@@ -35,26 +35,26 @@ class Way:
     direction: str = "half-space"
 
 
-OURS = {
-    "texture space, atlas 1024": Way("texture-space"),
-    "texture space, atlas 512": Way("texture-space", 512),
-    "Lambertian skin, atlas 1024": Way("texture-space", 1024, "lambertian"),
-    "screen space": Way("screen-space", 64),
+VARIANTS = {
+    "texture space, atlas 1024": RenderVariant("texture-space"),
+    "texture space, atlas 512": RenderVariant("texture-space", 512),
+    "Lambertian skin, atlas 1024": RenderVariant("texture-space", 1024, "lambertian"),
+    "screen space": RenderVariant("screen-space", 64),
 }
 """By their names in the table; screen space needs no atlas."""
-OF_2007 = {
-    "passes of 2007 as compute": Way(GPU_GEMS_3, direction="lambertian"),
-    "passes of 2007 as fragments": Way(FRAGMENTS, direction="lambertian"),
+GPU_GEMS_3_VARIANTS = {
+    "passes of 2007 as compute": RenderVariant(GPU_GEMS_3, direction="lambertian"),
+    "passes of 2007 as fragments": RenderVariant(FRAGMENT_TECHNIQUE, direction="lambertian"),
 }
 """The structure of 2007 in our renderer, to set beside the first of ours."""
-SEEDS = (100, 200)
+FIRST_SEEDS = (100, 200)
 """Of the first pass of each turn; the passes of a turn have the following ones."""
-_WORK = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
+_PROGRESS_STEPS = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
 """Expected time of a turn of frames and of a path through each pixel, for the progress bar."""
 
 
 @dataclass(frozen=True)
-class Plan:
+class PeerPlan:
     """What is rendered.
 
     side : of the image [pixel]
@@ -71,15 +71,15 @@ class Plan:
     @property
     def work(self) -> int:
         """Steps of the progress bar for one scene."""
-        each = _WORK["random-walk"] + _WORK["burley"]
-        turns = len(SEEDS) * len(METHODS) + 2
+        each = _PROGRESS_STEPS["random-walk"] + _PROGRESS_STEPS["burley"]
+        turns = len(FIRST_SEEDS) * len(METHODS) + 2
         return (
-            turns * _WORK["ours"] + len(SEEDS) * sum(self.samples) * each + self.paths * _WORK["path-traced"]
+            turns * _PROGRESS_STEPS["ours"] + len(FIRST_SEEDS) * sum(self.samples) * each + self.paths * _PROGRESS_STEPS["path-traced"]
         )
 
 
 @dataclass
-class Frames:
+class FrameTimes:
     """Our frames at one setting: the image, and what each frame took [s]."""
 
     image: NDArray[np.float32]
@@ -88,7 +88,7 @@ class Frames:
 
 
 @dataclass
-class Measured:
+class PeerRenders:
     """The pictures and times of all renderers for one scene.
 
     ours : by the names of OURS and OF_2007
@@ -99,16 +99,16 @@ class Measured:
 
     light: str
     region: str
-    ours: dict[str, Frames]
+    ours: dict[str, FrameTimes]
     cycles: dict[str, list[list[CyclesPass]]]
     left_out: dict[str, str]
     truth: PathTraced
     truth_core_seconds: float
 
 
-def measure(
-    head: Head, light: str, plan: Plan, renderer: Renderer, report: Callable[[int], None] = lambda work: None
-) -> Measured:
+def render_peers(
+    head: Head, light: str, plan: PeerPlan, renderer: Renderer, report: Callable[[int], None] = lambda work: None
+) -> PeerRenders:
     """Render everything under one light, ours before, between and after the others.
 
     report : is called with the amount of work since its last call
@@ -116,51 +116,51 @@ def measure(
     body = media()["skin1"].with_eta(1.0)
     settings = Settings(size=(plan.side, plan.side))
     cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in METHODS}
-    ours: dict[str, Frames] = {}
+    ours: dict[str, FrameTimes] = {}
     left_out: dict[str, str] = {}
 
     def per_pass(done: int, of: int) -> None:
-        report(SAMPLES_PER_PASS * _WORK["path-traced"])
+        report(SAMPLES_PER_PASS * _PROGRESS_STEPS["path-traced"])
 
-    of_scene = medium_scene(head, light, usual_region(light), body)
-    with TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS), of_scene as (scene, _):
-        for seed in SEEDS:
+    of_scene = medium_scene(head, light, default_region(light), body)
+    with TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS), of_scene as (scene, _):
+        for seed in FIRST_SEEDS:
             for method in METHODS:
                 _add_frames(ours, renderer, scene, plan)
-                report(_WORK["ours"])
+                report(_PROGRESS_STEPS["ours"])
                 try:
-                    cycles[method].append(_passes(scene, body, plan, settings, method, seed))
+                    cycles[method].append(_cycles_passes(scene, body, plan, settings, method, seed))
                 except DermisError as fault:
                     left_out[method] = str(fault)
-                report(_WORK[method] * sum(plan.samples))
+                report(_PROGRESS_STEPS[method] * sum(plan.samples))
         _add_frames(ours, renderer, scene, plan)
-        report(_WORK["ours"])
+        report(_PROGRESS_STEPS["ours"])
         worked = time.process_time()
         truth = path_trace(scene, body, plan.paths, settings, use_cache=False, progress=per_pass)
         core_seconds = time.process_time() - worked
         _add_frames(ours, renderer, scene, plan)
-        report(_WORK["ours"])
+        report(_PROGRESS_STEPS["ours"])
     whole = {method: turns for method, turns in cycles.items() if method not in left_out}
-    return Measured(light, usual_region(light), ours, whole, left_out, truth, core_seconds)
+    return PeerRenders(light, default_region(light), ours, whole, left_out, truth, core_seconds)
 
 
-def _passes(
-    scene: Scene, body: Medium, plan: Plan, settings: Settings, method: Method, seed: int
+def _cycles_passes(
+    scene: Scene, body: Medium, plan: PeerPlan, settings: Settings, method: Method, seed: int
 ) -> list[CyclesPass]:
     """Return passes of Cycles after one that is not counted, which builds the scene."""
     return cycles_passes(scene, body, (1, *plan.samples), settings, method=method, seed=seed)[1:]
 
 
-def _add_frames(ours: dict[str, Frames], renderer: Renderer, scene: Scene, plan: Plan) -> None:
+def _add_frames(ours: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan) -> None:
     """Add warm frames that compute everything from scratch."""
-    for name, way in (OURS | OF_2007).items():
+    for name, way in (VARIANTS | GPU_GEMS_3_VARIANTS).items():
         settings = Settings.model_validate(
             {"size": (plan.side, plan.side), "technique": way.technique, "atlas": way.atlas}
         )
         skin = Skin(**(scene.skin.model_dump() | {"direction": way.direction}))
         turned = replace(scene, skin=skin)
         drawn = renderer.draw(turned, settings, force=True)
-        frames = ours.setdefault(name, Frames(drawn.linear()))
+        frames = ours.setdefault(name, FrameTimes(drawn.linear()))
         for _ in range(plan.frames):
             began, worked = time.perf_counter(), time.process_time()
             renderer.draw(turned, settings, force=True)

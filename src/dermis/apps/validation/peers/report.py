@@ -16,24 +16,24 @@ import dermis
 from dermis.apps.truths.blender_process import blender_python
 from dermis.apps.truths.mitsuba_scene import load_mitsuba
 from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
-from dermis.apps.validation.pages import DOCS, RESULTS, Figures, fill_page, write_figures
-from dermis.apps.validation.peers.figures import figures
-from dermis.apps.validation.peers.rendering import METHODS, Measured, Plan, measure
+from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, fill_page, write_results
+from dermis.apps.validation.peers.figures import scene_results
+from dermis.apps.validation.peers.rendering import METHODS, PeerRenders, PeerPlan, render_peers
 from dermis.base.atomic_write import check_output
 from dermis.base.console import note, print_lines, progress_bar
 from dermis.base.errors import DermisError, refuse
 
 FIGURES, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
-LIGHTS = ("front", "back")
-QUICK = Plan(side=160, samples=(4, 16), paths=16, frames=3)
-GOAL = 50.0
+DEFAULT_LIGHTS = ("front", "back")
+QUICK = PeerPlan(side=160, samples=(4, 16), paths=16, frames=3)
+TARGET_RATIO = 50.0
 _COLUMNS = ("renderer", "", "seconds", "noise", "relative RMSE", "energy ratio")
 
 
 def peers(
     *,
     head: str = "lee_perry_smith",
-    lights: str = ",".join(LIGHTS),
+    lights: str = ",".join(DEFAULT_LIGHTS),
     quick: Annotated[bool, Parameter(negative="")] = False,
     side: int | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
@@ -60,18 +60,18 @@ def peers(
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
         check_output(target, (".json",), "Choose such a name")
-    plan = QUICK if quick else Plan()
+    plan = QUICK if quick else PeerPlan()
     plan = plan if side is None else replace(plan, side=side)
     report = compare_peers(head, lights.split(","), plan, adapter)
-    place, scenes = place_text(report), scenes_text(report)
+    place, scenes = machine_text(report), scenes_text(report)
     if target is not None:
-        write_figures(target, report)
+        write_results(target, report)
     if target == FIGURES:
         fill_page(PAGE, place=place, scenes=scenes)
     print_lines(place, "", scenes)
 
 
-def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> Figures:
+def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) -> JsonObject:
     """Return the whole report, ready for JSON; without Cycles its rows are left out.
 
     Raises DermisError for unknown lights, and without Mitsuba, which gives the truth.
@@ -85,7 +85,7 @@ def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> Fig
     except DermisError as fault:
         note(f"Cycles is left out. {fault}")
     loaded, renderer = dermis.load_head(head, subdivide=0), dermis.Renderer(adapter)
-    scenes: list[Measured] = []
+    scenes: list[PeerRenders] = []
     with progress_bar("measuring") as bar:
         done = 0
 
@@ -94,7 +94,7 @@ def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> Fig
             done += work
             bar(done, len(lights) * plan.work)
 
-        scenes = [measure(loaded, light, plan, renderer, report) for light in lights]
+        scenes = [render_peers(loaded, light, plan, renderer, report) for light in lights]
     return {
         "date": date.today().isoformat(),
         "head": head,
@@ -104,11 +104,11 @@ def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> Fig
         "versions": versions(scenes),
         "denoising": False,
         "plan": asdict(plan),
-        "scenes": [figures(one) for one in scenes],
+        "scenes": [scene_results(one) for one in scenes],
     }
 
 
-def versions(scenes: list[Measured]) -> dict[str, str]:
+def versions(scenes: list[PeerRenders]) -> dict[str, str]:
     """Return the versions of everything that renders, and of Python."""
     found = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
     passes = [
@@ -129,21 +129,21 @@ def cpu_model() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
-def scenes_text(report: Figures) -> str:
+def scenes_text(report: JsonObject) -> str:
     """Return a section for each light."""
     return "\n\n".join(
         f"## {scene['light'].capitalize()}\n\n{scene_text(scene)}" for scene in report["scenes"]
     )
 
 
-def scene_text(scene: Figures) -> str:
+def scene_text(scene: JsonObject) -> str:
     """Return the table of one scene and the sentences that follow from it."""
     head = f"| {' | '.join(_COLUMNS)} |\n|{'---|' * len(_COLUMNS)}"
-    table = [head, *(_line(row) for row in scene["rows"])]
+    table = [head, *(_table_line(row) for row in scene["rows"])]
     return "\n".join([*table, "", *(f"- {sentence}" for sentence in _sentences(scene))])
 
 
-def place_text(report: Figures) -> str:
+def machine_text(report: JsonObject) -> str:
     """Return the date, the machine and the versions of a measurement, in one line."""
     versions = ", ".join(f"{name} {version}" for name, version in report["versions"].items())
     side = report["plan"]["side"]
@@ -151,7 +151,7 @@ def place_text(report: Figures) -> str:
     return f"{report['date']}, {side}x{side}, {where}; {versions}"
 
 
-def _line(row: Figures) -> str:
+def _table_line(row: JsonObject) -> str:
     seconds = "-" if row["seconds"] is None else f"{row['seconds']:.3g}"
     noise = f"{row['noise']:.1%}" if row["noise"] > 0 else "-"
     cells = (
@@ -165,12 +165,12 @@ def _line(row: Figures) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _value(row: Figures, name: str) -> str:
+def _value(row: JsonObject, name: str) -> str:
     return "-" if row[name] is None else f"{row[name]:.4f} ± {row[name + '_se']:.4f}"
 
 
-def _sentences(scene: Figures) -> list[str]:
-    said = [_longer(setting, found) for setting, found in scene.get("as_near", {}).items()]
+def _sentences(scene: JsonObject) -> list[str]:
+    said = [_random_walk_sentence(setting, found) for setting, found in scene.get("as_near", {}).items()]
     right = "; ".join(f"{name} {error:.3f}" for name, error in scene["ours_energy_put_right"].items())
     said.append(f"Ours, each channel scaled to the truth's energy: {right}.")
     said += [
@@ -179,34 +179,34 @@ def _sentences(scene: Figures) -> list[str]:
         for name, ratio in scene.get("published", {}).items()
     ]
     if "burley_against_random_walk" in scene:
-        said.append(_burley(scene))
+        said.append(_burley_sentence(scene))
     return said + [f"Left out: {name}. {why}" for name, why in scene["left_out"].items()]
 
 
-def _longer(setting: str, found: dict[str, dict[str, float]]) -> str:
-    clean = f"to 5 % noise {_times(found['clean'])}"
+def _random_walk_sentence(setting: str, found: dict[str, dict[str, float]]) -> str:
+    clean = f"to 5 % noise {_time_text(found['clean'])}"
     if "same_error" not in found:
         return f"{setting}: Cycles' random walk never comes as near, for its own bias is greater; {clean}."
     same = found["same_error"]
-    reached = "reached" if same["ratio"] >= GOAL else "not reached"
+    reached = "reached" if same["ratio"] >= TARGET_RATIO else "not reached"
     return (
-        f"{setting}: Cycles' random walk comes as near in {_times(same)}, goal {GOAL:.0f} {reached}; {clean}."
+        f"{setting}: Cycles' random walk comes as near in {_time_text(same)}, goal {TARGET_RATIO:.0f} {reached}; {clean}."
     )
 
 
-def _times(found: dict[str, float]) -> str:
+def _time_text(found: dict[str, float]) -> str:
     """Return time, paths, and the ratio to our frame by the clock and by CPU time."""
     spent = f"{found['seconds']:.3g} s ({found['samples']:.0f} paths a pixel)"
     return (
-        f"{spent}: {_short(found['ratio'])} times our frame, {_short(found['core_ratio'])} by the cores' time"
+        f"{spent}: {_ratio_text(found['ratio'])} times our frame, {_ratio_text(found['core_ratio'])} by the cores' time"
     )
 
 
-def _short(ratio: float) -> str:
+def _ratio_text(ratio: float) -> str:
     return f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.1f}"
 
 
-def _burley(scene: Figures) -> str:
+def _burley_sentence(scene: JsonObject) -> str:
     """Return the distance of Burley's profile from the random walk, and of ours from path tracing."""
     theirs, error = scene["burley_against_random_walk"]
     ours = {

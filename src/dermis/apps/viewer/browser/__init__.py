@@ -1,1 +1,1 @@
-"""The viewer as a web page: rendercanvas' HTTP canvas and a guarded server."""
+"""Viewer as a web page: HTTP canvas of rendercanvas behind a server that checks requests."""

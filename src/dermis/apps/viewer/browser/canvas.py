@@ -1,4 +1,4 @@
-"""rendercanvas' HTTP canvas, with image encoding in threads and a first frame for every new page."""
+"""HTTP canvas of rendercanvas that encodes images in threads and sends a first frame to every new page."""
 
 from __future__ import annotations
 
@@ -19,43 +19,43 @@ from rendercanvas.http import HttpRenderCanvas, asgi
 from dermis.apps.viewer.session import HEAD_FILES
 
 _QUALITY = 88
-_LOSSLESS_AFTER_S = 0.3
+_LOSSLESS_DELAY_S = 0.3
 _TICKET_BYTES = 18
-_ENCODERS = 2  # frames encoded at the same time, while the next one is drawn
+_MAX_ENCODERS = 2  # frames encoded at the same time while the next one is rendered
 
 
 class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
-    """A canvas shown in web pages; a slow page skips frames and gets the newest when it is ready."""
+    """Canvas shown in web pages; a slow page skips frames and receives the newest when it is ready."""
 
-    def __init__(self, **given: object) -> None:
-        self._encoders = ThreadPoolExecutor(_ENCODERS, "encoder")
+    def __init__(self, **kwargs: object) -> None:
+        self._encoders = ThreadPoolExecutor(_MAX_ENCODERS, "encoder")
         self._encoding = 0  # lossy frames being encoded
-        self._drawn = self._sent = 0  # numbers of the last frame drawn and of the last one sent
-        self._lossless = 0  # number of the current lossless frame, 0 when a newer frame has replaced it
+        self._drawn = self._sent = 0  # numbers of the last drawn and of the last sent frame
+        self._lossless = 0  # number of the current lossless frame, 0 after a newer frame
         self._ticket_holder = 0
-        self.ticket = ""  # of the page that has control, for files that it sends
-        self.on_file: Callable[[Path, str], None] | None = None  # takes them when there is a viewer
-        self._said: dict[str, object] | None = None  # to pages that have nothing to show yet
-        super().__init__(**given)
+        self.ticket = ""  # upload ticket of the page that has control
+        self.on_file: Callable[[Path, str], None] | None = None  # handler of uploads, set by the viewer
+        self._startup_message: dict[str, object] | None = None  # shown by pages before the first frame
+        super().__init__(**kwargs)
 
-    def tell_stage(self, text: str, number: int, of: int) -> None:
-        """Tell the pages what is prepared, and the stage's number, before there is a picture."""
-        self._say({"type": "stage", "text": text, "number": number, "of": of})
+    def send_stage(self, text: str, number: int, total: int) -> None:
+        """Send the current stage of preparation and its number to the pages, before the first picture."""
+        self._broadcast({"type": "stage", "text": text, "number": number, "total": total})
 
-    def tell_failure(self, text: str) -> None:
-        """Tell the pages why there will be no picture."""
-        self._say({"type": "failure", "text": text})
+    def send_failure(self, text: str) -> None:
+        """Send the reason why no picture can be shown to the pages."""
+        self._broadcast({"type": "failure", "text": text})
 
-    def _say(self, message: dict[str, object]) -> None:
-        self._said = message
+    def _broadcast(self, message: dict[str, object]) -> None:
+        self._startup_message = message
         asgi.send_all(message)
 
-    def ask_for_file(self) -> None:
-        """Let the page that has control choose a file to send."""
+    def request_file(self) -> None:
+        """Ask the page that has control to choose a file to upload."""
         asgi.send_to({"type": "choose", "kinds": ",".join(HEAD_FILES)}, [], self._active_client)
 
     def _rc_close(self) -> None:
-        if not self._is_closed:  # collected later, it would close the pages of a newer canvas
+        if not self._is_closed:  # garbage collection of an old canvas must not close the pages of a newer one
             super()._rc_close()
 
     def _update_active_states(self) -> None:
@@ -63,59 +63,59 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         if self._active_client != self._ticket_holder:
             self.ticket, self._ticket_holder = secrets.token_urlsafe(_TICKET_BYTES), self._active_client
             asgi.send_to({"type": "ticket", "value": self.ticket}, [], self._active_client)
-        if self._said and not self._sent:
-            asgi.send_all(self._said)
+        if self._startup_message and not self._sent:
+            asgi.send_all(self._startup_message)
 
-    def offer(self, name: str, data: bytes) -> None:
+    def offer_download(self, name: str, data: bytes) -> None:
         """Send a file to the page that has control, which offers it as a download."""
         asgi.send_to({"type": "download", "name": name, "nbuffers": 1}, [data], self._active_client)
 
     def _on_event(self, event: dict[str, Any], id: int) -> None:
         kind = str(event.get("type"))
-        if kind == "_framefeedback":  # a frame that was not sent cannot have been shown
+        if kind == "_framefeedback":  # a page cannot have displayed a frame that was not sent
             event["index"] = min(event["index"], self._frame_info_per_client[id]["sent"])
         super()._on_event(event, id)
-        acted = kind == "_clients_change" or (kind[:1] != "_" and id == self._active_client)
-        if acted and self._frame_info_per_client:
-            # rendercanvas would draw one tick later, and for a reloaded or resized page only on motion.
+        is_input = kind == "_clients_change" or (kind[:1] != "_" and id == self._active_client)
+        if is_input and self._frame_info_per_client:
+            # rendercanvas would draw one tick later, and after a reload or resize only when something moves.
             self.request_draw()
         elif kind == "_framefeedback" and not self._draw_requested:
-            self._send_last_frame_to_ready_clients()  # encoded while this page was not ready
+            self._send_last_frame_to_ready_clients()  # it was encoded while this page was not ready
 
     def _maybe_draw(self) -> None:
-        """Draw unless too many frames are on their way to the page."""
-        known = self._frame_info_per_client.get(self._active_client)
-        if known and known["sent"] - known["confirmed"] + self._encoding >= self._max_buffered_frames:
-            self._pending_maybe_draw = False  # tried again after the next frame is encoded or confirmed
+        """Draw a frame, unless too many frames are waiting to be sent or confirmed."""
+        info = self._frame_info_per_client.get(self._active_client)
+        if info and info["sent"] - info["confirmed"] + self._encoding >= self._max_buffered_frames:
+            self._pending_maybe_draw = False  # retried after the next frame is encoded or confirmed
             self._send_last_frame_to_ready_clients()
         else:
             super()._maybe_draw()
 
     def _encode_frame(self, array: NDArray[np.uint8], is_lossless_redraw: bool = False) -> None:
-        """Encode a frame in a thread: JPEG while things move, then PNG."""
+        """Encode a frame in a thread: as JPEG while the picture changes, then as PNG."""
         self._cancel_lossless_draw()
         self._drawn += 1
         if is_lossless_redraw:
             self._lossless = self._drawn
         else:
             self._encoding += 1
-            self._schedule_lossless_draw(array, _LOSSLESS_AFTER_S)
-        work = partial(encoded, array, lossless=is_lossless_redraw)
-        made = asyncio.get_running_loop().run_in_executor(self._encoders, work)
-        made.add_done_callback(partial(self._send, self._drawn, is_lossless_redraw))
+            self._schedule_lossless_draw(array, _LOSSLESS_DELAY_S)
+        task = partial(encode_image, array, lossless=is_lossless_redraw)
+        future = asyncio.get_running_loop().run_in_executor(self._encoders, task)
+        future.add_done_callback(partial(self._send, self._drawn, is_lossless_redraw))
 
     def _cancel_lossless_draw(self) -> None:
-        """Also discard a lossless frame that is still being encoded."""
+        """Cancel the lossless frame, even if it is already being encoded."""
         self._lossless = 0
         super()._cancel_lossless_draw()
 
-    def _send(self, number: int, lossless: bool, made: asyncio.Future[bytes]) -> None:
-        """Send an encoded frame to the pages, unless a newer one was sent already."""
+    def _send(self, number: int, lossless: bool, future: asyncio.Future[bytes]) -> None:
+        """Send an encoded frame to the pages, unless a newer one has been sent."""
         self._encoding -= not lossless
         if self._is_closed:
             return
         self._schedule_maybe_draw()
-        data = made.result()
+        data = future.result()
         if number < self._sent or (lossless and number != self._lossless):
             return
         self._sent = number
@@ -131,12 +131,12 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._send_last_frame_to_ready_clients()
 
 
-def encoded(array: NDArray[np.uint8], *, lossless: bool) -> bytes:
-    """An (h, w, 4) image as PNG or JPEG, without alpha."""
+def encode_image(array: NDArray[np.uint8], *, lossless: bool) -> bytes:
+    """Encode an (h, w, 4) image without alpha as PNG (lossless) or JPEG."""
     from PIL import Image
 
     height, width = array.shape[:2]
-    # RGBX is Pillow's own layout, so JPEG needs no copy.
+    # RGBX is the internal layout of Pillow, so JPEG needs no copy.
     image = Image.frombuffer("RGBX", (width, height), np.ascontiguousarray(array), "raw", "RGBX", 0, 1)
     buffer = io.BytesIO()
     if lossless:

@@ -1,15 +1,15 @@
-// Files between the page and the server: what is saved is offered as a download, heads are sent.
+// Files between the page and the server: downloads of saved files, uploads of heads.
 
 const shelf = document.getElementById('files')
 const chooser = document.createElement('input')
 let announced = null // name of the file whose bytes come next
 let link = null
-let ticket = '' // says that this page has control
+let ticket = '' // proof that this page has control, for uploads
 
 chooser.type = 'file'
 chooser.onchange = () => {
   send(chooser.files[0])
-  chooser.value = '' // so that the same file can be chosen again
+  chooser.value = '' // otherwise the same file could not be chosen again
 }
 
 export function take (message) {
@@ -31,10 +31,10 @@ function offer (name, bytes) {
   link.href = URL.createObjectURL(bytes)
   link.download = link.textContent = name
   show('saved ', link)
-  link.click() // the link stays, for a browser that asks first or keeps nothing
+  link.click() // the link remains, in case the browser asks first or blocks the download
 }
 
-// A browser may refuse to open its list of files so long after the click, hence a button too.
+// A browser may refuse to open its file dialog so long after the click, hence the button.
 function choose (kinds) {
   chooser.accept = kinds
   const button = document.createElement('button')
@@ -50,8 +50,8 @@ async function send (file) {
   try {
     const address = `upload/${encodeURIComponent(file.name)}`
     const answer = await fetch(address, { method: 'POST', headers: { 'x-dermis-ticket': ticket }, body: file })
-    const said = await answer.text()
-    if (answer.ok) { shelf.replaceChildren() } else { show(said) }
+    const text = await answer.text()
+    if (answer.ok) { shelf.replaceChildren() } else { show(text) }
   } catch (error) {
     show(`${file.name} could not be sent: is it too large, or the connection lost?`)
   }

@@ -1,5 +1,5 @@
-// What rendercanvas' page lacks: it reconnects, works behind https, sends pinch gestures, and reports its size when
-// it becomes active.
+// Additions to the page of rendercanvas: it reconnects, works behind https, sends pinch gestures, and reports its
+// size when it becomes active.
 
 import { take } from './files.js'
 import { follow } from './stage.js'
@@ -12,21 +12,21 @@ const LOST = 'connection lost, reconnecting …'
 const OUR_KEYS = ['Tab', 'F1']
 const OUR_KEYS_WITH_CONTROL = ['z', 'y', 's']
 
-// Moves are sent at once, for one that waits would come after the release; the server merges those that queue.
+// Moves are sent immediately, because a delayed one would arrive after the release; the server merges queued moves.
 window.BaseRenderView.prototype.setThrottle = function (throttle) {
   this._moveThrottle = 0
   this._wheelThrottle = throttle
 }
 
-// A cookie has the token from here on; in the address it would be kept in the history and seen on screenshots.
+// The token is in a cookie now; in the URL it would remain in the history and be visible on screenshots.
 if (window.location.search) { window.history.replaceState(null, '', window.location.pathname) }
 
 const notice = document.getElementById('notice')
 
-// As a style of its own, without which rendercanvas would choose a size; pages may not write styles into elements.
+// Set as a style property, otherwise rendercanvas would choose a size; the policy forbids style attributes.
 Object.assign(document.getElementById('canvas').style, { width: '100%', height: '100%' })
 
-// The socket opened last, perhaps still connecting: with two of them this page would be watching itself.
+// The last opened socket, perhaps still connecting: with two sockets this page would only watch itself.
 let latest = null
 window.WebSocket = class extends window.WebSocket {
   constructor (address, ...rest) {
@@ -53,38 +53,38 @@ function hear (event) {
   if (message.type !== 'active') { return }
   notice.textContent = message.value ? '' : WATCHING
   if (message.value) {
-    tellSize()
+    sendSize()
     takeKeys()
   }
 }
 
-// The server ignores a page that watches, and a restarted server has forgotten its size.
-function tellSize () {
-  const exactly = new ResizeObserver(([entry], observer) => {
+// The server ignores the size of a page without control, and a restarted server does not know it.
+function sendSize () {
+  const sizeObserver = new ResizeObserver(([entry], observer) => {
     observer.disconnect()
     const ratio = window.devicePixelRatio
     const box = entry.devicePixelContentBoxSize // which Safari lacks
     const { width, height } = entry.contentRect
     const pwidth = box ? box[0].inlineSize : Math.floor(width * ratio)
     const pheight = box ? box[0].blockSize : Math.floor(height * ratio)
-    tell({ type: 'resize', width: pwidth / ratio, height: pheight / ratio, pwidth, pheight, ratio })
+    sendEvent({ type: 'resize', width: pwidth / ratio, height: pheight / ratio, pwidth, pheight, ratio })
   })
-  exactly.observe(document.querySelector('#canvas img'))
+  sizeObserver.observe(document.querySelector('#canvas img'))
 }
 
-// Make keys and the wheel work without a first click; on a touch screen this would open the keyboard.
+// Make keys and the wheel work without a first click, except on touch screens, where it would open the keyboard.
 function takeKeys () {
   const field = document.querySelector('#rendercanvas-focus-element-container input')
   if (field && window.matchMedia('(hover: hover)').matches) { field.focus({ preventScroll: true }) }
 }
 
-function tell (event) {
+function sendEvent (event) {
   if (window.websocket && window.websocket.readyState === WebSocket.OPEN) {
     window.websocket.send(JSON.stringify({ timestamp: performance.now() / 1000, ...event }))
   }
 }
 
-// Otherwise Tab would leave the picture, and Ctrl+S would save the page.
+// Otherwise Tab would leave the picture and Ctrl+S would save the page.
 window.addEventListener('keydown', (event) => {
   const held = event.ctrlKey || event.metaKey
   const keys = held ? OUR_KEYS_WITH_CONTROL : OUR_KEYS
@@ -93,8 +93,8 @@ window.addEventListener('keydown', (event) => {
 
 const fingers = new Map()
 let pinching = false
-let began = null // where the last finger touched
-let tapped = null // where and when the last tap ended
+let began = null // position where the last finger touched
+let tapped = null // position and time of the last tap
 
 function count (event) {
   if (event.pointerType !== 'touch') { return }
@@ -106,22 +106,22 @@ function count (event) {
   pinching = true
   event.stopImmediatePropagation() // rendercanvas handles a single finger
   event.preventDefault()
-  tellFingers()
+  sendFingers()
 }
 
-function tellFingers () {
+function sendFingers () {
   const touches = Object.fromEntries([...fingers.values()].entries())
   const { x, y } = touches[0]
-  tell({ type: 'pointer_move', x, y, button: 1, buttons: [1], modifiers: [], ntouches: fingers.size, touches })
+  sendEvent({ type: 'pointer_move', x, y, button: 1, buttons: [1], modifiers: [], ntouches: fingers.size, touches })
 }
 
-// Turn two taps at one point into a double click, which browsers do not do here.
+// Turn two taps at one point into a double click, because browsers do not do so here.
 function tap ({ clientX: x, clientY: y }) {
   const at = performance.now()
-  if (Math.hypot(x - began.x, y - began.y) > TAPS_PX) { // it was a drag
+  if (Math.hypot(x - began.x, y - began.y) > TAPS_PX) { // a drag, not a tap
     tapped = null
   } else if (tapped && at - tapped.at < TAPS_MS && Math.hypot(x - tapped.x, y - tapped.y) < TAPS_PX) {
-    tell({ type: 'double_click', x, y, button: 1, buttons: [1], modifiers: [] })
+    sendEvent({ type: 'double_click', x, y, button: 1, buttons: [1], modifiers: [] })
     tapped = null
   } else {
     tapped = { at, x, y }

@@ -1,4 +1,4 @@
-"""Checks of requests and of messages: who may connect, and what a page may send."""
+"""Validation of requests and messages: who may connect, and what a page may send."""
 
 from __future__ import annotations
 
@@ -13,99 +13,99 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 from dermis.base.errors import DermisError
 from dermis.base.reading import parse_json
 
-_MOST_LETTERS = 4096
-_LARGEST_SIDE = 4096  # of a picture [pixel]
-_FARTHEST = 1e5  # that a pointer may be from the picture's corner, logical
+_MAX_CHARACTERS = 4096  # of a message
+_MAX_SIDE = 4096  # of a page [pixel]
+_MAX_COORDINATE = 1e5  # of a pointer, relative to the corner of the picture [logical pixel]
 
 Seconds = Annotated[float, Field(ge=0.0, le=1e12)]
-Place = Annotated[float, Field(ge=-_FARTHEST, le=_FARTHEST)]
-Side = Annotated[int, Field(ge=0, le=_LARGEST_SIDE)]
+Coordinate = Annotated[float, Field(ge=-_MAX_COORDINATE, le=_MAX_COORDINATE)]
+PixelCount = Annotated[int, Field(ge=0, le=_MAX_SIDE)]
 Button = Annotated[int, Field(ge=0, le=16)]
-Word = Annotated[str, Field(max_length=32)]
+ShortText = Annotated[str, Field(max_length=32)]
 
 
-class _Checked(BaseModel):
-    """A model that drops fields that are not listed, and takes finite numbers only."""
+class _StrictModel(BaseModel):
+    """Model that ignores unknown fields and accepts finite numbers only."""
 
     model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False)
 
 
-class _Message(_Checked):
+class _TimedMessage(_StrictModel):
     timestamp: Seconds
 
 
-class Touch(_Checked):
-    """A finger."""
+class Touch(_StrictModel):
+    """Position of one finger."""
 
-    x: Place
-    y: Place
+    x: Coordinate
+    y: Coordinate
     pressure: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
 
 
-class _Held(_Message):
-    modifiers: Annotated[list[Word], Field(max_length=8)] = []
+class _InputMessage(_TimedMessage):
+    modifiers: Annotated[list[ShortText], Field(max_length=8)] = []
 
 
-class Pointer(_Held):
-    """Event of a mouse, a pen or fingers."""
+class Pointer(_InputMessage):
+    """Event of a mouse, pen or touch screen."""
 
     type: Literal[
         "pointer_down", "pointer_move", "pointer_up", "pointer_enter", "pointer_leave", "double_click"
     ]
-    x: Place
-    y: Place
+    x: Coordinate
+    y: Coordinate
     button: Button = 0
     buttons: Annotated[list[Button], Field(max_length=16)] = []
     ntouches: Annotated[int, Field(ge=0, le=16)] = 0
-    touches: Annotated[dict[Word, Touch], Field(max_length=16)] = {}
+    touches: Annotated[dict[ShortText, Touch], Field(max_length=16)] = {}
 
 
-class Wheel(_Held):
-    """Turn of a wheel, in the browser's pixels."""
+class Wheel(_InputMessage):
+    """Rotation of the mouse wheel, in pixels of the browser."""
 
     type: Literal["wheel"]
-    x: Place
-    y: Place
-    dx: Place
-    dy: Place
+    x: Coordinate
+    y: Coordinate
+    dx: Coordinate
+    dy: Coordinate
     buttons: Annotated[list[Button], Field(max_length=16)] = []
 
 
-class Key(_Held):
-    """Key, by its name in browsers."""
+class Key(_InputMessage):
+    """Key press or release, with the key name used by browsers."""
 
     type: Literal["key_down", "key_up"]
-    key: Word
+    key: ShortText
 
 
-class Letters(_Message):
-    """Text that is typed."""
+class TextInput(_TimedMessage):
+    """Typed text."""
 
     type: Literal["char"]
     data: str | None = None
     is_composing: bool = False
-    input_type: Word | None = None
+    input_type: ShortText | None = None
 
 
-class Resize(_Message):
-    """Size of the page: sides in logical and in physical pixels, and their ratio."""
+class Resize(_TimedMessage):
+    """Size of the page in logical and physical pixels, and their ratio."""
 
     type: Literal["resize"]
-    width: Place
-    height: Place
-    pwidth: Side
-    pheight: Side
+    width: Coordinate
+    height: Coordinate
+    pwidth: PixelCount
+    pheight: PixelCount
     ratio: Annotated[float, Field(ge=0.1, le=20.0)]
 
 
-class Seen(_Message):
-    """Whether the page is visible."""
+class VisibilityChange(_TimedMessage):
+    """Notice that the page became visible or hidden."""
 
     type: Literal["show", "hide"]
 
 
-class Shown(_Message):
-    """The number of a frame that the page has shown."""
+class FrameFeedback(_TimedMessage):
+    """Number of the frame that the page has displayed."""
 
     type: Literal["_framefeedback"]
     index: Annotated[int, Field(ge=0, le=1 << 53)]
@@ -113,23 +113,26 @@ class Shown(_Message):
 
 
 _MESSAGES: TypeAdapter[Any] = TypeAdapter(
-    Annotated[Pointer | Wheel | Key | Letters | Resize | Seen | Shown, Field(discriminator="type")]
+    Annotated[
+        Pointer | Wheel | Key | TextInput | Resize | VisibilityChange | FrameFeedback,
+        Field(discriminator="type"),
+    ]
 )
 
 
-def checked(text: object) -> str | None:
-    """Return the message with the fields of its kind only; None for one that no page sends.
+def checked_message(text: object) -> str | None:
+    """Return a message of a page with its known fields only, or None if it is invalid.
 
-    text : untrusted, of any type
+    text : untrusted message of any type
     """
-    if not isinstance(text, str) or len(text) > _MOST_LETTERS:
+    if not isinstance(text, str) or len(text) > _MAX_CHARACTERS:
         return None
     try:
         message = _MESSAGES.validate_python(parse_json(text, "message", "an event"))
-        said: str = message.model_dump_json()
-    except (DermisError, ValueError):  # pydantic's, or of half a letter, which no text can hold
+        checked_text: str = message.model_dump_json()
+    except (DermisError, ValueError):  # invalid JSON, a validation error, or half of a surrogate pair
         return None
-    return said
+    return checked_text
 
 
 Message = MutableMapping[str, Any]
@@ -137,22 +140,22 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Message, Receive, Send], Awaitable[None]]
 
-MOST_PAGES = 8
-"""Pages that may be open at the same time."""
+MAX_PAGES = 8
+"""Maximum number of open pages."""
 
 _SCHEMES = {"ws": "http", "wss": "https"}
-_NO_TOKEN = "This page needs its token: open the whole address that dermis view has printed."
-_NOT_HERE = "This page is not served under this name: open the address that dermis view has printed."
-_OTHER_SITE = "Only the page's own requests are answered."
-_TOO_MANY = "As many pages as may be are open: close one of them."
+_NO_TOKEN = "The token is missing: open the complete URL that dermis view has printed."
+_WRONG_HOST = "This page is not served under this host name: open the URL that dermis view has printed."
+_OTHER_SITE = "Requests of other web sites are not answered."
+_TOO_MANY = "Too many pages are open: close one of them."
 
 
-class Guard:
-    """ASGI middleware: lets only requests through that have the token and come from the server's own page.
+class RequestFilter:
+    """ASGI middleware that rejects requests without the token or from other web sites.
 
-    app : rendercanvas' application
-    token : in the query of the address, then in a cookie; empty for none
-    cookie : its name, one for each port, which browsers do not tell apart
+    app : ASGI application of rendercanvas
+    token : secret in the query of the URL and later in a cookie; empty if none is required
+    cookie : name of the cookie, different for each port because browsers share cookies between ports
     """
 
     def __init__(self, app: App, token: str, cookie: str = "dermis") -> None:
@@ -160,54 +163,56 @@ class Guard:
         self._pages = 0
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
-        """The ASGI entry point."""
+        """Handle a request (ASGI entry point)."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
-        elif refusal := self._refusal(scope):
-            await _refuse(refusal, scope, receive, send)
+        elif refusal := self._refusal_reason(scope):
+            await _reject(refusal, scope, receive, send)
         elif scope["type"] == "websocket":
             self._pages += 1
             try:
-                await self._app(scope, _checked(receive), send)
+                await self._app(scope, _receive_checked(receive), send)
             finally:
                 self._pages -= 1
         else:
-            await self._app(scope, receive, self._with_cookie(send) if self._in_query(scope) else send)
+            if self._has_query_token(scope):
+                send = self._sending_cookie(send)
+            await self._app(scope, receive, send)
 
-    def _refusal(self, scope: Message) -> str:
-        """Why a request is not answered, empty for one that is."""
+    def _refusal_reason(self, scope: Message) -> str:
+        """Return why a request is rejected, or an empty string if it is accepted."""
         host = next(iter(_headers(scope, b"host")), "")
-        if not self._token and not is_local(_name_of(host)):
-            return _NOT_HERE  # DNS rebinding: another site's name that resolves to this machine
+        if not self._token and not is_local(_host_name(host)):
+            return _WRONG_HOST  # DNS rebinding: the name of another site resolves to this machine
         scheme = _SCHEMES.get(scope["scheme"], scope["scheme"])
         if any(origin != f"{scheme}://{host}" for origin in _headers(scope, b"origin")):
             return _OTHER_SITE
-        if self._token and not self._in_query(scope) and not self._in_cookie(scope):
+        if self._token and not self._has_query_token(scope) and not self._has_cookie_token(scope):
             return _NO_TOKEN
-        return _TOO_MANY if scope["type"] == "websocket" and self._pages >= MOST_PAGES else ""
+        return _TOO_MANY if scope["type"] == "websocket" and self._pages >= MAX_PAGES else ""
 
-    def _in_query(self, scope: Message) -> bool:
-        given = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [])
-        return bool(self._token) and any(map(self._is_token, given))
+    def _has_query_token(self, scope: Message) -> bool:
+        tokens = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [])
+        return bool(self._token) and any(map(self._is_token, tokens))
 
-    def _in_cookie(self, scope: Message) -> bool:
-        crumbs = (crumb.strip() for line in _headers(scope, b"cookie") for crumb in line.split(";"))
-        pairs = (crumb.partition("=") for crumb in crumbs)
+    def _has_cookie_token(self, scope: Message) -> bool:
+        cookies = (cookie.strip() for line in _headers(scope, b"cookie") for cookie in line.split(";"))
+        pairs = (cookie.partition("=") for cookie in cookies)
         return any(self._is_token(value) for name, _, value in pairs if name == self._cookie)
 
     def _is_token(self, text: str) -> bool:
         return hmac.compare_digest(text.encode(), self._token.encode())
 
-    def _with_cookie(self, send: Send) -> Send:
-        """Let the browser keep the token, out of the reach of scripts and of other sites."""
+    def _sending_cookie(self, send: Send) -> Send:
+        """Return a `send` function that also sets the token cookie, hidden from scripts and other sites."""
         cookie = f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict".encode()
 
-        async def send_too(message: Message) -> None:
+        async def send_with_cookie(message: Message) -> None:
             if message["type"] == "http.response.start":
                 message["headers"] = [*message["headers"], (b"set-cookie", cookie)]
             await send(message)
 
-        return send_too
+        return send_with_cookie
 
 
 def is_local(host: str) -> bool:
@@ -220,37 +225,37 @@ def is_local(host: str) -> bool:
         return False
 
 
-def _headers(scope: Message, wanted: bytes) -> list[str]:
-    return [value.decode("latin-1") for name, value in scope["headers"] if name == wanted]
+def _headers(scope: Message, key: bytes) -> list[str]:
+    return [value.decode("latin-1") for name, value in scope["headers"] if name == key]
 
 
-def _name_of(host: str) -> str:
-    """The host of "name:port", "[address]:port" or the name alone."""
+def _host_name(host: str) -> str:
+    """Return the host of "name:port", "[address]:port" or "name"."""
     if host.startswith("["):
         return host[1:].partition("]")[0]
     return host.partition(":")[0]
 
 
-def _checked(receive: Receive) -> Receive:
-    """The page's messages without those it may not send."""
+def _receive_checked(receive: Receive) -> Receive:
+    """Return a `receive` function that drops invalid messages of the page."""
 
     async def next_message() -> Message:
         while True:
             message = await receive()
             if message["type"] != "websocket.receive":
                 return message
-            if (text := checked(message.get("text"))) is not None:
+            if (text := checked_message(message.get("text"))) is not None:
                 return {"type": "websocket.receive", "text": text}
 
     return next_message
 
 
-async def _refuse(reason: str, scope: Message, receive: Receive, send: Send) -> None:
+async def _reject(reason: str, scope: Message, receive: Receive, send: Send) -> None:
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.close", "code": 1008})
         return
-    # Closed, or a body that nobody reads could be sent for ever.
+    # Close the connection, otherwise the client could send an endless body.
     headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
     await send({"type": "http.response.start", "status": 403, "headers": headers})
     await send({"type": "http.response.body", "body": reason.encode()})

@@ -1,11 +1,11 @@
-// What is being prepared until there is a picture, or why there will be none.
+// Progress of the preparation until the first picture, or the reason why there is none.
 
 const TICK_MS = 1000
 const place = document.getElementById('stage')
 const words = document.createElement('p')
 const bar = document.createElement('progress')
-let said = '' // the stage
-let seconds = 0 // since it began
+let stage = ''
+let seconds = 0 // since the stage began
 let clock = null
 
 export function follow (message) {
@@ -21,18 +21,18 @@ export function follow (message) {
   }
 }
 
-function begin ({ text, number, of }) {
-  if (said !== text) { seconds = 0 }
-  said = text
-  bar.max = of
+function begin ({ text, number, total }) {
+  if (stage !== text) { seconds = 0 }
+  stage = text
+  bar.max = total
   bar.value = number - 1
   place.replaceChildren(words, bar)
-  clock = clock || setInterval(() => { seconds += 1; tell() }, TICK_MS)
-  tell()
+  clock = clock || setInterval(() => { seconds += 1; update() }, TICK_MS)
+  update()
 }
 
-function tell () {
-  words.textContent = `${said} … (${bar.value + 1}/${bar.max})` + (seconds > 2 ? `, ${seconds} s` : '')
+function update () {
+  words.textContent = `${stage} … (${bar.value + 1}/${bar.max})` + (seconds > 2 ? `, ${seconds} s` : '')
 }
 
 function end () {

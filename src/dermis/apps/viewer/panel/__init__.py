@@ -1,1 +1,1 @@
-"""The panel: Dear ImGui controls beside the picture. Its modules need the package imgui-bundle."""
+"""Control panel drawn with Dear ImGui; its modules need the package imgui-bundle."""

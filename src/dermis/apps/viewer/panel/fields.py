@@ -1,4 +1,4 @@
-"""Controls of the panel: a field of a model gets one, with the model's range and help and a plain label."""
+"""Controls of the panel for the fields of pydantic models, with their ranges, help and labels."""
 
 from __future__ import annotations
 
@@ -12,125 +12,152 @@ from imgui_bundle import imgui, implot
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.state import ViewerState
 from dermis.base.errors import DermisError
-from dermis.scene.field_errors import words_of
-from dermis.scene.plain import Colour, Plain, Range, choices_of, help_of, range_of
+from dermis.scene.field_errors import field_keywords
+from dermis.scene.frozen_model import (
+    Colour,
+    FrozenModel,
+    SliderRange,
+    field_choices,
+    field_help,
+    field_slider_range,
+)
 
-Apply = Callable[..., ViewerState]
-Put = Callable[[Any], ViewerState]
+ApplyFields = Callable[..., ViewerState]
+ApplyValue = Callable[[Any], ViewerState]
 _LOG = int(imgui.SliderFlags_.logarithmic)
 _HDR = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
-_FORMS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by the unit that a name ends in
-_ALL_NAMES = int(imgui.ComboFlags_.height_largest)
+_UNIT_FORMATS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by unit suffix of the field name
+_TALL_LIST = int(imgui.ComboFlags_.height_largest)
 _TOOLTIP_WIDTH = 260.0
-_AS_THEY_ARE: Mapping[str, str] = MappingProxyType({})
-_OWN = "own"
+_NO_DISPLAY_NAMES: Mapping[str, str] = MappingProxyType({})
+_CUSTOM = "own"
 _PLOT_HEIGHT = 130.0
-_BARE = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
-_PLOT = int(_BARE | implot.Flags_.no_inputs | implot.Flags_.no_legend)
-_MOST_ROWS = 14  # that are seen of many like controls
+_PLOT_BASE_FLAGS = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
+_PLOT_FLAGS = int(_PLOT_BASE_FLAGS | implot.Flags_.no_inputs | implot.Flags_.no_legend)
+_MAX_VISIBLE_ROWS = 14
 
 
 @dataclass(frozen=True)
-class Style:
-    """How a field is shown where the panel departs from the model.
+class FieldStyle:
+    """Presentation of a field where the panel differs from the model.
 
-    label : instead of the field's name; in "shown###name" the name is what positions and undo know it by
-    span : range of the slider, instead of the model's
-    unit : of the numbers shown, in units of the field
-    form : printf format of the numbers shown
-    options : the whole numbers to choose from
-    called : what people call the field's words
-    own : makes the first value of one's own where a field may also be a word
+    label : label to show; in "shown###name" the name identifies the control in positions and undo
+    value_range : range of the slider, instead of that of the model
+    unit : value of one displayed unit, in units of the field
+    number_format : printf format of the number
+    options : integers to choose from
+    display_names : text to show for each keyword of the field
+    custom_value : function that returns the first custom value of a field that may also be a keyword
     """
 
     label: str = ""
-    span: Range | None = None
+    value_range: SliderRange | None = None
     unit: float = 1.0
-    form: str = ""
+    number_format: str = ""
     options: tuple[int, ...] = ()
-    called: Mapping[str, str] = field(default_factory=dict)
-    own: Callable[[Session], object] | None = None
+    display_names: Mapping[str, str] = field(default_factory=dict)
+    custom_value: Callable[[Session], object] | None = None
 
 
-_PLAIN = Style()
+_DEFAULT_STYLE = FieldStyle()
 _COLOUR: Any = Colour
 
 
 def draw_fields(
     session: Session,
-    values: Plain,
-    apply: Apply,
-    styles: Mapping[str, Style],
+    values: FrozenModel,
+    make_state: ApplyFields,
+    styles: Mapping[str, FieldStyle],
     names: Iterable[str] | None = None,
-    suffix: str = "",
+    label_suffix: str = "",
 ) -> None:
-    """A control for each field of a model; fields whose type has none are skipped.
+    """Draw a control for each field of a model; fields without a suitable control are skipped.
 
-    apply : makes a state from a field's new value, given by name
-    names : of the fields, all of them by default
-    suffix : "##id" to tell controls with the same label apart
+    make_state : function that returns a state, given the new value of a field as keyword argument
+    names : names of the fields, all by default
+    label_suffix : "##id" that distinguishes controls with equal labels
     """
     for name in type(values).model_fields if names is None else names:
-        _draw_field(session, values, name, apply, styles.get(name, _PLAIN), suffix)
+        _draw_field(session, values, name, make_state, styles.get(name, _DEFAULT_STYLE), label_suffix)
 
 
-def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style: Style, suffix: str) -> None:
+def _draw_field(
+    session: Session,
+    values: FrozenModel,
+    name: str,
+    make_state: ApplyFields,
+    style: FieldStyle,
+    label_suffix: str,
+) -> None:
     kind, value = type(values), getattr(values, name)
-    label = (style.label or _label_of(name)) + suffix
-    span = style.span or range_of(kind, name) or Range(0.0, 1.0)
+    label = (style.label or _field_label(name)) + label_suffix
+    value_range = style.value_range or field_slider_range(kind, name) or SliderRange(0.0, 1.0)
 
-    def put(found: object) -> ViewerState:
-        return apply(**{name: found})
+    def with_value(new_value: object) -> ViewerState:
+        return make_state(**{name: new_value})
 
-    if words := words_of(kind, name):
-        _draw_words(session, label, value, words, put, style)
-        explain(help_of(kind, name))
+    if words := field_keywords(kind, name):
+        _draw_words(session, label, value, words, with_value, style)
+        draw_tooltip(field_help(kind, name))
         if isinstance(value, str):
             return
     if isinstance(value, bool):
-        hold(session, label, imgui.checkbox(label, value), put)
+        edit_value(session, label, imgui.checkbox(label, value), with_value)
     elif style.options:
-        combo(session, label, str(value), map(str, style.options), lambda text: put(int(text)))
+        combo(session, label, str(value), map(str, style.options), lambda text: with_value(int(text)))
     elif isinstance(value, (int, float)):
-        unit, exact = style.unit, round if isinstance(value, int) else float
-        form = style.form or next((_FORMS[end] for end in _FORMS if name.endswith(end)), "%.3f")
-        shown = Range(span.low / unit, span.high / unit, span.logarithmic)
-        slider(session, label, value / unit, lambda found: put(exact(unit * found)), shown, form)
+        unit, convert = style.unit, round if isinstance(value, int) else float
+        formats = (_UNIT_FORMATS[suffix] for suffix in _UNIT_FORMATS if name.endswith(suffix))
+        number_format = style.number_format or next(formats, "%.3f")
+        displayed = SliderRange(value_range.low / unit, value_range.high / unit, value_range.logarithmic)
+        slider(
+            session,
+            label,
+            value / unit,
+            lambda new: with_value(convert(unit * new)),
+            displayed,
+            number_format,
+        )
     elif kind.model_fields[name].annotation == _COLOUR:
         result = imgui.color_edit3(label, list(value), _HDR)
-        hold(session, label, result, lambda found: put(tuple(max(0.0, c) for c in found)))
-    elif isinstance(value, tuple) and span.logarithmic:
-        result = imgui.slider_float3(label, list(value), span.low, span.high, "%.3g", _LOG)
-        hold(session, label, result, lambda found: put(tuple(clamped(one, span) for one in found)))
-    elif len(words := choices_of(kind, name)) > 1:
-        combo(session, label, str(value), words, put, called=style.called)
+        edit_value(session, label, result, lambda new: with_value(tuple(max(0.0, c) for c in new)))
+    elif isinstance(value, tuple) and value_range.logarithmic:
+        result = imgui.slider_float3(label, list(value), value_range.low, value_range.high, "%.3g", _LOG)
+        edit_value(session, label, result, lambda new: with_value(tuple(clamp(c, value_range) for c in new)))
+    elif len(words := field_choices(kind, name)) > 1:
+        combo(session, label, str(value), words, with_value, display_names=style.display_names)
     else:
         return
-    explain(help_of(kind, name))
+    draw_tooltip(field_help(kind, name))
 
 
 def _draw_words(
-    session: Session, label: str, value: object, words: tuple[str, ...], put: Put, style: Style
+    session: Session,
+    label: str,
+    value: object,
+    words: tuple[str, ...],
+    with_value: ApplyValue,
+    style: FieldStyle,
 ) -> None:
-    """A list of the words that a number or a colour may be instead."""
-    own = style.own
+    """Draw a list of the keywords that a number or colour can be instead of a value."""
+    custom_value = style.custom_value
 
     def choose(word: str) -> ViewerState:
-        return put(own(session) if own and word == _OWN else word)
+        return with_value(custom_value(session) if custom_value and word == _CUSTOM else word)
 
-    chosen = value if isinstance(value, str) else _OWN
-    combo(session, f"{label} from", chosen, (*words, _OWN) if own else words, choose)
+    chosen = value if isinstance(value, str) else _CUSTOM
+    combo(session, f"{label} from", chosen, (*words, _CUSTOM) if custom_value else words, choose)
 
 
-def _label_of(name: str) -> str:
-    """The field's name without its unit."""
-    for unit in _FORMS:
+def _field_label(name: str) -> str:
+    """Return the name of the field without its unit."""
+    for unit in _UNIT_FORMATS:
         name = name.removesuffix(unit)
     return name.replace("_", " ")
 
 
-def explain(text: str) -> None:
-    """A tooltip for the control drawn last."""
+def draw_tooltip(text: str) -> None:
+    """Draw a tooltip for the last control."""
     if not text or not imgui.is_item_hovered() or imgui.is_any_mouse_down():
         return
     imgui.begin_tooltip()
@@ -141,9 +168,9 @@ def explain(text: str) -> None:
 
 
 def draw_rows(label: str, count: int, draw: Callable[[int], None]) -> None:
-    """Many like controls one below the other, in a part that scrolls; only those that are seen are drawn."""
+    """Draw many controls in a scrollable area; only the visible ones are drawn."""
     width, line = imgui.calc_item_width(), imgui.get_frame_height_with_spacing()
-    imgui.begin_child(label, imgui.ImVec2(0.0, min(count, _MOST_ROWS) * line))
+    imgui.begin_child(label, imgui.ImVec2(0.0, min(count, _MAX_VISIBLE_ROWS) * line))
     imgui.push_item_width(width)
     clipper = imgui.ListClipper()
     clipper.begin(count, line)
@@ -154,24 +181,31 @@ def draw_rows(label: str, count: int, draw: Callable[[int], None]) -> None:
     imgui.end_child()
 
 
-def slider(session: Session, label: str, value: float, put: Put, span: Range, form: str) -> None:
-    """A number on a scale."""
-    flags = _LOG if span.logarithmic else 0
-    result = imgui.slider_float(label, value, span.low, span.high, form, flags)
-    hold(session, label, result, lambda found: put(clamped(found, span)))
+def slider(
+    session: Session,
+    label: str,
+    value: float,
+    with_value: ApplyValue,
+    value_range: SliderRange,
+    number_format: str,
+) -> None:
+    """Draw a slider of a number."""
+    flags = _LOG if value_range.logarithmic else 0
+    result = imgui.slider_float(label, value, value_range.low, value_range.high, number_format, flags)
+    edit_value(session, label, result, lambda new: with_value(clamp(new, value_range)))
 
 
-def clamped(value: float, span: Range) -> float:
-    """Within the range, which typing and single precision can leave."""
-    return min(span.high, max(span.low, value))
+def clamp(value: float, value_range: SliderRange) -> float:
+    """Clamp a value to the range, because typed values and single precision can be outside."""
+    return min(value_range.high, max(value_range.low, value))
 
 
-def hold(session: Session, label: str, result: tuple[bool, Any], put: Put) -> None:
-    """Apply the new value of a control; all values while it is held are one step of the undo history."""
+def edit_value(session: Session, label: str, result: tuple[bool, Any], with_value: ApplyValue) -> None:
+    """Apply the new value of a control; all changes while it is held are one step of the undo history."""
     record_position(session, label)
-    moved, found = result
-    if moved:
-        attempt(session, lambda: session.change(put(found), f"hold {label}"))
+    is_changed, new_value = result
+    if is_changed:
+        run_action(session, lambda: session.change(with_value(new_value), f"hold {label}"))
     if imgui.is_item_deactivated():
         session.history.end_gesture()
 
@@ -181,33 +215,33 @@ def combo(
     label: str,
     current: str,
     names: Iterable[str],
-    put: Put,
-    called: Mapping[str, str] = _AS_THEY_ARE,
+    with_value: ApplyValue,
+    display_names: Mapping[str, str] = _NO_DISPLAY_NAMES,
 ) -> None:
-    """One of some names.
+    """Draw a drop-down list that changes the state.
 
-    names : "" is a line between two groups
-    called : what is shown instead of a name
+    names : choices; "" is a separator
+    display_names : text to show for each name, where it differs
     """
-    chosen = choose(session, label, current, names, called)
+    chosen = choose(session, label, current, names, display_names)
     if chosen is not None:
-        attempt(session, lambda: session.change(put(chosen)))
+        run_action(session, lambda: session.change(with_value(chosen)))
 
 
 def choose(
-    session: Session, label: str, current: str, names: Iterable[str], called: Mapping[str, str]
+    session: Session, label: str, current: str, names: Iterable[str], display_names: Mapping[str, str]
 ) -> str | None:
-    """Draw a list as of `combo`; return the name that was clicked."""
+    """Draw a drop-down list as in `combo` and return the clicked name; None if there is none."""
     chosen = None
-    if not imgui.begin_combo(label, called.get(current, current), _ALL_NAMES):
+    if not imgui.begin_combo(label, display_names.get(current, current), _TALL_LIST):
         record_position(session, label)
         return None
     for name in names:
         if not name:
             imgui.separator()
             continue
-        clicked, _ = imgui.selectable(f"{called.get(name, name)}###{name}", name == current)
-        record_position(session, f"{_key(label)}/{name}")
+        clicked, _ = imgui.selectable(f"{display_names.get(name, name)}###{name}", name == current)
+        record_position(session, f"{_label_key(label)}/{name}")
         if clicked and name != current:
             chosen = name
     imgui.end_combo()
@@ -221,47 +255,47 @@ def button(session: Session, label: str) -> bool:
     return bool(pressed)
 
 
-def begin_plot(label: str, axes: tuple[str, str], across: tuple[float, float], highest: float) -> bool:
-    """Begin a plot from 0 to a little above the highest value; returns whether it is visible."""
-    if not implot.begin_plot(f"##{label}", imgui.ImVec2(-1.0, _PLOT_HEIGHT), _PLOT):
+def begin_plot(label: str, axes: tuple[str, str], x_range: tuple[float, float], highest: float) -> bool:
+    """Begin a plot from 0 to slightly above the highest value; return whether it is visible."""
+    if not implot.begin_plot(f"##{label}", imgui.ImVec2(-1.0, _PLOT_HEIGHT), _PLOT_FLAGS):
         return False
     hidden = int(implot.AxisFlags_.no_tick_labels) if axes[0] == "frames" else 0
     implot.setup_axes(*axes, hidden, 0)
-    implot.setup_axes_limits(*across, 0.0, 1.1 * highest, int(imgui.Cond_.always))
+    implot.setup_axes_limits(*x_range, 0.0, 1.1 * highest, int(imgui.Cond_.always))
     return True
 
 
 def record_position(session: Session, label: str) -> None:
-    """Record where the item drawn last is: a point in its left part, which is never its label.
+    """Record a position inside the last control, in its left part, which is never its label.
 
-    label : of which the part after "###", if it has one, is the key
+    label : label whose part after "###", if any, is the key of the position
     """
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     x = float(low.x) + min(20.0, 0.5 * float(high.x - low.x))
-    session.positions[_key(label)] = x, 0.5 * float(low.y + high.y)
+    session.positions[_label_key(label)] = x, 0.5 * float(low.y + high.y)
 
 
-def _key(label: str) -> str:
+def _label_key(label: str) -> str:
     return label.rpartition("###")[2]
 
 
-def attempt(session: Session, act: Callable[[], None]) -> None:
-    """Run an action; an error becomes the message over the picture."""
+def run_action(session: Session, action: Callable[[], None]) -> None:
+    """Run an action and show errors as a message over the picture."""
     try:
-        act()
+        action()
     except DermisError as error:
         session.message = str(error)
     except Exception as error:
-        session.tell_fault("This cannot be done", error)
+        session.report_error("This cannot be done", error)
 
 
 SURFACE = {
-    "mix": Style("colour before blur###mix"),
-    "roughness": Style("roughness m###roughness"),
-    "rho_s": Style("specular strength ρ_s###rho_s"),
-    "specular": Style(
+    "mix": FieldStyle("colour before blur###mix"),
+    "roughness": FieldStyle("roughness m###roughness"),
+    "rho_s": FieldStyle("specular strength ρ_s###rho_s"),
+    "specular": FieldStyle(
         "specular BRDF###BRDF",
-        called={
+        display_names={
             "kelemen": "Kelemen, Szirmay-Kalos",
             "torrance-sparrow": "Torrance-Sparrow",
             "torrance-sparrow-smith": "Torrance-Sparrow, Smith's G",
@@ -270,47 +304,59 @@ SURFACE = {
             "phong": "Phong",
             "phong-plain": "Phong, not normalised",
             "two-lobe": "two lobes",
-            "kelemen-direct": "Kelemen, without its table",
+            "kelemen-direct": "Kelemen, without table",
         },
     ),
-    "fresnel": Style("Fresnel###Fresnel", called={"schlick": "Schlick", "exact": "exact dielectric"}),
-    "specular_colour": Style("reflection colour###reflection", called={"wrong": "albedo (wrong)"}),
-    "energy": Style("energy conserved###energy", called={"none": "no", "published": "as published"}),
-    "direction": Style("exit direction###direction", called={"lambertian": "Lambertian"}),
+    "fresnel": FieldStyle(
+        "Fresnel###Fresnel", display_names={"schlick": "Schlick", "exact": "exact dielectric"}
+    ),
+    "specular_colour": FieldStyle(
+        "reflection colour###reflection", display_names={"wrong": "albedo (wrong)"}
+    ),
+    "energy": FieldStyle(
+        "energy conserved###energy", display_names={"none": "no", "published": "as published"}
+    ),
+    "direction": FieldStyle("exit direction###direction", display_names={"lambertian": "Lambertian"}),
 }
-"""Labels of `Skin`, for its surface."""
+"""Labels of the surface fields of `Skin`."""
 
-ALBEDO = {"albedo": Style("colour by###colour from", called={"map": "albedo map", "profile": "profile"})}
-"""Labels of `Skin`, for its profile."""
+ALBEDO = {
+    "albedo": FieldStyle("colour by###colour from", display_names={"map": "albedo map", "profile": "profile"})
+}
+"""Labels of the profile fields of `Skin`."""
 
 TECHNIQUE = {
-    "technique": Style(
-        called={"none": "none (dry skin)", "one-blur": "one Gaussian", "gpu-gems-3": "GPU Gems 3"}
+    "technique": FieldStyle(
+        display_names={"none": "none (dry skin)", "one-blur": "one Gaussian", "gpu-gems-3": "GPU Gems 3"}
     ),
-    "stretch": Style(
-        "stretch correction###stretch", called={"full": "stretch and shear", "axes": "along u and v"}
+    "stretch": FieldStyle(
+        "stretch correction###stretch", display_names={"full": "stretch and shear", "axes": "along u and v"}
     ),
-    "seams": Style("uv seams###seams", called={"stitch": "stitched", "none": "left open"}),
-    "transmission": Style("translucency###transmission", called={"thin": "thin parts"}),
-    "occlusion": Style("ambient occlusion###occlusion", called={"baked": "as posed", "rest": "as at rest"}),
-    "strands": Style("hairs###strands"),
-    "tone": Style("tone curve###tone", called={"none": "none (linear)", "neutral": "Khronos neutral"}),
-    "gamma": Style(called={"right": "gamma-correct", "wrong": "not gamma-correct"}),
+    "seams": FieldStyle("uv seams###seams", display_names={"stitch": "stitched", "none": "left open"}),
+    "transmission": FieldStyle("translucency###transmission", display_names={"thin": "thin parts"}),
+    "occlusion": FieldStyle(
+        "ambient occlusion###occlusion", display_names={"baked": "as posed", "rest": "of the rest pose"}
+    ),
+    "strands": FieldStyle("hairs###strands"),
+    "tone": FieldStyle(
+        "tone curve###tone", display_names={"none": "none (linear)", "neutral": "Khronos neutral"}
+    ),
+    "gamma": FieldStyle(display_names={"right": "gamma-correct", "wrong": "not gamma-correct"}),
 }
 """Labels of `Settings`."""
 
 LAYER = {
-    "thickness_mm": Style("thickness###thickness"),
-    "absorption_per_mm": Style("absorption σ_a###absorption"),
-    "scattering_per_mm": Style("scattering σ_s'###scattering"),
+    "thickness_mm": FieldStyle("thickness###thickness"),
+    "absorption_per_mm": FieldStyle("absorption σ_a###absorption"),
+    "scattering_per_mm": FieldStyle("scattering σ_s'###scattering"),
 }
 """Labels of `TissueLayer`."""
 
 LIGHT = {
-    "irradiance": Style("colour###irradiance"),
-    "softness_mm": Style("shadow softness###softness"),
-    "shadows": Style("casts shadows###shadows"),
-    "angle_degrees": Style("angular size###angle"),
+    "irradiance": FieldStyle("colour###irradiance"),
+    "softness_mm": FieldStyle("shadow softness###softness"),
+    "shadows": FieldStyle("casts shadows###shadows"),
+    "angle_degrees": FieldStyle("angular size###angle"),
 }
 """Labels of the lights."""
 
@@ -322,7 +368,7 @@ LIGHT_KINDS = {
     "directional": "sun (directional)",
     "stripe": "laser stripe",
 }
-"""Kinds of lights."""
+"""Display names of the kinds of lights."""
 
 PROFILES = {
     "gpu-gems-3": "GPU Gems 3",
@@ -338,4 +384,4 @@ PROFILES = {
     "chicken1": "chicken 1",
     "chicken2": "chicken 2",
 }
-"""Names of profiles: first those of skin, then some of other media."""
+"""Display names of profiles: first those of skin, then some of other media."""

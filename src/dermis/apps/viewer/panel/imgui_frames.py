@@ -1,4 +1,4 @@
-"""Dear ImGui on a device: its style, its frames, its input, and recovery from code that fails in a frame."""
+"""Dear ImGui on a wgpu device: style, frames, input, and recovery from errors within a frame."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from dermis.apps.viewer.controls import Event
 from dermis.gpu import Device, TextureView
 
 _FONT_SIZE = 15.0
-_GREYS = (  # without hues, which would affect how the skin beside them is judged
+_GREYS = (  # no hues, because they would affect the perception of the skin beside them
     ("window_bg", 0.08),
     ("frame_bg", 0.18),
     ("frame_bg_hovered", 0.26),
     ("frame_bg_active", 0.32),
-    ("slider_grab", 0.42),  # dark enough for the number over it
+    ("slider_grab", 0.42),  # dark enough to read the number on it
     ("slider_grab_active", 0.55),
     ("check_mark", 0.8),
     ("checkbox_selected_bg", 0.26),
@@ -35,7 +35,7 @@ _GREYS = (  # without hues, which would affect how the skin beside them is judge
 
 
 def set_style() -> None:
-    """A legible font on a dark ground."""
+    """Set a legible font on a dark background."""
     io, style = imgui.get_io(), imgui.get_style()
     font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto" / "Roboto-Regular.ttf"
     if font.is_file():
@@ -44,116 +44,116 @@ def set_style() -> None:
     io.fonts.flags |= int(imgui.ImFontAtlasFlags_.no_baked_lines)  # some backends cannot draw them
     style.window_rounding, style.frame_rounding, style.window_border_size = 0.0, 3.0, 0.0
     for name, grey in _GREYS:
-        if hasattr(imgui.Col_, name):  # some need a newer version
+        if hasattr(imgui.Col_, name):  # some names require a newer version
             style.set_color_(int(getattr(imgui.Col_, name)), imgui.ImVec4(grey, grey, grey, 1.0))
 
 
-Tell = Callable[[Exception], None]
+ReportError = Callable[[Exception], None]
 
 
 class ImguiFrames:
-    """A context of Dear ImGui with the resources that draw it.
+    """Dear ImGui context with the resources that draw it.
 
-    tell : called with what failed; frames go on
+    report_error : function that receives errors; later frames are still drawn
     """
 
-    def __init__(self, tell: Tell) -> None:
-        self._tell = tell
-        self._is_new = self._is_whole = False
+    def __init__(self, report_error: ReportError) -> None:
+        self._report_error = report_error
+        self._is_new = self._has_layout = False
 
     def open(self, device: Device, target: str) -> None:
-        """Create the resources for drawing into textures of a format."""
-        # A context holds its font's texture, which belongs to one device.
+        """Create the resources for drawing into textures of the given format."""
+        # A context holds its font texture, which belongs to one device.
         self._context = imgui.create_context()
         self._plots = implot.create_context()
         self.enter()
         set_style()
         self._is_new = True
         self._device, self._target = device, target
-        self._backend = ImguiWgpuBackend(device.handle, target)
+        self._imgui_backend = ImguiWgpuBackend(device.handle, target)
 
     def enter(self) -> None:
-        """Make it the context that calls of Dear ImGui act on."""
+        """Make this the current context of Dear ImGui."""
         imgui.set_current_context(self._context)
         implot.set_current_context(self._plots)
 
     def lay_out(self, size: tuple[float, float], draw: Callable[[], None]) -> None:
-        """Let Dear ImGui see the events so far, and lay out what `render` draws.
+        """Process the input so far and lay out the next frame for `render`.
 
-        size : of the window, logical
+        size : logical size of the window
         """
         try:
             imgui.get_io().display_size = imgui.ImVec2(*size)
-            for _ in range(2 if self._is_new else 1):  # the first frame of a window only measures it
+            for _ in range(2 if self._is_new else 1):  # the first frame of a context only measures the window
                 self._is_new = False
                 imgui.new_frame()
-                with closed_again(self._tell):
+                with recover_imgui(self._report_error):
                     draw()
                 imgui.render()
-            self._is_whole = True
-        except Exception as error:  # of Dear ImGui itself, which cannot go on from there
-            self._tell(error)
-            self._begin_anew()
+            self._has_layout = True
+        except Exception as error:  # raised by Dear ImGui itself, whose context is then unusable
+            self._report_error(error)
+            self._recreate_context()
 
     def render(self, target: TextureView) -> None:
-        """Draw over what the target shows; nothing where the last layout failed."""
-        if not self._is_whole:
+        """Draw over the target, unless the last layout failed."""
+        if not self._has_layout:
             return
         encoder = self._device.handle.create_command_encoder()
         attachment = {"view": target, "load_op": "load", "store_op": "store"}
         render_pass = encoder.begin_render_pass(label="panel", color_attachments=[attachment])
-        self._backend.render(imgui.get_draw_data(), render_pass)
+        self._imgui_backend.render(imgui.get_draw_data(), render_pass)
         render_pass.end()
         self._device.handle.queue.submit([encoder.finish()])
 
-    def _begin_anew(self) -> None:
-        """Take another context, which forgets which sections are open."""
-        self._is_whole = False
+    def _recreate_context(self) -> None:
+        """Replace the context, which resets the open sections."""
+        self._has_layout = False
         implot.destroy_context(self._plots)
         imgui.destroy_context(self._context)
         self.open(self._device, self._target)
 
 
 @contextmanager
-def closed_again(tell: Tell) -> Iterator[None]:
-    """End what an error inside left open: windows, tables, pushed styles and ids."""
-    before = imgui.internal.ErrorRecoveryState()
-    imgui.internal.error_recovery_store_state(before)
+def recover_imgui(report_error: ReportError) -> Iterator[None]:
+    """Close what an error inside the block left open: windows, tables, pushed styles and ids."""
+    state = imgui.internal.ErrorRecoveryState()
+    imgui.internal.error_recovery_store_state(state)
     try:
         yield
     except Exception as error:
         io = imgui.get_io()
-        io.config_error_recovery_enable_assert = False  # each end that is missing would be an error again
+        io.config_error_recovery_enable_assert = False  # otherwise each missing end would raise an error
         io.config_error_recovery_enable_debug_log = io.config_error_recovery_enable_tooltip = False
-        imgui.internal.error_recovery_try_to_recover_state(before)
+        imgui.internal.error_recovery_try_to_recover_state(state)
         io.config_error_recovery_enable_assert = True
-        tell(error)
+        report_error(error)
 
 
 POINTER = ("pointer_down", "pointer_move", "pointer_up", "double_click", "wheel")
-_WHEEL = 0.01
+_WHEEL_SPEED = 0.01
 
 
 def feed_pointer(event: Event, frame: Callable[[], None]) -> None:
-    """Process an event of `POINTER`.
+    """Pass an event of `POINTER` to Dear ImGui.
 
-    frame : lays out the panel with the events so far
+    frame : function that lays out the panel with the events so far
     """
     kind = event["event_type"]
     imgui.get_io().add_mouse_pos_event(event["x"], event["y"])
     if kind in ("pointer_down", "pointer_up"):
-        # A slider ignores a move in the frame of its release, and a press is where that frame's last move is.
-        frame()  # which may take another context, with other inputs
+        # A slider ignores a move in the frame of its release, and a press uses the last move of its frame.
+        frame()  # may replace the context and its inputs
         imgui.get_io().add_mouse_button_event(max(0, event["button"] - 1), kind == "pointer_down")
         frame()
     elif kind == "wheel":
-        imgui.get_io().add_mouse_wheel_event(-_WHEEL * event["dx"], -_WHEEL * event["dy"])
+        imgui.get_io().add_mouse_wheel_event(-_WHEEL_SPEED * event["dx"], -_WHEEL_SPEED * event["dy"])
 
 
 def feed_key(event: Event, frame: Callable[[], None]) -> None:
-    """Process a key or a letter; it is seen in a frame of its own, as keys between two frames cancel out.
+    """Pass a key or character to Dear ImGui in a frame of its own, as keys between two frames cancel out.
 
-    frame : as above
+    frame : function that lays out the panel with the events so far
     """
     io, kind = imgui.get_io(), event["event_type"]
     if kind == "char":

@@ -1,4 +1,4 @@
-"""The panel on the left of the window, drawn with Dear ImGui, and what is drawn over the picture."""
+"""Panel at the left of the window, drawn with Dear ImGui, and overlays on the picture."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from dermis.apps.viewer.controls import Event, Split
-from dermis.apps.viewer.panel.fields import attempt, button, record_position
-from dermis.apps.viewer.panel.imgui_frames import POINTER, ImguiFrames, closed_again, feed_key, feed_pointer
+from dermis.apps.viewer.controls import Event, SplitView
+from dermis.apps.viewer.panel.fields import button, record_position, run_action
+from dermis.apps.viewer.panel.imgui_frames import POINTER, ImguiFrames, feed_key, feed_pointer, recover_imgui
 from dermis.apps.viewer.panel.sections import SECTIONS
 from dermis.apps.viewer.session import Session
 from dermis.gpu import Device, TextureView
@@ -36,56 +36,56 @@ SHORTCUTS = (
     ("Escape", "close a list or this help, clear the search"),
     ("? or H", "hide or show this help"),
 )
-_TEXT_MARGIN, _NARROWEST_TEXT = 10.0, 80.0
-_GRIP = 7.0  # radius of the divider's handle
-_WIDEST_HELP, _FIRST_COLUMN = 460.0, 0.4
+_TEXT_MARGIN, _MIN_TEXT_WIDTH = 10.0, 80.0
+_HANDLE_RADIUS = 7.0  # of the divider
+_HELP_WIDTH, _FIRST_COLUMN = 460.0, 0.4
 
 
-def draw_divider(split: Split, left: float, size: tuple[float, float]) -> None:
-    """Draw the line between before and after, with a handle in its middle.
+def draw_divider(split: SplitView, left: float, size: tuple[float, float]) -> None:
+    """Draw the divider between before and after, with a handle in its centre.
 
-    left : where the picture begins
-    size : of the window, logical
+    left : left edge of the picture
+    size : logical size of the window
     """
-    if split.before is None:
+    if split.frozen_state is None:
         return
-    over, x = imgui.get_background_draw_list(), left + split.share * (size[0] - left)
+    draw_list, x = imgui.get_background_draw_list(), left + split.divider_position * (size[0] - left)
     light, dark = imgui.IM_COL32(230, 230, 230, 255), imgui.IM_COL32(0, 0, 0, 255)
-    over.add_line(imgui.ImVec2(x, 0.0), imgui.ImVec2(x, size[1]), light, 1.0)
+    draw_list.add_line(imgui.ImVec2(x, 0.0), imgui.ImVec2(x, size[1]), light, 1.0)
     middle = imgui.ImVec2(x, 0.5 * size[1])
-    over.add_circle_filled(middle, _GRIP, light)
-    over.add_circle(middle, _GRIP, dark)
+    draw_list.add_circle_filled(middle, _HANDLE_RADIUS, light)
+    draw_list.add_circle(middle, _HANDLE_RADIUS, dark)
     for text, start in (
         ("before", x - imgui.calc_text_size("before").x - _TEXT_MARGIN),
         ("after", x + _TEXT_MARGIN),
     ):
-        over.add_text(imgui.ImVec2(start + 1.0, _TEXT_MARGIN + 1.0), dark, text)
-        over.add_text(imgui.ImVec2(start, _TEXT_MARGIN), light, text)
+        draw_list.add_text(imgui.ImVec2(start + 1.0, _TEXT_MARGIN + 1.0), dark, text)
+        draw_list.add_text(imgui.ImVec2(start, _TEXT_MARGIN), light, text)
 
 
 def draw_messages(lines: Sequence[str], left: float, size: tuple[float, float]) -> None:
-    """Draw lines of text on a dark ground at the lower edge of the picture, which begins at `left`."""
+    """Draw lines of text on a dark background at the lower edge of the picture, which begins at `left`."""
     if not lines:
         return
-    over = imgui.get_foreground_draw_list()
+    draw_list = imgui.get_foreground_draw_list()
     left += _TEXT_MARGIN
-    wrapped = max(_NARROWEST_TEXT, size[0] - left - _TEXT_MARGIN)
+    wrap_width = max(_MIN_TEXT_WIDTH, size[0] - left - _TEXT_MARGIN)
     text = "\n".join(lines)
-    box = imgui.calc_text_size(text, False, wrapped)
+    box = imgui.calc_text_size(text, False, wrap_width)
     top = size[1] - box.y - _TEXT_MARGIN
-    ground, white = imgui.IM_COL32(0, 0, 0, 150), imgui.IM_COL32(235, 235, 235, 255)
+    background, white = imgui.IM_COL32(0, 0, 0, 150), imgui.IM_COL32(235, 235, 235, 255)
     corners = imgui.ImVec2(left - 6, top - 4), imgui.ImVec2(left + box.x + 6, size[1] - 6)
-    over.add_rect_filled(*corners, ground, 4.0)
+    draw_list.add_rect_filled(*corners, background, 4.0)
     font, start = imgui.get_font(), imgui.ImVec2(left, top)
-    over.add_text(font, imgui.get_font_size(), start, white, text, wrapped)
+    draw_list.add_text(font, imgui.get_font_size(), start, white, text, wrap_width)
 
 
 def draw_help(left: float, size: tuple[float, float]) -> None:
-    """Draw the shortcuts in the middle of the picture, which begins at `left`; pointers pass through.
+    """Draw the list of shortcuts in the centre of the picture, which begins at `left`; ignore pointers.
 
-    size : of the window, logical
+    size : logical size of the window
     """
-    width = min(_WIDEST_HELP, size[0] - left - 2.0 * _TEXT_MARGIN)
+    width = min(_HELP_WIDTH, size[0] - left - 2.0 * _TEXT_MARGIN)
     imgui.set_next_window_pos(imgui.ImVec2(0.5 * (left + size[0]), 0.5 * size[1]), 0, imgui.ImVec2(0.5, 0.5))
     imgui.set_next_window_size(imgui.ImVec2(width, 0.0))
     imgui.set_next_window_bg_alpha(0.88)
@@ -102,74 +102,77 @@ def draw_help(left: float, size: tuple[float, float]) -> None:
     imgui.end()
 
 
-_WIDTH, _CONTROLS = 330.0, 0.5  # of the panel, and their share of it
-_MOST_OF_WINDOW, _LEAST_SCALE = 0.5, 0.8  # of text in a narrow panel
-_NARROW, _PHONE = 400.0, 480.0  # less wide windows have a drawer; the latter is for phones held upright
-_UPRIGHT = 1.4  # height over width, at least
-_DRAWER = 0.86  # of the window's width
-_FINGER = 8.0  # room around text for a finger
-_MARGIN, _FAINT = 8.0, 0.6  # of the button that brings the panel back
+_WIDTH, _CONTROL_FRACTION = 330.0, 0.5  # logical width of the panel, and fraction of it for the controls
+_MAX_WIDTH_FRACTION = 0.5  # of the window
+_MIN_TEXT_SCALE = 0.8  # in a narrow panel
+_NARROW_WINDOW, _PHONE_WINDOW = 400.0, 480.0  # width below which windows, and upright phones, have a drawer
+_PORTRAIT_ASPECT = 1.4  # least height over width of an upright phone
+_DRAWER_FRACTION = 0.86  # of the window's width
+_TOUCH_PADDING = 8.0  # vertical padding of controls for fingers
+_BUTTON_MARGIN, _BUTTON_ALPHA = 8.0, 0.6  # of the button that opens the panel
 
 
 class Panel:
-    """Draws the sections, and decides which events are for the panel.
+    """Panel with its sections, and the decision whether an event is for the panel or the picture.
 
-    visible : whether it is there in a window of some width
-    opened : whether it is there in a narrow window, as a drawer over the picture
+    is_visible : whether the panel is shown in a wide window
+    is_drawer_open : whether the panel is shown in a narrow window, as a drawer over the picture
     """
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self.visible, self.opened, self.shows_help = True, False, False
+        self.is_visible, self.is_drawer_open, self.shows_help = True, False, False
         self._size = (0.0, 0.0)
         self._has_popup = self._scrolls = False
         self._button_end = (0.0, 0.0)
-        self._frames = ImguiFrames(partial(session.tell_fault, "The panel cannot be drawn"))
-        self.label_width = 0.0  # right of the controls, logical
+        self._frames = ImguiFrames(partial(session.report_error, "The panel cannot be drawn"))
+        self.label_width = 0.0  # space right of the controls [logical pixel]
 
     def open(self, device: Device, target: str) -> None:
-        """Create the resources for drawing into textures of a format."""
+        """Create the resources for drawing into textures of the given format."""
         self._frames.open(device, target)
 
     def width(self, size: tuple[float, float]) -> float:
-        """Return the width that the panel takes from the picture in a window of that size, logical."""
-        return 0.0 if is_drawer(size) else self._reach(size)
+        """Return the logical width that the panel takes from the picture in a window of the given size."""
+        return 0.0 if is_drawer(size) else self._covered_width(size)
 
-    def _reach(self, size: tuple[float, float]) -> float:
-        """Return the width that the panel covers, logical; 0 when it is hidden."""
-        share, there = (_DRAWER, self.opened) if is_drawer(size) else (_MOST_OF_WINDOW, self.visible)
-        return round(min(_WIDTH, share * size[0])) if there else 0.0
+    def _covered_width(self, size: tuple[float, float]) -> float:
+        """Return the logical width that the panel covers; 0 if it is hidden."""
+        fraction, is_shown = _MAX_WIDTH_FRACTION, self.is_visible
+        if is_drawer(size):
+            fraction, is_shown = _DRAWER_FRACTION, self.is_drawer_open
+        return round(min(_WIDTH, fraction * size[0])) if is_shown else 0.0
 
     def toggle(self) -> None:
-        """Hide or show it."""
+        """Show or hide the panel."""
         if is_drawer(self._size):
-            self.opened = not self.opened
+            self.is_drawer_open = not self.is_drawer_open
         else:
-            self.visible = not self.visible
+            self.is_visible = not self.is_visible
 
-    def feed(self, event: Event, size: tuple[float, float]) -> bool:
-        """Process an event; returns whether it was for the panel, not for the picture."""
+    def handle_event(self, event: Event, size: tuple[float, float]) -> bool:
+        """Process an event; return whether it was for the panel instead of the picture."""
         self._frames.enter()
         self._size = size
         io, kind = imgui.get_io(), event["event_type"]
         if kind == "key_down" and not io.want_text_input and self._shortcut(event):
             return True
-        if kind == "pointer_down" and event["x"] >= self._reach(size):
+        if kind == "pointer_down" and event["x"] >= self._covered_width(size):
             self.shows_help = False
         if kind in POINTER:
-            covers = self._covers(event["x"], event["y"], size)  # before a press closes a list
+            is_on_panel = self._covers(event["x"], event["y"], size)  # evaluated before a press closes a list
             feed_pointer(event, lambda: self._frame(size))
-            return covers
+            return is_on_panel
         if kind == "pointer_leave":
             io.add_mouse_pos_event(-1e6, -1e6)
             return False
         feed_key(event, lambda: self._frame(size))
-        return bool(imgui.get_io().want_text_input)  # of a context that the frame may have made
+        return bool(imgui.get_io().want_text_input)  # of the current context, which the frame may replace
 
     def draw(self, target: TextureView, size: tuple[float, float], pixel_ratio: float) -> None:
-        """Draw over what the target shows.
+        """Draw the panel over the target.
 
-        size : of the window, logical
+        size : logical size of the window
         """
         self._frames.enter()
         imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
@@ -181,12 +184,12 @@ class Panel:
         self._frames.lay_out(size, lambda: self._draw_windows(size))
 
     def _shortcut(self, event: Event) -> bool:
-        """Return whether a key was a shortcut of the panel."""
+        """Process a key; return whether it is a shortcut of the panel."""
         key, session = str(event["key"]), self._session
         if {"Control", "Meta"} & set(event.get("modifiers", ())):
             if key.lower() != "s":
                 return False
-            attempt(session, lambda: session.save(Path(session.scene_file)))
+            run_action(session, lambda: session.save(Path(session.scene_file)))
         elif key == "Tab":
             self.toggle()
         elif key == "Escape":
@@ -200,7 +203,7 @@ class Panel:
         return True
 
     def _escape(self) -> bool:
-        """Close what is open, the topmost first; returns whether there was something."""
+        """Close the topmost popup, help or search; return whether there was one."""
         if self._has_popup:
             imgui.internal.close_popup_to_level(0, False)
             self._has_popup = False
@@ -214,16 +217,16 @@ class Panel:
 
     def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
         """Return whether a pointer is over the panel; Dear ImGui would know it only a frame later."""
-        reach = self._reach(size)
-        on_button = not reach and x < self._button_end[0] and y < self._button_end[1]
-        return x < reach or on_button or self._has_popup or bool(imgui.is_any_item_active())
+        width = self._covered_width(size)
+        on_button = not width and x < self._button_end[0] and y < self._button_end[1]
+        return x < width or on_button or self._has_popup or bool(imgui.is_any_item_active())
 
     def _draw_windows(self, size: tuple[float, float]) -> None:
-        """The panel, or the button that brings it back, and the overlay."""
-        room = _FINGER if is_drawer(size) else imgui.get_style().frame_padding.y
-        padding = imgui.ImVec2(imgui.get_style().frame_padding.x, room)
+        """Draw the panel, or the button that opens it, and the overlays."""
+        vertical_padding = _TOUCH_PADDING if is_drawer(size) else imgui.get_style().frame_padding.y
+        padding = imgui.ImVec2(imgui.get_style().frame_padding.x, vertical_padding)
         imgui.push_style_var(int(imgui.StyleVar_.frame_padding), padding)
-        if self._reach(size):
+        if self._covered_width(size):
             self._draw_panel(size)
         else:
             self._draw_button()
@@ -232,41 +235,41 @@ class Panel:
         if self.shows_help:
             draw_help(left, size)
         draw_divider(session.split, left, size)
-        lines = session.message, session.heads.note, "" if self._reach(size) > left else session.status
-        draw_messages([line for line in lines if line], left, size)
+        status = "" if self._covered_width(size) > left else session.status
+        draw_messages([line for line in (session.message, session.heads.note, status) if line], left, size)
 
     def _draw_button(self) -> None:
-        """A button in the corner of the picture."""
+        """Draw the button that opens the panel in the corner of the picture."""
         self._has_popup = False
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
         flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
-        imgui.push_style_var(int(imgui.StyleVar_.alpha), _FAINT)
+        imgui.push_style_var(int(imgui.StyleVar_.alpha), _BUTTON_ALPHA)
         imgui.begin("corner", None, int(flags | imgui.WindowFlags_.always_auto_resize))
         if button(self._session, "panel"):
             self.toggle()
         end = imgui.get_item_rect_max()
-        self._button_end = float(end.x) + _MARGIN, float(end.y) + _MARGIN
+        self._button_end = float(end.x) + _BUTTON_MARGIN, float(end.y) + _BUTTON_MARGIN
         imgui.end()
         imgui.pop_style_var()
 
     def _draw_panel(self, size: tuple[float, float]) -> None:
-        session, width = self._session, self._reach(size)
-        imgui.get_style().font_scale_main = max(_LEAST_SCALE, min(1.0, width / _WIDTH))
+        session, width = self._session, self._covered_width(size)
+        imgui.get_style().font_scale_main = max(_MIN_TEXT_SCALE, min(1.0, width / _WIDTH))
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
         imgui.set_next_window_size(imgui.ImVec2(width, size[1]))
         fixed = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
         imgui.begin("dermis", None, int(fixed | imgui.WindowFlags_.no_title_bar))
         self._draw_toolbar()
-        imgui.push_item_width(_CONTROLS * width)
+        imgui.push_item_width(_CONTROL_FRACTION * width)
         gap = imgui.get_style().item_inner_spacing.x
-        self.label_width = imgui.get_content_region_avail().x - _CONTROLS * width - gap
-        for section in (one for one in SECTIONS if one.applies(session)):
+        self.label_width = imgui.get_content_region_avail().x - _CONTROL_FRACTION * width - gap
+        for section in filter(lambda section: section.applies(session), SECTIONS):
             flags = int(imgui.TreeNodeFlags_.default_open) if section.is_open else 0
             is_open = imgui.collapsing_header(section.title, flags)
             record_position(session, section.title)
             if is_open:
-                imgui.push_id(section.title)  # sections may share labels
-                with closed_again(partial(session.tell_fault, f"{section.title} cannot be drawn")):
+                imgui.push_id(section.title)  # labels may occur in several sections
+                with recover_imgui(partial(session.report_error, f"{section.title} cannot be drawn")):
                     section.draw(session)
                 imgui.pop_id()
         imgui.pop_item_width()
@@ -275,11 +278,12 @@ class Panel:
         imgui.end()
 
     def _draw_toolbar(self) -> None:
-        h = self._session.history
-        for label, possible, step in (("undo", h.can_undo, h.undo), ("redo", h.can_redo, h.redo)):
-            imgui.begin_disabled(not possible)
+        history = self._session.history
+        undo, redo = ("undo", history.can_undo, history.undo), ("redo", history.can_redo, history.redo)
+        for label, is_possible, action in (undo, redo):
+            imgui.begin_disabled(not is_possible)
             if button(self._session, label):
-                step()
+                action()
             imgui.end_disabled()
             imgui.same_line()
         self.shows_help ^= button(self._session, "help")
@@ -288,7 +292,7 @@ class Panel:
             self.toggle()
 
     def _scroll_by_touch(self) -> None:
-        """Scroll with a drag that began beside all controls: fingers have no wheel."""
+        """Scroll with a drag that began beside all controls, because fingers have no wheel."""
         if imgui.is_mouse_clicked(0):
             self._scrolls = imgui.is_window_hovered() and not imgui.is_any_item_hovered()
         if self._scrolls and imgui.is_mouse_down(0):
@@ -296,6 +300,6 @@ class Panel:
 
 
 def is_drawer(size: tuple[float, float]) -> bool:
-    """Return whether a window of that size is too narrow for the panel beside the picture, as a phone is."""
+    """Return whether a window is so narrow that the panel is a drawer over the picture."""
     width, height = size
-    return width < (_PHONE if height > _UPRIGHT * width else _NARROW)
+    return width < (_PHONE_WINDOW if height > _PORTRAIT_ASPECT * width else _NARROW_WINDOW)

@@ -1,5 +1,5 @@
-"""The atlas as textures: layout, stretch, stitched gutters, and blending of two layouts."""
+"""Atlas on the device: layout, stretch maps, stitched gutters, and blending of two layouts."""
 
-from dermis.frame.features.atlas.textures import atlas_numbers as shader_numbers
+from dermis.frame.features.atlas.textures import atlas_constants as shader_constants
 
-__all__ = ["shader_numbers"]
+__all__ = ["shader_constants"]

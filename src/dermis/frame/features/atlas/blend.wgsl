@@ -1,4 +1,4 @@
-// Fades the light near the seams of one layout to that of another, whose seams are elsewhere.
+// Near the seams of one layout, fades its light to that of a second layout with other seams.
 //#include "shape/geometry.wgsl"
 //#include "bilinear.wgsl"
 //#include "edges.wgsl"
@@ -9,7 +9,7 @@ override FADE_MM: f32; // width of the fade
 @group(0) @binding(31) var edge_map: texture_2d<f32>; // distance to the nearest seam [texel]
 @group(0) @binding(35) var stretch_map: texture_2d<f32>;
 @group(0) @binding(32) var first: texture_2d<f32>;
-@group(0) @binding(33) var second: texture_2d<f32>; // in the layout of the triangle table
+@group(0) @binding(33) var second: texture_2d<f32>; // light in the layout whose coordinates the triangle table has
 @group(0) @binding(34) var blended: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
@@ -25,6 +25,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let w = unpack2x16unorm(texel.y);
     let other = load_bilinear(second, place_of_point(texel.x - 1u, vec3f(1.0 - w.x - w.y, w)));
-    let kept = smoothstep(0.0, FADE_MM, edge_mm(textureLoad(edge_map, id.xy, 0).x, textureLoad(stretch_map, id.xy, 0).xy));
-    textureStore(blended, id.xy, vec4f(mix(other.rgb, own.rgb, kept), own.a)); // where profiles are mixed, a packs shares
+    let own_weight = smoothstep(0.0, FADE_MM, edge_mm(textureLoad(edge_map, id.xy, 0).x, textureLoad(stretch_map, id.xy, 0).xy));
+    textureStore(blended, id.xy, vec4f(mix(other.rgb, own.rgb, own_weight), own.a)); // a: packed weights where profiles are mixed
 }

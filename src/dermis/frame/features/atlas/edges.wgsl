@@ -1,6 +1,6 @@
 // Distance to the nearest seam.
 
-// texels : to the edge of the chart
+// texels : distance to the edge of the chart [texels]
 fn edge_mm(texels: f32, per_mm: vec2f) -> f32 {
     return texels / max(sqrt(per_mm.x * per_mm.y), 1e-3);
 }

@@ -1,10 +1,10 @@
-// The list of texels beyond the charts' edges.
+// List of gutter texels.
 
-struct Beyond {
-    source: vec2f, // where the light is [texel], whole numbers at texel centres
-    texel: vec2u, // where it is shown
+struct GutterTexel {
+    source: vec2f, // position whose light is copied [texels]; integers are texel centres
+    texel: vec2u,
 }
 
-@group(0) @binding(0) var<storage, read> gutter: array<Beyond>;
+@group(0) @binding(0) var<storage, read> gutter: array<GutterTexel>;
 
 const ROW: u32 = 1024u; // entries in a row of invocations

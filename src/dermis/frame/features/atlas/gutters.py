@@ -1,4 +1,4 @@
-"""Gutters of a stitched atlas that follow another person: walks over the surface from the edges of charts."""
+"""Gutters of a stitched atlas, traced again over the surface of each person."""
 
 from __future__ import annotations
 
@@ -9,97 +9,100 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.stitched.surface import sides_across
-from dermis.frame.features.atlas.textures import ENTRY_BYTES, AtlasTextures
-from dermis.frame.features.shape.mesh import HeadResources
-from dermis.frame.programs import each, program
+from dermis.atlas.stitched.surface import side_neighbours
+from dermis.frame.features.atlas.textures import GUTTER_ENTRY_BYTES, AtlasTextures
+from dermis.frame.features.shape.mesh import HeadGeometry
+from dermis.frame.features.shape.shape import run_bounds
+from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Bindings, Buffer, Device, Recorder
 from dermis.mesh.mesh import Mesh
 
 Words = NDArray[np.uint32]
-_NONE = 0xFFFFFFFF  # across a side
+_NO_NEIGHBOUR = 0xFFFFFFFF  # word of a side without skin across it
 
 
 @dataclass(frozen=True, eq=False)
-class Walks:
-    """What walks begin with, as buffers.
+class GutterTracing:
+    """Constant inputs of the passes that trace gutters.
 
-    walks, sides : as gutter_walk.wgsl reads them
-    halvings : of the coarser atlases that have gutters, as gutter_halve.wgsl reads them
+    starts : buffer of the start of each path, for gutter_trace.wgsl
+    sides : buffer of the triangle across each side of the mesh, for gutter_trace.wgsl
+    halvings : texel lists of each coarser atlas with gutters, for gutter_halve.wgsl
     """
 
-    walks: Buffer
+    starts: Buffer
     sides: Buffer
     halvings: tuple[Bindings, ...]
 
 
-def make_walks(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> Walks:
-    """What the passes read, of an atlas that has gutters."""
-    walks, sides = (device.buffer(words, "STORAGE") for words in (_walks(atlas), _side_words(mesh)))
-    sheets = (textures, *textures.coarser)
-    return Walks(walks, sides, tuple(_halving(device, *pair) for pair in pairwise(sheets) if pair[1].gutter))
+def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> GutterTracing:
+    """Upload the constant inputs of tracing, for an atlas that has gutters."""
+    starts, sides = (device.buffer(words, "STORAGE") for words in (_start_words(atlas), _side_words(mesh)))
+    pairs = pairwise((textures, *textures.coarser))
+    halvings = tuple(_halving(device, finer, coarser) for finer, coarser in pairs if coarser.gutter)
+    return GutterTracing(starts, sides, halvings)
 
 
-def with_lists(device: Device, textures: AtlasTextures) -> AtlasTextures:
-    """The atlas with lists of gutters of its own, none of whose sources is known yet."""
+def with_own_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
+    """Return the atlas with empty gutter lists of its own, for `draw` to fill."""
 
-    def listed(sheet: AtlasTextures) -> AtlasTextures:
-        words = np.zeros((len(sheet.gutter_texels), ENTRY_BYTES // 4), np.uint32)
-        return replace(sheet, gutter=device.buffer(words, "STORAGE")) if len(words) else sheet
+    def with_list(level: AtlasTextures) -> AtlasTextures:
+        words = np.zeros((len(level.gutter_texels), GUTTER_ENTRY_BYTES // 4), np.uint32)
+        return replace(level, gutter=device.buffer(words, "STORAGE")) if len(words) else level
 
-    return replace(listed(textures), coarser=tuple(map(listed, textures.coarser)))
+    return replace(with_list(textures), coarser=tuple(map(with_list, textures.coarser)))
 
 
-def _walks(atlas: Atlas) -> Words:
-    """(a, 5) texel, triangle and weights where the walk begins, and the source if it leads nowhere."""
+def _start_words(atlas: Atlas) -> Words:
+    """Return (a, 5) words: texel, triangle and weights of a path's start, and the source without a path."""
     root = np.full((atlas.size, atlas.size), -1, np.int64)
-    root[atlas.beyond[:, 1], atlas.beyond[:, 0]] = np.arange(len(atlas.beyond))
+    root[atlas.outside[:, 1], atlas.outside[:, 0]] = np.arange(len(atlas.outside))
     x, y = atlas.gutter.T.astype(np.uint32)
-    of = root[y, x]
-    second, third = atlas.root_weight[of].T.astype(np.uint32)
-    begun = np.stack([x | (y << 16), atlas.root[of].astype(np.uint32), second | (third << 16)], axis=1)
-    return np.concatenate([begun, np.ascontiguousarray(atlas.source).view(np.uint32)], axis=1)
+    index = root[y, x]
+    second, third = atlas.border_weights[index].T.astype(np.uint32)
+    start = np.stack([x | (y << 16), atlas.border_triangle[index].astype(np.uint32), second | (third << 16)], axis=1)
+    return np.concatenate([start, np.ascontiguousarray(atlas.source).view(np.uint32)], axis=1)
 
 
 def _side_words(mesh: Mesh) -> Words:
-    """(f, 3) what lies across each side, as gutter_walk.wgsl reads it."""
-    beside, entry, flipped = sides_across(mesh)
+    """Return the (f, 3) words of the triangle across each side, for gutter_trace.wgsl."""
+    neighbour, neighbour_side, flipped = side_neighbours(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
-    word = (beside.astype(np.uint32) << 3) | (entry.astype(np.uint32) << 1) | flipped
-    return np.where((beside >= 0) & skin[beside], word, _NONE).astype(np.uint32)
+    word = (neighbour.astype(np.uint32) << 3) | (neighbour_side.astype(np.uint32) << 1) | flipped
+    return np.where((neighbour >= 0) & skin[neighbour], word, _NO_NEIGHBOUR).astype(np.uint32)
 
 
 def _halving(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
-    """Which texels of the finer list each texel of the coarser one stands for."""
-    wide = int(finer.gutter_texels.max()) + 1
+    """Return the texels of the finer gutter that each texel of the coarser gutter averages."""
+    width = int(finer.gutter_texels.max()) + 1
 
-    def square(texels: NDArray[np.integer]) -> NDArray[np.int64]:
-        return texels[:, 1].astype(np.int64) * wide + texels[:, 0]
+    def texel_index(texels: NDArray[np.integer]) -> NDArray[np.int64]:
+        return texels[:, 1].astype(np.int64) * width + texels[:, 0]
 
-    fine, coarse = square(finer.gutter_texels // 2), square(coarser.gutter_texels)
+    fine, coarse = texel_index(finer.gutter_texels // 2), texel_index(coarser.gutter_texels)
     order = np.argsort(fine, kind="stable")
-    ends = [np.searchsorted(fine[order], coarse, side) for side in ("left", "right")]
     x, y = coarser.gutter_texels.T.astype(np.uint32)
-    listed = np.stack([x | (y << 16), *ends], axis=1).astype(np.uint32)
+    squares = np.column_stack([x | (y << 16), run_bounds(fine[order], coarse)])
     return {
-        "squares": device.buffer(listed, "STORAGE"),
+        "squares": device.buffer(squares, "STORAGE"),
         "members": device.buffer(order.astype(np.uint32), "STORAGE"),
     }
 
 
-def draw(graph: Recorder, atlas: AtlasTextures, walks: Walks, head: HeadResources) -> None:
-    """Find where each texel beyond a chart's edge has its light.
+def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, head: HeadGeometry) -> None:
+    """Declare the passes that compute the source of each gutter texel.
 
-    atlas : with lists of its own, see `frame.gutters.with_lists`
-    head : at rest
+    atlas : result of `with_own_gutters`
+    head : surface of the person at rest
     """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)
     assert atlas.gutter is not None
-    begun: Bindings = {**head.resources, "walks": walks.walks, "sides": walks.sides, "gutter": atlas.gutter}
-    walk, halve = program(device, "atlas/gutter_walk.wgsl", size), program(device, "atlas/gutter_halve.wgsl")
-    graph.dispatch("gutters", walk, begun, each(len(atlas.gutter_texels)))
-    listed = [sheet for sheet in (atlas, *atlas.coarser) if sheet.gutter]
-    for (finer, coarser), halving in zip(pairwise(listed), walks.halvings, strict=True):
+    paths = {"starts": tracing.starts, "sides": tracing.sides, "gutter": atlas.gutter}
+    trace = program(device, "atlas/gutter_trace.wgsl", size)
+    halve = program(device, "atlas/gutter_halve.wgsl")
+    graph.dispatch("gutters", trace, {**head.resources, **paths}, workgroup_grid(len(atlas.gutter_texels)))
+    levels = [level for level in (atlas, *atlas.coarser) if level.gutter]
+    for (finer, coarser), halving in zip(pairwise(levels), tracing.halvings, strict=True):
         assert finer.gutter is not None and coarser.gutter is not None
         bound = {**halving, "finer": finer.gutter, "coarser": coarser.gutter}
-        graph.dispatch("gutters", halve, bound, each(len(coarser.gutter_texels)))
+        graph.dispatch("gutters", halve, bound, workgroup_grid(len(coarser.gutter_texels)))

@@ -1,41 +1,41 @@
-"""An atlas of the head with the resources that light its texels."""
+"""Atlas of the head with the resources that light its texels."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dermis.frame.features.atlas.gutters import Walks
+from dermis.frame.features.atlas.gutters import GutterTracing
 from dermis.frame.features.atlas.textures import AtlasTextures
-from dermis.frame.features.shape.mesh import HeadResources
+from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.gpu import MutableBindings, Texture
 
 
 @dataclass(frozen=True, eq=False)
-class Walked:
-    """Inputs of the gutters that are recomputed for each person.
+class GutterUpdate:
+    """Inputs of the passes that recompute gutters for a person.
 
-    walks : what they begin with
-    head : the person's surface at rest
+    tracing : constant inputs of the passes
+    head : surface of the person at rest
     """
 
-    walks: Walks
-    head: HeadResources
+    tracing: GutterTracing
+    head: HeadGeometry
 
 
 @dataclass(frozen=True, eq=False)
 class LitAtlas:
-    """An atlas of the head with the resources that light its texels.
+    """Atlas of the head with the resources that light its texels.
 
-    head : its triangles, as they lie in the atlas
-    lit : resources by the shaders' names: geometry, maps, lights, shadows, surroundings
-    surfaces : texture of the surface at each texel, as surface_texels.wgsl packs it
-    scattered : texture of the light that leaves below the surface
-    walked : what its gutters follow the person by, None where they are the head's own or there are none
+    head : triangles with their coordinates in the atlas
+    bindings : geometry, maps, lights, shadows and environment by their names in the shaders
+    surfaces : texture of the surface at each texel, packed by surface_texels.wgsl
+    scattered : texture of the exitance of light that scattered below the surface
+    gutter_update : inputs that recompute the gutters for a person, None where they are constant
     """
 
     atlas: AtlasTextures
-    head: HeadResources
-    lit: MutableBindings
+    head: HeadGeometry
+    bindings: MutableBindings
     surfaces: Texture
     scattered: Texture
-    walked: Walked | None = None
+    gutter_update: GutterUpdate | None = None

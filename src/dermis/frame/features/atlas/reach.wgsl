@@ -1,4 +1,4 @@
-// Texels on the same chart without a gap: left, right, up, down; the first number's top bit marks texels of gutters.
+// Numbers of connected texels of the same chart to the left, right, up and down; the top bit of the first marks gutters.
 
 //#fill const GUTTER_BIT: u32 = {gutter_bit}u;
 

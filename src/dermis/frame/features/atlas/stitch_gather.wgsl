@@ -1,4 +1,4 @@
-// Gathers the light of texels beyond a chart's edge into a list, from where the surface continues.
+// Gathers the light of gutter texels from their sources into a list.
 //#include "gutter.wgsl"
 //#include "source.wgsl"
 

@@ -1,4 +1,4 @@
-// Writes the gathered light to the texels beyond a chart's edge.
+// Writes the gathered light to the gutter texels.
 //#include "gutter.wgsl"
 //#include "store.wgsl"
 

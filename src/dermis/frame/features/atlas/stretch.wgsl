@@ -1,9 +1,9 @@
-// How the map lies on the surface at each texel that shows a triangle.
-//#include "stretch_of.wgsl"
+// Stretch at each texel that a triangle covers.
+//#include "texel_stretch.wgsl"
 //#include "edges.wgsl"
 
 @group(0) @binding(31) var atlas: texture_2d<u32>; // triangle + 1, two barycentric weights packed
-@group(0) @binding(32) var edge_map: texture_2d<f32>; // as edges.wgsl reads it
+@group(0) @binding(32) var edge_map: texture_2d<f32>; // distance to the nearest seam [texels]
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -15,10 +15,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let w = unpack2x16unorm(texel.y);
-    var stretch = stretch_of(texel.x - 1u, vec3f(1.0 - w.x - w.y, w));
+    var stretch = stretch_at(texel.x - 1u, vec3f(1.0 - w.x - w.y, w));
     if (FEATHER_MM > 0.0) {
         let away = edge_mm(textureLoad(edge_map, id.xy, 0).x, stretch.xy);
-        stretch = vec3f(stretch.xy * clamp(away / FEATHER_MM, LEAST_SHARE, 1.0), stretch.z);
+        stretch = vec3f(stretch.xy * clamp(away / FEATHER_MM, MIN_FRACTION, 1.0), stretch.z);
     }
-    put_stretch(id.xy, stretch);
+    store_stretch(id.xy, stretch);
 }

@@ -1,9 +1,9 @@
-// How the map lies on the surface at half its resolution: the mean of four texels, of those not in gutters if there are any.
+// Stretch at half the resolution: mean of four texels, or of those among them that are in no gutter.
 //#include "halves.wgsl"
 //#include "reach.wgsl"
 
 @group(0) @binding(0) var finer: texture_2d<f32>;
-@group(0) @binding(1) var reach_map: texture_2d<u32>; // of the finer ones
+@group(0) @binding(1) var reach_map: texture_2d<u32>; // of the finer atlas
 @group(0) @binding(2) var stretch_map: texture_storage_2d<rgba16float, write>;
 
 @compute @workgroup_size(16, 16)
@@ -11,7 +11,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= textureDimensions(stretch_map))) {
         return;
     }
-    var own = vec4f(0.0); // sums, and how many there are
+    var own = vec4f(0.0); // sum and count
     var all = vec4f(0.0);
     for (var k = 0u; k < 4u; k++) {
         let at = 2u * id.xy + vec2u(k & 1u, k >> 1u);

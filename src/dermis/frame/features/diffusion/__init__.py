@@ -1,4 +1,4 @@
-"""Blurs over the atlas: Gaussian levels, their weighted sum, and profiles that a map mixes."""
+"""Diffusion of light over the atlas: a pyramid of Gaussian blurs, its weighted sum and mixed profiles."""
 
 from dermis.frame.features.diffusion.resources import Resources, make
 

@@ -1,4 +1,4 @@
-"""The hierarchy of Gaussian blurs: each level from the one before, first along u, then along v."""
+"""Passes that fill the blur pyramid: each level is the previous one blurred along u, then along v."""
 
 from __future__ import annotations
 
@@ -11,85 +11,90 @@ from numpy.typing import NDArray
 from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion.kernels import (
-    NARROW,
+    MAX_SUMMED_DEVIATION,
+    MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT,
     SUMMED_TRUNCATION,
     TRUNCATION,
-    WIDEST,
     kernel_table,
 )
-from dermis.frame.features.diffusion.pyramid import Blur, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.programs import TILE, program
 from dermis.gpu import ComputeProgram, Device, MutableBindings, Recorder, Texture, TextureOrView
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 
 EDGES = ("repeated", "cleared", "skipped")
 # Variance that halving the resolution adds: averaging four texels, and interpolating the means [texel^2].
-_AVERAGED, _READ = 1 / 16, 3 / 16
+_AVERAGING_VARIANCE, _INTERPOLATION_VARIANCE = 1 / 16, 3 / 16
 
 
-def draw(graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
-    """Fill layer k with the light of layer 0 spread by blur.variance_mm2[k - 1]."""
-    variance_mm2, sheets = blur.variance_mm2, atlas.sheets(blur.edge)
+def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
+    """Fill level k with level 0 blurred by a Gaussian of variance blur.variance_mm2[k - 1]."""
+    variance_mm2, sheets = blur.variance_mm2, atlas.mips_for(blur.edge)
     source: TextureOrView = levels.layer(0)
-    first = np.sqrt(variance_mm2[0]) * atlas.usual_per_mm  # [texel]
-    alone = len(variance_mm2) == 1 or first > NARROW
-    for k, added in enumerate(_added(variance_mm2, blur.halvings), start=1):
-        finer, here = blur.halvings[k - 1 : k + 1]
-        draw_gutters(graph, "diffuse", sheets[finer], source, levels.texel)
-        if here > finer:
-            source = _halved(graph, levels, source, k - 1, here)
-        far = k > 1 and k - 1 in blur.steps and k not in blur.steps  # most of its width comes at once
-        cut = TRUNCATION if far or (alone and k == 1) else SUMMED_TRUNCATION
+    first_deviation = np.sqrt(variance_mm2[0]) * atlas.usual_per_mm  # [texel]
+    full_first = len(variance_mm2) == 1 or first_deviation > MAX_SUMMED_DEVIATION
+    for k, members in enumerate(_spread_members(variance_mm2, blur.halvings), start=1):
+        source_halvings, halvings = blur.halvings[k - 1 : k + 1]
+        draw_gutters(graph, "diffuse", sheets[source_halvings], source, levels.texel)
+        if halvings > source_halvings:
+            source = _halve(graph, levels, source, k - 1, halvings)
+        # The level after an intermediate one gains most of its width in one blur.
+        wide = k > 1 and k - 1 in blur.intermediate_levels and k not in blur.intermediate_levels
+        truncation = TRUNCATION if wide or (full_first and k == 1) else SUMMED_TRUNCATION
         clear = blur.scale * np.asarray(blur.clear)
-        for axis, blurred in enumerate((levels.spare(here), levels.layer(k, here))):
-            along = _along(graph.device, levels.texel, axis, atlas.sheared, blur.edge)
-            spread = along.record("Spread", truncation=cut, clear=clear, **added)
-            bound: MutableBindings = {**sheets[here].resources, "source": source, "stored": blurred}
-            bound |= {"spread": spread, "kernel_table": _kernel_texture(graph.device)}
-            _run(graph, along, bound, levels.size >> here)
+        for axis, blurred in enumerate((levels.scratch_view(halvings), levels.layer(k, halvings))):
+            shader = _axis_program(graph.device, levels.texel, axis, atlas.sheared, blur.edge)
+            spread = shader.record("Spread", truncation=truncation, clear=clear, **members)
+            bindings: MutableBindings = {**sheets[halvings].resources, "source": source, "stored": blurred}
+            bindings |= {"spread": spread, "kernel_table": _kernel_texture(graph.device)}
+            _dispatch(graph, shader, bindings, levels.size >> halvings)
             source = blurred
 
 
-def _halved(graph: Recorder, levels: Levels, source: TextureOrView, k: int, times: int) -> TextureOrView:
-    """Layer k at half its resolution."""
-    into = levels.layer(k, times)
-    halve = program(graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel, levels.texel)
-    _run(graph, halve, {"source": source, "stored": into}, levels.size >> times)
-    return into
+def _halve(
+    graph: Recorder, levels: PyramidLevels, source: TextureOrView, k: int, halvings: int
+) -> TextureOrView:
+    """Fill level k at half its resolution, and return the view of it."""
+    halved = levels.layer(k, halvings)
+    shader = program(graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel, levels.texel)
+    _dispatch(graph, shader, {"source": source, "stored": halved}, levels.size >> halvings)
+    return halved
 
 
-def _run(graph: Recorder, shader: ComputeProgram, bound: MutableBindings, side: int) -> None:
+def _dispatch(graph: Recorder, shader: ComputeProgram, bindings: MutableBindings, side: int) -> None:
     linear = graph.device.sampler(mag_filter="linear", min_filter="linear")
-    graph.compute("diffuse", shader, bound | {"linear": linear}, (side, side), TILE)
+    graph.compute("diffuse", shader, bindings | {"linear": linear}, (side, side), TILE)
 
 
-def _along(device: Device, texel: str, axis: int, sheared: bool, edge: str) -> ComputeProgram:
-    """The pass along u (axis 0) or along v."""
-    table = (("ROWS_PER_UNIT", ROWS_PER_UNIT), ("WIDEST", WIDEST))
-    chosen = (("AXIS", axis), *table, ("SHEARED", sheared), ("EDGE", EDGES.index(edge)))
-    return program(device, "diffusion/diffuse.wgsl", chosen, texel, texel)
+def _axis_program(device: Device, texel: str, axis: int, sheared: bool, edge: str) -> ComputeProgram:
+    """Return the program that blurs along u (axis 0) or along v (axis 1)."""
+    table = (("ROWS_PER_UNIT", ROWS_PER_UNIT), ("MAX_TABLE_VARIANCE", MAX_TABLE_VARIANCE))
+    constants = (("AXIS", axis), *table, ("SHEARED", sheared), ("EDGE", EDGES.index(edge)))
+    return program(device, "diffusion/diffuse.wgsl", constants, texel, texel)
 
 
 def _kernel_texture(device: Device) -> Texture:
     def make() -> Texture:
         table = kernel_table()
-        return texture_from(device, np.dstack([table[:-1], table[1:]]), "rg32float")
+        return texture_from_array(device, np.dstack([table[:-1], table[1:]]), "rg32float")
 
-    return device.shared("kernels", make)
+    return device.cached("kernels", make)
 
 
-def _added(variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]) -> Iterator[dict[str, float]]:
-    """Members of the shader's `Spread`: variance that levels add to the one before, and halving to both."""
-    before = owed = paid = 0.0
-    for variance, (finer, here) in zip(variance_mm2, pairwise(halvings), strict=True):
-        halved = _AVERAGED + _READ if here > finer else 0.0
+def _spread_members(variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]) -> Iterator[dict[str, float]]:
+    """Yield the members of the shader's struct `Spread` for each blurred level."""
+    source_mm2 = previous_resampling = previous_mm2 = 0.0
+    for variance, (source_halvings, level_halvings) in zip(variance_mm2, pairwise(halvings), strict=True):
+        halved = level_halvings > source_halvings
+        resampling = _AVERAGING_VARIANCE + _INTERPOLATION_VARIANCE if halved else 0.0
         yield {
-            "variance_mm2": variance - before,
-            "before_mm2": before,
-            "resampled": halved,
-            "to_come": sum(_READ / 4**times for times in range(here)),
-            "owed": owed / 4 ** (here - finer),
-            "paid_mm2": paid,
+            "variance_mm2": variance - source_mm2,
+            "source_mm2": source_mm2,
+            "resampling": resampling,
+            "pending": sum(_INTERPOLATION_VARIANCE / 4**times for times in range(level_halvings)),
+            "previous_resampling": previous_resampling / 4 ** (level_halvings - source_halvings),
+            "previous_mm2": previous_mm2,
         }
-        owed, paid, before = halved, variance - before, float(variance)
+        previous_resampling, previous_mm2 = resampling, variance - source_mm2
+        source_mm2 = float(variance)

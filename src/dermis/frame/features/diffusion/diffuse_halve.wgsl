@@ -1,4 +1,4 @@
-// Light at half the resolution: the mean of the texels with surface among each four.
+// Light at half the resolution: the mean of the texels with surface among each 2 x 2.
 //#include "source.wgsl"
 //#include "store.wgsl"
 
@@ -6,7 +6,7 @@
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(source) / 2u;
     if (all(id.xy < size)) {
-        let light = source_at((vec2f(id.xy) + 0.5) / vec2f(size)); // where the four meet
+        let light = source_at((vec2f(id.xy) + 0.5) / vec2f(size)); // the corner that the four texels share
         store(id.xy, light / max(light.a, 0.25));
     }
 }

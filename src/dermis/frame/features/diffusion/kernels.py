@@ -1,4 +1,4 @@
-"""Gaussian kernels of exact variance at whole texels, and chains of blurs at falling resolution."""
+"""Gaussian kernels of exact variance on whole texels, and chains of blurs at decreasing resolution."""
 
 from __future__ import annotations
 
@@ -9,113 +9,109 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.features.diffusion.pyramid import SHARP, halvings_of
+from dermis.frame.features.diffusion.pyramid import MIN_SMOOTHNESS, choose_halvings
 
 Floats = NDArray[np.float64]
 ROWS_PER_UNIT = 64
-WIDEST = 9
+"""Rows of the kernel table per unit of variance."""
+MAX_TABLE_VARIANCE = 9
+"""Variance of the last row of the kernel table [step^2]."""
 TRUNCATION = 3.3
-"""Standard deviations at which a Gaussian is cut off."""
+"""Half-width of a kernel in standard deviations."""
 SUMMED_TRUNCATION = 2.4
-"""The same for a Gaussian that starts from a narrower one: the cut keeps its variance, and the next blur
-smooths what it changes of the shape (0.014 % of an image at most)."""
-NARROW = 1.5
-"""Standard deviation up to which a Gaussian that starts from unblurred light may be cut off there [texel]."""
-_MOST_TAPS = math.ceil(TRUNCATION * math.sqrt(WIDEST))
+"""Half-width of a kernel whose source is already blurred, in standard deviations.
+
+The kernel has the exact variance all the same, and the next blur smooths the changed shape: the error is at
+most 0.014 % of an image.
+"""
+MAX_SUMMED_DEVIATION = 1.5
+"""Largest standard deviation at which `SUMMED_TRUNCATION` suits unblurred light too [texel]."""
+_MAX_TAPS = math.ceil(TRUNCATION * math.sqrt(MAX_TABLE_VARIANCE))
 _BISECTIONS = 60
-_WIDE_TRUNCATION, _SMOOTH = 4.0, 1.6  # as in diffuse.wgsl
-_OTHER_READS = 5.0  # of a texel in one pass beside taps: how the map lies there, gutters, what is stored
-_LEVEL = 2.0  # what a level costs whatever its size, in reads of every texel
-_LEAST_SAVED = 0.25  # of a chain's cost: for less, a chain stays as it is
-_PAST = 1.001  # of the variance that permits a halving, so that rounding does not forbid it
-_EVEN = 1.0  # least deviation of a level between in its own texels: a point of light keeps its place
-_APART = 1.5  # variances that are nearer are one level
+_WIDE_TRUNCATION, _MAX_STEP = 4.0, 1.6  # as in diffuse.wgsl
+_READS_PER_PASS = 5.0  # texel reads of a pass besides its taps: stretch map, gutters, the result
+_READS_PER_LEVEL = 2.0  # fixed cost of a level, in reads per texel of the full resolution
+_MIN_SAVING = 0.25  # fraction of the cost that an intermediate level has to save
+_HALVING_MARGIN = 1.001  # factor of the variance that permits a halving, against rounding
+_MIN_DEVIATION = 1.0  # least standard deviation of an intermediate level, in its own texels
+_MIN_VARIANCE_RATIO = 1.5  # between an intermediate level and any other
 
 
-def taps(variance: float, truncation: float = TRUNCATION) -> int:
-    """Taps on each side for a variance in units of the step squared."""
+def tap_count(variance: float, truncation: float = TRUNCATION) -> int:
+    """Return the number of taps on each side of the centre for a variance [step^2]."""
     return math.ceil(truncation * math.sqrt(variance))
 
 
 @cache
 def kernel_table() -> NDArray[np.float32]:
-    """q = w(1) / w(0) of the kernel w(n) = q^(n^2): rows by variance (1/64 step^2), columns by taps a side.
+    """Return q = w(1) / w(0) of kernels w(n) = q^(n^2); rows by variance [1/64 step^2], columns by taps a side.
 
-    A Gaussian that is sampled and cut off loses variance, a narrow one most of it. So q is solved for each
+    A Gaussian that is sampled and truncated loses variance, a narrow one most of it. So q is solved for each
     number of taps such that the kernel has the requested variance.
     """
-    variance = np.arange(WIDEST * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
-    n = np.arange(_MOST_TAPS + 1)
-    inside = n[None, :] <= n[:, None]  # column of the table, tap
+    variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
+    n = np.arange(_MAX_TAPS + 1)
+    within_kernel = n[None, :] <= n[:, None]  # column of the table, tap
     low, high = np.zeros((len(variance), len(n))), np.ones((len(variance), len(n)))
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        narrow = _variance(middle, inside) < variance
-        low, high = np.where(narrow, middle, low), np.where(narrow, high, middle)
+        too_narrow = _kernel_variance(middle, within_kernel) < variance
+        low, high = np.where(too_narrow, middle, low), np.where(too_narrow, high, middle)
     return (0.5 * (low + high)).astype(np.float32)
 
 
-def kernel(variance: float, truncation: float = TRUNCATION) -> Floats:
-    """(2 taps + 1,) normalised weights for a variance in units of the step squared."""
-    reach = taps(variance, truncation)
-    row = variance * ROWS_PER_UNIT
-    low, high = kernel_table().astype(np.float64)[[int(row), int(row) + 1], reach]
-    n = np.arange(-reach, reach + 1)
-    weights = (low + (high - low) * (row % 1.0)) ** (n**2)
-    return np.asarray(weights / weights.sum())
-
-
-def _variance(q: Floats, inside: NDArray[np.bool_]) -> Floats:
-    n2 = np.arange(inside.shape[1], dtype=np.float64) ** 2
+def _kernel_variance(q: Floats, within_kernel: NDArray[np.bool_]) -> Floats:
+    n2 = np.arange(within_kernel.shape[1], dtype=np.float64) ** 2
     with np.errstate(under="ignore"):
-        weights = np.where(inside, q[..., None] ** n2, 0.0)
+        weights = np.where(within_kernel, q[..., None] ** n2, 0.0)
     variance: Floats = 2.0 * (weights @ n2) / (2.0 * weights.sum(axis=-1) - 1.0)
     return variance
 
 
-def lead_up(
-    variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int
+def add_intermediate_levels(
+    variance_mm2: NDArray[np.float64], texels_per_mm: float, max_halvings: int
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    """Variances with those between that make the chain cheaper, and which of them are between [mm^2].
+    """Return the variances [mm^2] of the cheapest chain of blurs, and the indices of its intermediate levels.
 
-    variance_mm2 : of the profile's levels, increasing
-    texels_per_mm : of the map
-    most : how often the resolution may be halved
+    variance_mm2 : (k,) increasing variances of the profile's levels [mm^2]
+    texels_per_mm : density of the atlas
+    max_halvings : how often the resolution may be halved
 
-    A level between is just wide enough that the next may have half the resolution, by the rule of
-    `halvings_of`, and at least as wide as its texels.
+    An intermediate level is just wide enough for the next level to have half the resolution, by the rule of
+    `choose_halvings`, and at least as wide as its texels. Index 0 is the unblurred level.
     """
-    wanted = tuple(float(v) for v in variance_mm2)
-    return _lead_up(wanted, float(texels_per_mm), most)
+    profile_mm2 = tuple(float(v) for v in variance_mm2)
+    return _add_intermediate_levels(profile_mm2, float(texels_per_mm), max_halvings)
 
 
 @cache
-def _lead_up(
-    wanted: tuple[float, ...], texels_per_mm: float, most: int
+def _add_intermediate_levels(
+    profile_mm2: tuple[float, ...], texels_per_mm: float, max_halvings: int
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    chosen = list(wanted)
-    sides = [2.0**times / texels_per_mm for times in range(most)]  # [mm]
-    permits = [_PAST * max(SHARP * (2.0 * side) ** 2, _EVEN * side) ** 2 for side in sides]
-    least = chain_cost(chosen, texels_per_mm, most)
-    for between in permits:
-        if between >= wanted[-1] or any(between < _APART * v and v < _APART * between for v in chosen):
+    chain = list(profile_mm2)
+    min_cost = chain_cost(chain, texels_per_mm, max_halvings)
+    for side in (2.0**times / texels_per_mm for times in range(max_halvings)):  # of a texel [mm]
+        between = _HALVING_MARGIN * max(MIN_SMOOTHNESS * (2.0 * side) ** 2, _MIN_DEVIATION * side) ** 2
+        if between >= profile_mm2[-1]:
             continue
-        tried = sorted({*chosen, between})
-        cost = chain_cost(tried, texels_per_mm, most)
-        if cost < (1.0 - _LEAST_SAVED) * least:
-            chosen, least = tried, cost
-    steps = tuple(k for k, v in enumerate(chosen, start=1) if v not in wanted)
-    return np.array(chosen), steps
+        if any(between < _MIN_VARIANCE_RATIO * v and v < _MIN_VARIANCE_RATIO * between for v in chain):
+            continue
+        candidate = sorted({*chain, between})
+        cost = chain_cost(candidate, texels_per_mm, max_halvings)
+        if cost < (1.0 - _MIN_SAVING) * min_cost:
+            chain, min_cost = candidate, cost
+    intermediate_levels = tuple(k for k, v in enumerate(chain, start=1) if v not in profile_mm2)
+    return np.array(chain), intermediate_levels
 
 
-def chain_cost(variance_mm2: list[float], texels_per_mm: float, most: int) -> float:
-    """About how many texels of the whole resolution a chain reads for each that it makes."""
-    halvings = halvings_of(np.array(variance_mm2), texels_per_mm, most)
+def chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: int) -> float:
+    """Return the approximate number of texel reads of a chain of blurs, per texel of the full resolution."""
+    halvings = choose_halvings(np.array(variance_mm2), texels_per_mm, max_halvings)
     cost = 0.0
     for (before, after), halved in zip(pairwise([0.0, *variance_mm2]), halvings[1:], strict=True):
         per_mm2 = (texels_per_mm / 2.0**halved) ** 2
-        step = max(1.0, math.floor(math.sqrt(min(_SMOOTH**2 * before, after - before) * per_mm2)))
+        step = max(1.0, math.floor(math.sqrt(min(_MAX_STEP**2 * before, after - before) * per_mm2)))
         scaled = (after - before) * per_mm2 / step**2
-        reach = taps(scaled, _WIDE_TRUNCATION if scaled > WIDEST else SUMMED_TRUNCATION)
-        cost += 2.0 * (2.0 * reach + 1.0 + _OTHER_READS) / 4.0**halved + _LEVEL
+        reach = tap_count(scaled, _WIDE_TRUNCATION if scaled > MAX_TABLE_VARIANCE else SUMMED_TRUNCATION)
+        cost += 2.0 * (2.0 * reach + 1.0 + _READS_PER_PASS) / 4.0**halved + _READS_PER_LEVEL
     return cost

@@ -1,4 +1,4 @@
-"""Profiles mixed by a map: shares over the atlas, and the light of each profile."""
+"""Profiles mixed by a map: blend weights over the atlas, and the light of each profile."""
 
 from __future__ import annotations
 
@@ -10,121 +10,127 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.base.reading import named_path
-from dermis.formats.maps import share_map
+from dermis.base.reading import checked_path
+from dermis.formats.maps import mixture_map
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.features.atlas.passes import draw_gutters
-from dermis.frame.features.diffusion.pyramid import Levels
+from dermis.frame.features.diffusion.pyramid import PyramidLevels
 from dermis.frame.programs import FLOATS, HALVES, TILE, program
 from dermis.gpu import Bindings, Device, Recorder, Texture, TextureView, make_texture, upload
-from dermis.gpu.textures import view_of
+from dermis.gpu.textures import make_view
 from dermis.images.filters import mip_chain
 
-_KEPT = 4
+_CACHE_SIZE = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """Space for the light below skin whose profile a map mixes of a first one and one or two others.
+    """Textures for skin whose profile is mixed by a map from a first profile and one or two others.
 
-    shares_over_uv : texture of the others' shares
-    given : for each other, levels of the light that enters where the skin has it
-    shares : for each layout, a texture of the others' shares at each texel of the atlas
-    sums : texture of the first profile's light, and for each other, how its own differs by what it is where
-        light leaves, and by what it is where light enters
+    uv_weights : texture of the blend weights of the other profiles over uv
+    entering : pyramid for the light that enters skin of each other profile
+    atlas_weights : textures of these blend weights over the atlas, one for each layout
+    sums : texture array: the first layer is the light by the first profile alone; two layers for each other
+        profile hold what it changes, by the blend weights where light leaves and where it enters
     """
 
-    shares_over_uv: Texture
-    given: tuple[Levels, ...]
-    shares: tuple[Texture, ...]
+    uv_weights: Texture
+    entering: tuple[PyramidLevels, ...]
+    atlas_weights: tuple[Texture, ...]
     sums: Texture
     _views: dict[int, TextureView] = field(default_factory=dict)
 
-    def sum(self, layer: int) -> TextureView:
-        """A view of one of the sums."""
+    def sum_layer(self, layer: int) -> TextureView:
+        """Return a view of one layer of `sums`."""
         if layer not in self._views:
-            self._views[layer] = view_of(self.sums, layer=layer)
+            self._views[layer] = make_view(self.sums, layer=layer)
         return self._views[layer]
 
 
-def make_mixture(device: Device, shares: Texture, given: tuple[Levels, ...], layouts: int) -> Mixture:
-    """Space for a mixture over atlases of the size of its levels."""
-    side, texel = given[0].size, given[0].texel
-    over_atlas = tuple(
+def make_mixture(
+    device: Device, uv_weights: Texture, entering: tuple[PyramidLevels, ...], layouts: int
+) -> Mixture:
+    """Allocate the textures of a mixture for a number of atlas layouts."""
+    side, texel = entering[0].size, entering[0].texel
+    atlas_weights = tuple(
         make_texture(device, (side, side), texel, name="shares of profiles") for _ in range(layouts)
     )
-    layers = sums_of(len(given))
+    layers = sum_count(len(entering))
     sums = make_texture(device, (side, side), FLOATS, layers=layers, name="light of mixed profiles")
-    return Mixture(shares, given, over_atlas, sums)
+    return Mixture(uv_weights, entering, atlas_weights, sums)
 
 
-def sums_of(others: int) -> int:
-    """How many sums of blurred light there are for so many other profiles."""
+def sum_count(others: int) -> int:
+    """Return the number of layers of `Mixture.sums` for a number of other profiles."""
     return 1 + 2 * others
 
 
-def upload_shares(device: Device, shares: NDArray[np.float32]) -> Texture:
-    """A texture of (h, w, 2) shares with all its mips."""
-    height, width = shares.shape[:2]
-    levels = mip_chain(np.pad(shares, ((0, 0), (0, 0), (0, 2))))
-    texture = make_texture(device, (width, height), HALVES, mips=len(levels), use="map")
-    for mip, level in enumerate(levels):
-        upload(device, texture, level, mip=mip)
+def upload_blend_weights(device: Device, weights: NDArray[np.float32]) -> Texture:
+    """Upload (h, w, 2) blend weights as a texture with all its mip levels."""
+    height, width = weights.shape[:2]
+    mips = mip_chain(np.pad(weights, ((0, 0), (0, 0), (0, 2))))
+    texture = make_texture(device, (width, height), HALVES, mips=len(mips), use="map")
+    for mip, pixels in enumerate(mips):
+        upload(device, texture, pixels, mip=mip)
     return texture
 
 
-def load_shares(name: str) -> NDArray[np.float32]:
-    """(h, w, 2) shares of a picture; read again when the file has changed.
+def load_blend_weights(name: str) -> NDArray[np.float32]:
+    """Return the (h, w, 2) blend weights of an image file, which is read again only when it has changed.
 
-    Raises DermisError for what is no such picture.
+    Raises DermisError for a missing file and for what is no such image.
     """
-    path = named_path(name, "a map of profiles")
+    path = checked_path(name, "a map of profiles")
     try:
-        found = path.stat()
+        status = path.stat()
     except (OSError, ValueError):
-        refuse(
-            f"profile map {name}",
-            "a picture: grey, or red and green",
-            "there is no such file",
-            "Check the name",
-        )
-    return _loaded(path, (found.st_mtime_ns, found.st_size, found.st_ino))
+        expected = "a picture: grey, or red and green"
+        refuse(f"profile map {name}", expected, "there is no such file", "Check the name")
+    return _load(path, (status.st_mtime_ns, status.st_size, status.st_ino))
 
 
-@lru_cache(_KEPT)
-def _loaded(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
-    return share_map(path)
+@lru_cache(_CACHE_SIZE)
+def _load(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
+    return mixture_map(path)
 
 
-def share(graph: Recorder, layout: LitAtlas, mixture: Mixture, number: int) -> None:
-    """Fill the shares of other profiles over an atlas, beyond the charts' edges too.
+def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, index: int) -> None:
+    """Fill the blend weights over the atlas, gutters included.
 
-    number : of the layout
+    index : number of the layout
     """
-    into, texel = mixture.shares[number], mixture.given[0].texel
-    bound: Bindings = {
-        **layout.lit,
+    into, texel = mixture.atlas_weights[index], mixture.entering[0].texel
+    bindings: Bindings = {
+        **layout.bindings,
         **layout.atlas.resources,
-        "share_map": mixture.shares_over_uv,
+        "weight_map": mixture.uv_weights,
         "stored": into,
     }
     shader = program(graph.device, "diffusion/profile_blend_weights.wgsl", store=texel)
-    graph.compute("profiles", shader, bound, into.size[:2])
+    graph.compute("profiles", shader, bindings, into.size[:2])
     draw_gutters(graph, "profiles", layout.atlas, into, texel)
 
 
-def give(graph: Recorder, levels: Levels, mixture: Mixture, number: int, other: int) -> None:
-    """Fill the first of another profile's levels with the light that enters where the skin has it."""
-    given, device = mixture.given[other], graph.device
-    shader = program(device, "diffusion/profile_entering.wgsl", (("OTHER", other),), levels.texel, levels.texel)
+def draw_entering(graph: Recorder, levels: PyramidLevels, mixture: Mixture, index: int, other: int) -> None:
+    """Fill the unblurred level of another profile: all light that enters, times the profile's blend weight.
+
+    index : number of the layout
+    other : number of the profile, 0 for the first of the others
+    """
+    entering, device, texel = mixture.entering[other], graph.device, levels.texel
+    shader = program(device, "diffusion/profile_entering.wgsl", (("OTHER", other),), texel, texel)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
-    light = {"source": levels.layer(0), "stored": given.layer(0)}
-    bound: Bindings = {**light, "linear": linear, "shares": mixture.shares[number]}
-    graph.compute("profiles", shader, bound, (levels.size,) * 2, TILE)
+    light = {"source": levels.layer(0), "stored": entering.layer(0)}
+    bindings: Bindings = {**light, "linear": linear, "blend_weights": mixture.atlas_weights[index]}
+    graph.compute("profiles", shader, bindings, (levels.size,) * 2, TILE)
 
 
-def draw(graph: Recorder, mixture: Mixture, number: int, into: Texture) -> None:
-    """Mix the sums of blurred light, and put the shares beside them."""
-    shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.given)),))
-    bound: Bindings = {"sums": mixture.sums, "shares": mixture.shares[number], "mixed": into}
-    graph.compute("profiles", shader, bound, into.size[:2], TILE)
+def draw(graph: Recorder, mixture: Mixture, index: int, into: Texture) -> None:
+    """Mix the sums of blurred light, and store the packed blend weights in the alpha channel.
+
+    index : number of the layout
+    """
+    shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.entering)),))
+    weights = mixture.atlas_weights[index]
+    bindings: Bindings = {"sums": mixture.sums, "blend_weights": weights, "mixed": into}
+    graph.compute("profiles", shader, bindings, into.size[:2], TILE)

@@ -1,9 +1,9 @@
-// The share of the skin that other profiles have at each texel of the atlas, from a map over uv.
+// Blend weights of other profiles at each texel of the atlas, from a map over uv.
 //#include "shape/geometry.wgsl"
 //#include "store.wgsl"
 
 @group(0) @binding(3) var map_sampler: sampler;
-@group(0) @binding(4) var share_map: texture_2d<f32>; // filtered
+@group(0) @binding(4) var weight_map: texture_2d<f32>; // filtered
 @group(0) @binding(30) var atlas: texture_2d<u32>; // triangle + 1, two barycentric weights packed
 
 @compute @workgroup_size(8, 8)
@@ -23,8 +23,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let b = corner_at(t.y);
     let c = corner_at(t.z);
     let uv = (1.0 - w.x - w.y) * a.uv + w.x * b.uv + w.y * c.uv;
-    let sides = vec2f(textureDimensions(share_map));
+    let sides = vec2f(textureDimensions(weight_map));
     let footprint = maps_over_atlas(texel.x - 1u, a, b, c) / f32(size.x) * max(sides.x, sides.y);
-    let shares = textureSampleLevel(share_map, map_sampler, uv, max(0.0, log2(footprint)));
-    store(id.xy, vec4f(shares.xy, 0.0, 1.0));
+    let weights = textureSampleLevel(weight_map, map_sampler, uv, max(0.0, log2(footprint)));
+    store(id.xy, vec4f(weights.xy, 0.0, 1.0));
 }

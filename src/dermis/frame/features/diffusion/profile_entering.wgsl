@@ -1,10 +1,10 @@
-// The light that enters skin of another profile: all that enters, times that profile's share of the skin.
+// Light that enters skin of another profile: all light that enters, times the blend weight of the profile.
 //#include "source.wgsl"
 //#include "store.wgsl"
 
-override OTHER: u32; // which of the other profiles, from 0
+override OTHER: u32; // index of the profile among the others
 
-@group(0) @binding(1) var shares: texture_2d<f32>; // as profile_blend_weights.wgsl stores them
+@group(0) @binding(1) var blend_weights: texture_2d<f32>; // see profile_blend_weights.wgsl
 
 @compute @workgroup_size(16, 16)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -12,5 +12,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let light = textureLoad(source, id.xy, 0);
-    store(id.xy, vec4f(textureLoad(shares, id.xy, 0)[OTHER] * light.rgb, light.a));
+    store(id.xy, vec4f(textureLoad(blend_weights, id.xy, 0)[OTHER] * light.rgb, light.a));
 }

@@ -1,4 +1,4 @@
-"""Gaussian profiles of skins whose pigments or layers change from frame to frame."""
+"""Diffusion profiles of skins, fitted again when pigments or layers change between frames."""
 
 from __future__ import annotations
 
@@ -8,74 +8,76 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.frame.features.diffusion.mixture import load_shares
+from dermis.frame.features.diffusion.mixture import load_blend_weights
 from dermis.optics.fits.gaussian import shared_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import fit_profile, load_profile, preset_names
 from dermis.scene.skin import Pigments, Skin
-from dermis.scene.tissue import tissue_of
+from dermis.scene.tissue import skin_tissue
 
-Mixed = tuple[tuple[GaussianSum, ...], NDArray[np.float32] | None]
-_KEPT = 4  # the live skin, one to compare with, and those just before
+ProfileMix = tuple[tuple[GaussianSum, ...], NDArray[np.float32] | None]
+"""Profiles as sums of the same Gaussians, and (h, w, 2) blend weights of all but the first."""
+_CACHE_SIZE = 4  # the current skin, one to compare with, and two previous ones
 
 
 class SkinProfiles:
-    """Profiles of skins; fits start from a similar one, which is several times faster.
+    """Cache of the diffusion profiles of recent skins.
 
-    With pigments alone that is the profile's own, so that a person's never follows from who was drawn before;
-    with layers or a structure of one's own, as a hand changes them in a window, it is the last of the kind.
-    Files are checked for changes when the skin changes, not for each frame of the same skin.
+    A fit that starts from a similar profile is several times faster. Skin with pigments alone starts from
+    the published profile, so that a person's profile does not depend on the people before; skin with own
+    layers or structure starts from the last fit of the same kind.
     """
 
     def __init__(self) -> None:
         self._fits: list[tuple[Skin, GaussianSum]] = []
-        self._newest: tuple[Skin, GaussianSum] | None = None
+        self._current: tuple[Skin, GaussianSum] | None = None
 
-    def of(self, skin: Skin) -> GaussianSum:
-        """The skin's Gaussians.
+    def profile(self, skin: Skin) -> GaussianSum:
+        """Return the diffusion profile of a skin, its first one if a map mixes several.
 
-        Raises DermisError for pigments or layers of a profile that is not made of them.
+        Files are read again when the skin changes, not for each frame of the same skin.
+
+        Raises DermisError for pigments or layers with a profile that is not made of them.
         """
-        if self._newest is None or self._newest[0] is not skin:
-            self._newest = skin, self._found(skin)
-        return self._newest[1]
+        if self._current is None or self._current[0] is not skin:
+            self._current = skin, self._load_or_fit(skin)
+        return self._current[1]
 
-    def mixed(self, skin: Skin) -> Mixed:
-        """The skin's profiles as sums of the same Gaussians, and the shares of all but the first by place.
+    def mixture(self, skin: Skin) -> ProfileMix:
+        """Return all profiles of a skin, and the blend weights of all but the first; None without others.
 
-        Raises DermisError for a map without other profiles, and for others without one.
+        Raises DermisError for a map without other profiles, and for other profiles without a map.
         """
-        first = self.of(skin)
+        first = self.profile(skin)
         if not skin.other_profiles and skin.profile_map is None:
             return (first,), None
         if not skin.other_profiles or skin.profile_map is None:
-            came = "there is only a map" if skin.profile_map else "there is no map"
-            remedy = "Give profile_map and other_profiles both"
-            refuse("profile_map", "a map of shares, and the profiles whose shares these are", came, remedy)
+            actual = "there is only a map" if skin.profile_map else "there is no map"
+            advice = "Give profile_map and other_profiles both"
+            refuse("profile_map", "a map of blend weights, and the profiles that it blends", actual, advice)
         others = (load_profile(name) for name in skin.other_profiles)
-        return shared_gaussians((first, *others)), load_shares(skin.profile_map)
+        return shared_gaussians((first, *others)), load_blend_weights(skin.profile_map)
 
-    def _found(self, skin: Skin) -> GaussianSum:
-        known = self._last(_tissue, skin)
+    def _load_or_fit(self, skin: Skin) -> GaussianSum:
+        cached = self._latest_fit(_tissue, skin)
         if not skin.layers and skin.pigments in (None, Pigments()):
             profile = load_profile(skin.profile)
-        elif known:
-            profile = known[1]
+        elif cached:
+            profile = cached[1]
         else:
-            profile = fit_profile(tissue_of(skin), skin.profile, self._near(skin))
-        self._fits = [*(fit for fit in self._fits if fit is not known), (skin, profile)][-_KEPT:]
+            profile = fit_profile(skin_tissue(skin), skin.profile, self._initial_guess(skin))
+        self._fits = [*(fit for fit in self._fits if fit is not cached), (skin, profile)][-_CACHE_SIZE:]
         return profile
 
-    def _near(self, skin: Skin) -> GaussianSum | None:
-        plain = skin.pigments is not None and skin.pigments.structure is None and not skin.layers
-        if plain and skin.profile in preset_names():
+    def _initial_guess(self, skin: Skin) -> GaussianSum | None:
+        pigments_only = skin.pigments is not None and skin.pigments.structure is None and not skin.layers
+        if pigments_only and skin.profile in preset_names():
             return load_profile(skin.profile)
-        fit = self._last(_kind, skin)
+        fit = self._latest_fit(_kind, skin)
         return fit and fit[1]
 
-    def _last(self, of: Callable[[Skin], object], skin: Skin) -> tuple[Skin, GaussianSum] | None:
-        alike = (fit for fit in reversed(self._fits) if of(fit[0]) == of(skin))
-        return next(alike, None)
+    def _latest_fit(self, key: Callable[[Skin], object], skin: Skin) -> tuple[Skin, GaussianSum] | None:
+        return next((fit for fit in reversed(self._fits) if key(fit[0]) == key(skin)), None)
 
 
 def _tissue(skin: Skin) -> tuple[object, ...]:
@@ -83,5 +85,5 @@ def _tissue(skin: Skin) -> tuple[object, ...]:
 
 
 def _kind(skin: Skin) -> tuple[object, ...]:
-    """Key that skins with similar profiles share."""
+    """Return a key that is equal for skins with similar profiles."""
     return skin.profile, skin.pigments and skin.pigments.structure, len(skin.layers)

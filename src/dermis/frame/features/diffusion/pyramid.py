@@ -1,4 +1,4 @@
-"""The blurred levels of light: their textures, formats and resolutions."""
+"""The blur pyramid: textures, formats and resolutions of its levels."""
 
 from __future__ import annotations
 
@@ -9,27 +9,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.programs import FLOATS
-from dermis.gpu import Device, Texture, TextureView, make_texture, scratch
-from dermis.gpu.textures import view_of
+from dermis.gpu import Device, Texture, TextureView, make_texture, mark_scratch
+from dermis.gpu.textures import make_view
 
-_BRIGHT = 16.0  # scaled irradiance of all lights, a 4000th of the largest half
-_MOST_SCALED = 2.0**100  # its inverse is a float too; light that would need more counts as none
+_TARGET_IRRADIANCE = 16.0  # sum of all lights after scaling, 1/4000 of the largest half float
+_MAX_SCALE = 2.0**100  # its inverse is a float too; dimmer light counts as none
 Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
-"""Of each layout, how often the resolution of each level is halved, see `Blur`."""
-SHARP = 0.45  # least standard deviation [mm] of a halved level, over its squared texel side [mm^2]
-LEAST_WEIGHT = 1e-12
-"""By which shares of a colour that nothing blurs are taken."""
+"""`Blur.halvings` of each layout."""
+MIN_SMOOTHNESS = 0.45  # least standard deviation [mm] of a halved level, over its squared texel side [mm^2]
+MIN_WEIGHT = 1e-12
+"""Least divisor of a sum of weights, for channels without any weight."""
 
 
 @dataclass(frozen=True, eq=False)
-class Levels:
-    """Textures for light and its blurred levels, level 0 unblurred, and for light between two passes.
+class PyramidLevels:
+    """Textures of the blur pyramid: unblurred light as level 0, its blurred levels, and scratch space.
 
-    stacks : for each number of halvings a texture with a layer for each level of that resolution, before
-        them the last finer one, halved
-    first : the level in the first layer of each
-    texel : format of the textures
+    stacks : one texture for each number of halvings, with a layer for each level of that resolution; its
+        first layer, but that of the full resolution, is the last finer level at half its resolution
+    first : level in the first layer of each stack
+    scratch : texture between the passes along u and v
+    size : texels along the side of the full resolution
+    texel : texture format
     """
 
     stacks: tuple[Texture, ...]
@@ -40,30 +42,30 @@ class Levels:
     _views: dict[tuple[int, int], TextureView] = field(default_factory=dict)
 
     def layer(self, k: int, halvings: int = 0) -> TextureView:
-        """A view of level k at one resolution."""
+        """Return a view of level k at one resolution."""
         if (k, halvings) not in self._views:
             layer = k - self.first[halvings]
-            self._views[k, halvings] = view_of(self.stacks[halvings], layer=layer)
+            self._views[k, halvings] = make_view(self.stacks[halvings], layer=layer)
         return self._views[k, halvings]
 
-    def spare(self, halvings: int = 0) -> TextureView:
-        """A view of the texture between two passes."""
+    def scratch_view(self, halvings: int = 0) -> TextureView:
+        """Return a view of the scratch texture at one resolution."""
         if (-1, halvings) not in self._views:
-            self._views[-1, halvings] = view_of(self.scratch, mip=halvings)
+            self._views[-1, halvings] = make_view(self.scratch, mip=halvings)
         return self._views[-1, halvings]
 
 
 @dataclass(frozen=True)
 class Blur:
-    """How light spreads over an atlas.
+    """Gaussian blurs of one atlas layout.
 
-    variance_mm2, weight : (k,) increasing, and (k, 3) of the Gaussians
-    halvings : how often the resolution of each level is halved, that of the unblurred one first
-    scale : factor of the light in the layers
-    edge : what lies beyond a chart's edge and its gutter: "repeated", "cleared" or "skipped"
-    clear : the light that empty texels show when the edge is "cleared"
-    steps : levels without weight that only lead to others, counted from the unblurred one
-    changes : (k, 3) by which the weights of each profile that a map mixes in differ
+    variance_mm2, weight : (k,) increasing variances [mm^2] and (k, 3) weights [-] of the Gaussians
+    halvings : how often the resolution of each level is halved, starting with the unblurred level
+    scale : factor from irradiance to the values that the levels store
+    edge : what blurs read beyond a chart and its gutter: "repeated", "cleared" or "skipped"
+    clear : irradiance that blurs read from empty texels when the edge is "cleared"
+    intermediate_levels : indices of levels without weight, which only serve as the source of others
+    weight_changes : (k, 3) differences of weights from the first profile, one array for each other profile
     """
 
     variance_mm2: Floats
@@ -72,30 +74,30 @@ class Blur:
     scale: float = 1.0
     edge: str = "repeated"
     clear: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    steps: tuple[int, ...] = ()
-    changes: tuple[Floats, ...] = ()
+    intermediate_levels: tuple[int, ...] = ()
+    weight_changes: tuple[Floats, ...] = ()
 
     @property
-    def own(self) -> tuple[int, ...]:
-        """The layers of the unblurred light and of the profile's levels, without those that lead to them."""
-        return tuple(k for k in range(len(self.halvings)) if k not in self.steps)
+    def profile_levels(self) -> tuple[int, ...]:
+        """Return the indices of all levels but the intermediate ones."""
+        return tuple(k for k in range(len(self.halvings)) if k not in self.intermediate_levels)
 
 
-def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> Levels:
-    """Space for the light that enters and the blurred levels, of the format `texel`."""
-    held = layers_of(halvings)
+def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> PyramidLevels:
+    """Allocate the pyramid for an atlas of size x size texels, in the texture format `texel`."""
+    ranges = levels_by_resolution(halvings)
     stacks = tuple(
         make_texture(device, (size >> times,) * 2, texel, layers=len(levels), name="blurred light")
-        for times, levels in enumerate(held)
+        for times, levels in enumerate(ranges)
     )
     between = mark_scratch(
-        device, make_texture(device, (size, size), texel, mips=len(held), name="light between two blurs")
+        device, make_texture(device, (size, size), texel, mips=len(ranges), name="light between two blurs")
     )
-    return Levels(stacks, tuple(levels.start for levels in held), between, size, texel)
+    return PyramidLevels(stacks, tuple(levels.start for levels in ranges), between, size, texel)
 
 
-def layers_of(halvings: Halvings) -> tuple[range, ...]:
-    """The levels that are held at each resolution."""
+def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
+    """Return the range of levels that are stored at each resolution, finest first."""
     coarsest = max(map(max, halvings))
     return tuple(
         range(
@@ -106,28 +108,33 @@ def layers_of(halvings: Halvings) -> tuple[range, ...]:
     )
 
 
-def scale_of(texel: str, brightest: float) -> float:
-    """Factor that brings light into the range of halves: a power of two, which is exact; 1 for floats.
+def half_precision_scale(texel: str, brightest: float) -> float:
+    """Return the factor that brings light into the range of half floats; 1 for 32-bit floats.
 
-    brightest : sum of the lights' irradiances as given; skin nearer to a light gets more
+    texel : texture format of the levels
+    brightest : sum of the irradiances of all lights; skin close to a light receives more
+
+    The factor is a power of two, so that scaling is exact.
     """
     if texel == FLOATS or brightest == 0.0:
         return 1.0
-    return math.ldexp(0.5, math.frexp(min(_BRIGHT / brightest, _MOST_SCALED))[1])
+    return math.ldexp(0.5, math.frexp(min(_TARGET_IRRADIANCE / brightest, _MAX_SCALE))[1])
 
 
-def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int) -> tuple[int, ...]:
-    """How often the resolution of each level may be halved, the unblurred one included.
+def choose_halvings(
+    variance_mm2: NDArray[np.float64], texels_per_mm: float, max_halvings: int
+) -> tuple[int, ...]:
+    """Return how often the resolution of each level may be halved, starting with the unblurred level.
 
-    Texels twice as large need a blur four times as wide: what they lose in the sparse parts of a map is then
-    as small a part of the image (docs/performance.md has the errors).
+    variance_mm2 : (k,) increasing variances of the blurred levels [mm^2]
+    texels_per_mm : density of the atlas
 
-    variance_mm2 : of the blurred levels, increasing
-    texels_per_mm : of the map
+    Texels twice as large need a blur four times as wide: the error in sparse parts of a map then stays the
+    same fraction of the image (docs/performance.md lists the errors).
     """
-    found = [0]
-    for before in (0.0, *variance_mm2[:-1]):
-        smooth = texels_per_mm * math.sqrt(math.sqrt(before) / SHARP)
-        finest, coarsest = found[-1], min(most, found[-1] + 1)
-        found.append(int(min(max(math.log2(max(smooth, 1.0)), finest), coarsest)))
-    return tuple(found)
+    halvings = [0]
+    for source_mm2 in (0.0, *variance_mm2[:-1]):
+        smooth = texels_per_mm * math.sqrt(math.sqrt(source_mm2) / MIN_SMOOTHNESS)
+        finest, coarsest = halvings[-1], min(max_halvings, halvings[-1] + 1)
+        halvings.append(int(min(max(math.log2(max(smooth, 1.0)), finest), coarsest)))
+    return tuple(halvings)

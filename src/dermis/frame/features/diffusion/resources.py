@@ -1,4 +1,4 @@
-"""Resources of the diffusion: blurred levels of light, how each atlas blurs, and mixed profiles."""
+"""Resources of the diffusion: the blur pyramid, the blurs of each layout, and mixed profiles."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.textures import AtlasTextures
-from dermis.frame.features.diffusion.pyramid import Blur, Halvings, Levels
-from dermis.frame.features.diffusion.mixture import Mixture, make_mixture, upload_shares
+from dermis.frame.features.diffusion.mixture import Mixture, make_mixture, upload_blend_weights
+from dermis.frame.features.diffusion.pyramid import Blur, Halvings, PyramidLevels
 from dermis.frame.request import FrameRequest
 from dermis.frame.technique import ProfileSplit
 from dermis.gpu import Device, Memo
 
 
 class BlurScheme(Protocol):
-    """How a technique blurs over an atlas."""
+    """Interface by which a technique chooses the blurs of an atlas."""
 
-    def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
-        """Return textures for light and its blurred levels."""
+    def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
+        """Allocate the blur pyramid."""
 
     def chain(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Return the split with weightless levels that lead to others, and which those are."""
+        """Return the split with intermediate levels of weight 0, and their indices."""
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how often the resolution of each level is halved, that of the unblurred one first."""
+        """Return how often the resolution of each level is halved, starting with the unblurred level."""
 
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """Space for the light that enters the skin, its blurred levels, and their mixtures.
+    """Textures of the diffusion, and its blurs.
 
-    levels : light and its blurred levels
-    blurs : how light spreads on each layout, empty where none does
-    mixture : of profiles by a map, None for one profile
+    levels : the blur pyramid
+    blurs : the blurs of each layout, empty when no light is blurred
+    mixture : textures of profiles mixed by a map, None for a single profile
     """
 
-    levels: Levels
+    levels: PyramidLevels
     blurs: tuple[Blur, ...]
     mixture: Mixture | None
 
@@ -53,30 +53,40 @@ def make(
     scheme: BlurScheme,
     atlases: Sequence[AtlasTextures],
 ) -> Resources:
-    """Return the resources of the diffusion over some layouts."""
-    blurs = tuple(_blur(request, scheme, one) for one in atlases) if request.count else ()
+    """Return the resources of the diffusion for all atlas layouts."""
+    blurs = tuple(_blur(request, scheme, one) for one in atlases) if request.blur_count else ()
     side, halvings = request.settings.atlas if blurs else 1, tuple(blur.halvings for blur in blurs) or ((0,),)
-    make = device, scheme, side, halvings, request.light_of
-    levels = memo.keep(_make_levels, *make, of=request.view)
+    args = device, scheme, side, halvings, request.light_key
+    levels = memo.get(_make_levels, *args, owner=request.view_name)
     mixture = None
-    if request.share_map is not None and blurs:
-        ours = (f"{request.view} other {k}" for k in range(len(request.others)))
-        given = tuple(memo.keep(_make_levels, *make, of=of) for of in ours)
-        mixture = memo.keep(_mixture, device, request.share_map, given, len(atlases), of=request.view)
+    if request.blend_weights is not None and blurs:
+        names = (f"{request.view_name} other {k}" for k in range(len(request.other_profiles)))
+        entering = tuple(memo.get(_make_levels, *args, owner=name) for name in names)
+        mixture = memo.get(_mixture, device, request.blend_weights, entering, len(atlases), owner=request.view_name)
     return Resources(levels, blurs, mixture)
 
 
 def _blur(request: FrameRequest, scheme: BlurScheme, atlas: AtlasTextures) -> Blur:
-    red, green, blue = (np.pi * c * request.remedy.coloured for c in request.settings.seam_colour)
-    edge, clear = request.remedy.edge, (red, green, blue)
-    split, steps = scheme.chain(request.split, atlas, edge)
-    spread = split.blurred_mm2, split.weight, scheme.halvings(split, atlas, edge)
-    return Blur(*spread, edge=edge, clear=clear, steps=steps, changes=split.changes)
+    red, green, blue = (np.pi * c * request.seam_method.coloured for c in request.settings.seam_colour)
+    edge, clear = request.seam_method.edge, (red, green, blue)
+    split, intermediate = scheme.add_intermediate_levels(request.split, atlas, edge)
+    halvings = scheme.halvings(split, atlas, edge)
+    return Blur(
+        split.blurred_mm2,
+        split.weight,
+        halvings,
+        edge=edge,
+        clear=clear,
+        intermediate_levels=intermediate,
+        weight_changes=split.weight_changes,
+    )
 
 
-def _make_levels(device: Device, scheme: BlurScheme, side: int, halvings: Halvings, _: str) -> Levels:
+def _make_levels(device: Device, scheme: BlurScheme, side: int, halvings: Halvings, _: str) -> PyramidLevels:
     return scheme.make_levels(device, side, halvings)
 
 
-def _mixture(device: Device, shares: NDArray[np.float32], given: tuple[Levels, ...], layouts: int) -> Mixture:
-    return make_mixture(device, upload_shares(device, shares), given, layouts)
+def _mixture(
+    device: Device, weights: NDArray[np.float32], entering: tuple[PyramidLevels, ...], layouts: int
+) -> Mixture:
+    return make_mixture(device, upload_blend_weights(device, weights), entering, layouts)

@@ -1,7 +1,6 @@
-"""Hair: strands moved by the skin, lit at their knots, drawn over the picture, and their shadows."""
+"""Hair: strands that follow the skin, are shaded at their knots and drawn over the picture; their shadows."""
 
 from dermis.frame.features.hair.passes import draw, draw_shadows
-from dermis.frame.features.hair.resources import Resources, make
-from dermis.frame.features.hair.resources import strand_numbers as shader_numbers
+from dermis.frame.features.hair.resources import Resources, make, shader_constants
 
-__all__ = ["Resources", "draw", "draw_shadows", "make", "shader_numbers"]
+__all__ = ["Resources", "draw", "draw_shadows", "make", "shader_constants"]

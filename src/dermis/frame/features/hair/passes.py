@@ -1,13 +1,13 @@
-"""Passes of hair: posing, shadows, shading at knots, and drawing over the picture."""
+"""Passes of hair: posing, shadows, shading at the knots, and drawing over the picture."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from dermis.frame.features.hair.resources import TILE, WINDOW_KNOTS, Resources, StrandTables, drawn_of
-from dermis.frame.features.shape.mesh import HeadResources
+from dermis.frame.features.hair.resources import TILE, WINDOW_KNOTS, Resources, StrandTables, drawn_hair_count
+from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import Shape
-from dermis.frame.programs import each, program
+from dermis.frame.programs import program, workgroup_grid
 from dermis.frame.projection import Views
 from dermis.gpu import (
     Bindings,
@@ -16,140 +16,149 @@ from dermis.gpu import (
     Device,
     Graph,
     MutableBindings,
-    Record,
     Recorder,
     Texture,
+    UniformRecord,
 )
 
-Look = tuple[Bindings, Record, Constants]
+ShadingInputs = tuple[Bindings, UniformRecord, Constants]
+"""Resources of the lighting, record of the shading, and pipeline constants of the lights."""
 
-_ROWS, _ROUNDS = 8, 60_000
-_HEAD_MM = 100.0  # side of a square that has no more hair than a head seen from anywhere
-_CROWDED = 6.0  # pieces that a tile may list, over their mean
-_CLEARING = 256  # workgroups that empty the shadows of hairs
-_RAYS_APART = 4  # of those to an area light: all of them change pictures by 0.0002 of their light at most
+_MAX_ROWS, _MAX_ITERATIONS = 8, 60_000
+_HEAD_MM = 100.0  # side of a square in the picture that holds all hair of a head
+_CROWDING = 6.0  # segments in a crowded tile over the mean of all tiles
+_CLEARING_GROUPS = 256
+_RAYS_APART = 4  # of the rays to an area light one in four is traced: pictures change by 0.0002 at most
 
 
-def draw_shadows(graph: Graph, made: Resources, shape: Shape, shadow_views: Views, lit: Bindings) -> None:
-    """Declare the passes that pose the hairs and find what they hold back of lights that cast shadows."""
-    graph.repeat(pose, made.tables, shape)
+def draw_shadows(graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting: Bindings) -> None:
+    """Declare the passes that pose the strands and compute the shadows that they cast."""
+    graph.repeat(pose_strands, strands.tables, shape)
     if len(shadow_views.clips):
-        shadow(graph, made, lit)
+        _draw_deep_opacity(graph, strands, lighting)
 
 
-def pose(graph: Recorder, made: StrandTables, shape: Shape) -> None:
-    """Put the hairs where the skin is."""
-    bound: MutableBindings = {
+def pose_strands(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
+    """Move the knots with the quads of the skin in which their strands are rooted."""
+    bindings: MutableBindings = {
         "points": shape.surface["points"],
-        "strands": made.strands,
-        "knots": made.knots,
-        "hairs": made.record,
+        "strands": tables.strands,
+        "knots": tables.knots,
+        "hairs": tables.record,
+        "posed": tables.posed,
     }
-    count = made.fine.hairs * made.fine.knots + made.coarse.hairs * made.coarse.knots
-    _each(graph, "hair/strands_pose.wgsl", bound | {"posed": made.posed}, count)
+    knots = tables.fine.all_knots() + tables.coarse.all_knots()
+    _dispatch(graph, "hair/strands_pose.wgsl", bindings, knots)
 
 
-def shadow(graph: Recorder, strands: Resources, lit: Bindings) -> None:
-    """Find what the hairs hold back of each light that casts shadows."""
-    made = strands.tables
-    pieces = made.fine.pieces() + made.coarse.pieces(made.shading)
-    knots = made.fine.hairs * made.fine.knots + made.shading * made.coarse.knots
-    bound: MutableBindings = {**lit, "posed": made.posed, "hairs": made.record}
-    bound |= {"windows": strands.shadows, "splatted": strands.shadows}
-    graph.dispatch("strands", program(graph.device, "hair/strands_clear.wgsl"), bound, (_CLEARING, 1, 1))
-    ends = program(graph.device, "hair/strands_window.wgsl")
-    graph.dispatch("strands", ends, bound, (max(1, -(-knots // WINDOW_KNOTS)), 1, 1))
-    for covers in (0, 1):
-        _each(graph, "hair/strands_shadow.wgsl", bound, pieces, (("COVERS", covers),))
+def _draw_deep_opacity(graph: Recorder, strands: Resources, lighting: Bindings) -> None:
+    """Fill the deep opacity maps of all lights that cast shadows."""
+    tables = strands.tables
+    casters = tables.shadow_casters
+    segments = tables.fine.all_segments() + tables.coarse.all_segments(casters)
+    knots = tables.fine.all_knots() + tables.coarse.all_knots(casters)
+    bindings: MutableBindings = {**lighting, "posed": tables.posed, "hairs": tables.record}
+    bindings |= {"windows": strands.shadows, "opacity": strands.shadows}
+    clear = program(graph.device, "hair/strands_clear.wgsl")
+    graph.dispatch("strands", clear, bindings, (_CLEARING_GROUPS, 1, 1))
+    windows = program(graph.device, "hair/strands_window.wgsl")
+    graph.dispatch("strands", windows, bindings, (max(1, -(-knots // WINDOW_KNOTS)), 1, 1))
+    for adds_cover in (0, 1):
+        _dispatch(graph, "hair/strands_shadow.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
 
 
 def draw(
     graph: Recorder,
     strands: Resources,
-    look: Look,
-    head: HeadResources,
+    shading: ShadingInputs,
+    head: HeadGeometry,
     visibility: Texture,
     radiance: Texture,
     labels: Bindings | None = None,
 ) -> Texture:
-    """The picture with hairs over it, a texture of theirs.
+    """Draw the strands over the picture, and return its texture.
 
-    look : resources and record of the shading, and pipeline constants of the lights
-    visibility : texture of the triangles that samples see
-    labels : what is bound where the class of the hairs over each pixel is found as well
+    visibility : texture of the triangle at each sample
+    radiance : texture of the picture without hair
+    labels : resources for labels of hair, None without labels
     """
-    made, picture, (lit, view, lights) = strands.tables, strands.picture, look
-    light = program(graph.device, "hair/strands_light.wgsl", (*lights, ("RAYS_APART", _RAYS_APART)))
-    record, coarse = _view_record(light, strands, view)
-    seen: Bindings = {"strand_view": record, "drawn": made.drawn, "hairs": made.record}
-    knots = made.fine.hairs * made.fine.knots + coarse * made.coarse.knots
-    pieces = made.fine.pieces() + made.coarse.pieces(coarse)
-    graph.dispatch("strands", light, {**lit, **seen, "posed": made.posed}, each(knots))
-    listed: Bindings = {"chains": picture.chains, "links": picture.links}
-    _each(graph, "hair/strands_empty.wgsl", listed, picture.chains.size // 4)
-    ways = (("WAYS", picture.ways),)
-    _each(graph, "hair/strands_bin.wgsl", {**seen, **listed}, pieces, ways)
-    over: Bindings = {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
-    bound = {**head.resources, **seen, **listed, **over, **(labels or {})}
+    tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading
     width, height = picture.result.size[:2]
-    if picture.ways > 1:
-        shader = program(graph.device, "hair/strands_draw_tiles.wgsl", ways, labels=labels is not None)
-        graph.compute("strands", shader, bound, (width, height))
+    pixel_mm = _pixel_mm(view, tables, height)
+    coarse = drawn_hair_count(tables, pixel_mm)
+    segments = tables.fine.all_segments() + tables.coarse.all_segments(coarse)
+    knots = tables.fine.all_knots() + tables.coarse.all_knots(coarse)
+    light_constants = (*light_constants, ("RAYS_APART", _RAYS_APART))
+    light = program(graph.device, "hair/strands_light.wgsl", light_constants)
+    record = _view_record(light, strands, view, coarse)
+    shared: Bindings = {"strand_view": record, "projected": tables.projected, "hairs": tables.record}
+    graph.dispatch(
+        "strands", light, {**lighting, **shared, "posed": tables.posed}, workgroup_grid(knots)
+    )
+    lists: Bindings = {"chains": picture.chains, "links": picture.links}
+    _dispatch(graph, "hair/strands_empty.wgsl", lists, picture.chains.size // 4)
+    chains = (("CHAINS", picture.chains_per_tile),)
+    _dispatch(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, chains)
+    images: Bindings = {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
+    bindings = {**head.resources, **shared, **lists, **images, **(labels or {})}
+    if picture.chains_per_tile > 1:
+        shader = program(graph.device, "hair/strands_draw_tiles.wgsl", chains, labels=labels is not None)
+        graph.compute("strands", shader, bindings, (width, height))
         return picture.result
-    rows = _rows_for(graph.device, strands, view)
+    rows = rows_per_invocation(graph.device, _max_segments_in_tile(tables, segments, pixel_mm))
     shader = program(graph.device, "hair/strands_draw.wgsl", (("ROWS", rows),), labels=labels is not None)
-    graph.compute("strands", shader, bound, (width, -(-height // rows)))
+    graph.compute("strands", shader, bindings, (width, -(-height // rows)))
     return picture.result
 
 
-def _view_record(shader: ComputeProgram, strands: Resources, view: Record) -> tuple[Record, int]:
-    """A shader's record StrandView, and how many coarse hairs stand for all.
+def _view_record(
+    shader: ComputeProgram, strands: Resources, view: UniformRecord, coarse: int
+) -> UniformRecord:
+    """Return a record of the shader's struct StrandView.
 
     view : record of the shading
+    coarse : number of coarse strands to draw
     """
-    made, size = strands.tables, strands.picture.result.size[:2]
-    looked = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "shown")
-    record = shader.record("StrandView", **{name: view[name] for name in looked})
-    coarse = drawn_of(made, _pixel_mm(view, made, size[1]))
-    record["coarse"], record["size"], record["skin"] = coarse, size, strands.skin
-    record["wider"] = made.coarse.hairs / max(1, coarse)
-    return record, coarse
+    members = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "light_factors")
+    record = shader.record("StrandView", **{name: view[name] for name in members})
+    record["coarse"], record["size"] = coarse, strands.picture.result.size[:2]
+    record["skin"] = strands.skin_albedo
+    record["width_scale"] = strands.tables.coarse.hairs / max(1, coarse)
+    return record
 
 
-def _rows_for(device: Device, strands: Resources, view: Record) -> int:
-    """`rows_of` what tiles of this picture may list."""
-    made = strands.tables
-    pixel_mm = _pixel_mm(view, made, strands.picture.result.size[1])
-    pieces = made.fine.pieces() + made.coarse.pieces(drawn_of(made, pixel_mm))
-    return rows_of(device, _most_in_tile(made, pieces, pixel_mm))
+def _pixel_mm(view: UniformRecord, tables: StrandTables, height: int) -> float:
+    """Return the side of a pixel at the depth of the coarse strands [mm]."""
+    depth = float(np.dot(tables.centre_mm - view["eye"], view["forward"]))
+    return 2.0 * float(np.linalg.norm(view["up"])) * max(depth, 1.0) / height
 
 
-def _pixel_mm(view: Record, made: StrandTables, height: int) -> float:
-    """Side of a pixel where the coarse hairs are [mm]."""
-    deep = float(np.dot(made.middle_mm - view["eye"], view["forward"]))
-    return 2.0 * float(np.linalg.norm(view["up"])) * max(deep, 1.0) / height
+def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) -> int:
+    """Return the largest number of segments in a tile: all fine ones, and a multiple of the mean of coarse ones.
 
-
-def _most_in_tile(made: StrandTables, pieces: int, pixel_mm: float) -> int:
-    """Pieces that a tile may list: all the fine ones, and several times the mean of the coarse ones."""
+    segments : drawn segments of all strands
+    """
     tiles = max(1.0, (_HEAD_MM / (TILE * pixel_mm)) ** 2)
-    return int(made.fine.pieces() + min(1.0, _CROWDED / tiles) * (pieces - made.fine.pieces()))
+    fine = tables.fine.all_segments()
+    return int(fine + min(1.0, _CROWDING / tiles) * (segments - fine))
 
 
-def rows_of(device: Device, pieces: int) -> int:
-    """Pixels that an invocation draws one below the other: a power of two, so that few shaders are compiled.
+def rows_per_invocation(device: Device, segments: int) -> int:
+    """Return how many pixels of a column an invocation draws: a power of two, so that few shaders are compiled.
 
-    pieces : in a tile, at most
+    segments : largest number of segments in a tile
 
-    Software adapters run the whole shader for pixels without hairs too, unless a loop skips these. They also
-    leave a shader's loops, all together, after 65,535 rounds.
+    Software adapters run the whole shader for pixels without hair too, unless a loop skips these. They also
+    end all loops of a shader after 65,535 iterations in total.
     """
     if device.adapter.kind != "CPU":
         return 1
-    most = max(1, min(_ROWS, _ROUNDS // max(1, pieces)))
-    return 1 << most.bit_length() - 1
+    rows = max(1, min(_MAX_ROWS, _MAX_ITERATIONS // max(1, segments)))
+    return 1 << rows.bit_length() - 1
 
 
-def _each(graph: Recorder, name: str, bound: Bindings, count: int, constants: Constants = ()) -> None:
-    """A pass of one invocation for each of `count`."""
-    graph.dispatch("strands", program(graph.device, name, constants), bound, each(count))
+def _dispatch(
+    graph: Recorder, name: str, bindings: Bindings, count: int, constants: Constants = ()
+) -> None:
+    """Add a pass with one invocation for each of `count` elements."""
+    graph.dispatch("strands", program(graph.device, name, constants), bindings, workgroup_grid(count))

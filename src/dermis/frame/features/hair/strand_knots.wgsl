@@ -1,20 +1,20 @@
-// Hairs as rows: where each stands on the skin, what its inside absorbs, and its knots from root to tip. Fine hairs come first,
-// brows and lashes; then the coarse ones of head and beard, of which the first few stand for all where that is enough.
+// Layout of strands in buffers: normal of the skin, absorption and the knots from root to tip. Fine strands, brows and lashes,
+// come first, then the coarse ones of head and beard, of which the first ones may stand for all.
 
-const ROWS_BEFORE: u32 = 2u; // of a hair before its knots: the skin's normal, then the absorption [1/mm] and how deep hair is
+const ROWS_BEFORE: u32 = 2u; // of a strand before its knots: normal of the skin; absorption [1/mm] and cover by other hair
 
 struct Hairs {
-    fine: u32, // how many
+    fine: u32, // number of strands
     coarse: u32,
-    shading: u32, // coarse ones that shade
-    fine_knots: u32, // of each
+    shadow_casters: u32, // coarse strands that cast shadows
+    fine_knots: u32, // knots per strand
     coarse_knots: u32,
-    wider: f32, // than they are, for those that shade to do so as all do
+    width_scale: f32, // factor of their width, so that they cast the shadows of all
 }
 
 @group(0) @binding(41) var<uniform> hairs: Hairs;
 
-// Hair that a knot, or a piece between two knots, belongs to.
+// Strand of a knot or a segment, by their numbers per strand.
 fn hair_of(index: u32, of_fine: u32, of_coarse: u32) -> u32 {
     let fines = hairs.fine * of_fine;
     if (index < fines) {
@@ -27,8 +27,8 @@ fn hair_of_knot(knot: u32) -> u32 {
     return hair_of(knot, hairs.fine_knots, hairs.coarse_knots);
 }
 
-fn hair_of_piece(piece: u32) -> u32 {
-    return hair_of(piece, hairs.fine_knots - 1u, hairs.coarse_knots - 1u);
+fn hair_of_segment(segment: u32) -> u32 {
+    return hair_of(segment, hairs.fine_knots - 1u, hairs.coarse_knots - 1u);
 }
 
 fn is_coarse(hair: u32) -> bool {
@@ -44,8 +44,8 @@ fn first_knot(hair: u32) -> u32 {
     return select(hair * hairs.fine_knots, of_coarse, is_coarse(hair));
 }
 
-// Of all fine hairs and some of the coarse ones.
-fn pieces_of(coarse: u32) -> u32 {
+// Segments of all fine strands and some of the coarse ones.
+fn segment_count(coarse: u32) -> u32 {
     return hairs.fine * (hairs.fine_knots - 1u) + coarse * (hairs.coarse_knots - 1u);
 }
 
@@ -53,20 +53,20 @@ fn all_knots(coarse: u32) -> u32 {
     return hairs.fine * hairs.fine_knots + coarse * hairs.coarse_knots;
 }
 
-// A piece as tiles list it: the knot at which it begins, and whether it is a hair's first and last.
-const FIRST_PIECE: u32 = 0x40000000u;
-const LAST_PIECE: u32 = 0x80000000u;
+// Packed segment: its first knot, and whether it is the first and the last one of a strand.
+const FIRST_SEGMENT: u32 = 0x40000000u;
+const LAST_SEGMENT: u32 = 0x80000000u;
 
-fn listed_piece(begin: u32, hair: u32) -> u32 {
+fn pack_segment(begin: u32, hair: u32) -> u32 {
     let k = begin - first_knot(hair);
-    return begin | select(0u, FIRST_PIECE, k == 0u) | select(0u, LAST_PIECE, k + 2u == knots_of(hair));
+    return begin | select(0u, FIRST_SEGMENT, k == 0u) | select(0u, LAST_SEGMENT, k + 2u == knots_of(hair));
 }
 
-fn begin_of(listed: u32) -> u32 {
-    return listed & ~(FIRST_PIECE | LAST_PIECE);
+fn first_knot_of(packed: u32) -> u32 {
+    return packed & ~(FIRST_SEGMENT | LAST_SEGMENT);
 }
 
-// First of a hair's rows.
+// First row of a strand.
 fn row_of_hair(hair: u32) -> u32 {
     return first_knot(hair) + ROWS_BEFORE * hair;
 }

@@ -1,8 +1,8 @@
-// Pixels one below the other, for an invocation that does them. What it makes of one that hairs may cover is its own function
-// `cover`, of one that none does `leave`: a loop passes these over, as software adapters run what is in a branch for all.
+// Columns of pixels for each invocation. The including shader defines `draw_pixel` for pixels that strands may cover, and
+// `pass_through` for all others: a loop skips these, as software adapters run both sides of a branch.
 //#include "strand_fragments.wgsl"
 
-override ROWS: u32 = 1u; // pixels of an invocation; see `rows_of`
+override ROWS: u32 = 1u; // pixels of an invocation; see `rows_per_invocation`
 
 @group(0) @binding(31) var<storage, read> chains: array<u32>; // see strands_bin.wgsl
 @group(0) @binding(32) var<storage, read> links: array<vec2u>;
@@ -11,20 +11,20 @@ fn chain_at(pixel: vec2u) -> u32 {
     return chains[1u + pixel.y / STRAND_TILE * tiles_across(strand_view.size) + pixel.x / STRAND_TILE];
 }
 
-// The next pixel that hairs may cover.
+// Next pixel that strands may cover.
 fn next_covered(first: vec2u, end: u32) -> vec2u {
     var at = first;
     loop {
         if (at.y >= end || chain_at(at) != 0u) {
             break;
         }
-        leave(at);
+        pass_through(at);
         at.y += 1u;
     }
     return at;
 }
 
-fn cover_rows(id: vec2u, size: vec2u) {
+fn draw_rows(id: vec2u, size: vec2u) {
     let first = vec2u(id.x, id.y * ROWS);
     if (any(first >= size)) {
         return;
@@ -35,7 +35,7 @@ fn cover_rows(id: vec2u, size: vec2u) {
         return;
     }
     loop {
-        cover(at, chain_at(at));
+        draw_pixel(at, chain_at(at));
         at = next_covered(at + vec2u(0u, 1u), end);
         if (at.y >= end) {
             break;

@@ -1,23 +1,23 @@
-// How the eye sees hairs: knots in the picture, their width there and the light that leaves them.
+// Camera and projected knots: position and width in the picture, and radiance.
 
 struct StrandView {
     eye: vec3f,
-    samples: u32, // in a pixel
+    samples: u32, // per pixel
     forward: vec3f,
-    coarse: u32, // coarse hairs that stand for all
-    right: vec3f, // scaled as in shade.wgsl
+    coarse: u32, // number of coarse strands that are drawn
+    right: vec3f, // scaled as in shading.wgsl
     up: vec3f,
     shift: vec2f, // of the picture's middle from the axis, in half pictures
-    shown: vec2f, // factors of light from below the skin and of reflected light, which that of hairs counts as
+    light_factors: vec2f, // of light from below the skin and of reflected light; that of hair counts as reflected
     size: vec2f, // of the picture [pixel]
-    wider: f32, // than they are, for coarse hairs to cover what all do
-    skin: vec3f, // albedo of the skin under the hairs
-    jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
+    width_scale: f32, // factor of the width of coarse strands, so that they cover the area of all
+    skin: vec3f, // albedo of the skin below the strands
+    jitter: array<vec4f, 64>, // positions of samples in the pixel, 0..1
 }
 
-// A knot as it is drawn.
-struct Drawn {
-    place: vec2f, // [pixel]
+// A knot in the picture.
+struct ProjectedKnot {
+    position: vec2f, // [pixel]
     depth: f32, // along the view [mm]
     width: f32, // [pixel], negative behind the eye
     radiance: vec3f,
@@ -25,13 +25,13 @@ struct Drawn {
 
 @group(0) @binding(40) var<uniform> strand_view: StrandView;
 
-fn seen_at(p: vec3f, radius: f32) -> Drawn {
-    let way = p - strand_view.eye;
-    let depth = dot(way, strand_view.forward);
+fn project_knot(p: vec3f, radius: f32) -> ProjectedKnot {
+    let offset = p - strand_view.eye;
+    let depth = dot(offset, strand_view.forward);
     let right = strand_view.right;
     let up = strand_view.up;
-    let ndc = vec2f(dot(way, right) / dot(right, right), dot(way, up) / dot(up, up)) / max(depth, 1e-3);
-    let place = (0.5 + vec2f(0.5, -0.5) * (ndc - strand_view.shift)) * strand_view.size;
+    let ndc = vec2f(dot(offset, right) / dot(right, right), dot(offset, up) / dot(up, up)) / max(depth, 1e-3);
+    let position = (0.5 + vec2f(0.5, -0.5) * (ndc - strand_view.shift)) * strand_view.size;
     let width = radius * strand_view.size.y / (length(up) * max(depth, 1e-3));
-    return Drawn(place, depth, select(-1.0, width, depth > 1.0), vec3f(0.0));
+    return ProjectedKnot(position, depth, select(-1.0, width, depth > 1.0), vec3f(0.0));
 }

@@ -1,4 +1,4 @@
-// Empties what hairs hold back of each light, and where they are on its shadow map.
+// Empties the deep opacity maps of all lights and the bounds of their windows.
 //#include "shape/geometry.wgsl"
 //#include "surface/surface.wgsl"
 //#include "strand_window.wgsl"
@@ -7,17 +7,17 @@
 
 const LANES: u32 = 256u;
 
-// Of a word of a light.
+// Initial value of a word of a light.
 fn empty_word(word: u32) -> u32 {
     if (word >= WINDOW_HEAD) {
         return select(0u, NO_HAIR, (word - WINDOW_HEAD) % TEXEL_WORDS == 0u);
     }
-    return select(0u, ~0u, word < 3u); // the high end below the low one
+    return select(0u, ~0u, word < 3u); // empty bounds: high below low
 }
 
 @compute @workgroup_size(LANES)
 fn main(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     for (var word = id.x; word < arrayLength(&windows); word += groups.x * LANES) {
-        windows[word] = empty_word(word % window_begin(1));
+        windows[word] = empty_word(word % first_word(1));
     }
 }

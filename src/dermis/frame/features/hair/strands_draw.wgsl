@@ -1,32 +1,32 @@
-// Hairs over the picture: each pixel keeps the nearest pieces of hair that cover it and lays them over what it shows.
+// Draws strands over the picture: each pixel keeps its nearest fragments and composites them over the radiance behind.
 //#include "strand_rows.wgsl"
 //#include "strand_labels.wgsl"
 
 @group(0) @binding(34) var behind: texture_2d<f32>; // radiance and coverage
 @group(0) @binding(35) var image: texture_storage_2d<rgba32float, write>;
 
-fn leave(pixel: vec2u) {
-    put_label(pixel);
+fn pass_through(pixel: vec2u) {
+    store_label(pixel);
     textureStore(image, pixel, textureLoad(behind, pixel, 0));
 }
 
-fn cover(pixel: vec2u, first: u32) {
+fn draw_pixel(pixel: vec2u, first: u32) {
     let depths = depths_at(pixel);
-    take_none();
+    clear_fragments();
     begin_labels(pixel);
     for (var link = first; link != 0u; link = links[link - 1u].y) {
-        var one = fragment_of(vec2f(pixel) + 0.5, hold(links[link - 1u].x));
-        label_piece(one);
-        one.cover *= free_share(one.depth, depths);
+        var one = fragment_of(vec2f(pixel) + 0.5, load_segment(links[link - 1u].x));
+        label_fragment(one);
+        one.cover *= visible_fraction(one.depth, depths);
         if (one.cover > 0.0) {
-            take(one);
+            add_fragment(one);
         }
     }
-    put_label(pixel);
-    textureStore(image, pixel, laid_over(textureLoad(behind, pixel, 0)));
+    store_label(pixel);
+    textureStore(image, pixel, composite(textureLoad(behind, pixel, 0)));
 }
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    cover_rows(id.xy, textureDimensions(image));
+    draw_rows(id.xy, textureDimensions(image));
 }

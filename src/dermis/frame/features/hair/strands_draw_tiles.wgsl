@@ -1,4 +1,4 @@
-// The same by tiles.
+// Draws strands over the picture by tiles: a workgroup draws the segments of a tile.
 //#include "strand_team.wgsl"
 //#include "strand_labels.wgsl"
 
@@ -7,8 +7,8 @@
 
 var<private> depths: Depths;
 
-fn begin_pieces(pixel: vec2u) {
-    take_none();
+fn begin_pixel(pixel: vec2u) {
+    clear_fragments();
     depths = Depths(vec4f(-1.0), vec4f(-1.0), 1.0);
     if (all(pixel < textureDimensions(image))) {
         depths = depths_at(pixel);
@@ -16,41 +16,41 @@ fn begin_pieces(pixel: vec2u) {
     }
 }
 
-fn see_piece(seen: Fragment) {
-    label_piece(seen);
-    var one = seen;
-    one.cover *= free_share(one.depth, depths);
+fn visit_segment(fragment: Fragment) {
+    label_fragment(fragment);
+    var one = fragment;
+    one.cover *= visible_fraction(one.depth, depths);
     if (one.cover > 0.0) {
-        take(one);
+        add_fragment(one);
     }
 }
 
-// What a layer knows of a pixel, on its way to the first layer.
-struct Rest {
-    farther: array<u32, 2>,
+// Sums of a pixel by one layer, to be merged by the first layer.
+struct PartialSums {
+    cover_sums: array<u32, 2>,
     light: array<u32, 3>,
 }
 
-var<workgroup> handed: array<array<Fragment, NEAREST>, LANES>;
-var<workgroup> rests: array<Rest, LANES>;
+var<workgroup> partial_nearest: array<array<Fragment, MAX_FRAGMENTS>, LANES>;
+var<workgroup> partial_sums: array<PartialSums, LANES>;
 
-fn hand_over(lane: u32) {
-    handed[lane] = kept;
-    rests[lane] = Rest(array<u32, 2>(farther.x, farther.y), array<u32, 3>(light.x, light.y, light.z));
-    hand_labels_over(lane);
+fn store_partial(lane: u32) {
+    partial_nearest[lane] = nearest;
+    partial_sums[lane] = PartialSums(array<u32, 2>(cover_sums.x, cover_sums.y), array<u32, 3>(light.x, light.y, light.z));
+    store_partial_labels(lane);
 }
 
-fn take_over(lane: u32) {
-    for (var k = 0u; k < NEAREST; k += 1u) {
-        let one = handed[lane][k];
+fn merge_partial(lane: u32) {
+    for (var k = 0u; k < MAX_FRAGMENTS; k += 1u) {
+        let one = partial_nearest[lane][k];
         if (one.cover > 0.0) {
-            take(one);
+            add_fragment(one);
         }
     }
-    let rest = rests[lane];
-    farther += vec2u(rest.farther[0], rest.farther[1]);
-    light += vec3u(rest.light[0], rest.light[1], rest.light[2]);
-    take_labels_over(lane);
+    let sums = partial_sums[lane];
+    cover_sums += vec2u(sums.cover_sums[0], sums.cover_sums[1]);
+    light += vec3u(sums.light[0], sums.light[1], sums.light[2]);
+    merge_partial_labels(lane);
 }
 
 @compute @workgroup_size(STRAND_TILE, STRAND_TILE, LAYERS)
@@ -61,25 +61,25 @@ fn main(
 ) {
     let layer = index / LANES;
     let lane = index % LANES;
-    let covered = see_pieces(id.xy, tile.xy, lane, layer);
+    let covered = visit_segments(id.xy, tile.xy, lane, layer);
     for (var other = 1u; covered && other < LAYERS; other += 1u) {
         workgroupBarrier();
         if (layer == other) {
-            hand_over(lane);
+            store_partial(lane);
         }
         workgroupBarrier();
         if (layer == 0u) {
-            take_over(lane);
+            merge_partial(lane);
         }
     }
     if (layer > 0u || any(id.xy >= textureDimensions(image))) {
         return;
     }
-    put_label(id.xy);
-    let under = textureLoad(behind, id.xy, 0);
+    store_label(id.xy);
+    let radiance = textureLoad(behind, id.xy, 0);
     if (covered) {
-        textureStore(image, id.xy, laid_over(under));
+        textureStore(image, id.xy, composite(radiance));
     } else {
-        textureStore(image, id.xy, under);
+        textureStore(image, id.xy, radiance);
     }
 }

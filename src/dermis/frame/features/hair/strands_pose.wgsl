@@ -1,16 +1,16 @@
-// Hairs where the skin has moved them: each turns with the quad that it is rooted in.
+// Poses the strands: each follows the quad of the skin in which it is rooted.
 //#include "each.wgsl"
 //#include "strand_knots.wgsl"
 
 struct Strand {
-    corner: vec4u, // points of its quad, in a round
-    share: vec4f, // of each in the root's place
-    absorption: vec4f, // of its inside [1/mm], and what hair around covers of its root
+    corner: vec4u, // points of its quad, in order around it
+    weight: vec4f, // of the points at the root
+    absorption: vec4f, // [1/mm], and cover of the root by other hair
 }
 
-@group(0) @binding(0) var<storage, read> points: array<f32>; // three of each [mm]
+@group(0) @binding(0) var<storage, read> points: array<f32>; // x, y, z [mm]
 @group(0) @binding(1) var<storage, read> strands: array<Strand>;
-@group(0) @binding(2) var<storage, read> knots: array<vec4f>; // along the quad, beside that, along its normal; radius [mm]
+@group(0) @binding(2) var<storage, read> knots: array<vec4f>; // coordinates in the frame of the quad: along, across, normal; radius [mm]
 @group(0) @binding(3) var<storage, read_write> posed: array<vec4f>; // see strand_knots.wgsl
 
 fn point_at(index: u32) -> vec3f {
@@ -29,7 +29,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let b = point_at(strand.corner.y);
     let c = point_at(strand.corner.z);
     let d = point_at(strand.corner.w);
-    let root = mat4x3f(a, b, c, d) * strand.share;
+    let root = mat4x3f(a, b, c, d) * strand.weight;
     let along = normalize((b - a) + (c - d));
     let across = cross(c - a, d - b);
     let normal = normalize(across - dot(across, along) * along);

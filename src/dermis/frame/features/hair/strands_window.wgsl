@@ -1,11 +1,11 @@
-// Finds where hairs are on the shadow map of each light: the ends of some knots in each workgroup, then of all.
+// Computes the bounds of all strands on the shadow map of each light, by workgroups and then by atomic minima and maxima.
 //#include "shape/geometry.wgsl"
 //#include "surface/surface.wgsl"
 //#include "strand_knots.wgsl"
 //#include "strand_window.wgsl"
 
 @group(0) @binding(30) var<storage, read> posed: array<vec4f>;
-@group(0) @binding(31) var<storage, read_write> splatted: array<atomic<u32>>; // see strand_window.wgsl
+@group(0) @binding(31) var<storage, read_write> opacity: array<atomic<u32>>; // see strand_window.wgsl
 
 //#fill const KNOTS: u32 = {strand_window_knots}; // of a workgroup
 const LANES: u32 = 256u;
@@ -13,12 +13,12 @@ const LANES: u32 = 256u;
 var<workgroup> lows: array<vec3f, LANES>;
 var<workgroup> highs: array<vec3f, LANES>;
 
-fn gather(light: Light, first: u32, lane: u32) {
+fn find_bounds(light: Light, first: u32, lane: u32) {
     var low = vec3f(1e30);
     var high = vec3f(-1e30);
-    let end = min(first + KNOTS, all_knots(hairs.shading));
+    let end = min(first + KNOTS, all_knots(hairs.shadow_casters));
     for (var k = first + lane; k < end; k += LANES) {
-        let at = on_map(light, posed[row_of_knot(k, hair_of_knot(k))].xyz);
+        let at = project_to_map(light, posed[row_of_knot(k, hair_of_knot(k))].xyz);
         low = min(low, at);
         high = max(high, at);
     }
@@ -39,11 +39,11 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     for (var i = 0u; i < skin.light_count; i += 1u) {
         let light = lights.light[i];
         if (light.layer >= 0) {
-            gather(light, group.x * KNOTS, lane);
+            find_bounds(light, group.x * KNOTS, lane);
             if (lane < 3u) {
-                let word = window_begin(light.layer) + lane;
-                atomicMin(&splatted[word], ordered(lows[0])[lane]);
-                atomicMax(&splatted[word + 3u], ordered(highs[0])[lane]);
+                let word = first_word(light.layer) + lane;
+                atomicMin(&opacity[word], sortable(lows[0])[lane]);
+                atomicMax(&opacity[word + 3u], sortable(highs[0])[lane]);
             }
             workgroupBarrier();
         }

@@ -1,6 +1,5 @@
-"""Light from skin to skin through the air."""
+"""Interreflection: light that leaves skin, crosses the air and meets skin again."""
 
-from dermis.frame.features.interreflection.interreflection import Interreflection, draw
-from dermis.frame.features.interreflection.interreflection import link_numbers as shader_numbers
+from dermis.frame.features.interreflection.interreflection import Interreflection, draw, shader_constants
 
-__all__ = ["Interreflection", "draw", "shader_numbers"]
+__all__ = ["Interreflection", "draw", "shader_constants"]

@@ -1,4 +1,4 @@
-"""Light from skin to skin: links between patches, and the passes that light them and let light bounce."""
+"""Interreflection: form factors between patches of the skin, and the passes that let light bounce."""
 
 from __future__ import annotations
 
@@ -10,174 +10,177 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.interreflection import SAMPLES, SIDE, Links, cached_links
-from dermis.frame.programs import EACH, each, program
-from dermis.gpu import Bindings, Buffer, Constants, Device, Memo, Recorder, scratch
+from dermis.atlas.interreflection import SAMPLES, SIDE, FormFactors, cached_form_factors
+from dermis.frame.programs import WORKGROUP_SIZE, program, workgroup_grid
+from dermis.gpu import Bindings, Buffer, Constants, Device, Memo, Recorder, mark_scratch
 from dermis.mesh.head import Head
 
 LinkBuffers = tuple[tuple[Buffer, int], dict[str, Buffer], dict[str, Buffer]]
-"""Places and their number, links of patches, links of cells."""
+"""Sample points and their number, links of patches, links of cells."""
 _TEXEL = 16  # bytes of four floats
-_BOUNCES = 4  # between patches; gathering adds another
+_BOUNCES = 4  # between patches; the gathering by cells is another one
 _TEAM = 16  # invocations of a patch or a cell
 
 
-def link_numbers() -> dict[str, int]:
-    """What shaders fill in."""
+def shader_constants() -> dict[str, int]:
+    """Return the numbers that shaders of this feature are generated with."""
     return {"linked_side": SIDE, "linked_samples": SAMPLES}
 
 
 @dataclass(frozen=True, eq=False)
-class LinkSpace:
-    """What light from skin to skin needs that is alike for all skins.
+class InterreflectionBuffers:
+    """Buffers of interreflection that do not depend on the skin.
 
-    places : buffer of the places at which patches are lit, and how many there are
-    bounces, cells : buffers of the links of patches and of cells, by their names in the shaders
-    occluded : whether cells hold the mean of what they see, as the map of occlusion says how much that is
-    emitted : buffer of the light that leaves places
-    leaving : buffer of the light that leaves patches without bounces
-    around : buffer of that which leaves them where 1 arrives from everywhere
-    patches : two buffers of the light that leaves patches after bounces, in turn
-    from_skin, unlit : buffers of the light that reaches cells, and of none
+    sample_points : buffer of the points at which patches are lit, and their number
+    patch_links, cell_links : buffers of the form factors of patches and of cells, by their names in shaders
+    averaged : whether cells store the mean radiance of the patches that they see; else its sum by form factors
+    sample_exitance : exitance of the sample points
+    direct_exitance : exitance of the patches without bounces
+    uniform_exitance : exitance of the patches in uniform irradiance 1
+    bounced_exitance : exitance of the patches after a bounce, two buffers that are used in turn
+    from_skin, no_light : light that reaches the cells, and a buffer of zeros in its place
     """
 
-    places: tuple[Buffer, int]
-    bounces: dict[str, Buffer]
-    cells: dict[str, Buffer]
-    occluded: bool
-    emitted: Buffer
-    leaving: Buffer
-    around: Buffer
-    patches: tuple[Buffer, Buffer]
+    sample_points: tuple[Buffer, int]
+    patch_links: dict[str, Buffer]
+    cell_links: dict[str, Buffer]
+    averaged: bool
+    sample_exitance: Buffer
+    direct_exitance: Buffer
+    uniform_exitance: Buffer
+    bounced_exitance: tuple[Buffer, Buffer]
     from_skin: Buffer
-    unlit: Buffer
+    no_light: Buffer
 
     @property
     def nbytes(self) -> int:
-        """Of all but the space between passes, each once."""
-        read = (self.places[0], *self.bounces.values(), *self.cells.values(), self.from_skin)
-        return sum(int(one.size) for one in read)
+        """Return the size of all buffers but those between passes [byte]."""
+        links = *self.patch_links.values(), *self.cell_links.values()
+        return sum(int(buffer.size) for buffer in (self.sample_points[0], *links, self.from_skin))
 
 
 class Interreflection(NamedTuple):
-    """Light from skin to skin, and the (3,) albedo of the profile."""
+    """Interreflection of a head: its buffers, and the (3,) albedo of the profile."""
 
-    space: LinkSpace
+    buffers: InterreflectionBuffers
     albedo: NDArray[np.float64]
 
 
-def interreflection_of(
+def make_interreflection(
     memo: Memo,
     device: Device,
     head: Head,
     atlas: Atlas,
     albedo: NDArray[np.float64],
-    occluded: bool,
-    light: str,
-    of: str,
+    has_occlusion: bool,
+    light_key: str,
+    owner: str,
 ) -> Interreflection | None:
-    """Light from skin to skin, None for a head that sees nothing of itself.
+    """Return the interreflection of a head, None for a convex one.
 
     albedo : (3,) of the profile
-    occluded : whether it is known how much of the sky each place sees
-    light : whose it is, of several views in turn
-    of : name of the atlas among several
+    has_occlusion : whether a map tells how much of the sky each point sees
+    light_key : cache key of the light, for callers that draw several scenes in turn
+    owner : name of the atlas layout in the memo
     """
-    links = memo.keep(_found, head, atlas, of=of)
-    if not len(links.share):
+    form_factors = memo.get(_form_factors, head, atlas, owner=owner)
+    if not len(form_factors.cell_factor):
         return None
-    buffers = memo.keep(_uploaded, device, links, of=of)
-    return Interreflection(memo.keep(_space, device, buffers, occluded, light, of=f"{of} {light}"), albedo)
+    uploaded = memo.get(_upload_links, device, form_factors, owner=owner)
+    key = f"{owner} {light_key}"
+    buffers = memo.get(_make_buffers, device, uploaded, has_occlusion, light_key, owner=key)
+    return Interreflection(buffers, albedo)
 
 
 def no_interreflection(device: Device) -> Buffer:
-    """A buffer of no light."""
-    return device.shared("no interreflection", lambda: device.space(_TEXEL * SIDE * SIDE))
+    """Return a buffer of zeros for heads without interreflection."""
+    return device.cached("no interreflection", lambda: device.storage_buffer(_TEXEL * SIDE * SIDE))
 
 
-def _found(head: Head, atlas: Atlas) -> Links:
-    return cached_links(head.mesh, atlas.place, atlas.mapped)
+def _form_factors(head: Head, atlas: Atlas) -> FormFactors:
+    return cached_form_factors(head.mesh, atlas.corner_uv, atlas.mapped)
 
 
-def _uploaded(device: Device, links: Links) -> LinkBuffers:
-    """Places, and links of patches and cells."""
-    places = np.stack([links.triangle, links.weights], axis=1)
-    bounces = _rows(device, links.bounce_first, links.bounce_patch, links.bounce_share)
-    cells = _rows(device, links.first, links.patch, links.share)
-    own = np.stack([links.own, links.held.view(np.uint32)], axis=1)
-    cells["cells"] = device.buffer(own, "STORAGE")
-    return (device.buffer(places, "STORAGE"), len(places)), bounces, cells
+def _upload_links(device: Device, form_factors: FormFactors) -> LinkBuffers:
+    points = np.stack([form_factors.sample_triangle, form_factors.sample_weights], axis=1)
+    patch_links = _upload_rows(device, form_factors.patch_first, form_factors.patch_target, form_factors.patch_factor)
+    cell_links = _upload_rows(device, form_factors.cell_first, form_factors.cell_target, form_factors.cell_factor)
+    own = np.stack([form_factors.nearest_patch, form_factors.confidence.view(np.uint32)], axis=1)
+    cell_links["cells"] = device.buffer(own, "STORAGE")
+    return (device.buffer(points, "STORAGE"), len(points)), patch_links, cell_links
 
 
-def _rows(
-    device: Device, first: NDArray[np.uint32], patch: NDArray[np.uint32], share: NDArray[np.float32]
+def _upload_rows(
+    device: Device, first: NDArray[np.uint32], patch: NDArray[np.uint32], form_factor: NDArray[np.float32]
 ) -> dict[str, Buffer]:
-    links = np.stack([patch, share.view(np.uint32)], axis=1)
+    links = np.stack([patch, form_factor.view(np.uint32)], axis=1)
     links = links if len(links) else np.zeros((1, 2), np.uint32)
     return {"first": device.buffer(first, "STORAGE"), "links": device.buffer(links, "STORAGE")}
 
 
-def _space(
-    device: Device,
-    buffers: LinkBuffers,
-    occluded: bool,
-    _: str,
-) -> LinkSpace:
-    places, bounces, cells = buffers
-    leaving, around, *patches = (
-        mark_scratch(device, device.space(_TEXEL * (places[1] // SAMPLES))) for _ in range(4)
+def _make_buffers(
+    device: Device, uploaded: LinkBuffers, averaged: bool, _: str
+) -> InterreflectionBuffers:
+    sample_points, patch_links, cell_links = uploaded
+    count = sample_points[1]
+    direct, uniform, *bounced = (
+        mark_scratch(device, device.storage_buffer(_TEXEL * (count // SAMPLES))) for _ in range(4)
     )
-    return LinkSpace(
-        places=places,
-        bounces=bounces,
-        cells=cells,
-        occluded=occluded,
-        emitted=mark_scratch(device, device.space(2 * _TEXEL * places[1])),
-        leaving=leaving,
-        around=around,
-        patches=(patches[0], patches[1]),
-        from_skin=device.space(_TEXEL * SIDE * SIDE),
-        unlit=no_interreflection(device),
+    return InterreflectionBuffers(
+        sample_points=sample_points,
+        patch_links=patch_links,
+        cell_links=cell_links,
+        averaged=averaged,
+        sample_exitance=mark_scratch(device, device.storage_buffer(2 * _TEXEL * count)),
+        direct_exitance=direct,
+        uniform_exitance=uniform,
+        bounced_exitance=(bounced[0], bounced[1]),
+        from_skin=device.storage_buffer(_TEXEL * SIDE * SIDE),
+        no_light=no_interreflection(device),
     )
 
 
-def draw(graph: Recorder, lit: Bindings, made: Interreflection, constants: Constants) -> None:
-    """Find the light that skin sends to skin.
+def draw(
+    graph: Recorder, bindings: Bindings, interreflection: Interreflection, constants: Constants
+) -> None:
+    """Compute the light that reaches the skin from other skin.
 
-    lit : what patches are lit with
+    bindings : resources of the lighting
     constants : pipeline constants of the lights
 
     Source: [Goral1984].
     """
-    shader, (space, albedo) = (
-        program(graph.device, "interreflection/interreflection_points.wgsl", constants),
-        made,
+    shader = program(graph.device, "interreflection/interreflection_points.wgsl", constants)
+    buffers, albedo = interreflection
+    (points, count), footprint = buffers.sample_points, 2.0 / (SIDE * SAMPLES**0.5)
+    own: Bindings = {
+        "samples": shader.record("Samples", count=count, footprint=footprint, albedo=albedo),
+        "sample_points": points,
+        "sample_exitance": buffers.sample_exitance,
+        "from_skin": buffers.no_light,
+    }
+    graph.dispatch("interreflection", shader, {**bindings, **own}, workgroup_grid(count))
+    graph.repeat(_bounce, buffers)
+
+
+def _bounce(graph: Recorder, buffers: InterreflectionBuffers) -> None:
+    """Let light bounce between the patches, and gather it in the cells."""
+    device = graph.device
+    team = 1 if device.adapter.kind == "CPU" else _TEAM  # barriers are slow on software adapters
+    constants: Constants = (("TEAM", team), ("MEAN", int(buffers.averaged)))
+    patches, cells = (
+        workgroup_grid(count, WORKGROUP_SIZE // team)
+        for count in (buffers.sample_points[1] // SAMPLES, SIDE * SIDE)
     )
-    (places, count), footprint = space.places, 2.0 / (SIDE * SAMPLES**0.5)
-    record = shader.record("Leaving", places=count, footprint=footprint, albedo=albedo)
-    own: Bindings = {"leaving": record, "places": places, "emitted": space.emitted, "from_skin": space.unlit}
-    graph.dispatch("interreflection", shader, {**lit, **own}, each(count))
-    graph.repeat(_carry, space)
-
-
-def _carry(graph: Recorder, made: LinkSpace) -> None:
-    """Let light bounce between the patches, and gather it."""
-    device, sent, team = graph.device, made.leaving, _team(graph.device)
-    chosen: Constants = (("TEAM", team), ("MEAN", int(made.occluded)))
-    patches, cells = each(made.places[1] // SAMPLES, EACH // team), each(SIDE * SIDE, EACH // team)
-    alike = {"leaving": made.leaving, "around": made.around}
-    means = program(device, "interreflection/interreflection_means.wgsl", chosen[:1])
-    graph.dispatch("interreflection", means, {"emitted": made.emitted, **alike}, patches)
-    bounce = program(device, "interreflection/interreflection_bounce.wgsl", chosen)
-    for after in islice(cycle(made.patches), _BOUNCES):
-        bound: Bindings = {**made.bounces, **alike, "sent": sent, "after": after}
-        graph.dispatch("interreflection", bounce, bound, patches)
-        sent = after
-    gather = program(device, "interreflection/interreflection_gather.wgsl", chosen)
-    gathered: Bindings = {**made.cells, "sent": sent, "from_skin": made.from_skin}
-    graph.dispatch("interreflection", gather, gathered, cells)
-
-
-def _team(device: Device) -> int:
-    """Invocations that share links: few patches leave a GPU idle, and software waits at barriers."""
-    return 1 if device.adapter.kind == "CPU" else _TEAM
+    shared = {"direct_exitance": buffers.direct_exitance, "uniform_exitance": buffers.uniform_exitance}
+    means = program(device, "interreflection/interreflection_means.wgsl", constants[:1])
+    graph.dispatch("interreflection", means, {"sample_exitance": buffers.sample_exitance, **shared}, patches)
+    bounce = program(device, "interreflection/interreflection_bounce.wgsl", constants)
+    exitance = buffers.direct_exitance
+    for bounced in islice(cycle(buffers.bounced_exitance), _BOUNCES):
+        bindings: Bindings = {**buffers.patch_links, **shared, "exitance": exitance, "bounced": bounced}
+        graph.dispatch("interreflection", bounce, bindings, patches)
+        exitance = bounced
+    gather = program(device, "interreflection/interreflection_gather.wgsl", constants)
+    bindings = {**buffers.cell_links, "exitance": exitance, "from_skin": buffers.from_skin}
+    graph.dispatch("interreflection", gather, bindings, cells)

@@ -1,11 +1,11 @@
-// What leaves a patch of the skin: the mean of its places.
+// Exitance of each patch of the skin: the mean of its sample points.
 //#include "team.wgsl"
 
-//#fill const SAMPLES: u32 = {linked_samples}u; // places of a patch
+//#fill const SAMPLES: u32 = {linked_samples}u; // samples of a patch
 
-@group(0) @binding(0) var<storage, read> emitted: array<vec4f>; // as interreflection_points.wgsl has them
-@group(0) @binding(1) var<storage, read_write> leaving: array<vec4f>; // light, and the share of light from everywhere that enters
-@group(0) @binding(2) var<storage, read_write> around: array<vec4f>; // light that leaves where 1 arrives from everywhere
+@group(0) @binding(0) var<storage, read> sample_exitance: array<vec4f>; // see interreflection_points.wgsl
+@group(0) @binding(1) var<storage, read_write> direct_exitance: array<vec4f>; // exitance, and the fraction of uniform light that enters the skin
+@group(0) @binding(2) var<storage, read_write> uniform_exitance: array<vec4f>; // exitance in uniform irradiance 1
 
 @compute @workgroup_size(EACH)
 fn main(
@@ -14,17 +14,17 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = number_of(group, groups, lane) / TEAM;
-    let places = select(0u, SAMPLES, index < arrayLength(&leaving));
-    var light = vec4f(0.0);
-    var more = vec4f(0.0);
-    for (var k = lane % TEAM; k < places; k += TEAM) {
-        light += emitted[2u * (index * SAMPLES + k)];
-        more += emitted[2u * (index * SAMPLES + k) + 1u];
+    let samples = select(0u, SAMPLES, index < arrayLength(&direct_exitance));
+    var direct = vec4f(0.0);
+    var uniform_light = vec4f(0.0);
+    for (var k = lane % TEAM; k < samples; k += TEAM) {
+        direct += sample_exitance[2u * (index * SAMPLES + k)];
+        uniform_light += sample_exitance[2u * (index * SAMPLES + k) + 1u];
     }
-    light = of_team(light, lane) / f32(SAMPLES);
-    more = of_team(more, lane) / f32(SAMPLES);
-    if (lane % TEAM == 0u && places > 0u) {
-        leaving[index] = vec4f(light.rgb, more.a);
-        around[index] = vec4f(more.rgb, 0.0);
+    direct = of_team(direct, lane) / f32(SAMPLES);
+    uniform_light = of_team(uniform_light, lane) / f32(SAMPLES);
+    if (lane % TEAM == 0u && samples > 0u) {
+        direct_exitance[index] = vec4f(direct.rgb, uniform_light.a);
+        uniform_exitance[index] = vec4f(uniform_light.rgb, 0.0);
     }
 }

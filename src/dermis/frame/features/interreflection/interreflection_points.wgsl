@@ -1,19 +1,19 @@
-// Light that leaves places of the skin's patches, and which share of more light would.
+// Exitance at the sample points of the patches: by direct light, and by uniform light.
 //#include "irradiance/lighting.wgsl"
 //#include "irradiance/fine_light.wgsl"
 //#include "each.wgsl"
 
-const SPREAD: f32 = 0.5; // standard deviation over which light that is finer is averaged, over the footprint
+const AREA_DEVIATION: f32 = 0.5; // standard deviation of the area over which fine stripes of light are averaged, over the footprint
 
-struct Leaving {
-    places: u32,
-    footprint: f32, // side of what a place stands for, over that of the uv square
+struct Samples {
+    count: u32,
+    footprint: f32, // side of the area that a sample stands for, over that of the uv square
     albedo: vec3f, // of the profile
 }
 
-@group(0) @binding(30) var<uniform> leaving: Leaving;
-@group(0) @binding(31) var<storage, read> places: array<vec2u>; // triangle, its packed weights
-@group(0) @binding(32) var<storage, read_write> emitted: array<vec4f>; // radiant exitance; then that of 1 from everywhere, and how much of it enters
+@group(0) @binding(30) var<uniform> samples: Samples;
+@group(0) @binding(31) var<storage, read> sample_points: array<vec2u>; // triangle, packed barycentric weights
+@group(0) @binding(32) var<storage, read_write> sample_exitance: array<vec4f>; // exitance by direct light; then exitance in uniform irradiance 1, and the fraction of it that enters the skin
 
 @compute @workgroup_size(EACH)
 fn main(
@@ -22,32 +22,32 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = number_of(group, groups, lane);
-    if (index >= leaving.places) {
+    if (index >= samples.count) {
         return;
     }
-    let triangle = places[index].x;
+    let triangle = sample_points[index].x;
     let t = triangle_at(triangle);
-    let w2 = unpack2x16unorm(places[index].y);
+    let w2 = unpack2x16unorm(sample_points[index].y);
     let w = vec3f(1.0 - w2.x - w2.y, w2);
     let a = corner_at(t.x);
     let b = corner_at(t.y);
     let c = corner_at(t.z);
     var point = interpolate(a, b, c, w, t.w);
     point.place = place_of_point(triangle, w);
-    let surface = surface_at(point, leaving.footprint * maps_over_atlas(triangle, a, b, c));
+    let surface = surface_at(point, samples.footprint * maps_over_atlas(triangle, a, b, c));
     if (STRIPE_LIGHT) {
-        let axes = texel_axes(triangle, a, b, c, 1.0 / leaving.footprint);
-        area_u = SPREAD * axes.u;
-        area_v = SPREAD * axes.v;
+        let axes = texel_axes(triangle, a, b, c, 1.0 / samples.footprint);
+        area_u = AREA_DEVIATION * axes.u;
+        area_v = AREA_DEVIATION * axes.v;
     }
     let open = open_at(point.place);
     let lit = light_up(point, surface, point.normal, open);
-    let out = leaving.albedo * surface.colour * leaves_everywhere(surface.roughness, surface.rho_s);
+    let leaving = samples.albedo * surface.colour * leaves_everywhere(surface.roughness, surface.rho_s);
     let enters = enters_from_everywhere(surface.roughness, surface.rho_s);
-    var around = vec3f(enters * select(1.0, 1.0 - open, environment.occluded != 0u)); // as entering_from_around has it
+    var uniform_light = vec3f(enters * select(1.0, 1.0 - open, environment.occluded != 0u)); // see entering_from_around
     if (HALF_SPACE) {
-        around *= skin.back_from_everywhere;
+        uniform_light *= skin.back_from_everywhere;
     }
-    emitted[2u * index] = vec4f(out * lit.entered, 0.0);
-    emitted[2u * index + 1u] = vec4f(out * around, enters);
+    sample_exitance[2u * index] = vec4f(leaving * lit.entered, 0.0);
+    sample_exitance[2u * index + 1u] = vec4f(leaving * uniform_light, enters);
 }

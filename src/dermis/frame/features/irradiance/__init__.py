@@ -1,5 +1,5 @@
-"""Light that enters the skin, on the atlas."""
+"""Irradiance of light that enters the skin, on the atlas."""
 
-from dermis.frame.features.irradiance.irradiance import fine_numbers as shader_numbers
+from dermis.frame.features.irradiance.irradiance import fine_light_constants as shader_constants
 
-__all__ = ["shader_numbers"]
+__all__ = ["shader_constants"]

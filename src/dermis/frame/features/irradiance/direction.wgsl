@@ -4,7 +4,7 @@
 
 override HALF_SPACE: bool = false; // whether skin does so; else it is a Lambertian surface
 
-const DIRECTIONS: u32 = 32u; // rows of the table, as in optics/directions.py
+const DIRECTIONS: u32 = 32u; // rows of the table, as in optics/angular_response.py
 
 // Share of light from a direction that comes back, over the share from straight above.
 fn coming_back(cosine: f32) -> vec3f {

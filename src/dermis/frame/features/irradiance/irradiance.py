@@ -1,4 +1,4 @@
-"""Light that enters the skin on the atlas, and the levels that show light finer than its texels."""
+"""Irradiance on the atlas, and the constants for light that is finer than texels."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.lit import LitAtlas
-from dermis.frame.lights.records import oblique
+from dermis.frame.lights.records import oblique_constants
 from dermis.frame.programs import FLOATS, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
 FINE_LEVELS = 8
-"""Narrowest levels that are made whole in the picture; wider ones, texels hold as they are."""
+"""Number of narrow Gaussians for which the picture adds light that is finer than texels."""
 TEXEL_AREA = 0.5
-"""Standard deviation of what a texel averages [texel]: little is left to beat with their grid."""
+"""Standard deviation of the filter of light on the atlas [texels], which avoids aliasing."""
 
 
-def fine_numbers() -> dict[str, float]:
-    """Numbers that fine_light.wgsl fills in."""
+def fine_light_constants() -> dict[str, float]:
+    """Return the constants of fine_light.wgsl, by their `//#fill` names."""
     return {"fine_levels": FINE_LEVELS}
 
 
-def fine_levels(
+def fine_light_members(
     variance_mm2: NDArray[np.float64], weight: NDArray[np.float64], relit_mm2: float
 ) -> dict[str, float | NDArray[np.floating]]:
-    """Members of the shader's struct Fine.
+    """Return the members of the shader record `Fine`.
 
-    variance_mm2, weight : (k,) and (k, 3) of the blurred levels
-    relit_mm2 : variance of the level that is not blurred
+    variance_mm2, weight : (k,) variances [mm2] and (k, 3) weights [-] of the Gaussians that blur
+    relit_mm2 : variance of the Gaussian that is relit [mm2]
     """
     count = min(len(variance_mm2), FINE_LEVELS)
     level = np.zeros((FINE_LEVELS, 4), np.float32)
@@ -45,17 +45,18 @@ def draw(
     scale: float = 1.0,
     area: float = 0.0,
 ) -> None:
-    """Irradiance that passes the surface, times albedo^mix, into a texture of the atlas' size.
+    """Declare the pass that stores the irradiance of light that enters the skin, times albedo^mix.
 
     constants : pipeline constants of the lights
-    texel : the texture's format
-    scale : factor of what is stored
-    area : standard deviation of what a texel averages of light that is finer [texel]; 0 for its centre alone,
-        as where texels beside each other are not beside each other on the surface
+    into : texture of `side` x `side` texels
+    texel : format of the texture
+    scale : factor of the stored values
+    area : standard deviation of the filter of light that is finer than texels [texels]; 0 samples texel centres,
+        for texels whose neighbours are no neighbours on the surface
     """
-    if area:  # the surface goes on beside each texel
-        constants = oblique(constants)
+    if area:  # neighbouring texels are neighbours on the surface
+        constants = oblique_constants(constants)
     shader = program(graph.device, "irradiance/irradiance.wgsl", constants, store=texel)
     entering = shader.record("Entering", scale=scale, area=area)
-    bound = {**layout.lit, "surfaces": layout.surfaces, "entering": entering, "stored": into}
+    bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering, "stored": into}
     graph.compute("irradiance", shader, bound, (side, side))

@@ -12,7 +12,7 @@
 
 // Whether each point skips the lights behind its surface by itself. Without that, software adapters shade it with every light
 // that a point beside it sees. GPUs do without: they read lights faster when all points read the same one.
-override PASSES_DARK: bool = false;
+override SKIPS_UNLIT: bool = false;
 
 const MOST_BEHIND: f32 = -0.75; // cosine at which oblique light may still shine
 
@@ -49,7 +49,7 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
     loop {
         let light = lights.light[i];
         let behind = select(0.0, MOST_BEHIND, OBLIQUE);
-        if (light.narrow == 0u || dot(towards_light(light, p), n) > behind || i + 1u >= skin.light_count) {
+        if (light.punctual == 0u || dot(towards_light(light, p), n) > behind || i + 1u >= skin.light_count) {
             break;
         }
         i++;
@@ -71,7 +71,7 @@ fn first_that_faces(light: Light, p: vec3f, n: vec3f) -> u32 {
 
 // Share of a light from a direction that reaches a point, past the head and its hairs.
 fn reaching(light: Light, point: Point, l: vec3f) -> f32 {
-    return visibility(light, point, l) * past_strands(light, point.position);
+    return visibility(light, point, l) * strand_transmittance(light, point.position);
 }
 
 // Light that enters from all around: from the environment, and from other skin. Where that is known, the environment's own guess
@@ -106,7 +106,7 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
         if (skin.light_count == 0u) {
             break;
         }
-        if (PASSES_DARK) {
+        if (SKIPS_UNLIT) {
             i = next_that_may_shine(i, point.position, surface.normal);
         }
         let light = lights.light[i];

@@ -1,5 +1,5 @@
-"""Ambient occlusion: the open share of the sky, baked for a head at rest and updated as it moves."""
+"""Ambient occlusion: the visible fraction of the sky, baked for a head at rest and updated as it moves."""
 
-from dermis.frame.features.occlusion.moving import Sky, draw
+from dermis.frame.features.occlusion.moving import VertexSky, draw
 
-__all__ = ["Sky", "draw"]
+__all__ = ["VertexSky", "draw"]

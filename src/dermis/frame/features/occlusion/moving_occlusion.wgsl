@@ -1,36 +1,37 @@
-// The open share of the sky as a head is now: the map of its rest, on the atlas and at vertices, changed as between the vertices.
+// Sky visibility of a moving head at texels and vertices: the baked map, corrected by the change at the vertices.
 
-const MOST_GAIN: f32 = 2.0; // of a texel over its vertices: more would be their noise
+const MAX_GAIN: f32 = 2.0; // of the change of a texel over that of its vertices, which limits noise
 
-@group(0) @binding(0) var corners: texture_2d<u32>; // three vertices and two barycentric weights packed
-@group(0) @binding(1) var resting_map: texture_2d<f32>; // the atlas, its last row again, the vertices
-@group(0) @binding(2) var<storage, read> shares: array<vec2f>; // open at vertices, at rest and now
-@group(0) @binding(3) var moved_map: texture_storage_2d<r32float, write>;
+@group(0) @binding(0) var corners: texture_2d<u32>; // three vertices, packed barycentric weights
+@group(0) @binding(1) var rest_map: texture_2d<f32>; // rows of the atlas, the last row repeated, then the vertices
+@group(0) @binding(2) var<storage, read> visibility: array<vec2f>; // of vertices, at rest and now
+@group(0) @binding(3) var moving_map: texture_storage_2d<r32float, write>;
 
-// What opens gives back its share of what was hidden, what closes takes its share of what was open.
-fn moved(open: f32, share: vec2f) -> f32 {
-    let closes = share.y < share.x;
-    let gain = select((1.0 - open) / max(1.0 - share.x, 1e-6), open / max(share.x, 1e-6), closes);
-    return clamp(open + (share.y - share.x) * min(gain, MOST_GAIN), 0.0, 1.0);
+// Visibility after a change at the vertices: an increase restores the same fraction of what was hidden, a decrease removes the
+// same fraction of what was visible.
+fn update(open: f32, vertex_visibility: vec2f) -> f32 {
+    let is_closing = vertex_visibility.y < vertex_visibility.x;
+    let gain = select((1.0 - open) / max(1.0 - vertex_visibility.x, 1e-6), open / max(vertex_visibility.x, 1e-6), is_closing);
+    return clamp(open + (vertex_visibility.y - vertex_visibility.x) * min(gain, MAX_GAIN), 0.0, 1.0);
 }
 
 @compute @workgroup_size(16, 16)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(moved_map);
+    let size = textureDimensions(moving_map);
     if (any(id.xy >= size)) {
         return;
     }
     let side = size.x;
-    let open = textureLoad(resting_map, id.xy, 0).x;
-    var share = vec2f(1.0);
+    let open = textureLoad(rest_map, id.xy, 0).x;
+    var vertex_visibility = vec2f(1.0);
     if (id.y > side) {
-        share = shares[min((id.y - side - 1u) * side + id.x, arrayLength(&shares) - 1u)];
+        vertex_visibility = visibility[min((id.y - side - 1u) * side + id.x, arrayLength(&visibility) - 1u)];
     } else {
         let corner = textureLoad(corners, vec2u(id.x, min(id.y, side - 1u)), 0);
         let w = unpack2x16unorm(corner.w);
-        if (corner.x < arrayLength(&shares)) {
-            share = (1.0 - w.x - w.y) * shares[corner.x] + w.x * shares[corner.y] + w.y * shares[corner.z];
+        if (corner.x < arrayLength(&visibility)) {
+            vertex_visibility = (1.0 - w.x - w.y) * visibility[corner.x] + w.x * visibility[corner.y] + w.y * visibility[corner.z];
         }
     }
-    textureStore(moved_map, id.xy, vec4f(moved(open, share)));
+    textureStore(moving_map, id.xy, vec4f(update(open, vertex_visibility)));
 }

@@ -1,20 +1,20 @@
-// Open sky at texels of the atlas and at vertices: sums of the cosines of the free directions, and of all.
+// Sky visibility at texels of the atlas and at vertices: sums of the cosines of visible directions, and of all directions.
 //#include "shape/geometry.wgsl"
 //#include "surface/skin.wgsl"
 //#include "lights.wgsl"
 
 struct Sky {
-    directions: u32, // parallel lights of this pass
-    side: u32, // of the grid of texels, row by row; the vertices follow
+    directions: u32, // number of directions of this pass, as parallel lights
+    side: u32, // texels along a side of the atlas; the vertices follow
     vertices: u32,
 }
 
 @group(0) @binding(30) var<uniform> sky: Sky;
 @group(0) @binding(31) var atlas: texture_2d<u32>;
-@group(0) @binding(32) var<storage, read_write> open: array<vec2f>; // sums so far
+@group(0) @binding(32) var<storage, read_write> sums: array<vec2f>; // sums over all passes so far
 
-fn texel_point(place: vec2u) -> Point {
-    let at = vec2u((vec2f(place) + 0.5) * vec2f(textureDimensions(atlas)) / f32(sky.side));
+fn texel_point(position: vec2u) -> Point {
+    let at = vec2u((vec2f(position) + 0.5) * vec2f(textureDimensions(atlas)) / f32(sky.side));
     let texel = textureLoad(atlas, at, 0);
     if (texel.x == 0u) {
         return Point();
@@ -50,5 +50,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             sum += cosine * vec2f(visibility(light, point, -light.direction), 1.0);
         }
     }
-    open[index] += sum;
+    sums[index] += sum;
 }

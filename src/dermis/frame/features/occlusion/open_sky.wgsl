@@ -1,4 +1,4 @@
-// Open share of the sky at a point of a triangle, from the atlas or from its corners.
+// Sky visibility at a point of a triangle, from the atlas or interpolated between its corners.
 //#include "irradiance/lighting.wgsl"
 
 // t: corners of the triangle, w: barycentric weights

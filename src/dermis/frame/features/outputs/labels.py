@@ -8,18 +8,18 @@ import numpy as np
 
 from dermis.frame.features.hair.resources import has_strands
 from dermis.frame.features.outputs.planes import Planes, fill, stage_program
-from dermis.frame.features.outputs.stage_inputs import SeenFrame
+from dermis.frame.features.outputs.stage_inputs import StageInputs
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Bindings, Buffer, Device, Memo, MutableBindings, Recorder, Texture
 from dermis.human.labels.classes import class_number, label_classes
-from dermis.human.labels.fields import Labelling, hair_classes, labelling
+from dermis.human.labels.fields import MeshLabels, hair_classes, labelling
 from dermis.mesh.head import Head
 
 STAGE = "label"
 
 
 @dataclass(frozen=True, eq=False)
-class LabelSpace:
+class LabelBuffers:
     """Buffers as label.wgsl and strand_labels.wgsl read them.
 
     tables : by their names there
@@ -33,26 +33,26 @@ class LabelSpace:
     hair_classes: Buffer | None
     hair_labels: Buffer
 
-    def for_hairs(self, centres: Texture) -> Bindings | None:
+    def hair_bindings(self, centres: Texture) -> Bindings | None:
         """Return what the pass that draws hairs binds to label them too; None without hair."""
         if self.hair_classes is None:
             return None
         return {"hair_classes": self.hair_classes, "hair_labels": self.hair_labels, "centres": centres}
 
 
-def label_space(memo: Memo, device: Device, request: FrameRequest) -> LabelSpace | None:
+def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> LabelBuffers | None:
     """Return what the requested labels take, None for none."""
-    keep = memo.keep
+    cached = memo.get
     if not any(name.startswith(STAGE) for name in request.outputs):
         return None
     head, settings = request.head.bare, request.settings
-    found = keep(labelling, head)
-    tables = keep(_tables, device, found)
+    found = cached(labelling, head)
+    tables = cached(_tables, device, found)
     if not has_strands(request.head, settings):
-        return LabelSpace(tables, len(found.classes), None, keep(_words, device, 1, of="no hair labels"))
+        return LabelBuffers(tables, len(found.classes), None, cached(_words, device, 1, owner="no hair labels"))
     pixels = settings.size[0] * settings.size[1]
-    space = keep(_words, device, pixels, of="hair labels")
-    return LabelSpace(tables, len(found.classes), keep(_hairs, device, head), space)
+    space = cached(_words, device, pixels, owner="hair labels")
+    return LabelBuffers(tables, len(found.classes), cached(_hairs, device, head), space)
 
 
 def label_numbers() -> dict[str, int]:
@@ -62,7 +62,7 @@ def label_numbers() -> dict[str, int]:
 
 
 def draw_labels(
-    graph: Recorder, planes: Planes, space: LabelSpace, seen: SeenFrame, centres: Texture
+    graph: Recorder, planes: Planes, space: LabelBuffers, seen: StageInputs, centres: Texture
 ) -> None:
     """Declare the pass that labels the pixels."""
     constants = ("FIELDS", space.fields), ("HAIRS", space.hair_classes is not None)
@@ -71,7 +71,7 @@ def draw_labels(
     fill(graph, planes, shader, bound)
 
 
-def _tables(device: Device, found: Labelling) -> MutableBindings:
+def _tables(device: Device, found: MeshLabels) -> MutableBindings:
     """Return the labelling, and the classes of its fields with those of FaceSynthetics by our numbers."""
     others = [one.face_synthetics for one in label_classes()]
     arrays = {
@@ -87,4 +87,4 @@ def _hairs(device: Device, head: Head) -> Buffer:
 
 
 def _words(device: Device, count: int) -> Buffer:
-    return device.space(4 * count, "hair labels")
+    return device.storage_buffer(4 * count, "hair labels")

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.errors import refuse, shown_value
-from dermis.frame.features.outputs.stage_inputs import SeenFrame
-from dermis.frame.programs import each, program
+from dermis.base.errors import format_value, refuse
+from dermis.frame.features.outputs.stage_inputs import StageInputs
+from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Buffer, Device, Recorder, Texture
 from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landmark_points
 from dermis.mesh.head import Head
 
-FoundLandmarks = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
+LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
 """Names of each set, and (n, 4) places [mm] with 1 for those that are seen."""
 TOLERANCE_MM = 2.0
 """By which the mesh at the pixels around a landmark may lie before it where it still counts as seen."""
@@ -24,7 +24,7 @@ _FOUND = 4  # floats of each: place, and whether it is seen
 
 
 @dataclass(frozen=True, eq=False)
-class LandmarkSpace:
+class LandmarkBuffers:
     """Landmarks of all requested sets, one after the other.
 
     sets : by their names
@@ -37,7 +37,7 @@ class LandmarkSpace:
     buffer: Buffer
     count: int
 
-    def found(self, raw: NDArray[np.uint8]) -> FoundLandmarks:
+    def found(self, raw: NDArray[np.uint8]) -> LandmarkPositions:
         """Return the names of each set, and (n, 4) places [mm] with 1 for those that are seen.
 
         raw : bytes of the buffer
@@ -55,12 +55,12 @@ def checked_landmarks(names: Iterable[str]) -> tuple[str, ...]:
     Raises DermisError for what is neither.
     """
     if isinstance(names, str) or not isinstance(names, Iterable):
-        came = f"{shown_value(names)} came"
-        refuse("landmarks", "several names", came, 'Write landmarks=("ibug-68",)')
+        actual = f"got {format_value(names)}"
+        refuse("landmarks", "several names", actual, 'Write landmarks=("ibug-68",)')
     return tuple(dict.fromkeys(check_landmarks(name) for name in names))
 
 
-def landmark_space(device: Device, head: Head, names: tuple[str, ...]) -> LandmarkSpace:
+def make_landmark_buffers(device: Device, head: Head, names: tuple[str, ...]) -> LandmarkBuffers:
     """Return the landmarks of a head on the device.
 
     Raises DermisError as `landmark_points` does.
@@ -71,12 +71,12 @@ def landmark_space(device: Device, head: Head, names: tuple[str, ...]) -> Landma
         rows[part] = np.concatenate([getattr(points, part) for points in sets.values()])
     rows["material"][:, 0] = np.concatenate([points.material for points in sets.values()]) + 1
     table = device.buffer(rows.view(np.uint32), "STORAGE")
-    return LandmarkSpace(sets, table, device.space(4 * _FOUND * len(rows), "landmarks"), len(rows))
+    return LandmarkBuffers(sets, table, device.storage_buffer(4 * _FOUND * len(rows), "landmarks"), len(rows))
 
 
-def draw_landmarks(graph: Recorder, space: LandmarkSpace, seen: SeenFrame, centres: Texture) -> None:
+def draw_landmarks(graph: Recorder, space: LandmarkBuffers, seen: StageInputs, centres: Texture) -> None:
     """Declare the pass that finds the landmarks."""
     shader = program(graph.device, "outputs/landmarks.wgsl", (("TOLERANCE_MM", TOLERANCE_MM),))
     bound = seen.bound(shader, centres) | {"landmarks": space.table}
     bound |= {"points": seen.shape.surface["points"], "found": space.buffer}
-    graph.dispatch("outputs", shader, bound, each(space.count))
+    graph.dispatch("outputs", shader, bound, workgroup_grid(space.count))

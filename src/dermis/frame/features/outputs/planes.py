@@ -82,9 +82,9 @@ def make_planes(
     if _WORD * count * pixels > device.max_storage_bytes:
         most = device.max_storage_bytes // (_WORD * count)
         limit = f"at most {most} pixels with {', '.join(name for name, _ in channels)}"
-        came = f"there are {pixels}"
-        refuse("size", f"{limit} at once from {device.adapter.name}", came, "Ask for fewer, or a smaller one")
-    return Planes(stage, dict(channels), size, device.space(_WORD * count * pixels, "outputs"))
+        actual = f"there are {pixels}"
+        refuse("size", f"{limit} at once from {device.adapter.name}", actual, "Ask for fewer, or a smaller one")
+    return Planes(stage, dict(channels), size, device.storage_buffer(_WORD * count * pixels, "outputs"))
 
 
 def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> ComputeProgram:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.frame.features.outputs.landmarks import FoundLandmarks
+from dermis.frame.features.outputs.landmarks import LandmarkPositions
 from dermis.frame.features.outputs.planes import PlaneArray
 from dermis.frame.features.outputs.resources import Resources
 from dermis.frame.features.post.picture import Picture, encoding_of
@@ -47,8 +47,8 @@ class Readback:
         """(h, w, 3 or 4) sRGB bytes or linear floats; waits for them. To be called once."""
         return self._image(self.fetched.array())
 
-    def all(self) -> tuple[PictureArray, dict[str, PlaneArray], FoundLandmarks]:
-        """The same, outputs by name and `LandmarkSpace.found`; in its place, to be called once."""
+    def all(self) -> tuple[PictureArray, dict[str, PlaneArray], LandmarkPositions]:
+        """The same, outputs by name and `LandmarkBuffers.found`; in its place, to be called once."""
         raw, start, found = self.fetched.array(), _WORD * self.words, dict[str, PlaneArray]()
         if self.outputs is None:
             return self._image(raw), {}, {}
@@ -102,7 +102,7 @@ def start_readback(
     _check_sum(device, buffers, pixels)
     graph.compute("pack", shader, bound | {"packed": packed}, (_ROW, -(-count // _ROW)))
     kind = np.float32 if linear else np.uint8
-    return Readback(graph.fetch(*buffers), picture.size, kind, channels, words, outputs)
+    return Readback(graph.read_back(*buffers), picture.size, kind, channels, words, outputs)
 
 
 def _check(device: Device, size: int, pixels: int) -> None:

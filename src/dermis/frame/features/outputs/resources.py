@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dermis.frame.features.outputs.labels import LabelSpace, label_space
-from dermis.frame.features.outputs.landmarks import LandmarkSpace, landmark_space
-from dermis.frame.features.outputs.light import LightSpace, light_space
+from dermis.frame.features.outputs.labels import LabelBuffers, make_label_buffers
+from dermis.frame.features.outputs.landmarks import LandmarkBuffers, make_landmark_buffers
+from dermis.frame.features.outputs.light import LightOutputs, make_light_outputs
 from dermis.frame.features.outputs.planes import Planes, make_planes
 from dermis.frame.features.shape.shape import Shape, ShapeTables, make_shape
 from dermis.frame.features.translucency.resources import Translucency
-from dermis.frame.features.visibility.layers import Layers, make_layers
+from dermis.frame.features.visibility.layers import ViewLayers, make_layers
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Device, Memo
 from dermis.scene.outputs import OUTPUTS
@@ -31,11 +31,11 @@ class Resources:
 
     names: tuple[str, ...]
     planes: tuple[Planes, ...]
-    centres: Layers | None
+    centres: ViewLayers | None
     previous: Shape | None
-    light: LightSpace
-    labels: LabelSpace | None
-    landmarks: LandmarkSpace | None
+    light: LightOutputs
+    labels: LabelBuffers | None
+    landmarks: LandmarkBuffers | None
 
     @property
     def buffers(self) -> list[Buffer]:
@@ -63,7 +63,7 @@ def make(
     """
     if not request.outputs and not request.landmarks:
         return None
-    settings, keep = request.settings, memo.keep
+    settings, cached = request.settings, memo.get
     stages: dict[str, list[tuple[str, int]]] = {}
     for name, channels in request.output_channels.items():
         stages.setdefault(OUTPUTS[name].stage, []).append((name, channels))
@@ -71,16 +71,16 @@ def make(
     return Resources(
         names=request.outputs,
         planes=tuple(
-            keep(make_planes, device, stage, tuple(of), settings.size, of=stage)
+            cached(make_planes, device, stage, tuple(of), settings.size, owner=stage)
             for stage, of in stages.items()
         ),
-        centres=None if settings.samples == 1 else keep(_centres, device, settings.size),
-        previous=keep(make_shape, device, tables, of="before") if "motion" in stages else None,
-        light=light_space(memo, device, request, thin),
-        labels=label_space(memo, device, request),
-        landmarks=keep(landmark_space, device, bare, names) if names else None,
+        centres=None if settings.samples == 1 else cached(_centres, device, settings.size),
+        previous=cached(make_shape, device, tables, owner="before") if "motion" in stages else None,
+        light=make_light_outputs(memo, device, request, thin),
+        labels=make_label_buffers(memo, device, request),
+        landmarks=cached(make_landmark_buffers, device, bare, names) if names else None,
     )
 
 
-def _centres(device: Device, size: tuple[int, int]) -> Layers:
+def _centres(device: Device, size: tuple[int, int]) -> ViewLayers:
     return make_layers(device, size, 1, triangles=True)

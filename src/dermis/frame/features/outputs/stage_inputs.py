@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dermis.frame.features.post.picture import Picture
-from dermis.frame.features.shading.view import rays_of
-from dermis.frame.features.shape.mesh import HeadResources
+from dermis.frame.features.shading.view import ray_record
+from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import MotionBytes, Shape
 from dermis.frame.features.translucency.resources import Translucency
-from dermis.frame.features.visibility.layers import Layers
+from dermis.frame.features.visibility.layers import ViewLayers
 from dermis.frame.projection import Triple, Views
-from dermis.gpu import Bindings, ComputeProgram, Constants, MutableBindings, Record, Texture, TextureOrView
+from dermis.gpu import Bindings, ComputeProgram, Constants, MutableBindings, UniformRecord, Texture, TextureOrView
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class PreviousScene:
     """
 
     motion: MotionBytes | None
-    view: Record
+    view: UniformRecord
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class SpreadLight:
 
 
 @dataclass(frozen=True, eq=False)
-class SeenFrame:
+class StageInputs:
     """What the stages read of a frame.
 
     lit : resources of the shading, of the layout that is looked at
@@ -59,13 +59,13 @@ class SeenFrame:
     """
 
     lit: Bindings
-    view: Record
+    view: UniformRecord
     centre_mm: Triple
     constants: Constants
     scattered: Texture
     camera: Views
-    head: HeadResources
-    visibility: Layers
+    head: HeadGeometry
+    visibility: ViewLayers
     shape: Shape
     picture: Picture
     hair: bool
@@ -79,5 +79,5 @@ class SeenFrame:
 
         centres : texture of the triangles at the pixels' centres
         """
-        look = shader.record("Look", rays=rays_of(shader, self.view), centre=self.centre_mm)
+        look = shader.record("Look", rays=ray_record(shader, self.view), centre=self.centre_mm)
         return {**self.lit, "look": look, "centres": centres}

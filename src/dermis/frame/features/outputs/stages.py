@@ -11,28 +11,28 @@ from dermis.frame.features.outputs.labels import draw_labels
 from dermis.frame.features.outputs.landmarks import draw_landmarks
 from dermis.frame.features.outputs.planes import Planes, fill, stage_program
 from dermis.frame.features.outputs.resources import Resources
-from dermis.frame.features.outputs.stage_inputs import SeenFrame
-from dermis.frame.features.shading.view import rays_of
+from dermis.frame.features.outputs.stage_inputs import StageInputs
+from dermis.frame.features.shading.view import ray_record
 from dermis.frame.features.shape import shape
 from dermis.frame.features.visibility.layers import draw_layers
-from dermis.frame.projection import MIDDLE, Views
+from dermis.frame.projection import PIXEL_CENTRE, Views
 from dermis.gpu import Bindings, Graph, Texture
 from dermis.gpu.wgsl_source import Member
 from dermis.scene.outputs import OUTPUTS, Output
 
-Stage = Callable[[Graph, Planes, Resources, SeenFrame, Texture], None]
+Stage = Callable[[Graph, Planes, Resources, StageInputs, Texture], None]
 _OF_THE_SURFACE = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
-def hair_labels(graph: Graph, made: Resources | None, seen: SeenFrame) -> Bindings | None:
+def hair_labels(graph: Graph, made: Resources | None, seen: StageInputs) -> Bindings | None:
     """Return what the pass that draws hairs binds to label them too; None where no labels are requested."""
     if not _labels_hairs(made, seen):
         return None
     assert made is not None and made.labels is not None
-    return made.labels.for_hairs(_draw_centres(graph, made, seen))
+    return made.labels.hair_bindings(_draw_centres(graph, made, seen))
 
 
-def draw(graph: Graph, made: Resources | None, seen: SeenFrame) -> None:
+def draw(graph: Graph, made: Resources | None, seen: StageInputs) -> None:
     """Declare the passes that fill the planes of all requested outputs."""
     if made is None:
         return
@@ -44,30 +44,30 @@ def draw(graph: Graph, made: Resources | None, seen: SeenFrame) -> None:
         draw_landmarks(graph, made.landmarks, seen, centres)
 
 
-def _labels_hairs(made: Resources | None, seen: SeenFrame) -> bool:
+def _labels_hairs(made: Resources | None, seen: StageInputs) -> bool:
     return seen.hair and made is not None and made.labels is not None and made.labels.hair_classes is not None
 
 
-def _draw_centres(graph: Graph, made: Resources, seen: SeenFrame) -> Texture:
+def _draw_centres(graph: Graph, made: Resources, seen: StageInputs) -> Texture:
     """Find the triangles at the pixels' centres, unless the picture's only sample lies there."""
     if made.centres is None:
         return seen.visibility.texture
-    draw_layers(graph, "outputs", made.centres, Views(seen.camera.clips, MIDDLE), seen.head)
+    draw_layers(graph, "outputs", made.centres, Views(seen.camera.clips, PIXEL_CENTRE), seen.head)
     return made.centres.texture
 
 
-def _geometry(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+def _geometry(graph: Graph, planes: Planes, made: Resources, seen: StageInputs, centres: Texture) -> None:
     shader = stage_program(graph.device, planes)
     fill(graph, planes, shader, seen.bound(shader, centres))
 
 
-def _surface(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+def _surface(graph: Graph, planes: Planes, made: Resources, seen: StageInputs, centres: Texture) -> None:
     constants = tuple(one for one in seen.constants if one[0] in _OF_THE_SURFACE)
     shader = stage_program(graph.device, planes, constants)
     fill(graph, planes, shader, seen.bound(shader, centres))
 
 
-def _motion(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+def _motion(graph: Graph, planes: Planes, made: Resources, seen: StageInputs, centres: Texture) -> None:
     previous, vertices = seen.previous, seen.shape.vertices
     assert previous is not None
     if previous.motion is not None:
@@ -76,24 +76,24 @@ def _motion(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, cent
         vertices = made.previous.vertices
     shader = stage_program(graph.device, planes)
     bound = seen.bound(shader, centres) | {
-        "before": shader.record("Before", rays=rays_of(shader, previous.view)),
+        "before": shader.record("Before", rays=ray_record(shader, previous.view)),
         "before_table": vertices["vertex_table"],
         "before_buffer": vertices["vertex_buffer"],
     }
     fill(graph, planes, shader, bound)
 
 
-def _alpha(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+def _alpha(graph: Graph, planes: Planes, made: Resources, seen: StageInputs, centres: Texture) -> None:
     fill(graph, planes, stage_program(graph.device, planes), {"exposed": seen.picture.exposed})
 
 
-def _label(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+def _label(graph: Graph, planes: Planes, made: Resources, seen: StageInputs, centres: Texture) -> None:
     assert made.labels is not None
     draw_labels(graph, planes, made.labels, seen, centres)
 
 
-def _of_light(draw: Callable[[Graph, Planes, light.LightSpace, SeenFrame, Texture], None]) -> Stage:
-    def stage(graph: Graph, planes: Planes, made: Resources, seen: SeenFrame, centres: Texture) -> None:
+def _of_light(draw: Callable[[Graph, Planes, light.LightOutputs, StageInputs, Texture], None]) -> Stage:
+    def stage(graph: Graph, planes: Planes, made: Resources, seen: StageInputs, centres: Texture) -> None:
         draw(graph, planes, made.light, seen, centres)
 
     return stage
@@ -128,6 +128,6 @@ def _made_by(stage: str) -> list[Member]:
 
 def _words(output: Output) -> tuple[tuple[str, str], ...]:
     """Type of its values in the shader, and the one where nothing is seen."""
-    kind = output.word if output.channels == 1 else f"vec{output.channels}f"
+    kind = output.wgsl_type if output.channels == 1 else f"vec{output.channels}f"
     nothing = output.background if kind == "f32" else int(output.background)
     return ("type", kind), ("nothing", f"{kind}({nothing})")

@@ -66,7 +66,7 @@ fn seen_at(pixel: vec2u, size: vec2u) -> Seen {
     let triangle = max(textureLoad(centres, pixel, 0, 0).x, 1u) - 1u;
     let t = triangle_at(triangle);
     let w = weights_at(t, vec2f(pixel) + 0.5, vec2f(size));
-    return Seen(triangle, t, w, point_under(triangle, w), pixel);
+    return Seen(triangle, t, w, point_on_triangle(triangle, w), pixel);
 }
 
 fn sees_any(pixel: vec2u) -> bool {

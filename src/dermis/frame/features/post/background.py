@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dermis.frame.features.post.meter import Meter, exposed_by
-from dermis.frame.features.shading.view import rays_of
+from dermis.frame.features.post.meter import Meter, exposure_input
+from dermis.frame.features.shading.view import ray_record
 from dermis.frame.programs import program
-from dermis.gpu import Bindings, Record, Recorder, Texture
+from dermis.gpu import Bindings, Recorder, Texture, UniformRecord
 from dermis.scene.settings import Settings
 
 _KINDS = ("gradient", "environment")  # numbered from 1 as in background.wgsl; 0 is a colour
@@ -27,7 +27,7 @@ class Backdrop:
 def draw(
     graph: Recorder,
     backdrop: Backdrop,
-    look: tuple[Bindings, Record],
+    look: tuple[Bindings, UniformRecord],
     image: Texture,
     meter: Meter | None,
     settings: Settings,
@@ -38,11 +38,11 @@ def draw(
     meter : None where the exposure is given
     """
     (lit, view), into = look, backdrop.result
-    shown, (exposure, metered) = settings.background, exposed_by(graph.device, settings, meter)
+    shown, (exposure, metered) = settings.background, exposure_input(graph.device, settings, meter)
     shader = program(graph.device, "post/background.wgsl")
     record = shader.record(
         "Behind",
-        rays=rays_of(shader, view),
+        rays=ray_record(shader, view),
         kind=1 + _KINDS.index(shown) if isinstance(shown, str) else 0,
         colour=(0.0, 0.0, 0.0) if isinstance(shown, str) else shown,
         exposure=exposure,

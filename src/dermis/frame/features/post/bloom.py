@@ -12,7 +12,7 @@ _COARSEST = 4  # halvings short of one pixel: the widest Gaussian spans a sixtee
 
 
 @dataclass(frozen=True, eq=False)
-class Glow:
+class BloomTextures:
     """Textures for a picture's halvings, for the sums on the way back up, and for the result."""
 
     halved: list[Texture]
@@ -20,15 +20,15 @@ class Glow:
     result: Texture
 
 
-def make_glow(device: Device, size: tuple[int, int]) -> Glow:
+def make_bloom(device: Device, size: tuple[int, int]) -> BloomTextures:
     """Space for a picture of size (width, height)."""
     count = max(1, int(math.log2(min(size))) - _COARSEST) if min(size) > 1 else 1
     sides = [(max(1, size[0] >> k), max(1, size[1] >> k)) for k in range(1, count + 1)]
     halved, sums = ([make_texture(device, side, "rgba32float") for side in sides] for _ in range(2))
-    return Glow(halved, sums[:-1], make_texture(device, size, "rgba32float"))
+    return BloomTextures(halved, sums[:-1], make_texture(device, size, "rgba32float"))
 
 
-def draw(graph: Recorder, glow: Glow, picture: Texture, share: float) -> Texture:
+def draw(graph: Recorder, glow: BloomTextures, picture: Texture, share: float) -> Texture:
     """The picture with `share` of its light scattered, none of it lost; a texture of `glow`."""
     source = picture
     for halved in glow.halved:

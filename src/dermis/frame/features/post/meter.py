@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dermis.frame.features.shading.view import rays_of
+from dermis.frame.features.shading.view import ray_record
 from dermis.frame.programs import program
-from dermis.gpu import Bindings, Buffer, Constants, Device, Record, Recorder, Texture
+from dermis.gpu import Bindings, Buffer, Constants, Device, Recorder, Texture, UniformRecord
 from dermis.scene.settings import Settings
 
 SIDE = 64
@@ -37,13 +37,13 @@ class Meter:
 
 def make_meter(device: Device) -> Meter:
     """Space for the meter."""
-    return Meter(device.space(8 * SIDE * SIDE), device.buffer(np.ones(1, np.float32), "STORAGE"))
+    return Meter(device.storage_buffer(8 * SIDE * SIDE), device.buffer(np.ones(1, np.float32), "STORAGE"))
 
 
 def draw(
     graph: Recorder,
     meter: Meter,
-    look: tuple[Bindings, Record, Constants],
+    look: tuple[Bindings, UniformRecord, Constants],
     visibility: Texture,
     image: Texture,
 ) -> None:
@@ -58,18 +58,18 @@ def draw(
         program(graph.device, "post/meter.wgsl", constants),
         program(graph.device, "post/meter_key.wgsl"),
     )
-    record = shader.record("Look", rays=rays_of(shader, view), place=view["jitter"][0, :2])
+    record = shader.record("Look", rays=ray_record(shader, view), place=view["jitter"][0, :2])
     bound = {**lit, "look": record, "visibility_buffer": visibility, "image": image, "points": meter.points}
     graph.compute("meter", shader, bound, (SIDE, SIDE))
     graph.dispatch("meter", key, {"points": meter.points, "exposure": meter.exposure}, (1, 1, 1))
 
 
-def exposed_by(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Buffer]:
+def exposure_input(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Buffer]:
     """The exposure for exposure.wgsl, 0 where it is metered, and the buffer that it reads."""
     if settings.exposure == "auto":
         assert meter is not None
         return 0.0, meter.exposure
-    none = device.shared("no meter", lambda: device.buffer(np.ones(1, np.float32), "STORAGE"))
+    none = device.cached("no meter", lambda: device.buffer(np.ones(1, np.float32), "STORAGE"))
     return settings.exposure, none
 
 

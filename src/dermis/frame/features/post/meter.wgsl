@@ -22,8 +22,8 @@ fn metered_at(triangle: u32, pixel: vec2u, size: vec2f) -> vec2f {
     if ((t.w & OPAQUE) != 0u) {
         return vec2f(NO_SKIN);
     }
-    let w = weights_under(t, ray_to(look.rays, vec2f(pixel) + look.place, size), look.rays.eye);
-    var point = point_under(triangle, w);
+    let w = ray_weights(t, ray_to(look.rays, vec2f(pixel) + look.place, size), look.rays.eye);
+    var point = point_on_triangle(triangle, w);
     point.flags = (point.flags | OPAQUE) & ~MAPPED; // what falls on it, whatever its tissue and other skin make of that
     let black = Surface(point.normal, vec3f(0.0), 1.0, 0.0);
     let lit = light_up(point, black, point.normal, open_sky(point, t, w));

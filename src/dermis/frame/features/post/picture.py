@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from dermis.frame.features.post.meter import Meter, exposed_by
+from dermis.frame.features.post.meter import Meter, exposure_input
 from dermis.frame.programs import program
 from dermis.gpu import Buffer, Device, MutableBindings, Recorder, Texture, make_texture
 from dermis.scene.settings import Settings
@@ -40,7 +40,7 @@ def draw(
     meter : None where the exposure is given
     """
     shader = program(graph.device, "post/post.wgsl")
-    exposure, metered = exposed_by(graph.device, settings, meter)
+    exposure, metered = exposure_input(graph.device, settings, meter)
     record = shader.record("Post", exposure=exposure, **encoding_of(settings))
     bound: MutableBindings = {"settings": record, "image": radiance, "metered": metered}
     bound |= {"exposed": picture.exposed, "bytes": picture.bytes}

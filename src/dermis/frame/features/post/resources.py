@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from dermis.base.errors import refuse
 from dermis.frame.features.post import background, bloom, meter, picture
 from dermis.frame.features.post.background import Backdrop
-from dermis.frame.features.post.bloom import Glow, make_glow
+from dermis.frame.features.post.bloom import BloomTextures, make_bloom
 from dermis.frame.features.post.meter import Meter, make_meter
 from dermis.frame.features.post.picture import Picture, make_picture
-from dermis.frame.lights.environment import sharp_panorama
+from dermis.frame.lights.environment import unfiltered_panorama
 from dermis.frame.request import FrameRequest
-from dermis.gpu import Bindings, Constants, Device, Memo, Record, Recorder, Texture, make_texture
+from dermis.gpu import Bindings, Constants, Device, Memo, Recorder, Texture, UniformRecord, make_texture
 from dermis.scene.settings import Settings
 
 
@@ -28,7 +28,7 @@ class Resources:
     picture: Picture
     meter: Meter | None
     backdrop: Backdrop | None
-    glow: Glow | None
+    glow: BloomTextures | None
 
 
 def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
@@ -36,12 +36,12 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
 
     Raises DermisError for a background that shows an environment where there is none.
     """
-    settings, keep = request.settings, memo.keep
+    settings, cached = request.settings, memo.get
     return Resources(
-        picture=keep(make_picture, device, settings.size),
-        meter=keep(make_meter, device) if settings.exposure == "auto" else None,
+        picture=cached(make_picture, device, settings.size),
+        meter=cached(make_meter, device) if settings.exposure == "auto" else None,
         backdrop=_backdrop(memo, device, request),
-        glow=keep(make_glow, device, settings.size) if settings.bloom else None,
+        glow=cached(make_bloom, device, settings.size) if settings.bloom else None,
     )
 
 
@@ -51,7 +51,7 @@ def draw(
     settings: Settings,
     radiance: Texture,
     lit: Bindings,
-    view: Record,
+    view: UniformRecord,
     light_constants: Constants,
     visibility: Texture,
 ) -> None:
@@ -74,14 +74,14 @@ def _backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | N
     settings, around = request.settings, request.environment
     if settings.background == "none":
         return None
-    result = memo.keep(_result, device, settings.size)
+    result = memo.get(_result, device, settings.size)
     if settings.background != "environment":
         return Backdrop(result)
     if around is None:
-        remedy = "Add one (--env), or choose another"
-        refuse("background environment", "an environment", "there is none", remedy)
+        advice = "Add one (--env), or choose another"
+        refuse("background environment", "an environment", "there is none", advice)
     sharp = settings.background_blur == 0.0
-    return Backdrop(result, memo.keep(sharp_panorama, device, around.name) if sharp else None)
+    return Backdrop(result, memo.get(unfiltered_panorama, device, around.name) if sharp else None)
 
 
 def _result(device: Device, size: tuple[int, int]) -> Texture:

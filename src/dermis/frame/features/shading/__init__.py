@@ -1,6 +1,6 @@
-"""The image: every sample of the visibility buffer shaded, and the same at places of the maps."""
+"""Shading of the picture, sample by sample of the visibility buffer, and of points of the maps."""
 
-from dermis.frame.features.shading.bake import baking_numbers as shader_numbers
+from dermis.frame.features.shading.bake import shader_constants
 from dermis.frame.features.shading.shade import draw
 
-__all__ = ["draw", "shader_numbers"]
+__all__ = ["draw", "shader_constants"]

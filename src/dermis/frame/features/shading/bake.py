@@ -1,4 +1,4 @@
-"""The skin as numbers at places of its maps, by the shading of the picture."""
+"""Properties and light of the skin at points of its maps, computed by the shading of the picture."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.programs import each, program
+from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Bindings, CommandList, Constants, Device, Texture, make_texture
 
 CHANNELS: Mapping[str, int] = MappingProxyType(
@@ -27,18 +27,19 @@ CHANNELS: Mapping[str, int] = MappingProxyType(
         "curvature": 1,
     }
 )
+"""Numbers of each quantity that bake.wgsl computes at a point, in its order."""
 COUNT = sum(CHANNELS.values())
 
 
-def baking_numbers() -> dict[str, int]:
-    """Numbers that bake.wgsl fills in."""
+def shader_constants() -> dict[str, int]:
+    """Return the constants of bake.wgsl by their `//#fill` names."""
     return {"baked_numbers": COUNT}
 
 
-def places_of(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
-    """(n, 4) words of places as bake.wgsl reads them.
+def point_words(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
+    """Return points on triangles as (n, 4) words that bake.wgsl reads.
 
-    weights : (n, 2) of the triangle's second and third corner
+    weights : (n, 2) barycentric weights of the second and third corner
     """
     words = np.zeros((len(triangle), 4), np.uint32)
     words[:, 0] = triangle
@@ -49,32 +50,34 @@ def places_of(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> N
 def bake(
     device: Device,
     constants: Constants,
-    bound: Bindings,
-    places: NDArray[np.uint32],
+    bindings: Bindings,
+    points: NDArray[np.uint32],
     footprint: float,
     pigments: tuple[float, float] | None,
 ) -> NDArray[np.float32]:
-    """(n, COUNT) numbers of each place, in the order of `baked_numbers`.
+    """Return (n, COUNT) numbers at points, in the order of `CHANNELS`.
 
-    bound : what shading.wgsl and bake.wgsl read of the frame
-    footprint : of a texel, as a share of the maps' side
-    pigments : shares of melanin and blood of skin that is alike everywhere; None for painted maps
+    constants : pipeline constants of the shading
+    bindings : resources of the frame that shading.wgsl and bake.wgsl read
+    points : (n, 4) see `point_words`
+    footprint : side of a texel over the side of the maps
+    pigments : melanin and blood of uniform skin [-]; None to read them from painted maps
     """
-    shader, space = (
-        program(device, "shading/bake.wgsl", constants),
-        device.space(4 * COUNT * len(places), "baked"),
+    shader = program(device, "shading/bake.wgsl", constants)
+    count, size = len(points), 4 * COUNT * len(points)
+    baked = device.storage_buffer(size, "baked")
+    uniform = pigments or (0.0, 0.0)
+    record = shader.record(
+        "Baking", count=count, footprint=footprint, painted=pigments is None, uniform_pigments=uniform
     )
-    given = {"count": len(places), "footprint": footprint, "painted": pigments is None}
-    record = shader.record("Baking", **given, everywhere=pigments or (0.0, 0.0))
-    listed = device.buffer(places, "STORAGE")
-    frame = CommandList(device, timed=False)
-    here = {**bound, "baking": record, "places": listed, "baked": space}
-    frame.dispatch("bake", shader, here, each(len(places)))
-    frame.submit()
-    raw = device.handle.queue.read_buffer(space, 0, 4 * COUNT * len(places))
+    own: Bindings = {"baking": record, "points": device.buffer(points, "STORAGE"), "baked": baked}
+    commands = CommandList(device, timed=False)
+    commands.dispatch("bake", shader, {**bindings, **own}, workgroup_grid(count))
+    commands.submit()
+    raw = device.handle.queue.read_buffer(baked, 0, size)
     return np.frombuffer(raw, np.float32).reshape(-1, COUNT).copy()
 
 
 def no_thickness(device: Device) -> Texture:
-    """Placeholder for the map of thickness where nothing measures it."""
-    return device.shared("no thickness", lambda: make_texture(device, (1, 1), "rgba32float"))
+    """Return a placeholder of 1 x 1 texels for the map of thickness."""
+    return device.cached("no thickness", lambda: make_texture(device, (1, 1), "rgba32float"))

@@ -1,22 +1,22 @@
-// What the frame knows of the head at places of its surface, rather than of the picture, seen from straight above.
+// Properties and light at points of the surface instead of the picture, seen along the normal.
 //#include "shading.wgsl"
 //#include "each.wgsl"
 
 struct Baking {
-    count: u32, // of places
-    footprint: f32, // of a texel, a share of the maps' side
-    painted: u32, // 1 where the map of roughness, as it was painted, has the pigments beside it
-    everywhere: vec2f, // melanin and blood of skin that is alike everywhere
+    count: u32, // number of points
+    footprint: f32, // side of a texel over the side of the maps
+    painted: u32, // 1 if the painted map of roughness also holds the pigments
+    uniform_pigments: vec2f, // melanin and blood of uniform skin
 }
 
-//#fill const NUMBERS: u32 = {baked_numbers}u; // of a place
+//#fill const NUMBERS: u32 = {baked_numbers}u; // per point
 
 @group(0) @binding(50) var<uniform> baking: Baking;
-@group(0) @binding(51) var<storage, read> places: array<vec4u>; // triangle, two weights' bits
+@group(0) @binding(51) var<storage, read> points: array<vec4u>; // triangle, bits of two barycentric weights
 @group(0) @binding(52) var<storage, read_write> baked: array<f32>;
 @group(0) @binding(53) var thickness_map: texture_2d<f32>; // of the coarse atlas [mm]; 1 where there is surface
 
-fn met_from_above(triangle: u32, weights: vec3f) -> Met {
+fn shading_point_from_above(triangle: u32, weights: vec3f) -> ShadingPoint {
     let t = triangle_at(triangle);
     var point = interpolate(corner_at(t.x), corner_at(t.y), corner_at(t.z), weights, t.w);
     point.place = place_of_point(triangle, weights);
@@ -31,36 +31,36 @@ fn met_from_above(triangle: u32, weights: vec3f) -> Met {
     let film = Film(surface.normal, vec3f(0.0));
     let side = f32(textureDimensions(scattered).x);
     let texel = texel_axes(triangle, corner_at(t.x), corner_at(t.y), corner_at(t.z), side);
-    var met = Met(point, surface, film, vec3f(1.0), surface.normal, baking.footprint, open, texel);
+    var shading_point = ShadingPoint(point, surface, film, vec3f(1.0), surface.normal, baking.footprint, open, texel);
     if (EYES) {
-        made_true(&met);
+        apply_modelled_parts(&shading_point);
     }
-    return met;
+    return shading_point;
 }
 
-// The normal with relief as a map of slopes has it: what `bend` makes of these slopes is that normal again.
+// Normal with relief in tangent space: the inverse of `bend`.
 fn tangent_normal(point: Point, normal: vec3f) -> vec3f {
     let slope = point.normal - normal / max(dot(normal, point.normal), 1e-3);
-    let along = dot(slope, point.dpdu) / max(length(point.dpdu), 1e-6);
-    let upward = -dot(slope, point.dpdv) / max(length(point.dpdv), 1e-6);
-    return normalize(vec3f(-along, -upward, 1.0));
+    let slope_u = dot(slope, point.dpdu) / max(length(point.dpdu), 1e-6);
+    let slope_v = -dot(slope, point.dpdv) / max(length(point.dpdv), 1e-6);
+    return normalize(vec3f(-slope_u, -slope_v, 1.0));
 }
 
 fn pigments_at(point: Point) -> vec2f {
     let mip = mip_for(roughness_map, baking.footprint);
     let painted = textureSampleLevel(roughness_map, map_sampler, point.uv, mip).zw;
-    return select(baking.everywhere, painted, baking.painted != 0u);
+    return select(baking.uniform_pigments, painted, baking.painted != 0u);
 }
 
 fn thickness_at(point: Point) -> f32 {
-    let found = load_bilinear(thickness_map, point.place);
-    return select(0.0, found.x / max(found.a, 1e-6), (point.flags & MAPPED) != 0u);
+    let thickness = load_bilinear(thickness_map, point.place);
+    return select(0.0, thickness.x / max(thickness.a, 1e-6), (point.flags & MAPPED) != 0u);
 }
 
-fn put_three(at: u32, value: vec3f) {
-    baked[at] = value.x;
-    baked[at + 1u] = value.y;
-    baked[at + 2u] = value.z;
+fn store_vec3(first: u32, value: vec3f) {
+    baked[first] = value.x;
+    baked[first + 1u] = value.y;
+    baked[first + 2u] = value.z;
 }
 
 @compute @workgroup_size(EACH)
@@ -73,22 +73,22 @@ fn main(
     if (index >= baking.count) {
         return;
     }
-    let place = places[index];
-    let second = bitcast<vec2f>(place.yz);
-    let met = met_from_above(place.x, vec3f(1.0 - second.x - second.y, second));
-    let surface = met.surface;
-    let lit = lit_at(met);
-    let light = shaded(met, lit);
-    let at = NUMBERS * index;
-    let pigments = pigments_at(met.point);
-    put_three(at, select(shade.total, vec3f(1.0), is_opaque(met.point)) * surface.colour / met.lids);
-    put_three(at + 3u, tangent_normal(met.point, surface.normal));
-    put_three(at + 6u, lit.entered);
-    put_three(at + 9u, PI * (light.below * light.leaving + light.still));
-    let u = length(met.point.dpdu);
-    let v = length(met.point.dpdv);
-    put_three(at + 12u, vec3f(u, v, dot(met.point.dpdu, met.point.dpdv) / max(u * v, 1e-9)));
-    put_three(at + 15u, vec3f(surface.roughness, surface.rho_s, 1.0 - enters_from_everywhere(surface.roughness, surface.rho_s)));
-    put_three(at + 18u, vec3f(pigments, thickness_at(met.point)));
-    baked[at + 21u] = met.point.curvature;
+    let words = points[index];
+    let weights_bc = bitcast<vec2f>(words.yz);
+    let shading_point = shading_point_from_above(words.x, vec3f(1.0 - weights_bc.x - weights_bc.y, weights_bc));
+    let surface = shading_point.surface;
+    let lit = lit_at(shading_point);
+    let shaded_point = shaded(shading_point, lit);
+    let first = NUMBERS * index;
+    let pigments = pigments_at(shading_point.point);
+    store_vec3(first, select(shade.total, vec3f(1.0), is_opaque(shading_point.point)) * surface.colour / shading_point.lids);
+    store_vec3(first + 3u, tangent_normal(shading_point.point, surface.normal));
+    store_vec3(first + 6u, lit.entered);
+    store_vec3(first + 9u, PI * (shaded_point.below * shaded_point.leaving + shaded_point.local));
+    let u = length(shading_point.point.dpdu);
+    let v = length(shading_point.point.dpdv);
+    store_vec3(first + 12u, vec3f(u, v, dot(shading_point.point.dpdu, shading_point.point.dpdv) / max(u * v, 1e-9)));
+    store_vec3(first + 15u, vec3f(surface.roughness, surface.rho_s, 1.0 - enters_from_everywhere(surface.roughness, surface.rho_s)));
+    store_vec3(first + 18u, vec3f(pigments, thickness_at(shading_point.point)));
+    baked[first + 21u] = shading_point.point.curvature;
 }

@@ -1,8 +1,8 @@
-// How much of the maps a part of the picture shows.
+// Footprint of a part of the picture in the maps.
 
-const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may cover
+const FINEST_RATIO: f32 = 4.0; // largest ratio of the sides of a footprint that one map sample covers
 
-// Side of what is filtered, from its sides in uv to the right and down.
+// Side of the filter, from the steps of the footprint in uv to the right and down.
 fn footprint_of(across: vec2f, down: vec2f) -> f32 {
     let x = length(across);
     let y = length(down);

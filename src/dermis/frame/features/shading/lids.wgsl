@@ -1,12 +1,12 @@
-// Distances of places of an eye from the edges of the lids, for whoever has these as `shade.lids`.
+// Distances of points of an eye from the edges of the lids, which are in `shade.lids`.
 //#include "eye.wgsl"
 
-const LID_POINTS: u32 = 56u; // around an eye, of which some are of the lower lid
-const LOWER_LID: vec2u = vec2u(27u, 49u); // first and last
+const LID_POINTS: u32 = 56u; // points of the edges around an eye
+const LOWER_LID: vec2u = vec2u(27u, 49u); // first and last point of the lower lid
 const FARTHEST_LID: f32 = 1e6;
 
-// How far the lids' edges are from a place of an eye, in its own space; seen from its centre, on the ball. They are far
-// where nobody knows them, which zeros say.
+// Distances of the edges of the lids from a point of an eye, both projected onto the ball from its centre. Edges of zeros are
+// unknown and count as far away.
 fn lids_around(eye: u32, p: vec3f) -> Lids {
     let q = SCLERA_MM * normalize(p);
     var lids = Lids(FARTHEST_LID, FARTHEST_LID, vec3f(0.0));

@@ -1,4 +1,4 @@
-// Up to 64 samples of a pixel as bits.
+// Sets of up to 64 samples as bits.
 
 // One bit of 64.
 fn bit_of(index: u32) -> vec2u {

@@ -1,46 +1,57 @@
-"""The image: shades every sample of the visibility buffer."""
+"""The pass that shades every sample of the visibility buffer."""
 
 from __future__ import annotations
 
-from dermis.frame.features.visibility.layers import Layers
-from dermis.frame.programs import program, strip_for
-from dermis.gpu import Bindings, ComputeProgram, Constants, Device, Record, Recorder, Texture, make_texture
+from dermis.frame.features.visibility.layers import ViewLayers
+from dermis.frame.programs import program, strip_constants
+from dermis.gpu import (
+    Bindings,
+    ComputeProgram,
+    Constants,
+    Device,
+    Recorder,
+    Texture,
+    UniformRecord,
+    make_texture,
+)
 
 
 def shade_program(device: Device, constants: Constants = ()) -> ComputeProgram:
-    """The pass' shader, which also has the structs of the lights', skin's and camera's records.
+    """Return the program of the shading, whose structs include those of lights, skin and camera.
 
-    constants : of the lights, the surface and the technique
+    constants : pipeline constants of the lights, the surface and the technique
     """
     return program(device, "shading/shade.wgsl", constants)
 
 
 def draw(
     graph: Recorder,
-    lit: Bindings,
-    view: Record,
+    lighting: Bindings,
+    view: UniformRecord,
     constants: Constants,
-    visibility: Layers,
+    visibility: ViewLayers,
     scattered: Texture,
     image: Texture,
     size: tuple[int, int],
-    apart: Texture | None = None,
+    subsurface: Texture | None = None,
 ) -> Texture:
-    """Shade every sample of every pixel into the image, radiance and coverage; return the image.
+    """Shade every sample of every pixel, and return the image of radiance and coverage.
 
-    view : record of the shader's struct Shade
-    constants : of the lights, the surface and the technique
-    scattered : light below the skin by place on the atlas, or the tables of pre-integrated skin
-    apart : layers for the light below the skin and how it leaves, which the radiance then lacks
+    lighting : resources of the lighting
+    view : record of the struct Shade
+    constants : pipeline constants of the lights, the surface and the technique
+    scattered : texture of the light below the skin over the atlas, or tables of pre-integrated skin
+    subsurface : layers that get the light below the skin and the fraction of it that leaves, which the image
+        then lacks
     """
     device, (width, height) = graph.device, size
-    bound = {**lit, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
-    bound |= {"image": image, "apart": apart or nothing_apart(device)}
-    shader = shade_program(device, (*constants, *strip_for(device, visibility.count)))
-    graph.compute("shade", shader, bound, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
+    bindings = {**lighting, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
+    bindings |= {"image": image, "subsurface": subsurface or no_subsurface_layers(device)}
+    shader = shade_program(device, (*constants, *strip_constants(device, visibility.count)))
+    graph.compute("shade", shader, bindings, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
     return image
 
 
-def nothing_apart(device: Device) -> Texture:
-    """Placeholder for the layers where no light is kept apart."""
-    return device.shared("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layers=2))
+def no_subsurface_layers(device: Device) -> Texture:
+    """Return a placeholder for the layers of light below the skin."""
+    return device.cached("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layers=2))

@@ -1,5 +1,5 @@
-// How a place of the picture is shaded: light scattered below the skin, relit at its finest level, under the white lobe of the
-// surface. The picture and what else a frame knows of its light call the same functions.
+// Shading of a point of the surface: light scattered below the skin, relit at its finest level, and the specular reflection. The
+// picture and the outputs of light call the same functions.
 //#include "irradiance/lighting.wgsl"
 //#include "mouth.wgsl"
 //#include "occlusion/open_sky.wgsl"
@@ -9,9 +9,9 @@
 //#include "diffusion/packed_blend_weights.wgsl"
 //#include "irradiance/fine_light.wgsl"
 
-override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture
-override MIXED: bool = false; // whether a map mixes profiles: `scattered` then has their shares beside the light
-override EYES: bool = false; // whether there are eyes of true shape, and teeth
+override SPLIT: bool = false; // whether light below the skin is stored in layers of its own, to be diffused over the picture
+override MIXED: bool = false; // whether a map mixes profiles: the alpha of `scattered` then holds their blend weights
+override EYES: bool = false; // whether there are modelled eyes and teeth
 
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
 
@@ -21,39 +21,39 @@ struct Shade {
     forward: vec3f,
     right: vec3f, // scaled so that forward + (x + shift) right + (y + shift) up spans the image for x, y in -1..1
     up: vec3f,
-    shift: vec2f, // of the picture's middle from the axis
-    relit: vec3f, // weight of the level that is not blurred
-    relit_changes: array<vec4f, 2>, // by which that of other profiles differs
-    total: vec3f, // weight of all levels
-    shown: vec2f, // factors of the light from below and of the reflected light
+    shift: vec2f, // offset of the middle of the picture from the axis
+    relit: vec3f, // weight of the unblurred level
+    relit_changes: array<vec4f, 2>, // difference for each of the other profiles
+    total: vec3f, // sum of the weights of all levels
+    light_factors: vec2f, // factors of light from below the skin and of reflected light
     pre: PreIntegrated,
     fine: Fine,
     eyes: array<Eye, 2>,
-    lids: array<vec4f, 112>, // edges of the lids around each eye, in its own space, half of them each; see human/lid_rings.csv
+    lids: array<vec4f, 112>, // edges of the lids in the space of each eye, half of the points for each; see human/lid_rings.csv
     material_colour: array<vec4f, 64>,
-    jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
+    jitter: array<vec4f, 64>, // positions of samples in the pixel, 0..1
 }
 
 @group(0) @binding(30) var<uniform> shade: Shade;
-@group(0) @binding(32) var scattered: texture_2d<f32>; // light on the atlas, blurred and combined; or pre-integrated tables
+@group(0) @binding(32) var scattered: texture_2d<f32>; // blurred and combined light over the atlas, or pre-integrated tables
 
-// What a place of the picture shows, before it is lit.
-struct Met {
+// A point to be shaded.
+struct ShadingPoint {
     point: Point,
     surface: Surface,
     film: Film,
-    lids: vec3f, // share of the light that the lids leave, which is in an eye's colour
+    lids: vec3f, // fraction of the light that the lids let pass; it is part of the colour of an eye
     v: vec3f, // towards the viewer
-    footprint: f32, // share of the maps' side
-    open: f32, // share of the sky that it sees
-    texel: TexelAxes, // where there is light finer than texels
+    footprint: f32, // side of the filter over the side of the maps
+    open: f32, // visible fraction of the sky
+    texel: TexelAxes, // if there is light that is finer than texels
 }
 
 struct Shaded {
     below: vec3f, // light below the skin
-    leaving: vec3f, // share of it that leaves towards the eye
-    still: vec3f, // light from below that does not spread: from plain materials, scattered only once
-    reflected: vec3f, // off the surface
+    leaving: vec3f, // fraction of it that leaves towards the eye
+    local: vec3f, // light from below that is not diffused: of plain materials, and scattered once
+    reflected: vec3f, // specular reflection
     depth: f32, // of skin [mm], else 0
 }
 
@@ -61,82 +61,82 @@ fn is_opaque(point: Point) -> bool {
     return (point.flags & OPAQUE) != 0u;
 }
 
-// Weight of the level that is not blurred, at a place of the atlas.
+// Weight of the unblurred level at a position of the atlas.
 fn relit_at(uv: vec2f) -> vec3f {
     if (!MIXED) {
         return shade.relit;
     }
-    let most = vec2i(textureDimensions(scattered)) - 1;
-    let place = uv * vec2f(most + 1) - 0.5;
-    let a = clamp(vec2i(floor(place)), vec2i(0), most);
-    let b = clamp(vec2i(floor(place)) + 1, vec2i(0), most);
-    let w = bilinear_weights(place);
-    let shares = w.x * shares_of(a) + w.y * shares_of(vec2i(b.x, a.y)) + w.z * shares_of(vec2i(a.x, b.y)) + w.w * shares_of(b);
-    return shade.relit + shares.x * shade.relit_changes[0].rgb + shares.y * shade.relit_changes[1].rgb;
+    let last = vec2i(textureDimensions(scattered)) - 1;
+    let position = uv * vec2f(last + 1) - 0.5;
+    let a = clamp(vec2i(floor(position)), vec2i(0), last);
+    let b = clamp(vec2i(floor(position)) + 1, vec2i(0), last);
+    let w = bilinear_weights(position);
+    let weights = w.x * blend_weights_at(a) + w.y * blend_weights_at(vec2i(b.x, a.y)) + w.z * blend_weights_at(vec2i(a.x, b.y)) + w.w * blend_weights_at(b);
+    return shade.relit + weights.x * shade.relit_changes[0].rgb + weights.y * shade.relit_changes[1].rgb;
 }
 
-fn shares_of(at: vec2i) -> vec2f {
-    return unpacked_shares(textureLoad(scattered, at, 0).a);
+fn blend_weights_at(at: vec2i) -> vec2f {
+    return unpacked_weights(textureLoad(scattered, at, 0).a);
 }
 
-fn shaded_skin(met: Met, lit: Lit, out: f32) -> Shaded {
-    let point = met.point;
-    let surface = met.surface;
-    let share = share_of(surface.colour, skin.mix);
-    var below = lit.entered * share;
+fn shaded_skin(shading_point: ShadingPoint, lit: Lit, exit_factor: f32) -> Shaded {
+    let point = shading_point.point;
+    let surface = shading_point.surface;
+    let entering = share_of(surface.colour, skin.mix);
+    var below = lit.entered * entering;
     if (PRE_INTEGRATED) {
-        below = shade.total * pre_integrated(point, surface, met.footprint, met.open) * share;
+        below = shade.total * pre_integrated(point, surface, shading_point.footprint, shading_point.open) * entering;
     } else if ((point.flags & MAPPED) != 0u) {
         let relit = relit_at(point.place);
         below = relit * below + load_bilinear(scattered, point.place).rgb;
         if (STRIPE_LIGHT) {
             let side = vec2f(textureDimensions(scattered));
-            below += share * finer_light(point, surface, met.texel, shade.fine, relit, side);
+            below += entering * finer_light(point, surface, shading_point.texel, shade.fine, relit, side);
             below = max(below, vec3f(0.0));
         }
     } else {
         below *= shade.total;
     }
-    let reflected = shade.shown.y * lit.reflected * mix(vec3f(1.0), surface.colour, skin.tint);
-    var still = vec3f(0.0);
-    var leaving = shade.shown.x * out * share_of(surface.colour, 1.0 - skin.mix);
+    let reflected = shade.light_factors.y * lit.reflected * mix(vec3f(1.0), surface.colour, skin.tint);
+    var local = vec3f(0.0);
+    var leaving = shade.light_factors.x * exit_factor * share_of(surface.colour, 1.0 - skin.mix);
     if (HALF_SPACE) {
-        // Light above the mean has scattered once and is not blurred: at grazing angles it is many times the rest, and
-        // blurred light from around must not be multiplied by it.
-        let beyond = directional_share(lit, shade.total * share, below);
-        still = below * leaving * max(beyond, vec3f(0.0));
-        leaving *= 1.0 + min(beyond, vec3f(0.0));
+        // Light above the mean has scattered once and is not blurred: at grazing angles it is many times the blurred light, which
+        // must not be multiplied by it.
+        let excess = directional_share(lit, shade.total * entering, below);
+        local = below * leaving * max(excess, vec3f(0.0));
+        leaving *= 1.0 + min(excess, vec3f(0.0));
     }
-    return Shaded(below, leaving, still, reflected, dot(point.position - shade.eye, shade.forward));
+    return Shaded(below, leaving, local, reflected, dot(point.position - shade.eye, shade.forward));
 }
 
-fn shaded_plain(surface: Surface, lit: Lit, out: f32) -> Shaded {
-    let below = lit.entered * surface.colour * out;
-    return Shaded(vec3f(0.0), vec3f(0.0), shade.shown.x * below, shade.shown.y * lit.reflected, 0.0);
+fn shaded_plain(surface: Surface, lit: Lit, exit_factor: f32) -> Shaded {
+    let below = lit.entered * surface.colour * exit_factor;
+    return Shaded(vec3f(0.0), vec3f(0.0), shade.light_factors.x * below, shade.light_factors.y * lit.reflected, 0.0);
 }
 
-fn ray_through(place: vec2f, size: vec2f) -> vec3f {
-    let ndc = vec2f(2.0, -2.0) * place / size + vec2f(-1.0, 1.0);
+fn ray_to_position(position: vec2f, size: vec2f) -> vec3f {
+    let ndc = vec2f(2.0, -2.0) * position / size + vec2f(-1.0, 1.0);
     return shade.forward + (ndc.x + shade.shift.x) * shade.right + (ndc.y + shade.shift.y) * shade.up;
 }
 
-// share: part of the pixel that is shaded at once; maps are filtered over it.
-fn met_at(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Met {
+// coverage: fraction of the pixel that is shaded at once, over which maps are filtered
+fn shading_point_at(triangle: u32, position: vec2f, coverage: f32, size: vec2f) -> ShadingPoint {
     let t = triangle_at(triangle);
     let a = corner_at(t.x);
     let b = corner_at(t.y);
     let c = corner_at(t.z);
     let weights = ray_to_weights(shade.eye, a.position, b.position, c.position);
-    let w = meet(weights, ray_through(place, size));
-    let inside = within(w); // a sample on an edge may lie a little outside
+    let w = meet(weights, ray_to_position(position, size));
+    let inside = within(w); // a sample on an edge may be slightly outside
     var point = interpolate(a, b, c, inside, t.w);
     point.place = place_of_point(triangle, inside);
     point.curvature = curvature_at(t, inside);
     let open = open_sky(point, t, inside);
     let v = normalize(shade.eye - point.position);
-    let spacing = sqrt(share);
-    let wx = meet(weights, ray_through(place + vec2f(spacing, 0.0), size)) - w;
-    let wy = meet(weights, ray_through(place + vec2f(0.0, spacing), size)) - w;
+    let spacing = sqrt(coverage);
+    let wx = meet(weights, ray_to_position(position + vec2f(spacing, 0.0), size)) - w;
+    let wy = meet(weights, ray_to_position(position + vec2f(0.0, spacing), size)) - w;
     let footprint = footprint_of(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv, wy.x * a.uv + wy.y * b.uv + wy.z * c.uv);
     var surface: Surface;
     if (is_opaque(point)) {
@@ -147,24 +147,24 @@ fn met_at(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Met {
     var texel: TexelAxes;
     if (STRIPE_LIGHT) {
         texel = texel_axes(triangle, a, b, c, f32(textureDimensions(scattered).x));
-        // The variance of as many samples as are shaded together.
-        let samples = max(1.0, round(share * f32(shade.samples)));
+        // Variance of the positions of the samples that are shaded together.
+        let samples = max(1.0, round(coverage * f32(shade.samples)));
         let deviation = sqrt((1.0 - 1.0 / samples) / 12.0);
         area_u = deviation * (wx.x * a.position + wx.y * b.position + wx.z * c.position);
         area_v = deviation * (wy.x * a.position + wy.y * b.position + wy.z * c.position);
     }
     let film = Film(surface.normal, vec3f(0.0));
-    var met = Met(point, surface, film, vec3f(1.0), v, footprint, open, texel);
+    var shading_point = ShadingPoint(point, surface, film, vec3f(1.0), v, footprint, open, texel);
     if (EYES) {
-        made_true(&met);
+        apply_modelled_parts(&shading_point);
     }
-    return met;
+    return shading_point;
 }
 
-// Eyes of true shape, teeth and the tongue in place of plain material.
-fn made_true(met: ptr<function, Met>) {
-    let point = (*met).point;
-    // A loop, because software adapters run both sides of a branch for all pixels, and a loop only while one needs it.
+// Replaces the plain material of modelled eyes, teeth and the tongue.
+fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
+    let point = (*shading_point).point;
+    // A loop instead of a branch: software adapters run both sides of a branch for all pixels.
     var k = 0u;
     loop {
         if (!is_opaque(point) || k >= 2u) {
@@ -172,33 +172,33 @@ fn made_true(met: ptr<function, Met>) {
         }
         let material = shade.material_colour[point.flags >> 8u];
         if (material.w > 0.0) {
-            (*met).surface = mouth_at(point, material);
-            (*met).film = Film((*met).surface.normal, MOUTH_SCATTERED);
+            (*shading_point).surface = mouth_at(point, material);
+            (*shading_point).film = Film((*shading_point).surface.normal, MOUTH_SHADOW_SCATTER);
             break;
         }
         if (shade.eyes[k].material == (point.flags >> 8u)) {
             let own = (shade.eyes[k].to_own * vec4f(point.position, 1.0)).xyz;
             let lids = lids_around(k, own);
-            let eye = eye_at(shade.eyes[k], own, lids, (*met).v);
-            (*met).surface = eye.surface;
-            (*met).film = eye.film;
-            (*met).lids = lid_shade(lids);
-            (*met).point.lit_position += SCATTERED_MM * eye.film.normal;
+            let eye = eye_at(shade.eyes[k], own, lids, (*shading_point).v);
+            (*shading_point).surface = eye.surface;
+            (*shading_point).film = eye.film;
+            (*shading_point).lids = lid_transmittance(lids);
+            (*shading_point).point.lit_position += SHADOW_OFFSET_MM * eye.film.normal;
             break;
         }
         k++;
     }
 }
 
-fn lit_at(met: Met) -> Lit {
-    // Called once: software adapters run both sides of a branch for all pixels.
-    return light_through(met.point, met.surface, met.film, met.v, met.open);
+fn lit_at(shading_point: ShadingPoint) -> Lit {
+    // The only call: software adapters run both sides of a branch for all pixels.
+    return light_through(shading_point.point, shading_point.surface, shading_point.film, shading_point.v, shading_point.open);
 }
 
-fn shaded(met: Met, lit: Lit) -> Shaded {
-    let out = leaves(dot(met.film.normal, met.v), met.surface.roughness, met.surface.rho_s) / PI;
-    if (is_opaque(met.point)) {
-        return shaded_plain(met.surface, lit, out);
+fn shaded(shading_point: ShadingPoint, lit: Lit) -> Shaded {
+    let exit_factor = leaves(dot(shading_point.film.normal, shading_point.v), shading_point.surface.roughness, shading_point.surface.rho_s) / PI;
+    if (is_opaque(shading_point.point)) {
+        return shaded_plain(shading_point.surface, lit, exit_factor);
     }
-    return shaded_skin(met, lit, out);
+    return shaded_skin(shading_point, lit, exit_factor);
 }

@@ -1,4 +1,4 @@
-"""The camera as the shading reads it: rays, samples, eyes, and what a picture shows."""
+"""The camera in the form that the shading reads: rays, samples, poses of the eyes and light factors."""
 
 from __future__ import annotations
 
@@ -13,33 +13,35 @@ from dermis.frame.projection import (
     Axes,
     Triple,
     Views,
-    axes_of,
-    between,
     depth_range,
     perspective,
     pixel_samples,
-    place_of,
-    rows_of,
+    vector_between,
+    view_axes,
+    view_rows,
+    world_position,
 )
 from dermis.frame.technique import ProfileSplit
-from dermis.gpu import ComputeProgram, Record
+from dermis.gpu import ComputeProgram, UniformRecord
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import PARTS
 from dermis.mesh.outline import Outline
 from dermis.scene.camera import Camera, Window
 from dermis.scene.settings import Settings
-from dermis.scene.skin import MOST_OTHERS
+from dermis.scene.skin import MAX_OTHER_PROFILES
 
-_MOST_MATERIALS = 64
-_PARTS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}  # from below, off the surface
-_RAYS = ("eye", "forward", "right", "up", "shift")
+_MAX_MATERIALS = 64
+# Factors of light from below the surface and of reflected light, by `Settings.parts`.
+_LIGHT_FACTORS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}
+_RAY_MEMBERS = ("eye", "forward", "right", "up", "shift")
 
 
 class Pinhole(NamedTuple):
-    """Where a camera is and what it sees.
+    """Pinhole camera.
 
-    axes : right, up and forward
-    window : of a plane before the eye
+    eye : position [mm]
+    axes : unit vectors to the right, up and forward
+    window : what the picture shows of a plane in front of the eye
     """
 
     eye: Triple
@@ -47,12 +49,12 @@ class Pinhole(NamedTuple):
     window: Window
 
 
-class EyesSeen(NamedTuple):
-    """How eyes of true shape stand in a motion.
+class EyePoses(NamedTuple):
+    """Poses of the modelled eyes of a head.
 
-    frames : (2, 4, 4) from the head's space to each eye's
-    edges_mm : (2, r, 3) the edges of the lids around each; between two, a point of a smooth curve is put;
-        None where they are unknown, as in files
+    frames : (2, 4, 4) matrices from the space of the head to that of each eye
+    edges_mm : (2, r, 3) points along the edges of the lids around each eye [mm]; None where they are unknown,
+        as in files
     """
 
     frames: NDArray[np.float64]
@@ -60,28 +62,32 @@ class EyesSeen(NamedTuple):
 
 
 def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
-    """The camera as the renderer takes it."""
-    eye, path = place_of(camera.position, head.centre_mm), between(camera.position, camera.target)
+    """Return the pinhole camera for a picture of the size of the settings."""
+    eye = world_position(camera.position, head.centre_mm)
+    forward = vector_between(camera.position, camera.target)
     width, height = settings.size
-    return Pinhole(eye, axes_of(path, camera.up), camera.window(width / height))
+    return Pinhole(eye, view_axes(forward, camera.up), camera.window(width / height))
 
 
 def camera_views(pinhole: Pinhole, outline: Outline, samples: int) -> Views:
-    """What the camera sees at each sample of the pixel."""
-    rows = rows_of(pinhole.eye, pinhole.axes)
+    """Return the view of a camera, with all samples of a pixel."""
+    rows = view_rows(pinhole.eye, pinhole.axes)
     clip = perspective(rows, pinhole.window, *depth_range(outline, rows))
     return Views(np.array([clip]), pixel_samples(samples))
 
 
-def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: ProfileSplit) -> Record:
-    """The shading pass' record without the camera: samples and weights."""
+def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: ProfileSplit) -> UniformRecord:
+    """Return the record of the struct Shade without the camera: samples, weights and materials.
+
+    Raises DermisError for a head with too many materials.
+    """
     jitter = np.zeros((64, 4), np.float32)
     jitter[: settings.samples, :2] = pixel_samples(settings.samples)
-    colours = np.zeros((_MOST_MATERIALS, 4), np.float32)
+    colours = np.zeros((_MAX_MATERIALS, 4), np.float32)
     materials = head.mesh.materials
-    if len(materials) > _MOST_MATERIALS:
+    if len(materials) > _MAX_MATERIALS:
         count = f"it has {len(materials)}"
-        refuse(head.name, f"at most {_MOST_MATERIALS} materials", count, "Join some groups")
+        refuse(head.name, f"at most {_MAX_MATERIALS} materials", count, "Join some groups")
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
         colours[index, 3] = 1 + PARTS.index(material.part) if material.part else 0
@@ -89,9 +95,9 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
         "Shade",
         samples=settings.samples,
         relit=split.relit,
-        relit_changes=np.pad(split.relit_changes, ((0, MOST_OTHERS - len(split.others)), (0, 1))),
+        relit_changes=np.pad(split.relit_changes, ((0, MAX_OTHER_PROFILES - len(split.others)), (0, 1))),
         total=split.total,
-        shown=_PARTS[settings.parts],
+        light_factors=_LIGHT_FACTORS[settings.parts],
         material_colour=colours,
         jitter=jitter,
     )
@@ -104,14 +110,14 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
     return record
 
 
-def seen_by(view: Record, pinhole: Pinhole, eyes: EyesSeen | None) -> Record:
-    """A shading pass' record with the rays of a camera.
+def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) -> UniformRecord:
+    """Return a copy of a record of the struct Shade with the rays of a camera.
 
-    eyes : of true shape, if it has such
+    eyes : poses of modelled eyes, None for a head without such eyes
     """
     eye, (right, up, forward), (half, shift) = pinhole
-    # Its bytes: numpy's own copy takes the members one by one, and has anything between them.
-    record: Record = np.ndarray((), view.dtype, bytearray(view.tobytes()))
+    # A copy of the bytes: NumPy copies structs member by member and leaves the padding undefined.
+    record: UniformRecord = np.ndarray((), view.dtype, bytearray(view.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
     record["shift"] = shift
@@ -120,12 +126,13 @@ def seen_by(view: Record, pinhole: Pinhole, eyes: EyesSeen | None) -> Record:
     if eyes is not None and eyes.edges_mm is not None:
         edges = eyes.edges_mm
         a, b, c = (np.roll(edges, -k, axis=1) for k in (-1, 1, 2))
-        both = np.stack([edges, (9.0 * (edges + b) - a - c) / 16.0], axis=2).reshape(2, -1, 3)
-        whole = np.concatenate([both, np.ones((*both.shape[:2], 1))], axis=-1)
-        record["lids"] = np.einsum("kij,krj->kri", eyes.frames, whole).reshape(-1, 4)
+        # A point of a smooth curve is added between each two points.
+        points = np.stack([edges, (9.0 * (edges + b) - a - c) / 16.0], axis=2).reshape(2, -1, 3)
+        homogeneous = np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=-1)
+        record["lids"] = np.einsum("kij,krj->kri", eyes.frames, homogeneous).reshape(-1, 4)
     return record
 
 
-def rays_of(shader: ComputeProgram, view: Record) -> Record:
-    """Return a record of a shader's struct Rays from that of the shading."""
-    return shader.record("Rays", **{name: view[name] for name in _RAYS})
+def ray_record(shader: ComputeProgram, view: UniformRecord) -> UniformRecord:
+    """Return a record of the struct Rays from a record of the struct Shade."""
+    return shader.record("Rays", **{name: view[name] for name in _RAY_MEMBERS})

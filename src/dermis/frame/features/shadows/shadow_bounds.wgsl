@@ -1,5 +1,5 @@
-// The nearest depth in squares of 4, 8, 16, 32 and 64 texels of each shadow map, to skip those that cannot hide a light.
-// The squares of 4 texels lie on the left, the larger ones below each other on their right.
+// Nearest depth in squares of 4, 8, 16, 32 and 64 texels of each shadow map: squares without occluders are skipped.
+// The squares of 4 texels are stored on the left, the larger ones below each other on their right.
 
 @group(0) @binding(0) var maps: texture_2d_array<f32>;
 @group(0) @binding(1) var maps_sampler: sampler; // non-filtering
@@ -9,13 +9,13 @@ const SIDE: u32 = 16u; // squares of 4 texels along the side of a workgroup
 
 var<workgroup> nearest: array<f32, 256>;
 
-// Nearest depth of 4 x 4 texels; beyond the map its edge is repeated.
+// Nearest depth of 4 x 4 texels; the sampler repeats the edge of the map.
 fn nearest_in_square(square: vec2u, layer: u32) -> f32 {
     let size = vec2f(textureDimensions(maps));
     var found = vec4f(0.0);
     for (var k = 0u; k < 4u; k++) {
-        let place = 4.0 * vec2f(square) + vec2f(f32(1u + 2u * (k % 2u)), f32(1u + 2u * (k / 2u)));
-        found = max(found, textureGather(0, maps, maps_sampler, place / size, layer));
+        let centre = 4.0 * vec2f(square) + vec2f(f32(1u + 2u * (k % 2u)), f32(1u + 2u * (k / 2u)));
+        found = max(found, textureGather(0, maps, maps_sampler, centre / size, layer));
     }
     return max(max(found.x, found.y), max(found.z, found.w));
 }

@@ -4,34 +4,36 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dermis.frame.features.shape.mesh import HeadResources
-from dermis.frame.features.visibility.layers import Layers, draw_layers, make_layers
+from dermis.frame.features.shape.mesh import HeadGeometry
+from dermis.frame.features.visibility.layers import ViewLayers, draw_layers, make_layers
 from dermis.frame.programs import program
 from dermis.frame.projection import Views
 from dermis.gpu import Bindings, Device, Recorder, Texture, make_texture
 from dermis.gpu.memory import check_memory
 
 SHADOW_BYTES = 4
+"""Size of a texel of a shadow map [bytes]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ShadowMaps:
-    """A depth layer for each light.
+    """Shadow maps of all lights.
 
-    bounds : texture of the nearest depths in ever larger squares of each layer, for area lights
+    layers : depth layer of each light
+    bounds : texture of the nearest depths in squares of increasing size of each layer, for area lights
     """
 
-    layers: Layers
+    layers: ViewLayers
     bounds: Texture
 
     @property
     def texture(self) -> Texture:
-        """Depth from each light: 1 near, 0 nothing."""
+        """Return the texture of z-buffer depths seen from each light, 1 near and 0 empty."""
         return self.layers.texture
 
 
 def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
-    """Empty maps, `size` texels a side.
+    """Create empty shadow maps with `size` texels a side.
 
     Raises DermisError when they do not fit into memory.
     """
@@ -42,15 +44,15 @@ def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
     return ShadowMaps(make_layers(device, (size, size), layers, triangles=False), bounds)
 
 
-def draw(graph: Recorder, maps: ShadowMaps, views: Views, head: HeadResources, bounded: bool = True) -> None:
-    """Draw the depth that each light sees.
+def draw(graph: Recorder, maps: ShadowMaps, views: Views, head: HeadGeometry, with_bounds: bool = True) -> None:
+    """Declare the passes that draw the depths seen from each light.
 
-    bounded : whether there are area lights, which read the bounds
+    with_bounds : whether the scene has area lights, which read the bounds
     """
     if not len(views.clips):
         return
     draw_layers(graph, "shadows", maps.layers, views, head)
-    if bounded:
+    if with_bounds:
         bound: Bindings = {
             "maps": maps.texture,
             "maps_sampler": graph.device.sampler(),
@@ -62,5 +64,5 @@ def draw(graph: Recorder, maps: ShadowMaps, views: Views, head: HeadResources, b
 
 
 def _squares(size: int) -> int:
-    """Number of squares of 4 texels along a side of the map, rounded up to whole squares of 64."""
+    """Return the number of squares of 4 texels along a side of the map, rounded up to a multiple of 16."""
     return 16 * -(-size // 64)

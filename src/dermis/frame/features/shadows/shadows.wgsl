@@ -1,6 +1,6 @@
-// Share of a light that reaches a point, from the light's shadow map.
+// Visibility of a light from a point, by the light's shadow map.
 
-// The point is lifted off the surface by the filter's width, so that the surface does not shadow itself.
+// The point is moved off the surface by the width of the filter to avoid self-shadowing.
 fn visibility(light: Light, point: Point, l: vec3f) -> f32 {
     if (light.layer < 0) {
         return 1.0;
@@ -27,9 +27,9 @@ fn visibility(light: Light, point: Point, l: vec3f) -> f32 {
 fn filtered_depth(light: Light, uv: vec2f, depth: f32) -> f32 {
     let size = vec2f(textureDimensions(shadow_maps));
     let texel = 1.0 / size;
-    let place = uv * size - 0.5;
-    let base = floor(place);
-    let f = place - base;
+    let position = uv * size - 0.5;
+    let base = floor(position);
+    let f = position - base;
     let h = i32(light.half_width);
     let width = f32(h);
     let columns = vec4f(0.0, 1.0, 2.0, 3.0);
@@ -45,8 +45,8 @@ fn filtered_depth(light: Light, uv: vec2f, depth: f32) -> f32 {
             let b = quad_at(light, corner + vec2f(2.0 * texel.x, 0.0));
             let c = quad_at(light, corner + vec2f(0.0, 2.0 * texel.y));
             let d = quad_at(light, corner + 2.0 * texel);
-            lit += free_share(a, depth, wx.xy, wy.xy) + free_share(b, depth, wx.zw, wy.xy);
-            lit += free_share(c, depth, wx.xy, wy.zw) + free_share(d, depth, wx.zw, wy.zw);
+            lit += unoccluded(a, depth, wx.xy, wy.xy) + unoccluded(b, depth, wx.zw, wy.xy);
+            lit += unoccluded(c, depth, wx.xy, wy.zw) + unoccluded(d, depth, wx.zw, wy.zw);
             i += 4;
             if (i > h) {
                 break;
@@ -65,13 +65,13 @@ fn quad_at(light: Light, corner: vec2f) -> vec4f {
     return textureGather(0, shadow_maps, nearest_sampler, corner, light.layer);
 }
 
-// Unoccluded share of a quad, weighted by column and row; gather returns its texels in the order (0,1) (1,1) (1,0) (0,0).
-fn free_share(nearest: vec4f, depth: f32, wx: vec2f, wy: vec2f) -> f32 {
-    let free = select(vec4f(0.0), vec4f(1.0), nearest <= vec4f(depth));
-    return dot(free, vec4f(wx.x * wy.y, wx.y * wy.y, wx.y * wy.x, wx.x * wy.x));
+// Unoccluded fraction of a quad, weighted by column and row; gather returns its texels in the order (0,1) (1,1) (1,0) (0,0).
+fn unoccluded(nearest: vec4f, depth: f32, wx: vec2f, wy: vec2f) -> f32 {
+    let visible = select(vec4f(0.0), vec4f(1.0), nearest <= vec4f(depth));
+    return dot(visible, vec4f(wx.x * wy.y, wx.y * wy.y, wx.y * wy.x, wx.x * wy.x));
 }
 
-// Depth along the map's axis [mm] of what the map holds.
+// Depth along the axis of the map [mm] for a value of the map.
 fn depth_of(light: Light, nearness: f32) -> f32 {
     if (is_parallel(light)) {
         return mix(light.map_far, light.map_near, nearness);

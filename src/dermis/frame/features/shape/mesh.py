@@ -1,4 +1,4 @@
-"""The mesh as textures and as buffers, with the place of each triangle in the atlas."""
+"""Mesh on the device, as textures and as buffers, with the atlas coordinates of its triangles."""
 
 from __future__ import annotations
 
@@ -8,49 +8,46 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.frame.features.shape.shape import VERTICES, Shape, ShapeTables, rest_shape
+from dermis.frame.features.shape.shape import VERTEX_RESOURCES, Shape, ShapeTables, evaluate_rest_shape
 from dermis.gpu import Buffer, Device, Memo, Texture
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 
-_TRIANGLES_PER_ROW = 2048  # the shaders take it from the texture's width
+_TRIANGLES_PER_ROW = 2048  # width of the texture; shaders query it
 
 
 @dataclass(frozen=True, eq=False)
-class HeadResources:
-    """What the shaders read of a head's surface.
+class HeadGeometry:
+    """Triangles and vertices of a head on the device.
 
     resources : textures and buffers by their names in geometry.wgsl
-    indices : buffer of the triangles' vertices, for the rasteriser
-    triangles : count
+    indices : index buffer for the rasteriser
+    triangles : number of triangles
     """
 
     resources: dict[str, Texture | Buffer]
     indices: Buffer
     triangles: int
 
-    def shaped(self, shape: Shape) -> HeadResources:
-        """The same triangles with the vertices of another shape."""
+    def with_shape(self, shape: Shape) -> HeadGeometry:
+        """Return the same triangles with the vertices of a shape."""
         return replace(self, resources=self.resources | shape.vertices)
 
-    def placed(self, other: HeadResources) -> HeadResources:
-        """The same triangles with another's vertices."""
+    def with_vertices_of(self, other: HeadGeometry) -> HeadGeometry:
+        """Return the same triangles with the vertices of another geometry."""
         return replace(
-            self, resources={**self.resources, **{name: other.resources[name] for name in VERTICES}}
+            self, resources={**self.resources, **{name: other.resources[name] for name in VERTEX_RESOURCES}}
         )
 
 
-def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas, shape: Shape) -> HeadResources:
-    """A head's triangles in an atlas, and the vertices of its shape."""
+def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas, shape: Shape) -> HeadGeometry:
+    """Upload the triangles of a head with their atlas coordinates, and add the vertices of its shape."""
     return _uploaded(device, _triangle_table(mesh, atlas), shape.vertices)
 
 
-def upload_bare(device: Device, triangles: NDArray[np.integer]) -> HeadResources:
-    """Triangles of no atlas and no material, without their vertices, for views that take depths alone.
-
-    triangles : (t, 3) vertices
-    """
+def upload_triangles(device: Device, triangles: NDArray[np.integer]) -> HeadGeometry:
+    """Upload (t, 3) triangles without vertices, atlas coordinates and materials, for depth passes."""
     table = np.zeros((3, len(triangles), 4), dtype=np.uint32)
     table[0, :, :3] = triangles
     return _uploaded(device, table, {})
@@ -58,14 +55,14 @@ def upload_bare(device: Device, triangles: NDArray[np.integer]) -> HeadResources
 
 def _uploaded(
     device: Device, table: NDArray[np.uint32], vertices: dict[str, Texture | Buffer]
-) -> HeadResources:
+) -> HeadGeometry:
     rows = np.concatenate([_rows(part, _TRIANGLES_PER_ROW) for part in table])
-    read = device.adapter.kind != "CPU"  # see geometry.wgsl; what is not read still needs to be there
+    read = device.adapter.kind != "CPU"  # see geometry.wgsl; an unread buffer must still be bound
     resources: dict[str, Texture | Buffer] = {
-        "triangle_table": texture_from(device, rows, "rgba32uint"),
+        "triangle_table": texture_from_array(device, rows, "rgba32uint"),
         "triangle_buffer": device.buffer(rows if read else rows[:1, :3], "STORAGE"),
     }
-    return HeadResources(resources | vertices, device.buffer(table[0, :, :3], "INDEX"), table.shape[1])
+    return HeadGeometry(resources | vertices, device.buffer(table[0, :, :3], "INDEX"), table.shape[1])
 
 
 def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
@@ -73,9 +70,9 @@ def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
     table = np.zeros((3, len(mesh.triangles), 4), dtype=np.uint32)
     table[0, :, :3] = mesh.triangles
     table[0, :, 3] = atlas.mapped | (opaque[mesh.material] << 1) | (mesh.material.astype(np.uint32) << 8)
-    table[1] = np.ascontiguousarray(atlas.place[:, :2]).reshape(-1, 4).view(np.uint32)
-    table[2, :, :2] = np.ascontiguousarray(atlas.place[:, 2]).view(np.uint32)
-    table[2, :, 2] = atlas.per_uv.view(np.uint32)
+    table[1] = np.ascontiguousarray(atlas.corner_uv[:, :2]).reshape(-1, 4).view(np.uint32)
+    table[2, :, :2] = np.ascontiguousarray(atlas.corner_uv[:, 2]).view(np.uint32)
+    table[2, :, 2] = atlas.texels_per_uv.view(np.uint32)
     return table
 
 
@@ -86,20 +83,22 @@ def _rows(table: NDArray[np.uint32], per_row: int) -> NDArray[np.uint32]:
     return padded.reshape(rows, per_row, -1)
 
 
-def surface_at_rest(
+def rest_geometry(
     memo: Memo,
     device: Device,
-    held: HeadResources,
+    geometry: HeadGeometry,
     tables: ShapeTables,
     head: Head,
-    person: NDArray[np.float32] | None,
+    rest_positions_mm: NDArray[np.float32] | None,
     index: int,
-) -> HeadResources:
-    """The triangles of an atlas at rest.
+) -> HeadGeometry:
+    """Return the geometry of an atlas layout with the head at rest.
 
-    person : (p, 3) places of the head's control points where another person rests, None for the head's own
-    index : of the atlas among several
+    rest_positions_mm : (p, 3) control points of another person at rest [mm], None for those of the head
+    index : number of the atlas layout
     """
-    positions, of = (head.control.positions_mm, "head") if person is None else (person, "person")
-    shape = memo.keep(rest_shape, device, tables, positions, of=of)
-    return memo.keep(HeadResources.shaped, held, shape, of=f"{of} {index}")
+    positions, owner = rest_positions_mm, "person"
+    if positions is None:
+        positions, owner = head.control.positions_mm, "head"
+    shape = memo.get(evaluate_rest_shape, device, tables, positions, owner=owner)
+    return memo.get(HeadGeometry.with_shape, geometry, shape, owner=f"{owner} {index}")

@@ -1,11 +1,11 @@
-"""Resources of a head's shape."""
+"""Resources of the shape of a head."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from dermis.frame.features.shape.curvature import Curvature, make_curvature
-from dermis.frame.features.shape.shape import Shape, ShapeTables, make_shape, shape_tables, still_shape
+from dermis.frame.features.shape.shape import Shape, ShapeTables, make_shape, shape_tables, make_rest_shape
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Device, Memo
 from dermis.mesh.head import Head
@@ -13,28 +13,28 @@ from dermis.mesh.head import Head
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """The shape of a head, which the motion of each frame moves.
+    """Shape of a head, which each frame poses.
 
-    tables : what the shape is made by
-    person : the shape of another person at rest, None for the head's own
-    curvature : the surface's, None where nothing reads it
+    tables : constant inputs of the shape
+    rest_shape : shape of the person at rest, None where it equals that of the topology
+    curvature : curvature of the surface, None unless the technique reads it
     """
 
     shape: Shape
     tables: ShapeTables
-    person: Shape | None
+    rest_shape: Shape | None
     curvature: Curvature | None
 
 
 def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
-    """Return the resources of the shape of the requested head."""
-    keep = memo.keep
-    tables = keep(shape_tables, device, request.topology, of="shared" if request.shares else "")
+    """Return the shape of the requested head."""
+    cached = memo.get
+    tables = cached(shape_tables, device, request.topology, owner="shared" if request.is_shared else "")
     return Resources(
-        shape=keep(make_shape, device, tables),
+        shape=cached(make_shape, device, tables),
         tables=tables,
-        person=keep(still_shape, device, tables) if request.person is not None else None,
-        curvature=keep(_curvature, device, request.topology) if request.technique.curved else None,
+        rest_shape=cached(make_rest_shape, device, tables) if request.rest_positions_mm is not None else None,
+        curvature=cached(_curvature, device, request.topology) if request.technique.needs_curvature else None,
     )
 
 

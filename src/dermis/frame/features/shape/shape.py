@@ -1,4 +1,4 @@
-"""The shape of a head on the device: its control points, what moves them, and the surface they span."""
+"""Shape of a head on the device: control points, their motion, and the surface through them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.programs import each, program
+from dermis.frame.programs import workgroup_grid, program
 from dermis.gpu import (
     Bindings,
     Buffer,
@@ -28,25 +28,25 @@ from dermis.mesh.rig import MorphTargets, Rig, Skeleton, Stencils
 Doubles = NDArray[np.float64]
 Words = NDArray[np.uint32]
 VERTICES_PER_ROW = 512
-"""Of the texture of vertices, four texels each."""
-VERTICES = ("vertex_table", "vertex_buffer", "vertex_lengths")
-"""Names of the vertices in geometry.wgsl and stretch_of.wgsl."""
-_PARTS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
-_VERTEX = np.dtype(list(_PARTS))  # as shape_vertices.wgsl reads it
-LEAST_ACROSS = 1e-3
-"""Share of dpdu across the normal, below which any other direction serves as well."""
+"""Vertices per row of the vertex texture; each has four texels."""
+VERTEX_RESOURCES = ("vertex_table", "vertex_buffer", "vertex_lengths")
+"""Names of the vertices in geometry.wgsl and texel_stretch.wgsl."""
+_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
+_VERTEX = np.dtype(list(_MEMBERS))  # struct of shape_vertices.wgsl
+MIN_TANGENT = 1e-3
+"""Least length of dpdu without its part along the normal, relative to dpdu; shorter ones are replaced."""
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeTables:
-    """What a shape is made by: buffers by their names in the shaders, that no motion changes.
+    """Constant inputs of a shape: buffers by their names in the shaders, and counts.
 
-    morphs : what moves the control points, as shape_pose.wgsl reads it; empty for nothing
-    stencils : means of control points, as shape_refine.wgsl reads them; empty for no subdivision
-    surface : the mesh, as shape_vertices.wgsl reads it
-    control, points, vertices : counts
-    targets, bones : counts
-    slides : whether some points stay off eyeballs
+    morphs : morph targets and bone weights for shape_pose.wgsl, empty for heads that do not move
+    stencils : subdivision weights of control points for shape_refine.wgsl, empty without subdivision
+    surface : mesh for shape_vertices.wgsl
+    control, points, vertices : numbers of control points, points and vertices
+    targets, bones : numbers of morph targets and bones
+    has_contacts : whether some points, such as the lids', are kept outside the eyeballs
     """
 
     morphs: dict[str, Buffer]
@@ -57,16 +57,17 @@ class ShapeTables:
     vertices: int
     targets: int
     bones: int
-    slides: bool
+    has_contacts: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What the passes of the shape read and write, by the names in their shaders.
+    """Buffers that the passes of a shape read and write.
 
-    rest, weights, matrices : buffers that each frame's motion is written to, beside `morphs`' displacements
-    morphs, stencils, surface : of shape_pose.wgsl, shape_refine.wgsl, shape_vertices.wgsl; empty for no pass
-    tables : those that it is made by
+    rest, weights, matrices : buffers of the pose, which are written in each frame
+    morphs, stencils, surface : resources of shape_pose.wgsl, shape_refine.wgsl and shape_vertices.wgsl, by
+        their names there; empty for a pass that is not needed
+    tables : constant inputs
     """
 
     rest: Buffer
@@ -79,12 +80,12 @@ class Shape:
 
     @property
     def vertices(self) -> dict[str, Texture | Buffer]:
-        """The vertices by their names in the shaders that read them."""
-        return {name: self.surface[name] for name in VERTICES}
+        """Return the vertices by their names in the shaders that read them."""
+        return {name: self.surface[name] for name in VERTEX_RESOURCES}
 
 
 def shape_tables(device: Device, head: Head) -> ShapeTables:
-    """What the shapes of a head are made by."""
+    """Upload the constant inputs of the shapes of a head."""
     rig, mesh = head.control, head.mesh
     moves, bones = bool(rig.targets.names or rig.skeleton), len(rig.skeleton.names) if rig.skeleton else 0
     return ShapeTables(
@@ -96,14 +97,14 @@ def shape_tables(device: Device, head: Head) -> ShapeTables:
         vertices=len(mesh.positions),
         targets=len(rig.targets.names),
         bones=bones,
-        slides=rig.contact is not None,
+        has_contacts=rig.contact is not None,
     )
 
 
 def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Shape:
-    """Space for a shape.
+    """Create the buffers of a shape.
 
-    moves : False for one that no morph target and no bone moves
+    moves : False for a shape without morph targets and bones
     """
     rest, morphs, stencils = _points(device, tables.control), dict[str, Buffer](), dict[str, Buffer]()
     weights, matrices = _floats(device, max(1, tables.targets)), _floats(device, 12 * max(1, tables.bones))
@@ -132,17 +133,17 @@ def _buffers(device: Device, tables: dict[str, NDArray[np.generic]]) -> dict[str
 
 
 def _vertices(device: Device, count: int) -> dict[str, Texture | Buffer]:
-    """Space for vertices; GPUs read the buffer and software the texture, the other is there to be bound."""
+    """Create a buffer of vertices for GPUs or a texture for software adapters, and a placeholder of the other."""
     rows, software = -(-count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
     words = np.zeros((1 if software else rows * VERTICES_PER_ROW, 4, 4), np.float32)
     return dict(
-        zip(VERTICES, (table, device.buffer(words, "STORAGE"), _floats(device, 4 * count)), strict=True)
+        zip(VERTEX_RESOURCES, (table, device.buffer(words, "STORAGE"), _floats(device, 4 * count)), strict=True)
     )
 
 
 def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
-    """Displacements and influences point by point."""
+    """Return displacements, bone weights and contacts point by point, by their names in shape_pose.wgsl."""
     count = len(rig.positions_mm)
     return {
         "first": _starts(rig.targets.point, count),
@@ -153,9 +154,9 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
 
 
 def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.float32]:
-    """(n, 4) displacements point by point, each with its target's number, as shape_pose.wgsl reads them.
+    """Return the (n, 4) displacements [mm] and target numbers, point by point, for shape_pose.wgsl.
 
-    template : targets that move the same points
+    template : targets that move the same points, whose order is used
     """
     number = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
     order = template.by_point
@@ -166,7 +167,7 @@ def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.f
 
 
 def _influences(skeleton: Skeleton | None, count: int) -> Words:
-    """(p, 8) four bones and their weights."""
+    """Return the (p, 8) indices of four bones per point and the bits of their weights."""
     if skeleton is None:
         return np.zeros((1, 8), np.uint32)
     weight = np.ascontiguousarray(skeleton.weight, np.float32).view(np.uint32)
@@ -174,7 +175,7 @@ def _influences(skeleton: Skeleton | None, count: int) -> Words:
 
 
 def _contacts(contact: Contact | None, count: int) -> Words:
-    """(p, 3) two points of the eyeball that each point stays off, and the least distance."""
+    """Return (p, 3) words: two points of the eyeball near each point, and the least distance from it."""
     if contact is None:
         return np.zeros((1, 3), np.uint32)
     found = np.zeros((count, 3), np.uint32)
@@ -190,58 +191,59 @@ def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:
 
 
 def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
-    """The vertices, the corners of triangles around them, and which of these are each one's own."""
+    """Return the vertices, the triangle corners at their points, and the ranges of corners of each vertex."""
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
     table = np.zeros(count, _VERTEX)
     table["uv"], table["point"] = mesh.uv, mesh.point
-    table["normal"] = own_normals(mesh)
-    # by point, then by vertex: those of a vertex lie within those of its point
+    table["normal"] = normals_in_vertex_frames(mesh)
+    # by point, then by vertex: the corners of a vertex are a range within those of its point
     point, key = mesh.point[corner], mesh.point[corner] * np.int64(count) + corner
     order = np.argsort(key, kind="stable")
     vertex = mesh.point * np.int64(count) + np.arange(count)
-    spans = spans_of(point[order], mesh.point), spans_of(key[order], vertex)
-    others = np.stack([np.roll(mesh.triangles, -k, axis=1).ravel()[order] for k in (1, 2)], axis=1)
+    spans = run_bounds(point[order], mesh.point), run_bounds(key[order], vertex)
+    other_corners = np.stack([np.roll(mesh.triangles, -k, axis=1).ravel()[order] for k in (1, 2)], axis=1)
     return {
         "vertices": table.view(np.uint32),
         "spans": np.concatenate(spans, axis=1),
-        "corners": others.astype(np.uint32),
+        "corners": other_corners.astype(np.uint32),
     }
 
 
-def spans_of(ordered: NDArray[np.integer], wanted: NDArray[np.integer]) -> Words:
-    """(n, 2) where the runs of some numbers begin and end among sorted ones."""
-    ends = [np.searchsorted(ordered, wanted, side) for side in ("left", "right")]
+def run_bounds(ordered: NDArray[np.integer], values: NDArray[np.integer]) -> Words:
+    """Return the (n, 2) start and end of the run of each value in a sorted array."""
+    ends = [np.searchsorted(ordered, values, side) for side in ("left", "right")]
     return np.stack(ends, axis=1).astype(np.uint32)
 
 
-def own_normals(mesh: Mesh) -> Doubles:
-    """(v, 3) the mesh's normals as seen from its smooth ones: along these, and along and beside u.
+def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
+    """Return the (v, 3) normals of the mesh in the frames of its smooth normals and u axes.
 
-    A file's normals keep this place while the surface moves.
+    The axes are the smooth normal, the u direction across it, and their cross product. Normals from a file
+    keep these coordinates while the surface moves.
     """
     smooth = vertex_normals(mesh.positions, mesh.point, mesh.triangles).astype(np.float64)
     axis = np.eye(3)[np.abs(smooth).argmin(axis=1)]
-    forth = mesh.dpdu - (mesh.dpdu * smooth).sum(axis=1, keepdims=True) * smooth
-    length = np.linalg.norm(forth, axis=1, keepdims=True)
-    usable = length > LEAST_ACROSS * np.linalg.norm(mesh.dpdu, axis=1, keepdims=True)
-    forth = np.where(usable, forth, np.cross(axis, smooth))
-    forth /= np.linalg.norm(forth, axis=1, keepdims=True)
-    frame = np.stack([smooth, forth, np.cross(smooth, forth)], axis=1)
+    tangent = mesh.dpdu - (mesh.dpdu * smooth).sum(axis=1, keepdims=True) * smooth
+    length = np.linalg.norm(tangent, axis=1, keepdims=True)
+    usable = length > MIN_TANGENT * np.linalg.norm(mesh.dpdu, axis=1, keepdims=True)
+    tangent = np.where(usable, tangent, np.cross(axis, smooth))
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    frame = np.stack([smooth, tangent, np.cross(smooth, tangent)], axis=1)
     return np.asarray(np.einsum("vkc,vc->vk", frame, mesh.normals.astype(np.float64)))
 
 
 def _starts(index: NDArray[np.integer], count: int) -> Words:
-    """(count + 1,) where the runs of 0, 1, 2, ... begin among sorted numbers."""
+    """Return the (count + 1,) starts of the runs of 0, 1, 2, ... in a sorted array."""
     return np.concatenate([[0], np.cumsum(np.bincount(index, minlength=count))]).astype(np.uint32)
 
 
 class MotionBytes(NamedTuple):
-    """What moves a shape, as the shaders read it.
+    """Pose of a shape as bytes for the shaders.
 
-    positions : three floats for each control point at rest [mm]
-    weights : a float for each morph target
-    matrices : twelve floats for each bone, row by row, from rest to pose [mm]
-    displacements : by morph targets, from `frame.shape.displacements`, of a person whose tables are shared
+    positions : three floats per control point, at rest [mm]
+    weights : one float per morph target
+    matrices : twelve floats per bone, row by row, from rest to pose [mm]
+    displacements : result of `displacements` for a person whose tables are those of a template, else empty
     """
 
     positions: bytes
@@ -251,12 +253,12 @@ class MotionBytes(NamedTuple):
 
     @property
     def at_rest(self) -> MotionBytes:
-        """That of a shape which nothing moves."""
+        """Return the same head at rest."""
         return MotionBytes(self.positions)
 
 
 def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
-    """Put the shape where the motion has it."""
+    """Write the pose to the shape's buffers, and declare the passes that evaluate its surface."""
     graph.write("shape", shape.rest, motion.positions)
     if motion.weights:
         graph.write("shape", shape.weights, motion.weights)
@@ -267,24 +269,24 @@ def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
     graph.repeat(_evaluate, shape)
 
 
-def still_shape(device: Device, tables: ShapeTables) -> Shape:
-    """Space for the shape of a person at rest."""
+def make_rest_shape(device: Device, tables: ShapeTables) -> Shape:
+    """Create the buffers of a person's shape at rest."""
     return make_shape(device, tables, moves=False)
 
 
-def rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
-    """The shape of a person at rest, evaluated at once.
+def evaluate_rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
+    """Return the evaluated shape of a person at rest.
 
-    positions_mm : (p, 3) of the control points
+    positions_mm : (p, 3) control points [mm]
     """
-    made, frame = still_shape(device, tables), CommandList(device, timed=False)
-    draw(frame, made, MotionBytes(positions_mm.tobytes()))
+    shape, frame = make_rest_shape(device, tables), CommandList(device, timed=False)
+    draw(frame, shape, MotionBytes(positions_mm.tobytes()))
     frame.submit()
-    return made
+    return shape
 
 
-def motion_at_rest(rig: Rig) -> MotionBytes:
-    """The motion that leaves a rig where it is."""
+def rest_motion(rig: Rig) -> MotionBytes:
+    """Return the rest pose of a rig."""
     weights, matrices, positions = (array.tobytes() for array in rig.rest)
     if rig.template is None or not rig.targets.names:
         return MotionBytes(positions, weights, matrices)
@@ -295,14 +297,14 @@ def motion_at_rest(rig: Rig) -> MotionBytes:
 def _evaluate(graph: Recorder, shape: Shape) -> None:
     tables = shape.tables
     if shape.morphs:
-        moving = ("BONED", tables.bones > 0), ("SLIDES", tables.slides)
-        _each(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, moving)
+        constants = ("HAS_BONES", tables.bones > 0), ("HAS_CONTACTS", tables.has_contacts)
+        _each(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
     if shape.stencils:
         _each(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
-    least = (("LEAST_UV", MIN_UV_CROSS), ("LEAST_ACROSS", LEAST_ACROSS))
-    _each(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, least)
+    constants = (("MIN_UV_CROSS", MIN_UV_CROSS), ("MIN_TANGENT", MIN_TANGENT))
+    _each(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, constants)
 
 
 def _each(graph: Recorder, name: str, bound: Bindings, count: int, constants: Constants = ()) -> None:
-    """A pass of one invocation for each of `count`."""
-    graph.dispatch("shape", program(graph.device, name, constants), bound, each(count))
+    """Declare a pass with `count` invocations."""
+    graph.dispatch("shape", program(graph.device, name, constants), bound, workgroup_grid(count))

@@ -2,8 +2,8 @@
 //#include "each.wgsl"
 //#include "eyeball.wgsl"
 
-override BONED: bool = false; // whether points follow bones
-override SLIDES: bool = false; // whether some stay off eyeballs
+override HAS_BONES: bool = false; // whether points follow bones
+override HAS_CONTACTS: bool = false; // whether some stay off eyeballs
 
 struct Influence {
     bone: vec4u,
@@ -36,7 +36,7 @@ fn resting(index: u32) -> vec3f {
 }
 
 fn carried(index: u32, p: vec3f) -> vec3f {
-    if (!BONED) {
+    if (!HAS_BONES) {
         return p;
     }
     let influence = influences[index];
@@ -75,7 +75,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         p += weights[bitcast<u32>(by.w)] * by.xyz;
     }
     p = carried(index, p);
-    if (SLIDES && contacts[index].apex != contacts[index].back) {
+    if (HAS_CONTACTS && contacts[index].apex != contacts[index].back) {
         p = kept_off(contacts[index], p);
     }
     posed[3u * index] = p.x;

@@ -2,8 +2,8 @@
 //#include "each.wgsl"
 
 override MESH_IN_BUFFERS: bool = false; // where vertices go, see geometry.wgsl
-override LEAST_UV: f32; // least twice-signed uv area of a triangle that has a direction of u and v
-override LEAST_ACROSS: f32; // share of dpdu across the normal, below which any other direction serves as well
+override MIN_UV_CROSS: f32; // least twice-signed uv area of a triangle that has a direction of u and v
+override MIN_TANGENT: f32; // share of dpdu across the normal, below which any other direction serves as well
 
 const LEAST_MM: f32 = 1e-6; // of dpdu and dpdv, per unit of uv
 
@@ -72,7 +72,7 @@ fn tangents_of(index: u32, p: vec3f, n: vec3f, span: vec2u) -> Tangents {
         let t = vertices[corner.y].uv - uv;
         let in_uv = s.x * t.y - s.y * t.x;
         let area = length(cross(a, b));
-        if (abs(in_uv) > LEAST_UV && area > 0.0) {
+        if (abs(in_uv) > MIN_UV_CROSS && area > 0.0) {
             sum.u += area / in_uv * (t.y * a - s.y * b);
             sum.v += area / in_uv * (s.x * b - t.x * a);
             total += area;
@@ -90,7 +90,7 @@ fn tangents_of(index: u32, p: vec3f, n: vec3f, span: vec2u) -> Tangents {
 fn own_normal(own: vec3f, n: vec3f, dpdu: vec3f) -> vec3f {
     var forth = dpdu - dot(dpdu, n) * n;
     let size = length(forth);
-    if (size > LEAST_ACROSS * length(dpdu)) {
+    if (size > MIN_TANGENT * length(dpdu)) {
         forth /= size;
     } else {
         forth = across(n);

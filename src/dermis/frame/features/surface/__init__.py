@@ -1,17 +1,17 @@
-"""The surface of the skin: its numbers, maps and lobe, painted maps, and the surface at the atlas' texels."""
+"""Surface of the skin: specular lobe, maps, painted maps, and the surface at the texels of the atlas."""
 
 from collections.abc import Callable, Mapping, Sequence
 
-from dermis.frame.features.surface.painting.paint import painting_numbers, texture_names
-from dermis.frame.features.surface.record import eye_numbers, lobe_shaders, surface_numbers
+from dermis.frame.features.surface.painting.paint import painting_constants, texture_names
+from dermis.frame.features.surface.record import eye_constants, lobe_shaders, lobe_constants
 from dermis.gpu.wgsl_source import Member
 
 
-def shader_numbers() -> Mapping[str, float]:
-    """Return the numbers that the shaders of lobes, eyes, mouths and painted skin fill in."""
-    return {**surface_numbers(), **eye_numbers(), **painting_numbers()}
+def shader_constants() -> Mapping[str, float]:
+    """Return the constants of shaders of lobes, eyes, mouths and painted skin by their `//#fill` names."""
+    return {**lobe_constants(), **eye_constants(), **painting_constants()}
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
-    """Return the lobes, and the textures of painted skin."""
+    """Return the lists that shaders of lobes and painted skin expand with `//#each`."""
     return {"lobes": lobe_shaders, **texture_names()}

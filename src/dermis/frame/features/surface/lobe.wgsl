@@ -6,7 +6,7 @@
 override MODEL: u32 = 0u;
 
 // Roots of cosine and roughness are evenly spaced in the table of albedos.
-//#fill const ROOT_OF_FIRST_ROW: f32 = {root_of_first_row};
+//#fill const MIN_ROUGHNESS_ROOT: f32 = {root_of_first_row};
 
 // BRDF for rho_s = 1, without the cosine [1/sr], for light above the surface.
 fn lobe(n: vec3f, l: vec3f, v: vec3f, m: f32) -> f32 {
@@ -21,7 +21,7 @@ fn lobe(n: vec3f, l: vec3f, v: vec3f, m: f32) -> f32 {
 // Share of light from (or to) a direction that the surface reflects, for rho_s = 1, and its mean over directions.
 fn surface_albedo(cos_theta: f32, m: f32) -> vec2f {
     let size = vec2f(textureDimensions(albedo_table));
-    let row = (sqrt(m) - ROOT_OF_FIRST_ROW) / (1.0 - ROOT_OF_FIRST_ROW);
+    let row = (sqrt(m) - MIN_ROUGHNESS_ROOT) / (1.0 - MIN_ROUGHNESS_ROOT);
     let place = vec2f(sqrt(max(cos_theta, 0.0)), row) * (size - 1.0);
     let corner = (floor(place) + 1.0) / size;
     let share = textureGather(0, albedo_table, nearest_sampler, corner);

@@ -1,4 +1,4 @@
-"""The head's maps as textures; made once for a head."""
+"""Maps of the head as textures."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from dermis.atlas.raster import rasterise, triangle_uv_area
 from dermis.frame.features.surface import mips as map_mips
 from dermis.frame.features.surface.painting import paint
-from dermis.frame.features.surface.painting.paint import Face
+from dermis.frame.features.surface.painting.paint import ExpressionMaps
 from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.gpu import Device, MutableBindings, Texture, make_texture, upload
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.human.skin.painted import PaintedMaps
-from dermis.human.skin.surface import Painting, painting
+from dermis.human.skin.surface import PaintedSurface, painted_surface
 from dermis.human.skin.textures import detail_slopes
 from dermis.images.colour import encode_srgb
 from dermis.images.filters import mip_chain
@@ -24,76 +24,79 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.specular.beckmann import beckmann_table
 
-_SOFTWARE_SIDE = 1024  # of painted maps on software adapters, which take over a second for so many texels
-_MEAN_TEXELS = 512  # a side of the grid that a map's mean is taken on
+_SOFTWARE_SIDE = 1024  # limit of painted maps on software adapters, which are slow [texels]
+_MEAN_SIDE = 512  # of the grid over which the mean of a map is computed [texels]
 
 
 @dataclass(frozen=True, eq=False)
 class UploadedMaps:
-    """A head's maps on the device.
+    """Maps of a head on the device.
 
-    bindings : by their names in skin.wgsl
-    face : what expressions change them by, None where they do not
+    bindings : resources by their names in skin.wgsl
+    expression_maps : painted maps that expressions change, None for none
     """
 
     bindings: MutableBindings
-    face: Face | None
+    expression_maps: ExpressionMaps | None
 
 
 def upload_maps(
-    device: Device, head: Head, use_colour: bool, decoded: bool = True, side: int = 0, moving: bool = False
+    device: Device, head: Head, use_colour: bool, decoded: bool = True, side: int = 0, animated: bool = False
 ) -> UploadedMaps:
-    """Return the head's maps with a sampler and the lobe's table.
+    """Upload or paint the maps of a head, with their sampler and the table of the specular lobe.
 
-    use_colour : False leaves the colour map white, for profiles that carry the colour
-    decoded : False takes the colour map's sRGB for linear, which is wrong
-    side : of maps that are painted [texels]
-    moving : whether expressions change them
+    use_colour : False replaces the colour map by white, for profiles that contain the colour
+    decoded : False takes sRGB values of the colour map for linear ones, a mistake that the talk shows
+    side : side of painted maps [texels]
+    animated : whether expressions change painted maps
     """
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
-        return UploadedMaps(_of_files(device, head, use_colour, decoded), None)
-    if not decoded and use_colour and maps.colour is None:  # which only pictures can be
-        found = paint.painted_maps(device, _surface(head), maps.look, side)
+        return UploadedMaps(_from_files(device, head, use_colour, decoded), None)
+    if not decoded and use_colour and maps.colour is None:  # only a picture can be taken for linear
+        found = paint.paint_arrays(device, _surface(head), maps.look, side)
         maps = replace(maps, colour=found.colour)
         head = replace(head, maps=maps)
-    painted, face = _painted(device, head, maps, use_colour, (side, moving))
-    return UploadedMaps(_of_files(device, head, use_colour, decoded) | painted, face)
+    painted, expression_maps = _painted(device, head, maps, use_colour, (side, animated))
+    return UploadedMaps(_from_files(device, head, use_colour, decoded) | painted, expression_maps)
 
 
-def fine_detail(device: Device, fine: bool) -> MutableBindings:
-    """What is finer than maps, by its names in skin.wgsl; flat unless the skin is painted."""
+def detail_bindings(device: Device, fine: bool) -> MutableBindings:
+    """Return the texture of relief finer than maps and its sampler, by their names in skin.wgsl.
+
+    fine : False gives a flat texture
+    """
     slopes = detail_slopes() if fine else np.zeros((1, 1, 4), np.float32)
-    around = {f"address_mode_{axis}": "repeat" for axis in "uv"}
-    sampler = device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear", **around)
+    repeat = {f"address_mode_{axis}": "repeat" for axis in "uv"}
+    sampler = device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear", **repeat)
     return {"detail_map": map_mips.detail(device, slopes), "detail_sampler": sampler}
 
 
 def _painted(
-    device: Device, head: Head, maps: PaintedMaps, use_colour: bool, how: tuple[int, bool]
-) -> tuple[MutableBindings, Face | None]:
-    """Return the maps that no file gives, painted, and what expressions change them by.
+    device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool]
+) -> tuple[MutableBindings, ExpressionMaps | None]:
+    """Paint the maps without files, and return them with those that expressions change.
 
-    how : their side [texels], and whether expressions change them
+    paint_options : side [texels], and whether expressions change the maps
     """
-    surface, (side, moving) = _surface(head), how
+    surface, (side, animated) = _surface(head), paint_options
     if device.adapter.kind == "CPU":
         side = min(side, _SOFTWARE_SIDE)
-    given = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
-    moving = moving and (given["relief"] is None or (use_colour and maps.colour is None))
-    painted = paint.draw(device, surface, maps.look, side, moving)
-    found = {role: getattr(painted, role) for role in ("colour", "specular", "roughness", "relief")}
-    given |= {"specular": maps.specular, "roughness": maps.roughness}
-    kept = [role for role in found if given[role] is None and (use_colour or role != "colour")]
-    return {f"{role}_map": found[role] for role in kept}, painted.face
+    from_file = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
+    animated = animated and (from_file["relief"] is None or (use_colour and maps.colour is None))
+    painted = paint.paint_textures(device, surface, maps.look, side, animated)
+    textures = {role: getattr(painted, role) for role in ("colour", "specular", "roughness", "relief")}
+    from_file |= {"specular": maps.specular, "roughness": maps.roughness}
+    used = [role for role in textures if from_file[role] is None and (use_colour or role != "colour")]
+    return {f"{role}_map": textures[role] for role in used}, painted.expression_maps
 
 
-def _surface(head: Head) -> Painting:
-    """What is painted of a head, told by its topology: everyone's is that of one template."""
-    return painting(head.topology.mesh, head.topology.control.stencils)
+def _surface(head: Head) -> PaintedSurface:
+    """Return the surface to paint, that of the topology, which all people of a template share."""
+    return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 
-def _of_files(device: Device, head: Head, use_colour: bool, decoded: bool) -> MutableBindings:
+def _from_files(device: Device, head: Head, use_colour: bool, decoded: bool) -> MutableBindings:
     maps = head.maps
     white = np.ones((1, 1, 3), np.float32)
     colour = (
@@ -107,34 +110,37 @@ def _of_files(device: Device, head: Head, use_colour: bool, decoded: bool) -> Mu
         "relief_map": map_mips.relief(device, maps.height),
         "slope_map": map_mips.slopes(device, maps.normal),
         "colour_map": map_mips.colours(device, colour),
-        "specular_map": _grey(device, _factor(maps.specular, head.mesh)),
-        "roughness_map": _grey(device, _plain(maps.roughness)),
-        "beckmann_table": device.shared(
-            "Beckmann's distribution", lambda: texture_from(device, beckmann_table(), "r32float")
+        "specular_map": _grey(device, _relative_to_mean(maps.specular, head.mesh)),
+        "roughness_map": _grey(device, _factor_channel(maps.roughness)),
+        "beckmann_table": device.cached(
+            "Beckmann's distribution", lambda: texture_from_array(device, beckmann_table(), "r32float")
         ),
     }
 
 
-def _plain(values: NDArray[np.float32] | None) -> NDArray[np.float32]:
+def _factor_channel(values: NDArray[np.float32] | None) -> NDArray[np.float32]:
     return np.ones((1, 1, 1), np.float32) if values is None else values[..., None]
 
 
-def _factor(values: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
-    """A map as a factor of the skin's own value: its mean over the surface is 1."""
+def _relative_to_mean(values: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
+    """Return a map divided by its mean over the surface, as a factor of the skin's own value."""
     if values is None:
-        return _plain(None)
-    texel, triangle = rasterise(mesh, _MEAN_TEXELS, np.arange(len(mesh.triangles)))
+        return _factor_channel(None)
+    texel, triangle = rasterise(mesh, _MEAN_SIDE, np.arange(len(mesh.triangles)))
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     weight = (triangle_areas(corners) / np.maximum(triangle_uv_area(mesh), 1e-12))[triangle]
     height, width = values.shape
-    row, column = texel // _MEAN_TEXELS, texel % _MEAN_TEXELS
-    found = values[row * height // _MEAN_TEXELS, column * width // _MEAN_TEXELS]
+    row, column = texel // _MEAN_SIDE, texel % _MEAN_SIDE
+    found = values[row * height // _MEAN_SIDE, column * width // _MEAN_SIDE]
     mean = float((weight * found).sum() / weight.sum()) if len(texel) else 0.0
-    return _plain(values / mean if mean > 0 else np.ones_like(values))
+    return _factor_channel(values / mean if mean > 0 else np.ones_like(values))
 
 
 def _grey(device: Device, values: NDArray[np.float32]) -> Texture:
-    """A texture of halves with all its mips: devices need not store to one channel of them."""
+    """Upload a one-channel map as half floats with all mip levels.
+
+    The CPU computes the levels, as devices need not support storing r16float.
+    """
     levels = mip_chain(values)
     height, width = values.shape[:2]
     texture = make_texture(device, (width, height), "r16float", mips=len(levels), use="map")

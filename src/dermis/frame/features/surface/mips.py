@@ -1,4 +1,4 @@
-"""Maps of the head with all their mips, filled in by the device."""
+"""Maps of the head with mip levels, which the device computes."""
 
 from __future__ import annotations
 
@@ -20,52 +20,52 @@ from dermis.gpu import (
     make_texture,
     upload,
 )
-from dermis.gpu.textures import texture_from, view_of
+from dermis.gpu.textures import make_view, texture_from_array
 from dermis.images.filters import mip_chain
 
 Floats = NDArray[np.float32]
-_ROWS = 32  # of an invocation, as in relief.wgsl
-_BAND_BYTES = 96 << 20  # of heights at a time: every device can bind so many
+_ROWS = 32  # rows per invocation of relief.wgsl
+_BAND_BYTES = 96 << 20  # heights per pass: every device can bind as many
 
 
-class Mipped(NamedTuple):
-    """A texture, and views of its mips to read from and to store to."""
+class MippedTexture(NamedTuple):
+    """Texture with a view of each mip level."""
 
     texture: Texture
     levels: tuple[TextureView, ...]
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height [texels]."""
+        """Return the width and height of the first level [texels]."""
         width, height = self.texture.size[:2]
         return width, height
 
 
 def colours(device: Device, image: Floats) -> Texture:
-    """A texture of an (h, w, 3) picture."""
-    made = empty(device, image.shape)
+    """Upload an (h, w, 3) picture with its mip levels."""
+    made = empty_map(device, image.shape)
     upload(device, made.texture, np.dstack([image.astype(np.float16), np.ones(image.shape[:2], np.float16)]))
     frame = CommandList(device, timed=False)
-    halve(frame, made)
+    fill_mips(frame, made)
     frame.submit()
     return made.texture
 
 
 def slopes(device: Device, image: Floats | None) -> Texture:
-    """A texture of (h, w, 2) slopes and their squares; flat without any."""
+    """Upload (h, w, 2) slopes with their squares and mip levels; None gives a flat texture."""
     if image is None:
         return _flat(device)
-    made, frame = empty(device, image.shape), CommandList(device, timed=False)
-    bound: Bindings = {"slopes": texture_from(device, image, "rg32float"), "stored": made.levels[0]}
+    made, frame = empty_map(device, image.shape), CommandList(device, timed=False)
+    bound: Bindings = {"slopes": texture_from_array(device, image, "rg32float"), "stored": made.levels[0]}
     shader = program(device, "surface/map_moments.wgsl", store=HALVES)
     frame.compute("maps", shader, bound, image.shape[1::-1])
-    halve(frame, made)
+    fill_mips(frame, made)
     frame.submit()
     return made.texture
 
 
 def detail(device: Device, slopes: Floats) -> Texture:
-    """A texture of two layers: a tile's (h, w, 4) slopes of two kinds, and the squares of either's."""
+    """Upload the (h, w, 4) slopes of a tile of two kinds of relief, and their squares as a second layer."""
     squares = slopes * slopes
     sums = np.stack([squares[..., 0] + squares[..., 1], squares[..., 2] + squares[..., 3]], axis=-1)
     layers = slopes, np.pad(sums, ((0, 0), (0, 0), (0, 2)))
@@ -79,37 +79,44 @@ def detail(device: Device, slopes: Floats) -> Texture:
 
 
 def relief(device: Device, height: Floats | None) -> Texture:
-    """A texture of the slopes of an (h, w) height map [mm per texel] and their squares; flat without any.
+    """Compute the slopes of an (h, w) height map [mm/texel], with their squares and mip levels.
 
-    Beyond the edge a plane goes on.
+    None gives a flat texture. Heights are extrapolated linearly beyond the edges.
     """
     if height is None or height.size == 1:
         return _flat(device)
     padded = np.pad(height, 1, "reflect", reflect_type="odd")
     band = max(_BAND_BYTES // padded[:1].nbytes // _ROWS, 1) * _ROWS
     bands = (device.buffer(padded[top : top + band + 2], "STORAGE") for top in range(0, len(height), band))
-    return relief_of(device, bands, height.shape, band)
+    return relief_from_buffers(device, bands, height.shape, band)
 
 
-def relief_of(device: Device, bands: Iterable[Buffer], shape: tuple[int, ...], band: int) -> Texture:
-    """The same of heights in buffers, of so many rows each, with a texel more on all sides."""
-    made, frame, (rows, columns) = empty(device, shape), CommandList(device, timed=False), shape
+def relief_from_buffers(
+    device: Device, bands: Iterable[Buffer], shape: tuple[int, ...], band: int
+) -> Texture:
+    """Compute the slopes of heights in buffers, with their squares and mip levels.
+
+    bands : buffers of consecutive rows, with a border of one texel on all sides
+    shape : (h, w) of the height map
+    band : number of rows per buffer
+    """
+    made, frame, (rows, columns) = empty_map(device, shape), CommandList(device, timed=False), shape
     for index, heights in enumerate(bands):
-        _relieve(frame, made, heights, index * band, min(band, rows - index * band))
-    halve(frame, made, 1 if rows % 2 or columns % 2 else 2)
+        _draw_slopes(frame, made, heights, index * band, min(band, rows - index * band))
+    fill_mips(frame, made, 1 if rows % 2 or columns % 2 else 2)
     frame.submit()
     return made.texture
 
 
-def relieve(recorder: Recorder, relief: Mipped, heights: Buffer) -> None:
-    """Fill a texture of even sides, and its mips, with the slopes of heights in one buffer."""
-    _relieve(recorder, relief, heights, 0, relief.size[1])
-    halve(recorder, relief, 2)
+def fill_relief(recorder: Recorder, relief: MippedTexture, heights: Buffer) -> None:
+    """Declare the passes that fill a texture of even size with the slopes of heights in one buffer."""
+    _draw_slopes(recorder, relief, heights, 0, relief.size[1])
+    fill_mips(recorder, relief, 2)
 
 
-def _relieve(recorder: Recorder, relief: Mipped, heights: Buffer, top: int, rows: int) -> None:
+def _draw_slopes(recorder: Recorder, relief: MippedTexture, heights: Buffer, top: int, rows: int) -> None:
     device = recorder.device
-    first = device.shared(
+    first = device.cached(
         f"relief from row {top}", lambda: device.buffer(np.array([top], np.uint32), "STORAGE")
     )
     bound: Bindings = {
@@ -123,23 +130,28 @@ def _relieve(recorder: Recorder, relief: Mipped, heights: Buffer, top: int, rows
 
 
 def _flat(device: Device) -> Texture:
-    return device.shared("no relief", lambda: make_texture(device, (1, 1), HALVES, use="map"))
+    return device.cached("no relief", lambda: make_texture(device, (1, 1), HALVES, use="map"))
 
 
-def empty(device: Device, shape: tuple[int, ...]) -> Mipped:
-    """Space for an (h, w) map with all its mips."""
+def empty_map(device: Device, shape: tuple[int, ...]) -> MippedTexture:
+    """Create an empty (h, w) map with all mip levels."""
     mips = max(shape[:2]).bit_length()
     texture = make_texture(device, (shape[1], shape[0]), HALVES, mips=mips, name="painted map")
-    return mipped(texture)
+    return with_mip_views(texture)
 
 
-def mipped(texture: Texture) -> Mipped:
-    """A texture with views of its mips."""
-    return Mipped(texture, tuple(view_of(texture, mip=mip) for mip in range(texture.mip_level_count)))
+def with_mip_views(texture: Texture) -> MippedTexture:
+    """Return a texture with a view of each mip level."""
+    return MippedTexture(
+        texture, tuple(make_view(texture, mip=mip) for mip in range(texture.mip_level_count))
+    )
 
 
-def halve(recorder: Recorder, mipped: Mipped, first: int = 1) -> None:
-    """Fill the mips of a texture from the first one that is not there."""
+def fill_mips(recorder: Recorder, mipped: MippedTexture, first: int = 1) -> None:
+    """Declare the passes that fill mip levels, each from the one before.
+
+    first : first level to fill
+    """
     shader, levels = program(recorder.device, "surface/map_halve.wgsl", store=HALVES), mipped.levels
     width, height = mipped.size
     for mip in range(first, len(levels)):

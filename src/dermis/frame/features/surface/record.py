@@ -1,47 +1,47 @@
-"""The surface of the skin as the shaders read it: numbers, pipeline constants and tables."""
+"""Surface of the skin as shaders read it: records and pipeline constants."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.gpu import ComputeProgram, Record
+from dermis.gpu import ComputeProgram, UniformRecord
 from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
 from dermis.human import teeth
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.mesh.maps import Maps
-from dermis.optics.flesh import aside_mm, medium_of
+from dermis.optics.equivalent_medium import equivalent_medium, oblique_offset_mm
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.slabs import forward_directions
-from dermis.optics.thin_parts import across
-from dermis.scene.skin import USUAL_ROUGHNESS, Skin, lobe_name
-from dermis.specular.albedo import ROOT_OF_FIRST_ROW
+from dermis.optics.slabs import anisotropic_response
+from dermis.optics.thin_parts import oblique_transmittance
+from dermis.scene.skin import DEFAULT_ROUGHNESS, Skin, lobe_name
+from dermis.specular.albedo import MIN_ROUGHNESS_ROOT
 from dermis.specular.fresnel import ENERGY, SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
 DEFAULT_COLOUR = 0.8
-"""Albedo of heads without a colour map."""
-_EYE_SEEDS = 1000  # that look different
+"""Albedo of heads without a colour map [-]."""
+_EYE_SEEDS = 1000  # number of different eyes
 _NO_BAND = -1.0
-_MOST_ASIDE_MM = 3.0  # farther, the surface no longer goes on as it does at a texel
+_MOST_ASIDE_MM = 3.0  # limit, as the surface is flat only near a texel
 
 
 def lobe_shaders() -> list[Member]:
-    """The models as lobe.wgsl includes them, numbered in order."""
+    """Return the shaders of the specular lobes in order, for lobe.wgsl to include."""
     return [Member(name, model.shader) for name, model in MODELS.items()]
 
 
-def surface_numbers() -> dict[str, float]:
-    """Numbers that lobe.wgsl and the models' shaders fill in."""
-    of_models = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
-    return {"root_of_first_row": ROOT_OF_FIRST_ROW, **of_models}
+def lobe_constants() -> dict[str, float]:
+    """Return the constants of lobe.wgsl and of the lobes' shaders, by their `//#fill` names."""
+    model_numbers = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
+    return {"root_of_first_row": MIN_ROUGHNESS_ROOT, **model_numbers}
 
 
-def eye_numbers() -> dict[str, float]:
-    """Numbers that eye.wgsl and mouth.wgsl fill in."""
+def eye_constants() -> dict[str, float]:
+    """Return the constants of eye.wgsl and mouth.wgsl, by their `//#fill` names."""
     return {
         "cornea_at": cornea_centre_mm(),
         "limbus_mm": LIMBUS_MM,
@@ -56,34 +56,34 @@ def eye_numbers() -> dict[str, float]:
     }
 
 
-def fill_eye(record: Record, look: EyeLook) -> None:
-    """Tell a shader's `Eye`, or some of them, what eyes look like."""
+def fill_eye(record: UniformRecord, look: EyeLook) -> None:
+    """Write the appearance of eyes to one shader record `Eye` or to several."""
     for name in ("eumelanin", "pupil_mm", "redness"):
         record[name] = getattr(look, name)
     record["seed"] = look.seed % _EYE_SEEDS
 
 
 def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
-    """Values of lobe.wgsl's `override`s where they are not the default 0."""
+    """Return the pipeline constants of lobe.wgsl that differ from 0."""
     numbers = {"MODEL": MODELS.names.index(lobe_name(skin)), "EXACT_FRESNEL": int(skin.fresnel == "exact")}
     return tuple((name, number) for name, number in numbers.items() if number)
 
 
 def skin_record(
     program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
-) -> Record:
-    """The shader's `Skin`: members that the model has by name come from it, the others are derived.
+) -> UniformRecord:
+    """Return the shader record `Skin`.
 
-    profile : of the skin
+    Members with the name of a field or property of `Skin` have its value, the others are derived from it.
     """
     members = struct_dtype(program.source.text, "Skin").names or ()
-    dials = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
-    return program.record("Skin", **dials, **_derived(skin, maps, profile), light_count=light_count)
+    values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
+    return program.record("Skin", **values, **_derived(skin, maps, profile), light_count=light_count)
 
 
 def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
-    """Members that no field or property of the model holds; the usual roughness leaves a map as it is."""
-    energy, usual = ENERGY[skin.energy], USUAL_ROUGHNESS if maps.rough else 1.0
+    """Return the members of the record that no field or property of `Skin` has."""
+    energy, usual = ENERGY[skin.energy], DEFAULT_ROUGHNESS if maps.rough else 1.0
     return {
         "m": skin.smoothing * skin.roughness / usual,
         "f0": SKIN_F0,
@@ -96,8 +96,8 @@ def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLik
     }
 
 
-def half_space_of(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
-    """(3,) what the half-space of the skin's mean colour returns of light from above, and its index."""
+def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
+    """Return the (3,) diffuse reflectance [-] and index of refraction of a half-space of mean skin colour."""
     if skin.albedo == "profile":
         colour = np.asarray(profile.albedo, np.float64)
     elif maps.mean_colour is None:
@@ -108,22 +108,27 @@ def half_space_of(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats,
 
 
 def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
-    """Members that direction.wgsl reads, for half-spaces of the skin's mean colour."""
-    half_space = half_space_of(skin, maps, profile)
-    law = forward_directions(*half_space, skin.anisotropy)
+    """Return the members that direction.wgsl reads, for a half-space of mean skin colour."""
+    half_space = mean_half_space(skin, maps, profile)
+    law = anisotropic_response(*half_space, skin.anisotropy)
     return {
         "inner_eta": law.eta,
-        "aside_mm": min(aside_mm(medium_of(profile, *half_space)), _MOST_ASIDE_MM),
-        "mean_once": law.mean_once,
-        "once": law.once,
-        "back_from_everywhere": law.from_everywhere,
-        "back": np.pad(law.returned, ((0, 0), (0, 1))),
-        "across": np.pad(across(*half_space, profile.counted, skin.anisotropy), ((0, 0), (0, 1))),
+        "aside_mm": min(oblique_offset_mm(equivalent_medium(profile, *half_space)), _MOST_ASIDE_MM),
+        "mean_once": law.mean_kernel,
+        "once": law.single_scattering,
+        "back_from_everywhere": law.relative_diffuse_reflectance,
+        "back": np.pad(law.relative_reflectance, ((0, 0), (0, 1))),
+        "across": np.pad(
+            oblique_transmittance(*half_space, profile.from_photons, skin.anisotropy), ((0, 0), (0, 1))
+        ),
     }
 
 
 def _relief_band(maps: Maps) -> float:
-    """Mip of a larger height map that matches the normal map: it adds only finer relief. -1: it adds all."""
+    """Return the mip level of the height map that has the size of the normal map, -1 without both maps.
+
+    The height map then adds only finer relief to the normal map; with -1 it adds all of it.
+    """
     if maps.normal is None or maps.height is None:
         return _NO_BAND
     finer = max(maps.height.shape[:2]) / max(maps.normal.shape[:2])

@@ -1,23 +1,23 @@
-"""The surface at each texel of an atlas, so that lighting it reads neither the mesh nor its maps."""
+"""Surface at the texels of an atlas, so that lighting reads neither the mesh nor its maps."""
 
 from __future__ import annotations
 
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.programs import program
-from dermis.gpu import Device, Recorder, Texture, make_texture, scratch
+from dermis.gpu import Device, Recorder, Texture, make_texture, mark_scratch
 
 SURFACE_BYTES = 32
-"""Bytes of a texel."""
+"""Size of a texel of the surface texture [bytes]."""
 
 
-def make_surfaces(device: Device, side: int) -> Texture:
-    """A texture for positions, normals, colours and gloss: two layers, as packed_surface.wgsl packs them."""
+def make_surface_texture(device: Device, side: int) -> Texture:
+    """Create the texture of positions, normals, colours and gloss of texels, see packed_surface.wgsl."""
     return mark_scratch(device, make_texture(device, (side, side), "rgba32uint", layers=2, name="atlas's surface"))
 
 
 def draw(graph: Recorder, layout: LitAtlas) -> None:
-    """Fill the layout's surfaces."""
-    bound = {**layout.lit, **layout.atlas.resources, "surfaces": layout.surfaces}
+    """Declare the pass that fills the surface texture of a layout."""
+    bound = {**layout.bindings, **layout.atlas.resources, "surfaces": layout.surfaces}
     graph.compute(
         "surface", program(graph.device, "surface/surface_texels.wgsl"), bound, layout.surfaces.size[:2]
     )

@@ -1,1 +1,1 @@
-"""Light through thin parts: ears, nostrils, lips, eyelids."""
+"""Translucency: light through thin parts such as ears, nostrils, lips and eyelids."""

@@ -1,4 +1,4 @@
-"""Translucency of a head: pairs of places by their reach, and tables of what passes by thickness."""
+"""Creation of the resources of translucency: pairs, and tables of the light that thin parts transmit."""
 
 from __future__ import annotations
 
@@ -9,50 +9,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.translucency.cells import Cells, divide
-from dermis.base.progress import preparing
-from dermis.frame.features.diffusion.pyramid import LEAST_WEIGHT
-from dermis.frame.features.surface import record as surface
+from dermis.atlas.translucency.cells import Cells, divide_into_cells
+from dermis.base.progress import logged_step
+from dermis.frame.features.diffusion.pyramid import MIN_WEIGHT
+from dermis.frame.features.surface import record as surface_record
 from dermis.frame.features.translucency.pair_search.search import (
-    CellTables,
-    Found,
-    cell_tables,
-    search,
+    PairTable,
+    search_pairs,
     upload_receivers,
     upload_sources,
 )
 from dermis.frame.features.translucency.passes import (
     RECEIVER_BYTES,
     SOURCE_BYTES,
-    source_level,
-    space,
-    weighing,
+    choose_source_level,
+    make_buffer,
+    weight_bindings,
 )
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.request import FrameRequest
-from dermis.gpu import Bindings, Device, Memo, Texture, make_texture, scratch, upload
-from dermis.optics.flesh import medium_of
+from dermis.gpu import Bindings, Device, Memo, Texture, make_texture, mark_scratch, upload
+from dermis.optics.equivalent_medium import equivalent_medium
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.thin_parts import ThinParts, thin_parts
+from dermis.optics.thin_parts import ThinParts, solve_thin_parts
 
 Floats = NDArray[np.float64]
-_REACH, _FARTHEST_MM = 4.0, 40.0  # standard deviations of the widest Gaussian, beyond all pairs
-_WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
-_WIDTHS = 4  # whose pairs are kept
-_ONE = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, as packed_light.wgsl has it
-_COARSER = 1.5  # times the side of cells whose pairs memory does not hold
+_REACH, _MAX_REACH_MM = 4.0, 40.0  # of the tables, in standard deviations of the widest Gaussian
+_STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # of rounded widths
+_CACHE_SIZE = 4
+_UNIT_LIGHT = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, encoded as in packed_light.wgsl
+_COARSENING = 1.5  # factor of the cell side when memory does not hold the pairs
 
 
-def thin_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
-    """What passes thin parts of half-spaces, for the blurred levels; None for lambertian skin."""
+def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
+    """Return tables of the light that thin parts transmit, by thickness; None for Lambertian skin."""
     if request.skin.direction != "half-space":
         return None
-    split, law = request.split, surface.half_space_of(request.skin, request.head.maps, request.profile)
+    split, maps = request.split, request.head.maps
+    half_space = surface_record.mean_half_space(request.skin, maps, request.profile)
     g = request.skin.anisotropy
-    return memo.keep(_made, request.profile, *law, g, split.total, split.blurred_mm2, split.weight)
+    levels = split.total, split.blurred_mm2, split.weight
+    return memo.get(_level_tables, request.profile, *half_space, g, *levels)
 
 
-def _made(
+def _level_tables(
     profile: GaussianSum,
     colour: Floats,
     eta: float,
@@ -61,110 +61,108 @@ def _made(
     variance_mm2: Floats,
     weight: Floats,
 ) -> ThinParts:
-    """Tables as weights of the blurred levels, which alone lose what passes: no more than they have."""
-    reach = min(_REACH * float(np.sqrt(variance_mm2[-1])), _FARTHEST_MM)
-    made = thin_parts(medium_of(profile, colour, eta), variance_mm2, reach, g)
-    blurred = weight.sum(axis=0) / np.maximum(total, LEAST_WEIGHT)
-    share = np.minimum(1.0, blurred / np.maximum(made.lost.sum(axis=1), LEAST_WEIGHT))[:, None]
-    lost = made.lost * share / np.maximum(blurred, LEAST_WEIGHT)
-    return replace(made, through=made.through * share * total, lost=lost)
+    """Return the tables as weights of the blurred levels, scaled so that no level loses more than it has."""
+    reach = min(_REACH * float(np.sqrt(variance_mm2[-1])), _MAX_REACH_MM)
+    tables = solve_thin_parts(equivalent_medium(profile, colour, eta), variance_mm2, reach, g)
+    blurred = weight.sum(axis=0) / np.maximum(total, MIN_WEIGHT)
+    scale = np.minimum(1.0, blurred / np.maximum(tables.lost.sum(axis=1), MIN_WEIGHT))[:, None]
+    lost = tables.lost * scale / np.maximum(blurred, MIN_WEIGHT)
+    return replace(tables, transmitted=tables.transmitted * scale * total, lost=lost)
 
 
-def translucency_of(
+def make_translucency(
     memo: Memo,
     device: Device,
     surface: Bindings,
-    at_rest: Bindings,
+    rest_surface: Bindings,
     atlas: Atlas,
     variance_mm2: Floats,
     weight: Floats,
-    thin: ThinParts | None,
-    changing: bool,
-    of: str,
+    tables: ThinParts | None,
+    shares_pairs: bool,
+    owner: str,
 ) -> Translucency:
-    """What comes through a head's thin parts, on an atlas.
+    """Return the resources of the light through thin parts of a head.
 
-    surface, at_rest : resources of geometry.wgsl and of the atlas, as the head is now and for the search
-    variance_mm2, weight : (k,) and (k, 3) of the blurred levels
-    thin : tables of what passes by thickness; None for Gaussians of the straight distance
-    changing : whether profiles come and go, so that similar ones should share their pairs
-    of : name of the atlas among several
+    surface, rest_surface : resources of geometry.wgsl and of the atlas, for the current shape and for the
+        shape in which pairs are searched
+    variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
+    tables : transmittance by thickness; None to use the Gaussians of the straight distance
+    shares_pairs : whether similar profiles use the same pairs, for skins that change from frame to frame
+    owner : name of the atlas layout in the memo
     """
-    widest = float(np.sqrt(variance_mm2[-1]))
-    widest = shared_width(widest) if changing else widest
-    pairs = memo.keep(PairsByWidth, device, at_rest, atlas, of=of).of(widest)
-    made = memo.keep(_unweighed, device, surface, pairs, of=of)
-    return memo.keep(_weighed, device, made, variance_mm2, weight, thin, of=of)
+    widest_mm = float(np.sqrt(variance_mm2[-1]))
+    widest_mm = rounded_width(widest_mm) if shares_pairs else widest_mm
+    pairs = memo.get(PairCache, device, rest_surface, atlas, owner=owner).for_width(widest_mm)
+    buffers = memo.get(make_buffers, device, surface, pairs, owner=owner)
+    return memo.get(with_profile, device, buffers, variance_mm2, weight, tables, owner=owner)
 
 
-class PairsByWidth:
-    """Pairs of a surface, kept for a few widths of skins that come in turn.
+class PairCache:
+    """Cache of the pairs of a surface for the last few widths of Gaussians.
 
     surface : resources of geometry.wgsl and of the atlas, for the search
     """
 
     def __init__(self, device: Device, surface: Bindings, atlas: Atlas) -> None:
         self._device, self._surface, self._atlas = device, surface, atlas
-        self._kept: dict[float, PairBuffers] = {}
+        self._cache: dict[float, PairBuffers] = {}
 
-    def of(self, widest_mm: float) -> PairBuffers:
-        """Those that Gaussians of at most this standard deviation reach."""
-        made = self._kept.pop(widest_mm, None)
-        if made is None:
-            while len(self._kept) >= _WIDTHS:
-                self._kept.pop(next(iter(self._kept)))
-            cells = divide(self._atlas, widest_mm)
-            tables = cell_tables(self._device, cells)
-            made = find_pairs(self._device, self._surface, self._atlas, cells, tables)
-        self._kept[widest_mm] = made
-        return made
+    def for_width(self, widest_mm: float) -> PairBuffers:
+        """Return the pairs within reach of Gaussians up to a standard deviation [mm]."""
+        pairs = self._cache.pop(widest_mm, None)
+        if pairs is None:
+            while len(self._cache) >= _CACHE_SIZE:
+                self._cache.pop(next(iter(self._cache)))
+            pairs = find_pairs(self._device, self._surface, self._atlas, divide_into_cells(self._atlas, widest_mm))
+        self._cache[widest_mm] = pairs
+        return pairs
 
 
-def shared_width(widest_mm: float) -> float:
-    """The nearest of a few widths [mm]: similar skins share their pairs."""
-    step = round(_WIDTHS_TO_DOUBLE * float(np.log2(max(widest_mm, _LEAST_SHARED_MM))))
-    return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
+def rounded_width(widest_mm: float) -> float:
+    """Return the nearest power of sqrt(2) [mm], so that skins with similar profiles share their pairs."""
+    step = round(_STEPS_PER_DOUBLING * float(np.log2(max(widest_mm, _MIN_WIDTH_MM))))
+    return float(2.0 ** (step / _STEPS_PER_DOUBLING))
 
 
-@preparing("finding the thin parts")
-def find_pairs(
-    device: Device, surface: Bindings, atlas: Atlas, cells: Cells, tables: CellTables
-) -> PairBuffers:
-    """The translucent pairs of a surface; of coarser cells where memory does not hold those of these."""
-    found, times = search(device, surface, cells, tables), count(1)
-    while found is None:
-        cells = divide(atlas, cells.widest_mm, _COARSER ** next(times))
-        found = search(device, surface, cells, cell_tables(device, cells))
-    return pairs_from(device, cells, found)
+@logged_step("finding the thin parts")
+def find_pairs(device: Device, surface: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
+    """Return the pairs of a surface, with coarser cells if a buffer cannot hold the pairs of these cells."""
+    table, times = search_pairs(device, surface, cells), count(1)
+    while table is None:
+        cells = divide_into_cells(atlas, cells.max_sigma_mm, _COARSENING ** next(times))
+        table = search_pairs(device, surface, cells)
+    return make_pair_buffers(device, cells, table)
 
 
-def pairs_from(device: Device, cells: Cells, found: Found) -> PairBuffers:
-    """Pairs that were found, as the frame's passes read them."""
+def make_pair_buffers(device: Device, cells: Cells, table: PairTable) -> PairBuffers:
+    """Upload the pairs in the form that the passes of a frame read."""
     return PairBuffers(
         cells=cells,
-        receivers=upload_receivers(device, cells, found.receiver),
-        sources=upload_sources(device, cells, found.source),
-        pairs=found.pairs,
-        count=int(found.first[-1]),
-        sums=device.buffer(_sums(cells, found), "STORAGE"),
-        light=mark_scratch(device, _unlit(device, cells.surface)),
-        lost=_unlit(device, cells.surface),
+        receivers=upload_receivers(device, cells, table.receiver),
+        sources=upload_sources(device, cells, table.source),
+        pairs=table.pairs,
+        count=int(table.first[-1]),
+        receiver_ranges=device.buffer(_receiver_ranges(cells, table), "STORAGE"),
+        transmitted=mark_scratch(device, _dark_map(device, cells.receiver_mask)),
+        lost=_dark_map(device, cells.receiver_mask),
     )
 
 
-def _sums(cells: Cells, found: Found) -> NDArray[np.uint32]:
-    """(m, 3) cell, x and y packed, where its pairs begin, and where they end; one without pairs for none.
+def _receiver_ranges(cells: Cells, table: PairTable) -> NDArray[np.uint32]:
+    """Return (m, 3) rows of packed cell, first pair and end of the pairs; one row of zeros for no receivers.
 
-    Those with most pairs come first: invocations that run side by side, and workgroups that are left for the
-    end, then have little to wait for.
+    Receivers with many pairs come first: invocations that run side by side then take about equally long, and
+    the last workgroups are short.
     """
-    first, end = found.first[:-1], found.first[1:]
+    first, end = table.first[:-1], table.first[1:]
     order = np.argsort(first - end, kind="stable")
-    listed = np.stack([cells.taking[found.receiver], first, end], axis=-1)[order].astype(np.uint32)
-    return listed if len(listed) else np.zeros((1, 3), np.uint32)
+    rows = np.stack([cells.receivers[table.receiver], first, end], axis=-1)[order].astype(np.uint32)
+    return rows if len(rows) else np.zeros((1, 3), np.uint32)
 
 
-def _unlit(device: Device, surface: NDArray[np.bool_]) -> Texture:
+def _dark_map(device: Device, surface: NDArray[np.bool_]) -> Texture:
+    """Return a texture of no light, with alpha 1 where there is surface."""
     light = np.zeros((*surface.shape, 4), np.float32)
     light[..., 3] = surface
     texture = make_texture(device, surface.shape, "rgba32float")
@@ -172,43 +170,41 @@ def _unlit(device: Device, surface: NDArray[np.bool_]) -> Texture:
     return texture
 
 
-def translucency_from(
+def with_profile(
     device: Device,
-    surface: Bindings,
-    pairs: PairBuffers,
+    buffers: Translucency,
     variance_mm2: Floats,
     weight: Floats,
-    thin: ThinParts | None = None,
+    tables: ThinParts | None = None,
 ) -> Translucency:
-    """What a profile lets pass between pairs, and space for it."""
-    return _weighed(device, _unweighed(device, surface, pairs), variance_mm2, weight, thin)
+    """Return translucency with the weights of a profile.
 
-
-def _weighed(
-    device: Device, made: Translucency, variance_mm2: Floats, weight: Floats, thin: ThinParts | None
-) -> Translucency:
-    share = weight / np.maximum(weight.sum(axis=0), LEAST_WEIGHT)
-    passing = weight if thin is None else thin.through
-    losing = share if thin is None else thin.lost
+    variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
+    tables : transmittance by thickness; None to use the Gaussians of the straight distance
+    """
+    fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT)
+    transmitted = weight if tables is None else tables.transmitted
+    lost = fraction if tables is None else tables.lost
     return replace(
-        made,
-        weighing=weighing(device, made.pairs, variance_mm2, weight, thin, passing),
-        losing=weighing(device, made.pairs, variance_mm2, share, thin, losing),
-        gaussians=len(weight),
-        slabs=thin is not None,
-        layer=source_level(made.pairs.cells.spacing_mm, variance_mm2),
+        buffers,
+        weight_bindings=weight_bindings(device, buffers.pairs, variance_mm2, weight, tables, transmitted),
+        loss_bindings=weight_bindings(device, buffers.pairs, variance_mm2, fraction, tables, lost),
+        gaussian_count=len(weight),
+        uses_tables=tables is not None,
+        source_level=choose_source_level(buffers.pairs.cells.cell_mm, variance_mm2),
     )
 
 
-def _unweighed(device: Device, surface: Bindings, pairs: PairBuffers) -> Translucency:
+def make_buffers(device: Device, surface: Bindings, pairs: PairBuffers) -> Translucency:
+    """Allocate the buffers of translucency, without the weights of a profile."""
     receivers, sources = pairs.receivers[1], pairs.sources[1]
     return Translucency(
         pairs=pairs,
         surface=surface,
-        receiver_points=mark_scratch(device, space(device, receivers, RECEIVER_BYTES)),
-        source_points=space(device, sources, SOURCE_BYTES),
-        weights=space(device, pairs.count, 8),
-        gathered=mark_scratch(device, space(device, sources, 16)),
-        slants=mark_scratch(device, space(device, sources, 8)),
-        evenly=device.buffer(np.tile(_ONE, (max(sources, 1), 2)), "STORAGE"),
+        receiver_points=mark_scratch(device, make_buffer(device, receivers, RECEIVER_BYTES)),
+        source_points=make_buffer(device, sources, SOURCE_BYTES),
+        weights=make_buffer(device, pairs.count, 8),
+        source_light=mark_scratch(device, make_buffer(device, sources, 16)),
+        direction_factors=mark_scratch(device, make_buffer(device, sources, 8)),
+        unit_light=device.buffer(np.tile(_UNIT_LIGHT, (max(sources, 1), 2)), "STORAGE"),
     )

@@ -1,11 +1,11 @@
-// The atlas in coarse cells.
+// Division of the atlas into coarse cells.
 //#include "each.wgsl"
 
 struct Cells {
-    size: u32, // texels along the atlas' side
-    side: u32, // cells
-    stride: u32, // between the texels that sources are made of
-    count: u32, // of what is asked for
+    size: u32, // texels along the side of the atlas
+    side: u32, // cells along the side of the atlas
+    stride: u32, // texels between the samples of a source
+    count: u32, // number of invocations
 }
 
 @group(0) @binding(2) var<uniform> cells: Cells;
@@ -18,11 +18,11 @@ fn packed(pair: vec2u) -> u32 {
     return pair.x | (pair.y << 16u);
 }
 
-// The first texel of a cell.
-fn first_of(cell: vec2u) -> vec2u {
+// First texel of a cell.
+fn first_texel(cell: vec2u) -> vec2u {
     return (cell * cells.size + cells.side - 1u) / cells.side;
 }
 
-fn middle_of(cell: vec2u) -> vec2u {
+fn middle_texel(cell: vec2u) -> vec2u {
     return ((2u * cell + 1u) * cells.size) / (2u * cells.side);
 }

@@ -1,10 +1,10 @@
-// A pair's source in the low bits of a word, and in the high ones how far light on its way is as in a deep slab.
+// Source of a pair in the low bits of a word, and the directionality of its transmittance in the high bits.
 
 const SOURCE_BITS: u32 = 24u;
-const SOURCE: u32 = 0xffffffu;
-const DEEPEST: f32 = 127.0; // stands for 1
+const SOURCE_MASK: u32 = 0xffffffu;
+const DIRECTIONALITY_SCALE: f32 = 127.0; // integer of 1
 
-// deep: -1 to 1; 1 where directions count as in a deep slab, 0 where all count alike
-fn pair_word(source: u32, deep: f32) -> u32 {
-    return source | (bitcast<u32>(i32(round(DEEPEST * deep))) << SOURCE_BITS);
+// directionality: -1 to 1; 1 where directions of incidence weigh as in a deep slab, 0 where all weigh the same
+fn pack_pair(source: u32, directionality: f32) -> u32 {
+    return source | (bitcast<u32>(i32(round(DIRECTIONALITY_SCALE * directionality))) << SOURCE_BITS);
 }

@@ -1,4 +1,4 @@
-"""Passes of the translucency: places of pairs, their weights, and the light that passes."""
+"""Passes of translucency: positions of the pairs, their weights, and the transmitted light."""
 
 from __future__ import annotations
 
@@ -7,208 +7,220 @@ from numpy.typing import NDArray
 
 from dermis.atlas.translucency.cells import Cells
 from dermis.frame.features.atlas.lit import LitAtlas
-from dermis.frame.features.diffusion.pyramid import Blur, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
-from dermis.frame.lights.records import oblique
-from dermis.frame.programs import each, program
-from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Record, Recorder, Texture
-from dermis.optics.gaussians import MOST_GAUSSIANS
-from dermis.optics.thin_parts import ROWS, ThinParts
+from dermis.frame.lights.records import oblique_constants
+from dermis.frame.programs import program, workgroup_grid
+from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Recorder, Texture, UniformRecord
+from dermis.optics.gaussians import MAX_GAUSSIANS
+from dermis.optics.thin_parts import THICKNESS_ROWS, ThinParts
 
 RECEIVER_BYTES, SOURCE_BYTES = 48, 32
-"""Of a place that takes light, and of one that gives it; see translucent_pair.wgsl."""
+"""Sizes of the structs Receiver and Source of translucent_pair.wgsl."""
 
 _FACETS: Constants = (("FACETS", 1),)
 _TEAMS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
-_ALONE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # software adapters pay for barriers
-_GATHERING = 64  # invocations of a workgroup, as in translucency_gather.wgsl
+_SINGLE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # barriers are slow on software adapters
+_SOURCE_GROUP = 64  # invocations of a workgroup, as in translucency_gather.wgsl
 Floats = NDArray[np.float64]
-GRAIN = (
-    0.72  # sampled at their spacing, Gaussians of more variance than this times its square are even to 1e-6
-)
-_ROW, _SIZE = 1024, 64  # pairs of a row, and of a workgroup in it, as in the shader
-_SMOOTH = 0.45  # of the spacing; light of this standard deviation has no detail that the sources miss
+# Least variance of a Gaussian over the squared spacing of its samples, for a sum that is even to 1e-6.
+_MIN_VARIANCE_RATIO = 0.72
+_ROW, _SIZE = 1024, 64  # pairs of a row, and of a workgroup in it, as in translucency_weights.wgsl
+_SMOOTH = 0.45  # least standard deviation of the light that sources sample, over their spacing
 
 
-def space(device: Device, count: int, size: int = 4) -> Buffer:
-    """A buffer for a number of things of some bytes; never without any."""
-    return device.space(size * max(1, count))
+def make_buffer(device: Device, count: int, size: int = 4) -> Buffer:
+    """Allocate a buffer for `count` elements of `size` bytes, and for one where there are none."""
+    return device.storage_buffer(size * max(1, count))
 
 
 def draw_receivers(
     graph: Recorder,
     surface: Bindings,
     cells: Cells,
-    listed: tuple[Buffer, int],
+    receivers: tuple[Buffer, int],
     points: Buffer,
     facets: bool = False,
 ) -> None:
-    """Write points, normals and metric of the cells that receive light.
+    """Write the current positions, normals and metric of receivers.
 
     surface : resources of geometry.wgsl, and stretch_map of the atlas
-    listed : buffer of the places on the mesh, and their number
+    receivers : buffer of cells, and their number
     points : buffer to write to
-    facets : whether the metric is that of the triangles, and not the stretch map's
+    facets : whether to take the metric from the triangles instead of the stretch map
     """
     shader = program(graph.device, "translucency/translucency_receivers.wgsl", _FACETS if facets else ())
-    places, count = listed
-    bound: Bindings = {"cells": _record(shader, cells, count), "receivers": places, "receiver_points": points}
-    graph.dispatch("pairs", shader, {**surface, **bound}, each(count))
+    buffer, count = receivers
+    bindings: Bindings = {
+        "cells": _cells_record(shader, cells, count),
+        "receivers": buffer,
+        "receiver_points": points,
+    }
+    graph.dispatch("pairs", shader, {**surface, **bindings}, workgroup_grid(count))
 
 
 def draw_sources(
-    graph: Recorder, surface: Bindings, cells: Cells, listed: tuple[Buffer, int], points: Buffer
+    graph: Recorder, surface: Bindings, cells: Cells, sources: tuple[Buffer, int], points: Buffer
 ) -> None:
-    """Write centres, normals and areas of the cells that emit light.
+    """Write the current centres, normals and areas of sources.
 
     surface : resources of geometry.wgsl, and the atlas
-    listed : buffer of the cells, and their number
+    sources : buffer of cells, and their number
     points : buffer to write to
     """
     shader = program(graph.device, "translucency/translucency_sources.wgsl")
-    places, count = listed
-    bound: Bindings = {"cells": _record(shader, cells, count), "sources": places, "source_points": points}
-    graph.dispatch("pairs", shader, {**surface, **bound}, each(count))
+    buffer, count = sources
+    bindings: Bindings = {
+        "cells": _cells_record(shader, cells, count),
+        "sources": buffer,
+        "source_points": points,
+    }
+    graph.dispatch("pairs", shader, {**surface, **bindings}, workgroup_grid(count))
 
 
-def _record(shader: ComputeProgram, cells: Cells, count: int) -> Record:
-    shape = {"size": cells.size, "side": cells.side, "stride": cells.stride}
-    return shader.record("Cells", **shape, count=count)
+def _cells_record(shader: ComputeProgram, cells: Cells, count: int) -> UniformRecord:
+    return shader.record("Cells", size=cells.size, side=cells.side, stride=cells.stride, count=count)
 
 
 def draw(
-    graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, constants: Constants = ()
+    graph: Recorder, levels: PyramidLevels, blur: Blur, thin: Translucency, constants: Constants = ()
 ) -> Texture:
-    """The light through thin parts: that of the blurred layers, summed over each receiver's sources.
+    """Sum the light that each receiver gets from its sources, and return the texture of it.
 
     constants : of translucency.wgsl, in place of those that suit the device
 
     Source: [JensenBuhler2002; dEonLuebke2007].
     """
-    device, pairs, level = graph.device, thin.pairs, blur.own[1 + thin.layer]
-    halved = blur.halvings[level]
+    device, pairs, level = graph.device, thin.pairs, blur.profile_levels[1 + thin.source_level]
+    halvings = blur.halvings[level]
     gather = program(device, "translucency/translucency_gather.wgsl")
     record = gather.record(
         "Entering",
-        layer=level - levels.first[halved],
+        layer=level - levels.first[halvings],
         sources=pairs.sources[1],
-        halved=halved,
+        halvings=halvings,
         scale=1.0 / blur.scale,
     )
-    entering: Bindings = {
+    bindings: Bindings = {
         "entering": record,
-        "levels": levels.stacks[halved],
+        "levels": levels.stacks[halvings],
         "source_points": thin.source_points,
-        "slants": thin.slants if thin.slabs else thin.evenly,
-        "gathered": thin.gathered,
+        "direction_factors": thin.direction_factors if thin.uses_tables else thin.unit_light,
+        "source_light": thin.source_light,
     }
-    graph.dispatch("translucency", gather, entering, each(pairs.sources[1], _GATHERING))
-    add_up(graph, thin, thin.gathered, pairs.light, constants)
-    return pairs.light
+    graph.dispatch("translucency", gather, bindings, workgroup_grid(pairs.sources[1], _SOURCE_GROUP))
+    sum_pairs(graph, thin, thin.source_light, pairs.transmitted, constants)
+    return pairs.transmitted
 
 
-def draw_slants(graph: Recorder, layout: LitAtlas, thin: Translucency, constants: Constants) -> None:
-    """How much of the light where sources lie passes deep slabs.
+def draw_direction_factors(
+    graph: Recorder, layout: LitAtlas, thin: Translucency, constants: Constants
+) -> None:
+    """Write the factor by which the directions of each source's light change what passes a deep slab.
 
     constants : pipeline constants of the lights
     """
-    shader = program(graph.device, "translucency/translucency_directions.wgsl", oblique(constants))
+    shader = program(graph.device, "translucency/translucency_directions.wgsl", oblique_constants(constants))
     count = thin.pairs.sources[1]
-    bound: Bindings = {
-        **layout.lit,
+    bindings: Bindings = {
+        **layout.bindings,
         "surfaces": layout.surfaces,
-        "slanted": shader.record("Slanted", sources=count),
+        "source_count": shader.record("SourceCount", sources=count),
         "source_points": thin.source_points,
-        "slants": thin.slants,
+        "direction_factors": thin.direction_factors,
     }
-    graph.dispatch("translucency", shader, bound, each(count, _GATHERING))
+    graph.dispatch("translucency", shader, bindings, workgroup_grid(count, _SOURCE_GROUP))
 
 
-def add_up(
+def sum_pairs(
     graph: Recorder,
     thin: Translucency,
-    gathered: Buffer,
+    source_light: Buffer,
     into: Texture,
     constants: Constants = (),
     stage: str = "translucency",
 ) -> None:
-    """Sum what sources give by the pairs' weights.
+    """Sum the light of the sources at each receiver, weighted by the pairs.
 
-    gathered : buffer of their light
+    source_light : buffer of the light of each source
     into : texture of the coarse atlas
+    constants : of translucency.wgsl, in place of those that suit the device
     """
     device, pairs = graph.device, thin.pairs
-    bound: Bindings = {
-        "receivers": pairs.sums,
+    bindings: Bindings = {
+        "receivers": pairs.receiver_ranges,
         "weights": thin.weights,
-        "gathered": gathered,
+        "source_light": source_light,
         "transmitted": into,
     }
-    chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + constants)
-    shader = program(device, "translucency/translucency.wgsl", tuple(chosen.items()))
-    receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
-    graph.dispatch(stage, shader, bound, each(pairs.receivers[1], receivers))
+    team = dict((_SINGLE if device.adapter.kind == "CPU" else _TEAMS) + constants)
+    shader = program(device, "translucency/translucency.wgsl", tuple(team.items()))
+    receivers_per_group = int(team["SIZE"]) // int(team["TEAM"])
+    graph.dispatch(stage, shader, bindings, workgroup_grid(pairs.receivers[1], receivers_per_group))
 
 
 def draw_weights(graph: Recorder, thin: Translucency) -> None:
-    """Weigh the pairs of the surface as it is now, and sum what it does not return because of them."""
+    """Compute the weights of all pairs for the current surface, and the fraction of light that is lost."""
     pairs, cells = thin.pairs, thin.pairs.cells
     draw_receivers(graph, thin.surface, cells, pairs.receivers, thin.receiver_points)
     draw_sources(graph, thin.surface, cells, pairs.sources, thin.source_points)
-    bound: Bindings = {
+    bindings: Bindings = {
         "pairs": pairs.pairs,
         "receiver_points": thin.receiver_points,
         "source_points": thin.source_points,
         "weights": thin.weights,
     }
-    shader, groups = _shader(graph.device, thin.gaussians, thin.slabs), max(1, -(-pairs.count // _ROW))
-    for weighed in (thin.losing, thin.weighing):
-        graph.dispatch("pairs", shader, {**bound, **weighed}, (_ROW // _SIZE, groups, 1))
-        if weighed is thin.losing:
-            add_up(graph, thin, thin.evenly, pairs.lost, stage="pairs")
+    shader = _weights_program(graph.device, thin.gaussian_count, thin.uses_tables)
+    groups = _ROW // _SIZE, max(1, -(-pairs.count // _ROW)), 1
+    graph.dispatch("pairs", shader, {**bindings, **thin.loss_bindings}, groups)
+    sum_pairs(graph, thin, thin.unit_light, pairs.lost, stage="pairs")
+    graph.dispatch("pairs", shader, {**bindings, **thin.weight_bindings}, groups)
 
 
-def source_level(spacing_mm: float, variance_mm2: Floats) -> int:
-    """The blurred level that is smooth enough for the sources to tell all of it."""
+def choose_source_level(spacing_mm: float, variance_mm2: Floats) -> int:
+    """Return the index of the narrowest blurred level that sources of this spacing sample without aliasing."""
     smooth = np.flatnonzero(variance_mm2 >= (_SMOOTH * spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
-def weighing(
+def weight_bindings(
     device: Device,
     pairs: PairBuffers,
     variance_mm2: Floats,
     weight: Floats,
-    thin: ThinParts | None = None,
-    passing: Floats | None = None,
+    tables: ThinParts | None = None,
+    transmittance: Floats | None = None,
 ) -> Bindings:
-    """The record of a profile's pass, and its table.
+    """Return the record and the table of a profile that translucency_weights.wgsl reads.
 
-    variance_mm2, weight : (k,) and (k, 3) of the blurred levels
-    passing : (ROWS, k, 3) of the tables of thin parts
+    variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
+    tables : tables by thickness, None without any
+    transmittance : (THICKNESS_ROWS, k, 3) the one of these tables to use, `transmitted` or `lost`
     """
-    gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
+    gaussian = np.zeros((MAX_GAUSSIANS, 4), np.float32)
     gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
-    record = _shader(device, len(weight), thin is not None).record(
-        "Weighing",
-        reach_mm=1.0 if thin is None else thin.reach_mm,
+    record = _weights_program(device, len(weight), tables is not None).record(
+        "PairProfile",
+        reach_mm=1.0 if tables is None else tables.max_thickness_mm,
         radius_mm=pairs.cells.radius_mm,
-        before_mm2=variance_mm2[source_level(pairs.cells.spacing_mm, variance_mm2)],
-        cell_mm2=pairs.cells.spacing_mm**2,
-        grain=GRAIN,
+        source_mm2=variance_mm2[choose_source_level(pairs.cells.cell_mm, variance_mm2)],
+        cell_mm2=pairs.cells.cell_mm**2,
+        min_variance_ratio=_MIN_VARIANCE_RATIO,
         gaussian=gaussian,
     )
-    return {"weighing": record, "passing": device.buffer(_table(len(weight), thin, passing), "STORAGE")}
+    table = _table(len(weight), tables, transmittance)
+    return {"pair_profile": record, "transmittance": device.buffer(table, "STORAGE")}
 
 
-def _table(gaussians: int, thin: ThinParts | None, passing: Floats | None) -> NDArray[np.float32]:
-    """(ROWS k, 4) what passes by thickness and Gaussian, and how deep each thickness is; one row for none."""
-    if thin is None or passing is None:
+def _table(gaussians: int, tables: ThinParts | None, transmittance: Floats | None) -> NDArray[np.float32]:
+    """Return (rows k, 4) transmittance by thickness and Gaussian, with the depth factor in the first alpha."""
+    if tables is None or transmittance is None:
         return np.zeros((1, 4), np.float32)
-    table = np.zeros((ROWS, gaussians, 4), np.float32)
-    table[..., :3], table[:, 0, 3] = passing, thin.deep
+    table = np.zeros((THICKNESS_ROWS, gaussians, 4), np.float32)
+    table[..., :3], table[:, 0, 3] = transmittance, tables.directionality
     return table.reshape(-1, 4)
 
 
-def _shader(device: Device, gaussians: int, slabs: bool) -> ComputeProgram:
-    return program(device, "translucency/translucency_weights.wgsl", (("COUNT", gaussians), ("SLABS", slabs)))
+def _weights_program(device: Device, gaussians: int, uses_tables: bool) -> ComputeProgram:
+    constants = ("COUNT", gaussians), ("TABLES", uses_tables)
+    return program(device, "translucency/translucency_weights.wgsl", constants)

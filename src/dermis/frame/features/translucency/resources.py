@@ -1,4 +1,4 @@
-"""Light through thin parts: translucent pairs of places, and what passes between them, on the device."""
+"""Resources of translucency: pairs of points on both sides of thin parts, and the light between them."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from dermis.gpu import Bindings, Buffer, Texture
 
 @dataclass(frozen=True, eq=False)
 class PairBuffers:
-    """Pairs of places of a surface on a device.
+    """Translucent pairs of a surface: a source, where light enters, and a receiver, where it leaves.
 
-    cells : of the coarse atlas
-    receivers, sources : buffers of those with pairs, as translucency_receivers.wgsl and
-        translucency_sources.wgsl read them, and how many there are
-    pairs : buffer of source, receiver and offset in the map, as translucency_weights.wgsl reads them
-    count : of pairs
-    sums : buffer of cells and their pairs, as translucency.wgsl reads them
-    light : texture of the coarse atlas for what comes through, none yet, and 1 where there is surface
-    lost : the same for the share that is not returned where light comes through
+    cells : cells of the coarse atlas
+    receivers, sources : buffers of the cells that have pairs, see translucency_receivers.wgsl and
+        translucency_sources.wgsl, each with its number of rows
+    pairs : buffer of source, receiver and offset in the atlas, see translucency_weights.wgsl
+    count : number of pairs
+    receiver_ranges : buffer of cells and the range of their pairs, see translucency.wgsl
+    transmitted : texture of the coarse atlas for the transmitted light, and 1 where there is surface
+    lost : texture of the coarse atlas for the fraction of light that is not returned, likewise
     """
 
     cells: Cells
@@ -27,26 +27,27 @@ class PairBuffers:
     sources: tuple[Buffer, int]
     pairs: Buffer
     count: int
-    sums: Buffer
-    light: Texture
+    receiver_ranges: Buffer
+    transmitted: Texture
     lost: Texture
 
 
 @dataclass(frozen=True, eq=False)
 class Translucency:
-    """Thin parts of an atlas.
+    """Resources of the light through thin parts of one atlas layout.
 
     pairs : translucent pairs
-    surface : resources of geometry.wgsl and of the atlas, for where they are now
-    receiver_points, source_points : buffers of where the pairs' places are
-    weights : buffer of the share of light that each pair lets pass
-    gathered : buffer for the light of the sources
-    evenly : buffer of the same for sources that all give 1
-    slants : buffer of how much of the sources' light passes deep slabs, by its directions
-    weighing, losing : what translucency_weights.wgsl reads of a profile, for what it lets pass and for what
-        it therefore does not return
-    gaussians, slabs : how many these have, and whether they have tables by thickness
-    layer : blurred level, counted from 0, whose light passes
+    surface : resources of geometry.wgsl and of the atlas, for the current shape
+    receiver_points, source_points : buffers of the current positions of receivers and sources
+    weights : buffer of the fraction of light that passes between each pair
+    source_light : buffer of the light at the sources
+    unit_light : buffer of light 1 at all sources
+    direction_factors : buffer of the factor of each source's light in deep slabs, by its directions
+    weight_bindings, loss_bindings : what translucency_weights.wgsl reads of the profile: for the transmitted
+        light, and for the light that is not returned because of it
+    gaussian_count : number of Gaussians of the profile
+    uses_tables : whether transmittance is read from tables by thickness
+    source_level : index of the blurred level whose light enters, 0 for the first one
     """
 
     pairs: PairBuffers
@@ -54,21 +55,11 @@ class Translucency:
     receiver_points: Buffer
     source_points: Buffer
     weights: Buffer
-    gathered: Buffer
-    evenly: Buffer
-    slants: Buffer
-    weighing: Bindings = field(default_factory=dict)
-    losing: Bindings = field(default_factory=dict)
-    gaussians: int = 0
-    slabs: bool = False
-    layer: int = 0
-
-    @property
-    def light(self) -> Texture:
-        """Texture of the coarse atlas for what comes through."""
-        return self.pairs.light
-
-    @property
-    def lost(self) -> Texture:
-        """Texture of the coarse atlas for the share that is not returned."""
-        return self.pairs.lost
+    source_light: Buffer
+    direction_factors: Buffer
+    unit_light: Buffer
+    weight_bindings: Bindings = field(default_factory=dict)
+    loss_bindings: Bindings = field(default_factory=dict)
+    gaussian_count: int = 0
+    uses_tables: bool = False
+    source_level: int = 0

@@ -1,16 +1,17 @@
-// How much of the light that enters where sources lie passes deep slabs: over that of uniform light of which as much comes back.
+// Direction factor of each source: what a deep slab transmits of its light, over what it transmits of uniform light of the same
+// diffuse reflectance.
 //#include "irradiance/lighting.wgsl"
 //#include "irradiance/texels_beside.wgsl"
 //#include "packed_light.wgsl"
 //#include "translucent_source.wgsl"
 
-struct Slanted {
+struct SourceCount {
     sources: u32,
 }
 
-@group(0) @binding(31) var<uniform> slanted: Slanted;
+@group(0) @binding(31) var<uniform> source_count: SourceCount;
 @group(0) @binding(32) var<storage, read> source_points: array<Source>;
-@group(0) @binding(33) var<storage, read_write> slants: array<vec2u>; // as in packed_light.wgsl
+@group(0) @binding(33) var<storage, read_write> direction_factors: array<vec2u>; // see packed_light.wgsl
 
 const SIZE: u32 = 64u; // of a workgroup
 
@@ -21,12 +22,12 @@ fn main(
     @builtin(local_invocation_index) number: u32,
 ) {
     let index = (group.y * groups.x + group.x) * SIZE + number;
-    if (index >= slanted.sources) {
+    if (index >= source_count.sources) {
         return;
     }
     let texel = vec2u(source_points[index].texel & 0xffffu, source_points[index].texel >> 16u);
     let packed = packed_at(vec2i(texel));
-    var slant = vec3f(1.0); // where it is dark, light comes from around
+    var factor = vec3f(1.0); // for uniform light
     if (packed.look.w != 0u) {
         let surface = unpack_surface(packed);
         var point = unpack_point(packed);
@@ -35,7 +36,7 @@ fn main(
             bend_here = bend_at(vec2i(texel), packed.place);
         }
         let lit = light_up(point, surface, surface.normal, open_at(point.place));
-        slant = select(slant, lit.across / max(lit.entered, vec3f(1e-20)), lit.entered > vec3f(0.0));
+        factor = select(factor, lit.across / max(lit.entered, vec3f(1e-20)), lit.entered > vec3f(0.0));
     }
-    slants[index] = light_words(slant);
+    direction_factors[index] = pack_light(factor);
 }

@@ -1,23 +1,23 @@
-// Where the middles of the atlas' cells that take light through thin parts lie now.
+// Current positions of receivers: the middles of cells where light through thin parts leaves.
 //#include "shape/geometry.wgsl"
 //#include "translucent_pair.wgsl"
 //#include "cells.wgsl"
 
-override FACETS: bool = false; // whether the map's stretch is the triangle's own, or what the stretch map says
+override FACETS: bool = false; // whether the metric is that of the triangle, or that of the stretch map
 
-@group(0) @binding(3) var stretch_map: texture_2d<f32>; // texels per mm along u and v, and their cosine
-@group(0) @binding(4) var<storage, read> receivers: array<vec4u>; // triangle, its packed weights, cell
+@group(0) @binding(3) var stretch_map: texture_2d<f32>; // texels per mm along u and v; cosine of the angle between them
+@group(0) @binding(4) var<storage, read> receivers: array<vec4u>; // triangle, packed barycentric weights, cell
 @group(0) @binding(5) var<storage, read_write> receiver_points: array<Receiver>;
 
-// Squares of a texel along u and v, and the product of both [mm^2].
+// First fundamental form per texel: E, G and F [mm^2].
 fn metric_at(texel: vec2u) -> vec3f {
     let stretch = textureLoad(stretch_map, texel, 0).xyz;
     let mm = 1.0 / max(stretch.xy, vec2f(1e-6));
     return vec3f(mm * mm, stretch.z * mm.x * mm.y);
 }
 
-// The same of a triangle, by its corners on the surface and in the map.
-fn metric_of(index: u32, along: mat2x3f) -> vec3f {
+// The metric of a triangle, by its corners on the surface and in the atlas.
+fn triangle_metric(index: u32, along: mat2x3f) -> vec3f {
     let ab = bitcast<vec4f>(triangle_row(index, 1u));
     let b = f32(cells.size) * (ab.zw - ab.xy);
     let c = f32(cells.size) * (bitcast<vec2f>(triangle_row(index, 2u).xy) - ab.xy);
@@ -46,10 +46,10 @@ fn main(
     let w = unpack2x16unorm(receiver.y);
     let along = mat2x3f(b.position - a.position, c.position - a.position);
     let normal = (1.0 - w.x - w.y) * a.normal + w.x * b.normal + w.y * c.normal;
-    let texel = middle_of(unpacked(receiver.z));
+    let texel = middle_texel(unpacked(receiver.z));
     var metric = vec3f(0.0);
     if (FACETS) {
-        metric = metric_of(receiver.x, along);
+        metric = triangle_metric(receiver.x, along);
     } else {
         metric = metric_at(texel);
     }

@@ -1,4 +1,4 @@
-// Where the cells of the atlas that give light to thin parts lie now, and how much surface they hold.
+// Current centres, normals and areas of sources: cells where light enters thin parts.
 //#include "shape/geometry.wgsl"
 //#include "translucent_pair.wgsl"
 //#include "cells.wgsl"
@@ -7,24 +7,24 @@
 @group(0) @binding(4) var<storage, read> sources: array<u32>; // cell
 @group(0) @binding(5) var<storage, read_write> source_points: array<Source>;
 
-const INSIDE: f32 = 0.1; // texels; the place of a texel beside a chart is on its edge, or in another chart
+const INSIDE: f32 = 0.1; // texels; gutter texels show a position that is farther from their own
 
-struct Shown {
+struct CellSum {
     centre: vec3f,
     area: f32,
-    nearest: f32, // texels from the cell's middle
+    nearest: f32, // distance of the texel from the middle of the cell [texel]
     normal: vec3f,
     texel: vec2u,
 }
 
-fn with_texel(shown: Shown, at: vec2u, middle: vec2f) -> Shown {
+fn with_texel(sum: CellSum, at: vec2u, middle: vec2f) -> CellSum {
     let texel = textureLoad(atlas, at, 0);
     let index = max(texel.x, 1u) - 1u;
     let t = triangle_at(index);
     let w = unpack2x16unorm(texel.y);
     let weights = vec3f(1.0 - w.x - w.y, w);
-    let off = abs(f32(cells.size) * place_of_point(index, weights) - (vec2f(at) + 0.5));
-    let inside = texel.x > 0u && max(off.x, off.y) < INSIDE;
+    let offset = abs(f32(cells.size) * place_of_point(index, weights) - (vec2f(at) + 0.5));
+    let inside = texel.x > 0u && max(offset.x, offset.y) < INSIDE;
     let a = corner_at(t.x);
     let b = corner_at(t.y);
     let c = corner_at(t.z);
@@ -32,16 +32,16 @@ fn with_texel(shown: Shown, at: vec2u, middle: vec2f) -> Shown {
     let ab = bitcast<vec4f>(triangle_row(index, 1u));
     let flat = determinant(mat2x2f(ab.zw - ab.xy, bitcast<vec2f>(triangle_row(index, 2u).xy) - ab.xy));
     let mm2 = select(0.0, length(surface) / max(abs(flat) * f32(cells.size * cells.size), 1e-9), inside);
-    let away = distance(vec2f(at), middle);
-    var made = shown;
-    made.centre += mm2 * (weights.x * a.position + weights.y * b.position + weights.z * c.position);
-    made.area += mm2;
-    if (inside && away < shown.nearest) {
-        made.nearest = away;
-        made.normal = weights.x * a.normal + weights.y * b.normal + weights.z * c.normal;
-        made.texel = at;
+    let distance_to_middle = distance(vec2f(at), middle);
+    var result = sum;
+    result.centre += mm2 * (weights.x * a.position + weights.y * b.position + weights.z * c.position);
+    result.area += mm2;
+    if (inside && distance_to_middle < sum.nearest) {
+        result.nearest = distance_to_middle;
+        result.normal = weights.x * a.normal + weights.y * b.normal + weights.z * c.normal;
+        result.texel = at;
     }
-    return made;
+    return result;
 }
 
 @compute @workgroup_size(EACH)
@@ -55,16 +55,16 @@ fn main(
         return;
     }
     let cell = unpacked(sources[index]);
-    let begin = cells.stride * ((first_of(cell) + cells.stride - 1u) / cells.stride);
-    let end = first_of(cell + 1u);
+    let begin = cells.stride * ((first_texel(cell) + cells.stride - 1u) / cells.stride);
+    let end = first_texel(cell + 1u);
     let middle = (vec2f(cell) + 0.5) * f32(cells.size) / f32(cells.side) - 0.5;
-    var shown = Shown(vec3f(0.0), 0.0, 1e9, vec3f(0.0), begin);
+    var sum = CellSum(vec3f(0.0), 0.0, 1e9, vec3f(0.0), begin);
     for (var y = begin.y; y < end.y; y += cells.stride) {
         for (var x = begin.x; x < end.x; x += cells.stride) {
-            shown = with_texel(shown, vec2u(x, y), middle);
+            sum = with_texel(sum, vec2u(x, y), middle);
         }
     }
-    let normal = shown.normal * inverseSqrt(max(dot(shown.normal, shown.normal), 1e-30));
-    let area = f32(cells.stride * cells.stride) * shown.area;
-    source_points[index] = Source(shown.centre / max(shown.area, 1e-30), area, normal, packed(shown.texel));
+    let normal = sum.normal * inverseSqrt(max(dot(sum.normal, sum.normal), 1e-30));
+    let area = f32(cells.stride * cells.stride) * sum.area;
+    source_points[index] = Source(sum.centre / max(sum.area, 1e-30), area, normal, packed(sum.texel));
 }

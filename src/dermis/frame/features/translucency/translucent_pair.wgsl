@@ -1,40 +1,41 @@
-// Places that give light and places that take it through the flesh, and how they lie to each other.
+// Sources, where light enters a thin part, and receivers, where it leaves; and the geometry of a pair of both.
 //#include "translucent_source.wgsl"
 
 struct Receiver {
     position: vec3f,
     texel: u32, // of the atlas, x and y packed
     normal: vec3f,
-    metric: vec3f, // squares of a texel along u and v, and the product of both [mm^2]
+    metric: vec3f, // first fundamental form per texel: E, G and F [mm^2]
 }
 
-const NOWHERE: u32 = 0x80008000u; // offset in the map to what no blur reaches
+const NO_OFFSET: u32 = 0x80008000u; // offset in the atlas to a source that no blur reaches
 
-const ASKEW: f32 = 0.5; // cosine of two normals from which a place counts
-const OPPOSED: f32 = -0.2; // to which it counts more and more
-const ACROSS_AIR: f32 = -0.5; // mean cosine to the inward normals at which two places only see each other from outside
+const MAX_COSINE: f32 = 0.5; // cosine between the normals above which a pair has no weight
+const FULL_COSINE: f32 = -0.2; // cosine below which it has its full weight
+const MIN_INWARD: f32 = -0.5; // mean cosine to the inward normals at which the segment of a pair lies outside the head
 
-struct Lie {
-    cosine: f32, // of the normals
-    inward: f32, // mean cosine of the way to the inward normals
-    square: f32, // of the distance [mm^2]
-    depth: f32, // under the tangent plane of the place that gives [mm]
+struct PairGeometry {
+    cosine: f32, // between the normals
+    inward: f32, // mean cosine between the segment and the inward normals
+    distance2: f32, // squared distance [mm^2]
+    depth: f32, // of the receiver below the tangent plane of the source [mm]
 }
 
-fn lie_of(place: vec3f, normal: vec3f, source: Source) -> Lie {
-    let to = source.centre - place;
-    let square = dot(to, to);
+fn pair_geometry(position: vec3f, normal: vec3f, source: Source) -> PairGeometry {
+    let to = source.centre - position;
+    let distance2 = dot(to, to);
     let depth = dot(to, source.normal);
-    let inward = 0.5 * (depth - dot(to, normal)) * inverseSqrt(max(square, 1e-12));
-    return Lie(dot(normal, source.normal), inward, square, abs(depth));
+    let inward = 0.5 * (depth - dot(to, normal)) * inverseSqrt(max(distance2, 1e-12));
+    return PairGeometry(dot(normal, source.normal), inward, distance2, abs(depth));
 }
 
-// From 0 at the start to 1 at the end, smooth at both.
-fn rise(start: f32, end: f32, x: f32) -> f32 {
+// Smooth step from 0 at `start` to 1 at `end`; start may exceed end.
+fn smooth_ramp(start: f32, end: f32, x: f32) -> f32 {
     let t = saturate((x - start) / (end - start));
     return t * t * (3.0 - 2.0 * t);
 }
 
-fn share_of(cosine: f32, inward: f32) -> f32 {
-    return rise(ASKEW, OPPOSED, cosine) * rise(ACROSS_AIR, 0.0, inward);
+// Weight of a pair by its orientation, 0 to 1.
+fn pair_fraction(cosine: f32, inward: f32) -> f32 {
+    return smooth_ramp(MAX_COSINE, FULL_COSINE, cosine) * smooth_ramp(MIN_INWARD, 0.0, inward);
 }

@@ -1,4 +1,4 @@
-// Places that give light through the flesh.
+// Sources: cells where light enters a thin part.
 
 struct Source {
     centre: vec3f,

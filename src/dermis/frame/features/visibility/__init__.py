@@ -1,5 +1,5 @@
-"""The nearest surface in each pixel of one or more views: a visibility buffer or depth maps."""
+"""Visibility: the nearest surface in each pixel of one or more views, as visibility buffer or depth maps."""
 
-from dermis.frame.features.visibility.layers import Layers, draw
+from dermis.frame.features.visibility.layers import ViewLayers, draw
 
-__all__ = ["Layers", "draw"]
+__all__ = ["ViewLayers", "draw"]

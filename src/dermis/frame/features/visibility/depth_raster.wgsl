@@ -1,4 +1,4 @@
-// Rasterises the nearest depth of triangles whose corners are given by an index buffer, so that each vertex is moved only once.
+// Rasterises depth with an index buffer, so that each vertex is transformed only once.
 //#include "shape/mesh_textures.wgsl"
 //#include "views.wgsl"
 

@@ -1,6 +1,6 @@
-"""The nearest surface in each pixel of one or more views: its depth or its triangle, a visibility buffer.
+"""Rasterisation of the nearest surface in each pixel of one or more views: its depth or its triangle.
 
-Two ways to one result. On the GPUs measured, a compute pass takes a fraction of the rasteriser's time;
+There are two implementations. A compute pass is several times faster than the rasteriser on the GPUs measured;
 software adapters rasterise faster than they compute.
 """
 
@@ -13,44 +13,44 @@ from functools import cache
 
 import numpy as np
 
-from dermis.frame.features.shape.mesh import HeadResources
-from dermis.frame.programs import FEATURES, program, shader_folders, suited
+from dermis.frame.features.shape.mesh import HeadGeometry
+from dermis.frame.programs import FEATURES, program, program_constants, shader_folders
 from dermis.frame.projection import Matrix, Views
 from dermis.gpu import (
     Buffer,
     Constants,
     Device,
     DrawTarget,
-    RasterProgram,
-    Record,
     Recorder,
+    RenderProgram,
     Texture,
     TextureView,
-    compiled,
+    UniformRecord,
+    cached_program,
     make_texture,
 )
 from dermis.gpu.program import Program
-from dermis.gpu.textures import view_of
+from dermis.gpu.textures import make_view
 
-_GROUPS = 2048  # workgroups that keep a GPU busy; where there are more triangles, each takes more of them
-_TAKEN = (8, 128)  # triangles of a workgroup of visibility_buffer.wgsl: fewest and most
-_RUN = 16  # of them in a row in the mesh, where they are many and small
+_GROUPS = 2048  # workgroups that occupy a GPU; each takes more triangles where there are more
+_GROUP_TRIANGLES = (8, 128)  # least and most triangles of a workgroup of visibility_buffer.wgsl
+_RUN = 16  # of them that are consecutive in the mesh, where triangles are many and small
 _GROUPS_PER_ROW = 32768
-_TILE = (64, 32)  # pixels, in tiles.wgsl
-_DEPTH, _FOUND, _BOTH = 0, 1, 2  # what visibility_buffer.wgsl records
-_COARSEST_MM = 0.1  # steps of depth at which a sample's depth and triangle share a word
+_TILE = (64, 32)  # pixels, as in tiles.wgsl
+_DEPTH, _TRIANGLE, _BOTH = 0, 1, 2  # what visibility_buffer.wgsl records
+_MAX_DEPTH_STEP_MM = 0.1  # at which the depth and the triangle of a sample fit in one word
 
 
 @dataclass(eq=False)
-class Layers:
-    """A texture array with a layer for each view, and what it takes to fill it.
+class ViewLayers:
+    """Texture array with a layer for each view, and the resources to fill it.
 
-    Even one view gets two layers: OpenGL takes a texture of one layer for no array.
+    A single view gets two layers: OpenGL does not treat a texture of one layer as an array.
 
-    texture : depth (1 near, 0 nothing) as float, or triangle + 1 as uint where `triangles`
-    depth : the rasteriser's depth attachments, one a layer, or one for all when triangles are wanted
-    targets : the rasteriser's colour targets, one a layer
-    nearness, found, tiles : the compute pass' buffers; `found` is made when a frame needs it
+    texture : depth (1 near, 0 nothing) as float, or triangle + 1 as uint if `triangles`
+    depth : depth attachments of the rasteriser, one per layer, or one for all layers if `triangles`
+    targets : colour targets of the rasteriser, one per layer
+    nearness, triangle_ids, tiles : buffers of the compute pass; `triangle_ids` is allocated when it is needed
     """
 
     texture: Texture
@@ -60,17 +60,17 @@ class Layers:
     depth: list[TextureView]
     targets: Sequence[TextureView | None]
     nearness: Buffer | None = None
-    found: Buffer | None = None
+    triangle_ids: Buffer | None = None
     tiles: Buffer | None = None
 
 
 def make_layers(
     device: Device, size: tuple[int, int], count: int, *, triangles: bool, compute: bool | None = None
-) -> Layers:
-    """Space for `count` views of size (width, height); those too large for a buffer are rasterised.
+) -> ViewLayers:
+    """Allocate `count` views of size (width, height); views that are too large for a buffer are rasterised.
 
-    triangles : whether the layers hold triangles rather than depths
-    compute : whether to rasterise in compute; None chooses by the adapter
+    triangles : whether the layers store triangles instead of depth
+    compute : whether to use the compute pass; None to choose by the adapter
     """
     compute = device.adapter.kind != "CPU" if compute is None else compute
     fits = 4 * size[0] * size[1] * count <= device.max_storage_bytes
@@ -78,106 +78,103 @@ def make_layers(
     return make(device, size, max(1, count), triangles)
 
 
-def draw_layers(graph: Recorder, stage: str, layers: Layers, views: Views, head: HeadResources) -> None:
-    """Fill a layer for each sample of each view; depth 1 is near and 0 far."""
+def draw_layers(graph: Recorder, stage: str, layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
+    """Fill one layer for each sample of each view; depth 1 is near and 0 far."""
     if layers.nearness is not None:
         _draw_compute(graph, stage, layers, views, head)
     else:
         _draw_raster(graph, stage, layers, views.matrices(layers.size), head)
 
 
-def draw(graph: Recorder, visibility: Layers, views: Views, head: HeadResources) -> None:
-    """Find the triangle that each sample of the image sees [Burns2013]; shading happens later, in compute."""
+def draw(graph: Recorder, visibility: ViewLayers, views: Views, head: HeadGeometry) -> None:
+    """Find the triangle at each sample of the picture [Burns2013]."""
     draw_layers(graph, "visibility", visibility, views, head)
 
 
-def _compute_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> Layers:
+def _compute_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> ViewLayers:
     texel, name = ("r32uint", "visibility buffer") if triangles else ("r32float", "shadow maps")
     texture = make_texture(device, size, texel, layers=max(2, count), name=name)
-    across, down = _tiles(size)
+    across, down = _tile_counts(size)
     counts = size[0] * size[1] * count, 1, across * down * count
-    nearness, found, tiles = (_words(device, number) for number in counts)
-    return Layers(texture, size, count, triangles, [], [], nearness, found, tiles)
+    return ViewLayers(texture, size, count, triangles, [], [], *(_word_buffer(device, one) for one in counts))
 
 
-def _words(device: Device, count: int) -> Buffer:
+def _word_buffer(device: Device, count: int) -> Buffer:
     return device.buffer(np.zeros(count, np.uint32), "STORAGE")
 
 
-def _raster_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> Layers:
+def _raster_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> ViewLayers:
     name = "visibility buffer" if triangles else "shadow maps"
 
     def layered(texel: str, number: int) -> tuple[Texture, list[TextureView]]:
         texture = make_texture(device, size, texel, layers=max(2, number), use="raster", name=name)
-        return texture, [view_of(texture, layer=k) for k in range(number)]
+        return texture, [make_view(texture, layer=k) for k in range(number)]
 
     if not triangles:
         texture, depth = layered("depth32float", count)
-        return Layers(texture, size, count, triangles, depth, [None] * count)
+        return ViewLayers(texture, size, count, triangles, depth, [None] * count)
     _, depth = layered("depth32float", 1)
     texture, targets = layered("r32uint", count)
-    return Layers(texture, size, count, triangles, depth * count, targets)
+    return ViewLayers(texture, size, count, triangles, depth * count, targets)
 
 
-def _draw_compute(graph: Recorder, stage: str, layers: Layers, views: Views, head: HeadResources) -> None:
-    device, triangles, (clips, places) = graph.device, head.triangles, views
-    resolve = program(
-        device, "visibility/resolve_triangles.wgsl" if layers.triangles else "visibility/resolve_depth.wgsl"
-    )
-    record, recorded = _views(resolve, layers, clips, head), _recorded(layers, triangles, clips)
-    record["sample"][: len(places), :2] = places
-    across, down = places.T.tolist()
-    record["reach"] = min(across), min(down), max(across), max(down)
-    record["index_bits"] = triangles.bit_length() if recorded == (_BOTH,) else 0
-    assert layers.nearness is not None and layers.found is not None and layers.tiles is not None
-    if _FOUND in recorded and layers.found.size < layers.nearness.size:
-        layers.found = _words(device, layers.nearness.size // 4)
+def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
+    device, triangles, (clips, positions) = graph.device, head.triangles, views
+    name = "resolve_triangles" if layers.triangles else "resolve_depth"
+    resolve = program(device, f"visibility/{name}.wgsl")
+    record, passes = _views_record(resolve, layers, clips, head), _passes(layers, triangles, clips)
+    record["sample"][: len(positions), :2] = positions
+    across, down = positions.T.tolist()
+    record["sample_bounds"] = min(across), min(down), max(across), max(down)
+    record["index_bits"] = triangles.bit_length() if passes == (_BOTH,) else 0
+    assert layers.nearness is not None and layers.triangle_ids is not None and layers.tiles is not None
+    if _TRIANGLE in passes and layers.triangle_ids.size < layers.nearness.size:
+        layers.triangle_ids = _word_buffer(device, layers.nearness.size // 4)
     resources = {
         **head.resources,
         "views": record,
         "nearness": layers.nearness,
-        "found": layers.found,
+        "triangle_ids": layers.triangle_ids,
         "tiles": layers.tiles,
         "layers": layers.texture,
     }
-    shared, count = _shared_out(triangles, len(clips), len(places))
+    work, count = _work_split(triangles, len(clips), len(positions))
     groups = (min(count, _GROUPS_PER_ROW), -(-count // _GROUPS_PER_ROW), len(clips))
-    for what in recorded:
-        constants = (("RECORDED", what), ("SAMPLES", len(places)), *shared)
-        graph.dispatch(
-            stage, program(device, "visibility/visibility_buffer.wgsl", constants), resources, groups
-        )
-    graph.dispatch(stage, resolve, resources, (*_tiles(layers.size), layers.count))
+    for recorded in passes:
+        constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work)
+        shader = program(device, "visibility/visibility_buffer.wgsl", constants)
+        graph.dispatch(stage, shader, resources, groups)
+    graph.dispatch(stage, resolve, resources, (*_tile_counts(layers.size), layers.count))
 
 
-def _recorded(layers: Layers, triangles: int, clips: Matrix) -> tuple[int, ...]:
-    """What each draw records, in order: depth and triangle in one word where that is precise enough."""
+def _passes(layers: ViewLayers, triangles: int, clips: Matrix) -> tuple[int, ...]:
+    """Return what each pass records: depth and triangle in one word where that is precise enough."""
     if not layers.triangles:
         return (_DEPTH,)
     steps = 2.0 ** (32 - triangles.bit_length())
-    fine = max(map(_depth_range_mm, clips)) <= _COARSEST_MM * steps
-    return (_BOTH,) if fine else (_DEPTH, _FOUND)
+    precise = max(map(_depth_range_mm, clips)) <= _MAX_DEPTH_STEP_MM * steps
+    return (_BOTH,) if precise else (_DEPTH, _TRIANGLE)
 
 
-def _draw_raster(graph: Recorder, stage: str, layers: Layers, clips: Matrix, head: HeadResources) -> None:
+def _draw_raster(graph: Recorder, stage: str, layers: ViewLayers, clips: Matrix, head: HeadGeometry) -> None:
     shader = _raster_program(graph.device, layers.triangles)
-    resources = {**head.resources, "views": _views(shader, layers, clips, head)}
+    resources = {**head.resources, "views": _views_record(shader, layers, clips, head)}
     for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
         indices, into = None if layers.triangles else head.indices, DrawTarget(depth, 0.0, target)
         graph.draw(stage, shader, resources, 3 * head.triangles, into, indices=indices, layer=layer)
 
 
-def _raster_program(device: Device, triangles: bool) -> RasterProgram:
-    def make() -> RasterProgram:
+def _raster_program(device: Device, triangles: bool) -> RenderProgram:
+    def make() -> RenderProgram:
         name = "visibility/visibility_buffer_raster.wgsl" if triangles else "visibility/depth_raster.wgsl"
         path, folders = FEATURES / name, shader_folders()
-        chosen, target = suited(device, path, folders), "r32uint" if triangles else None
-        return RasterProgram(device, path, folders, chosen, target=target, depth_compare="greater")
+        constants, targets = program_constants(device, path, folders), ["r32uint"] if triangles else []
+        return RenderProgram(device, path, folders, constants, targets=targets, depth_compare="greater")
 
-    return compiled(device, ("visibility buffer", triangles), (), make)
+    return cached_program(device, ("visibility buffer", triangles), (), make)
 
 
-def _views(shader: Program, layers: Layers, clips: Matrix, head: HeadResources) -> Record:
+def _views_record(shader: Program, layers: ViewLayers, clips: Matrix, head: HeadGeometry) -> UniformRecord:
     record = shader.record("Views", triangles=head.triangles)
     record["width"], record["height"] = layers.size
     record["clip"][: len(clips)] = clips.swapaxes(1, 2)
@@ -185,28 +182,29 @@ def _views(shader: Program, layers: Layers, clips: Matrix, head: HeadResources) 
 
 
 def _depth_range_mm(clip: Matrix) -> float:
-    """Distance between depths 0 and 1 if all depths were as coarse as the coarsest [mm]."""
+    """Return the distance from depth 0 to 1 if all steps of depth were as large as the largest one [mm]."""
     rows: list[list[float]] = clip.tolist()
-    _, _, (*depth, start), (*away, before) = rows
-    scale = sum(a * a for a in away)
+    _, _, (*depth, depth_offset), (*distance, distance_offset) = rows
+    scale = sum(d * d for d in distance)
     if scale == 0.0:  # parallel rays
         return 1.0 / math.hypot(*depth)
-    slope = sum(d * a for d, a in zip(depth, away, strict=True)) / scale  # depth = slope + rise / distance
-    rise = start - slope * before
+    slope = sum(a * b for a, b in zip(depth, distance, strict=True)) / scale  # depth = slope + rise / distance
+    rise = depth_offset - slope * distance_offset
     return rise / (slope * slope) / math.sqrt(scale)
 
 
 @cache
-def _shared_out(triangles: int, views: int, samples: int) -> tuple[Constants, int]:
-    """Pipeline constants for so many triangles, tuned on an H200, and the number of workgroups."""
-    fewest, most = _TAKEN
-    taken = min(most, max(fewest, 1 << (triangles * views // _GROUPS).bit_length() >> 1))
-    many = taken == most  # and small
+def _work_split(triangles: int, views: int, samples: int) -> tuple[Constants, int]:
+    """Return the pipeline constants for a number of triangles, tuned on an H200, and the number of workgroups."""
+    fewest, most = _GROUP_TRIANGLES
+    per_group = min(most, max(fewest, 1 << (triangles * views // _GROUPS).bit_length() >> 1))
+    many = per_group == most  # many triangles are small ones
     threads = 256 if many or samples > 1 else 128
     run, small = (_RUN, 32) if many else (1, 16)
-    return (("TAKEN", taken), ("RUN", run), ("SMALL", small), ("THREADS", threads)), -(-triangles // taken)
+    constants = ("TRIANGLES", per_group), ("RUN", run), ("SMALL", small), ("THREADS", threads)
+    return constants, -(-triangles // per_group)
 
 
-def _tiles(size: tuple[int, int]) -> tuple[int, int]:
-    """Tiles across and down."""
+def _tile_counts(size: tuple[int, int]) -> tuple[int, int]:
+    """Return the number of tiles across and down."""
     return -(-size[0] // _TILE[0]), -(-size[1] // _TILE[1])

@@ -1,16 +1,16 @@
-// Copies buffers to the layers of a texture, a workgroup for each tile: tiles where something was drawn are copied, those that
-// still hold something of the last frame are emptied, all others are up to date.
+// Copies buffers to the layers of a texture, with a workgroup for each tile: tiles where something was drawn are copied, tiles
+// that hold something of the last frame are cleared, all others are up to date.
 //#include "tiles.wgsl"
 
 @group(0) @binding(34) var<storage, read_write> tiles: array<u32>;
 
-const ROWS: u32 = 4u; // that a workgroup takes at a time
+const ROWS: u32 = 4u; // of a workgroup
 
 @compute @workgroup_size(TILE.x, ROWS)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) lane: vec3u) {
     let tile = tile_at(group.xy, group.z);
     let state = tiles[tile];
-    storageBarrier(); // until all have read it
+    storageBarrier(); // until all invocations have read it
     if (all(lane == vec3u(0u))) {
         tiles[tile] = select(0u, HELD, state == DRAWN);
     }
@@ -34,14 +34,14 @@ fn resolve(pixel: vec2u, layer: u32, drawn: bool) {
             store(vec2u(pixel.x, rows[k]), layer, bits[k]);
         }
         if (full[k]) {
-            empty(at[k]);
+            clear(at[k]);
         }
     }
 }
 
 fn read(full: bool, at: u32) -> u32 {
     if (full) {
-        return found_at(at);
+        return value_at(at);
     }
     return 0u;
 }

@@ -1,14 +1,14 @@
-// Copies depths from the compute pass' buffer to the layers of a texture, and empties the buffer for the next frame.
+// Copies depths from the buffer of the compute pass to the layers of a texture, and clears the buffer for the next frame.
 //#include "resolve.wgsl"
 
 @group(0) @binding(31) var<storage, read_write> nearness: array<u32>;
 @group(0) @binding(33) var layers: texture_storage_2d_array<r32float, write>;
 
-fn found_at(at: u32) -> u32 {
+fn value_at(at: u32) -> u32 {
     return nearness[at];
 }
 
-fn empty(at: u32) {
+fn clear(at: u32) {
     nearness[at] = 0u;
 }
 

@@ -1,4 +1,4 @@
-// Tiles of a view's pixels, so that those where nothing is drawn cost nothing.
+// Tiles of the pixels of a view, so that empty ones are skipped.
 //#include "views.wgsl"
 
 const TILE: vec2u = vec2u(64u, 32u); // pixels

@@ -1,15 +1,15 @@
-// Rasterises triangles in compute: the nearest depth of each sample, and which triangle it belongs to.
-// A workgroup takes some triangles of one view, and one invocation sets up each. It draws a small one at once; for others it
-// lists the blocks of pixels that they may cover, and teams of invocations draw those.
+// Rasterises triangles in compute: the nearest depth of each sample, and its triangle.
+// A workgroup takes some triangles of one view, and one invocation sets up each of them. It draws a small triangle at once; for
+// others it lists the blocks of pixels that they may cover, which are drawn by teams of invocations.
 //#include "projected_triangle.wgsl"
 //#include "record_visibility.wgsl"
 //#include "tiles.wgsl"
 
-override TAKEN: u32 = 32u; // triangles of a workgroup, at most as many as its invocations
-override RUN: u32 = 1u; // of them that follow each other in the mesh, as a run
-override SMALL: u32 = 16u; // most pixels of a box that one invocation draws by itself
-override MOST_BLOCKS: u32 = 16u; // of a triangle, that one invocation tests and lists; at most 32
-override LISTED: u32 = 8u * TAKEN; // blocks that a workgroup can list
+override TRIANGLES: u32 = 32u; // triangles of a workgroup, at most as many as its invocations
+override RUN: u32 = 1u; // consecutive triangles of the mesh in a workgroup
+override SMALL: u32 = 16u; // largest number of pixels of a triangle that one invocation draws
+override MAX_BLOCKS: u32 = 16u; // largest number of blocks of a triangle that one invocation lists; at most 32
+override MAX_LISTED: u32 = 8u * TRIANGLES; // capacity of the list of a workgroup
 
 override THREADS: u32 = 128u;
 override TEAMS: u32 = THREADS / TEAM;
@@ -18,10 +18,10 @@ const TEAM: u32 = 16u; // invocations that draw a block
 
 @group(0) @binding(34) var<storage, read_write> tiles: array<atomic<u32>>;
 
-var<workgroup> taken: array<Drawn, TAKEN>;
-var<workgroup> blocks: array<u32, LISTED>; // index of the triangle in `taken`, then x and y from the box's first block
+var<workgroup> triangles: array<ProjectedTriangle, TRIANGLES>;
+var<workgroup> blocks: array<u32, MAX_LISTED>; // index in `triangles`, then x and y from the first block of the box
 var<workgroup> block_count: atomic<u32>;
-var<workgroup> large: array<u32, TAKEN>; // indices in `taken` of triangles with more blocks
+var<workgroup> large_triangles: array<u32, TRIANGLES>; // indices in `triangles` of triangles with more blocks
 var<workgroup> large_count: atomic<u32>;
 
 @compute @workgroup_size(THREADS)
@@ -33,77 +33,77 @@ fn main(
     let first = group.y * groups.x + group.x;
     let step = groups.x * groups.y;
     let index = triangle_of(number, first, step);
-    if (number == 0u) { // some software adapters keep the last workgroup's counts
+    if (number == 0u) { // some software adapters keep the counts of the last workgroup
         atomicStore(&block_count, 0u);
         atomicStore(&large_count, 0u);
     }
     workgroupBarrier();
-    if (number < TAKEN && index < views.triangles) {
-        take(index, number, group.z);
+    if (number < TRIANGLES && index < views.triangles) {
+        setup(index, number, group.z);
     }
     workgroupBarrier();
     let lane = number % TEAM;
-    let count = min(atomicLoad(&block_count), LISTED);
+    let count = min(atomicLoad(&block_count), MAX_LISTED);
     for (var k = number / TEAM; k < count; k += TEAMS) {
         let block = blocks[k];
-        let place = block & 0xffu;
-        let at = first_block(taken[place].box) + vec2u((block >> 8u) & 0xffu, block >> 16u);
-        draw_block(triangle_of(place, first, step), taken[place], at, lane, group.z);
+        let slot = block & 0xffu;
+        let at = first_block(triangles[slot].box) + vec2u((block >> 8u) & 0xffu, block >> 16u);
+        draw_block(triangle_of(slot, first, step), triangles[slot], at, lane, group.z);
     }
     let larger = atomicLoad(&large_count);
     for (var k = 0u; k < larger; k++) {
-        let place = large[k];
-        draw_large(triangle_of(place, first, step), taken[place], (number / TEAM + k) % TEAMS, lane, group.z);
+        let slot = large_triangles[k];
+        draw_large(triangle_of(slot, first, step), triangles[slot], (number / TEAM + k) % TEAMS, lane, group.z);
     }
 }
 
-// A workgroup's runs lie far apart in the mesh: neighbours share corners, but are often all large.
-fn triangle_of(place: u32, first: u32, step: u32) -> u32 {
-    return (place / RUN * step + first) * RUN + place % RUN;
+// The runs of a workgroup are far apart in the mesh, because neighbours are often all large.
+fn triangle_of(slot: u32, first: u32, step: u32) -> u32 {
+    return (slot / RUN * step + first) * RUN + slot % RUN;
 }
 
-fn take(index: u32, place: u32, view: u32) {
-    let triangle = set_up(index, view);
+fn setup(index: u32, slot: u32, view: u32) {
+    let triangle = setup_triangle(index, view);
     let pixels = triangle.box.size.x * triangle.box.size.y;
     if (pixels > 0u && pixels <= SMALL) {
         draw_small(index, triangle, view);
         mark_box(triangle.box, view);
     }
     if (pixels > SMALL) {
-        taken[place] = triangle;
-        list_blocks(triangle, place, view);
+        triangles[slot] = triangle;
+        list_blocks(triangle, slot, view);
     }
 }
 
-// Lists the blocks that the triangle may cover. Where the list is full it counts as large: drawing a block twice does no harm.
-fn list_blocks(triangle: Drawn, place: u32, view: u32) {
+// Lists the blocks that the triangle may cover. If the list is full it counts as large: drawing a block twice does no harm.
+fn list_blocks(triangle: ProjectedTriangle, slot: u32, view: u32) {
     let first = first_block(triangle.box);
-    let size = blocks_of(triangle.box);
-    if (size.x * size.y > MOST_BLOCKS) {
-        large[atomicAdd(&large_count, 1u)] = place;
+    let size = block_counts(triangle.box);
+    if (size.x * size.y > MAX_BLOCKS) {
+        large_triangles[atomicAdd(&large_count, 1u)] = slot;
         return;
     }
-    let most = most_within_block(triangle);
+    let margin = block_margin(triangle);
     var covered = 0u;
-    for (var k = vec2u(0u); k.y < size.y; k = wrapped(k + vec2u(1u, 0u), size.x)) {
-        covered |= select(0u, 1u << (k.y * size.x + k.x), may_cover(triangle, most, first + k));
+    for (var k = vec2u(0u); k.y < size.y; k = wrap(k + vec2u(1u, 0u), size.x)) {
+        covered |= select(0u, 1u << (k.y * size.x + k.x), may_cover(triangle, margin, first + k));
     }
-    mark_box(triangle.box, view); // once, for many blocks lie in one tile
+    mark_box(triangle.box, view); // once, as many blocks lie in one tile
     let count = countOneBits(covered);
     var at = atomicAdd(&block_count, count);
-    if (at + count > LISTED) {
-        large[atomicAdd(&large_count, 1u)] = place;
+    if (at + count > MAX_LISTED) {
+        large_triangles[atomicAdd(&large_count, 1u)] = slot;
     }
-    for (var k = vec2u(0u); k.y < size.y && at < LISTED; k = wrapped(k + vec2u(1u, 0u), size.x)) {
+    for (var k = vec2u(0u); k.y < size.y && at < MAX_LISTED; k = wrap(k + vec2u(1u, 0u), size.x)) {
         if ((covered & (1u << (k.y * size.x + k.x))) != 0u) {
-            blocks[at] = place | (k.x << 8u) | (k.y << 16u);
+            blocks[at] = slot | (k.x << 8u) | (k.y << 16u);
             at++;
         }
     }
 }
 
-// Carries x beyond the row's end over to the rows below.
-fn wrapped(k: vec2u, width: u32) -> vec2u {
+// Wraps x beyond the end of a row to the next rows.
+fn wrap(k: vec2u, width: u32) -> vec2u {
     var at = k;
     while (at.x >= width) {
         at = vec2u(at.x - width, at.y + 1u);
@@ -111,13 +111,13 @@ fn wrapped(k: vec2u, width: u32) -> vec2u {
     return at;
 }
 
-// turn: of the team, which changes from triangle to triangle
-fn draw_large(index: u32, triangle: Drawn, turn: u32, lane: u32, view: u32) {
-    let most = most_within_block(triangle);
+// team: index of the team, which starts with another block for each triangle
+fn draw_large(index: u32, triangle: ProjectedTriangle, team: u32, lane: u32, view: u32) {
+    let margin = block_margin(triangle);
     let first = first_block(triangle.box);
-    let size = blocks_of(triangle.box);
-    for (var k = wrapped(vec2u(turn, 0u), size.x); k.y < size.y; k = wrapped(k + vec2u(TEAMS, 0u), size.x)) {
-        if (may_cover(triangle, most, first + k)) {
+    let size = block_counts(triangle.box);
+    for (var k = wrap(vec2u(team, 0u), size.x); k.y < size.y; k = wrap(k + vec2u(TEAMS, 0u), size.x)) {
+        if (may_cover(triangle, margin, first + k)) {
             for (var s = lane; s < SAMPLES; s += TEAM) {
                 mark((first + k) * BLOCK / TILE, view * SAMPLES + s);
             }
@@ -126,22 +126,22 @@ fn draw_large(index: u32, triangle: Drawn, turn: u32, lane: u32, view: u32) {
     }
 }
 
-// One invocation's part of a block: a pixel, or four pixels of a column where each has only one sample.
-fn draw_block(index: u32, triangle: Drawn, block: vec2u, lane: u32, view: u32) {
+// Part of a block that an invocation draws: a pixel, or four pixels of a column if each has a single sample.
+fn draw_block(index: u32, triangle: ProjectedTriangle, block: vec2u, lane: u32, view: u32) {
     let pixel = block * BLOCK + vec2u(lane % BLOCK, lane / BLOCK);
-    let at = pixel - triangle.box.low; // wraps round to more than any size left of and above the box
+    let at = pixel - triangle.box.low; // wraps around to a large number left of and above the box
     if (SAMPLES > 1u) {
         draw_samples(index, triangle, at, all(at < triangle.box.size), view);
         return;
     }
     let rows = vec4u(0u, 1u, 2u, 3u) * (TEAM / BLOCK);
     let inside = vec4<bool>(at.x < triangle.box.size.x) & (vec4u(at.y) + rows < vec4u(triangle.box.size.y));
-    let place = vec2f(vec2i(at)) + views.sample[0].xy;
+    let position = vec2f(vec2i(at)) + views.sample[0].xy;
     let texels = vec4u(texel_of(pixel, view)) + rows * views.width;
-    draw_four(index, triangle, vec4f(place.x), place.y + vec4f(rows), inside, texels);
+    draw_four(index, triangle, vec4f(position.x), position.y + vec4f(rows), inside, texels);
 }
 
-fn draw_small(index: u32, triangle: Drawn, view: u32) {
+fn draw_small(index: u32, triangle: ProjectedTriangle, view: u32) {
     let low = triangle.box.low;
     let size = triangle.box.size;
     for (var y = 0u; y < size.y; y++) {
@@ -153,34 +153,34 @@ fn draw_small(index: u32, triangle: Drawn, view: u32) {
             for (var x = 0u; x < size.x; x += 4u) {
                 let four = x + vec4u(0u, 1u, 2u, 3u);
                 let texels = texel_of(low + vec2u(0u, y), view) + four;
-                let place = views.sample[0].xy;
-                draw_four(index, triangle, place.x + vec4f(four), vec4f(place.y + f32(y)), four < vec4u(size.x), texels);
+                let position = views.sample[0].xy;
+                draw_four(index, triangle, position.x + vec4f(four), vec4f(position.y + f32(y)), four < vec4u(size.x), texels);
             }
         }
     }
 }
 
-// at: the pixel in the triangle's box
-fn draw_samples(index: u32, triangle: Drawn, at: vec2u, inside: bool, view: u32) {
+// at: pixel relative to the box
+fn draw_samples(index: u32, triangle: ProjectedTriangle, at: vec2u, inside: bool, view: u32) {
     let texel = texel_of(triangle.box.low + at, view * SAMPLES);
-    let place = vec2f(vec2i(at));
+    let position = vec2f(vec2i(at));
     for (var s = 0u; s < SAMPLES; s += 4u) {
         let four = s + vec4u(0u, 1u, 2u, 3u);
         let x = vec4f(views.sample[s].x, views.sample[s + 1u].x, views.sample[s + 2u].x, views.sample[s + 3u].x);
         let y = vec4f(views.sample[s].y, views.sample[s + 1u].y, views.sample[s + 2u].y, views.sample[s + 3u].y);
-        let wanted = vec4<bool>(inside) & (four < vec4u(SAMPLES));
-        draw_four(index, triangle, place.x + x, place.y + y, wanted, texel + four * (views.width * views.height));
+        let tested = vec4<bool>(inside) & (four < vec4u(SAMPLES));
+        draw_four(index, triangle, position.x + x, position.y + y, tested, texel + four * (views.width * views.height));
     }
 }
 
-// Tests four places in the triangle's box, and records those inside the triangle.
-fn draw_four(index: u32, triangle: Drawn, x: vec4f, y: vec4f, wanted: vec4<bool>, texels: vec4u) {
+// Tests four positions relative to the box, and records those inside the triangle.
+fn draw_four(index: u32, triangle: ProjectedTriangle, x: vec4f, y: vec4f, tested: vec4<bool>, texels: vec4u) {
     let a = triangle.at_low.x + x * triangle.along_x.x + y * triangle.along_y.x;
     let b = triangle.at_low.y + x * triangle.along_x.y + y * triangle.along_y.y;
     let c = triangle.at_low.z + x * triangle.along_x.z + y * triangle.along_y.z;
     let depth = triangle.at_low.w + x * triangle.along_x.w + y * triangle.along_y.w;
-    let between = (min(min(a, b), c) >= vec4f(-SLACK)) & (depth > vec4f(0.0)) & (depth <= vec4f(1.0)) & wanted;
-    record_four(index, depth, between, texels);
+    let covered = (min(min(a, b), c) >= vec4f(-SLACK)) & (depth > vec4f(0.0)) & (depth <= vec4f(1.0)) & tested;
+    record_four(index, depth, covered, texels);
 }
 
 fn texel_of(pixel: vec2u, layer: u32) -> u32 {
@@ -201,7 +201,7 @@ fn mark_box(box: Box, view: u32) {
 
 // Marks a tile in which something may be drawn.
 fn mark(tile: vec2u, layer: u32) {
-    if (RECORDED != AS_FOUND) {
+    if (RECORDED != AS_TRIANGLE) {
         atomicStore(&tiles[tile_at(tile, layer)], DRAWN);
     }
 }

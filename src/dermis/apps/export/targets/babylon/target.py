@@ -13,17 +13,17 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.apps.export.fitting import fit_d
+from dermis.apps.export.fitting import fit_burley_width
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, floats, numbers_of
-from dermis.apps.export.targets.pages.engine_page import EnginePage, Script, surface_rows
-from dermis.apps.export.targets.pages.html import hash_of, inline
-from dermis.optics.curve import Curve
+from dermis.apps.export.target import Parameter, Parameters, floats, get_numbers
+from dermis.apps.export.targets.pages.engine_page import EnginePage, LibraryFile, material_parameters
+from dermis.apps.export.targets.pages.html import csp_hash, escape_script
+from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import Floats
 
-SAMPLES = 40
+SAMPLE_COUNT = 40
 """Of a pixel, where the lobe covers 160 pixels or more."""
-TOO_WIDE = 2.0
+WIDTH_ERROR = 2.0
 """Width on the screen over the one that metersPerUnit stands for."""
 _GOLDEN = 1.618033988749895
 _PROFILE = "subSurface.scatteringDiffusionProfile"
@@ -39,70 +39,70 @@ class Babylon(EnginePage):
     title = "Babylon.js"
     versions = ("9.28.0",)
     licence = "Apache-2.0"
-    draw = Path(__file__).with_name("babylon.js")
-    wrong = (
+    drawing_script = Path(__file__).with_name("babylon.js")
+    limitations = (
         "Forty samples of one lobe a channel, the same in every pixel: shadows' edges show steps of a "
         "fortieth, and the narrower channels have fewer of them. Light spreads on the "
         "screen only, not through thin parts; slopes count twice in depth; diffuse light above 1 is "
         "cut off. Lights are parallel here."
     )
-    scripts: ClassVar = {
+    library_files: ClassVar = {
         "9.28.0": (
-            Script("babylonjs", "9.28.0", "babylon.js", _CORE),
-            Script("babylonjs-loaders", "9.28.0", "babylonjs.loaders.min.js", _LOADERS),
+            LibraryFile("babylonjs", "9.28.0", "babylon.js", _CORE),
+            LibraryFile("babylonjs-loaders", "9.28.0", "babylonjs.loaders.min.js", _LOADERS),
         )
     }
 
-    def parameters(self, subject: Subject, version: str) -> Rows:
+    def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return a profile of 1/d, and a scale that has the widest channel's lobe drawn from.
 
         A channel c is 1/c wide and all are drawn from a lobe of width max(c), both times 2/metersPerUnit mm.
         So with k = sqrt(d_min d_max) the colour k/d and metersPerUnit 2/k, both are true.
         """
-        d = fit_d(subject.curve)
+        d = fit_burley_width(subject.curve)
         k = float(np.sqrt(d.min() * d.max()))
-        return _rows(subject, k / d, TOO_WIDE / k)
+        return _parameters(subject, k / d, WIDTH_ERROR / k)
 
-    def naive(self, subject: Subject, version: str) -> Rows:
+    def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return widths in mm as the colour, as in the engine of the shader; the file is in metres."""
-        return _rows(subject, fit_d(subject.curve), 1.0)
+        return _parameters(subject, fit_burley_width(subject.curve), 1.0)
 
-    def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
+    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve of its samples."""
-        return spiral_curve(numbers_of(rows, _PROFILE), numbers_of(rows, _SCALE)[0], subject.curve.energy)
+        return spiral_curve(get_numbers(parameters, _PROFILE), get_numbers(parameters, _SCALE)[0], subject.curve.energy)
 
-    def loaded(self, version: str) -> tuple[str, list[str]]:
+    def library_elements(self, version: str) -> tuple[str, list[str]]:
         """Return two scripts."""
-        scripts = self.scripts[version]
-        if self.installed is None:
-            return "\n".join(script.element for script in scripts), [script.url for script in scripts]
-        texts = [inline(script.read(self.installed)) for script in scripts]
-        return "\n".join(f"<script>{text}</script>" for text in texts), [hash_of(text) for text in texts]
+        library_files = self.library_files[version]
+        if self.library_folder is None:
+            return "\n".join(script.element for script in library_files), [script.url for script in library_files]
+        texts = [escape_script(script.read(self.library_folder)) for script in library_files]
+        return "\n".join(f"<script>{text}</script>" for text in texts), [csp_hash(text) for text in texts]
 
 
-def _rows(subject: Subject, profile: Floats, metres: float) -> Rows:
+def _parameters(subject: Subject, profile: Floats, metres: float) -> Parameters:
     return (
-        Row(_PROFILE, floats(profile), "-", "1/width: a smaller number spreads farther"),
-        Row(_SCALE, metres, "m", "widths are 2 mm by this and by the colour; no length of the scene's"),
-        *surface_rows(subject),
+        Parameter(_PROFILE, floats(profile), "-", "1/width: a smaller number spreads farther"),
+        Parameter(_SCALE, metres, "m", "widths are 2 mm by this and by the colour; no length of the scene's"),
+        *material_parameters(subject),
     )
 
 
-def spiral(colour: ArrayLike, samples: int = SAMPLES) -> tuple[Floats, Floats, Floats]:
+def spiral_samples(colour: ArrayLike, samples: int = SAMPLE_COUNT) -> tuple[Floats, Floats, Floats]:
     """Return radii (n,) and angles (n,) [rad] of the samples, and weights (n, 3) that add up to 1.
 
     Radii are in mm where the screen's scale is that of metersPerUnit and would be right.
     """
     s = np.asarray(colour, np.float64)
     i = np.arange(samples)
-    radius, area = radii_of((i + 0.5) / samples)
+    radius, area = burley_radii((i + 0.5) / samples)
     width = float(s.max())
     r = width * radius[:, None]
     weight = s * (np.exp(-r * s / 3.0) + np.exp(-r * s)) * (area * width)[:, None]
     return r[:, 0], 2.0 * np.pi * ((i / _GOLDEN) % 1.0), weight / weight.sum(axis=0)
 
 
-def radii_of(share: ArrayLike) -> tuple[Floats, Floats]:
+def burley_radii(share: ArrayLike) -> tuple[Floats, Floats]:
     """Return radii within which shares of a lobe of width 1 lie, and their weights 1 / (r pdf(r))."""
     u = 1.0 - np.asarray(share, np.float64)
     g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
@@ -111,14 +111,16 @@ def radii_of(share: ArrayLike) -> tuple[Floats, Floats]:
     return 3.0 * np.log(c / (4.0 * u)), c**3 / (4.0 * u * (c * c + 16.0 * u * u))
 
 
-def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> Curve:
+def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> CumulativeProfile:
     """Return the curve of the samples over all directions of an edge, in a scene whose unit is a metre.
 
     metres : metersPerUnit
     """
-    r, _, weight = spiral(colour)
-    true_mm = TOO_WIDE * r / metres
-    return Curve.of(lambda at: (at[:, None, None] >= true_mm[:, None]).astype(float)[..., 0] @ weight, energy)
+    r, _, weight = spiral_samples(colour)
+    true_mm = WIDTH_ERROR * r / metres
+    return CumulativeProfile.from_function(
+        lambda at: (at[:, None, None] >= true_mm[:, None]).astype(float)[..., 0] @ weight, energy
+    )
 
 
 TARGET = Babylon()

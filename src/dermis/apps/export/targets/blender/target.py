@@ -13,44 +13,44 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.export.fitting import fit_length
+from dermis.apps.export.fitting import fit_length_scale
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, numbers_of
+from dermis.apps.export.target import Parameter, Parameters, Target, get_numbers
 from dermis.apps.export.targets.blender.files import Versions, write_scene
 from dermis.base.tables import read_rows
-from dermis.optics.curve import Curve
+from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import SKIN_ETA
 
 Floats = NDArray[np.float64]
 Entry = Literal["straight", "skin"]
 
-BURLEY_END, BURLEY_KEPT = 16.0, 0.9963790093708328
-"""Where the profile is cut [d], and the share of light within, by which it is divided."""
-LEAST_ALBEDO, MOST_ALBEDO = 0.2, 0.999999
-"""Of single scattering in walks; below the least the walk's light is dimmed instead."""
-_HALVINGS = 12
-_LEAST_COLOUR, _MOST_COLOUR = 1e-4, 0.995  # between which the dipole is inverted
-Within = Callable[[Floats], Floats]
+BURLEY_CUTOFF, BURLEY_CUTOFF_CDF = 16.0, 0.9963790093708328
+"""Radius at which Cycles truncates Burley's profile [d], and the fraction of light within it [-]."""
+MIN_ALBEDO, MAX_ALBEDO = 0.2, 0.999999
+"""Range of single-scattering albedos in random walks; below, Cycles scales the result instead."""
+_BISECTIONS = 12
+_MIN_COLOUR, _MAX_COLOUR = 1e-4, 0.995  # range in which Cycles inverts the dipole
+Cdf = Callable[[Floats], Floats]
 _RADIUS, _SCALE = "Subsurface Radius", "Subsurface Scale"
-_M = 1e-3
-_PI4 = 4.0 * np.pi
+_METRES_PER_MM = 1e-3
+_4_PI = 4.0 * np.pi
 JENSEN_MM = 3.67, 1.37, 0.68
-"""Diffuse mean free paths of skin1 in [Jensen2001], which forums pass on as "the" radii of skin [mm]."""
-_FIRST = 4, 5
-_MFP = 5, 2  # from which version on the radius of a random walk is a mean free path
-_FAR = 1e9
+"""Diffuse mean free paths of skin1 in [Jensen2001], widely used as the radii of skin [mm]."""
+_FIRST_VERSION = 4, 5
+_MFP_VERSION = 5, 2  # first version in which the radius of a random walk is a mean free path
+_FAR_RADIUS = 1e9
 
 
-def burley_within(radius: ArrayLike) -> Floats:
+def burley_cdf(radius: ArrayLike) -> Floats:
     """Share of light within radii [d] of Burley's profile as Cycles cuts it, of their shape [-].
 
     Source: [ChristensenBurley2015].
     """
-    r = np.minimum(np.asarray(radius, np.float64), BURLEY_END)
-    return np.asarray((1.0 - 0.25 * np.exp(-r) - 0.75 * np.exp(-r / 3.0)) / BURLEY_KEPT)
+    r = np.minimum(np.asarray(radius, np.float64), BURLEY_CUTOFF)
+    return np.asarray((1.0 - 0.25 * np.exp(-r) - 0.75 * np.exp(-r / 3.0)) / BURLEY_CUTOFF_CDF)
 
 
-def burley_stretch(colour: ArrayLike) -> Floats:
+def burley_shape_factor(colour: ArrayLike) -> Floats:
     """s(A) by which EEVEE divides the radius, of the colour over its brightest channel (3,) [-].
 
     Source: [ChristensenBurley2015].
@@ -66,17 +66,17 @@ def legacy_albedo(colour: ArrayLike) -> Floats:
     blend = A**0.25
     dim = 1.8260523782 * np.arctan(5.112467903288 * A) ** 1.09686102424
     bright = 0.496310210422 * np.arctan(4.2350090365 * A) ** 2.40602999408
-    return np.asarray(np.clip((1.0 - blend) * dim + blend * bright, 0.0, MOST_ALBEDO))
+    return np.asarray(np.clip((1.0 - blend) * dim + blend * bright, 0.0, MAX_ALBEDO))
 
 
-def albedo(colour: ArrayLike) -> Floats:
+def hulst_albedo(colour: ArrayLike) -> Floats:
     """Albedo of an isotropic walk for a colour, by van de Hulst's formula, as Cycles has it from 5.2 [-]."""
     C = np.asarray(colour, np.float64)
-    root = 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2) + 4.09712
-    return np.asarray(np.clip(1.0 - root**2, 0.0, MOST_ALBEDO))
+    s = 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2) + 4.09712
+    return np.asarray(np.clip(1.0 - s**2, 0.0, MAX_ALBEDO))
 
 
-def skin_stretch(colour: ArrayLike, eta: float) -> Floats:
+def skin_path_ratio(colour: ArrayLike, eta: float) -> Floats:
     """Mean free path of RANDOM_WALK_SKIN over its radius, of the colour's shape [-].
 
     The radius is a diffuse mean free path; the albedo is the one whose dipole returns the colour.
@@ -86,63 +86,64 @@ def skin_stretch(colour: ArrayLike, eta: float) -> Floats:
     Source: [Jensen2001].
     """
     inverse = 1.0 / eta
-    inside = inverse * (0.710 - 1.440 * inverse) + 0.668 + 0.0636 * eta
-    A = (1.0 + inside) / (1.0 - inside)
+    internal_reflectance = inverse * (0.710 - 1.440 * inverse) + 0.668 + 0.0636 * eta
+    A = (1.0 + internal_reflectance) / (1.0 - internal_reflectance)
     colours = np.asarray(colour, np.float64)
     low, high = np.zeros_like(colours), np.ones_like(colours)
-    for _ in range(_HALVINGS):
+    for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        darker = _dipole_total(middle, A) < colours
-        low, high = np.where(darker, middle, low), np.where(darker, high, middle)
-    found = np.where(colours < _LEAST_COLOUR, 0.0, np.where(colours >= _MOST_COLOUR, MOST_ALBEDO, middle))
-    return np.asarray(np.sqrt(3.0 * (1.0 - found)))
+        too_dark = _dipole_reflectance(middle, A) < colours
+        low, high = np.where(too_dark, middle, low), np.where(too_dark, high, middle)
+    albedo = np.where(colours < _MIN_COLOUR, 0.0, np.where(colours >= _MAX_COLOUR, MAX_ALBEDO, middle))
+    return np.asarray(np.sqrt(3.0 * (1.0 - albedo)))
 
 
-def _dipole_total(albedo: Floats, A: float) -> Floats:
+def _dipole_reflectance(albedo: Floats, A: float) -> Floats:
     root = np.sqrt(3.0 * (1.0 - albedo))
     return np.asarray(0.5 * albedo * (1.0 + np.exp(-4.0 / 3.0 * A * root)) * np.exp(-root))
 
 
-def walk_within(radius: ArrayLike, albedo: float, entry: Entry) -> Floats:
+def walk_cdf(radius: ArrayLike, albedo: float, entry: Entry) -> Floats:
     """Share of light within radii [mean free paths] that a walk returns, of their shape [-].
 
     albedo : of single scattering
     entry : "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
     """
-    walked = max(albedo, LEAST_ALBEDO)
-    radii, within = _curve(round(walked, 7), entry)
-    at = np.asarray(radius, np.float64)
-    share = np.interp(np.log(np.maximum(at, 1e-12)), np.log(radii), within)
-    near = np.minimum(at / radii[0], 1.0)  # as many in each step of the radius, where it is short
-    return np.asarray(albedo / walked * share * near)
+    walk_albedo = max(albedo, MIN_ALBEDO)
+    radii, within = _interpolate_albedo(round(walk_albedo, 7), entry)
+    r = np.asarray(radius, np.float64)
+    fraction = np.interp(np.log(np.maximum(r, 1e-12)), np.log(radii), within)
+    near = np.minimum(r / radii[0], 1.0)  # linear in the radius below the first tabulated one
+    return np.asarray(albedo / walk_albedo * fraction * near)
 
 
 @cache
-def _curve(albedo: float, entry: Entry) -> tuple[Floats, Floats]:
+def _interpolate_albedo(albedo: float, entry: Entry) -> tuple[Floats, Floats]:
     """Radii, finely [mean free paths], and the share of light within them."""
     from scipy.interpolate import PchipInterpolator
 
-    roots, radii, within = _table()[entry]
-    share = PchipInterpolator(roots, within, axis=0)(np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1]))
+    roots, radii, within = _load_table()[entry]
+    fraction = PchipInterpolator(roots, within, axis=0)(np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1]))
     fine = np.geomspace(radii[0], radii[-1], 8 * len(radii))
-    return fine, np.asarray(PchipInterpolator(np.log(radii), share)(np.log(fine)))
+    return fine, np.asarray(PchipInterpolator(np.log(radii), fraction)(np.log(fine)))
 
 
 @cache
-def _table() -> dict[Entry, tuple[Floats, Floats, Floats]]:
+def _load_table() -> dict[Entry, tuple[Floats, Floats, Floats]]:
     """By the way to enter: roots (n,), radii (m,) [mean free paths], and shares (n, m)."""
-    found: dict[str, list[list[float]]] = {}
+    by_entry: dict[str, list[list[float]]] = {}
     for row in read_rows(__package__, "cycles_walk"):
-        found.setdefault(row["entry"], []).append([float(row[name]) for name in ("root", "radius", "within")])
+        numbers = [float(row[name]) for name in ("root", "radius", "within")]
+        by_entry.setdefault(row["entry"], []).append(numbers)
     table = {}
-    for entry, rows in found.items():
+    for entry, rows in by_entry.items():
         columns = np.array(rows)
         roots, radii = np.unique(columns[:, 0]), np.unique(columns[:, 1])
         table[entry] = roots, radii, columns[:, 2].reshape(len(roots), len(radii))
-    return table  # type: ignore[return-value]  # the table's own words
+    return table  # type: ignore[return-value]  # the keys are values of `Entry`
 
 
-class Walk(NamedTuple):
+class RandomWalk(NamedTuple):
     """A random walk of Cycles for one colour.
 
     albedo : of single scattering
@@ -152,14 +153,14 @@ class Walk(NamedTuple):
     albedo: float
     entry: Entry
 
-    def within(self, radius: Floats) -> Floats:
+    def cdf(self, radius: Floats) -> Floats:
         """Return the share of what it returns that returns within radii [mean free paths]."""
-        return walk_within(radius, self.albedo, self.entry) / self.total
+        return walk_cdf(radius, self.albedo, self.entry) / self.total
 
     @property
     def total(self) -> float:
         """Light that it returns along the normal."""
-        return float(walk_within(np.array([_FAR]), self.albedo, self.entry)[0])
+        return float(walk_cdf(np.array([_FAR_RADIUS]), self.albedo, self.entry)[0])
 
 
 class Blender(Target):
@@ -171,101 +172,105 @@ class Blender(Target):
     versions = ("4.5", "5.0", "5.1", "5.2")
     variants = ("random-walk-skin", "random-walk", "burley", "eevee")
     needs_maps = True
-    wrong = (
-        "Walks return less than the base colour to a camera before the skin, and more to one beside it;"
-        " Burley's profile knows no thin parts. All scatter in one layer, which holds no layered red."
-        " EEVEE was not run."
+    limitations = (
+        "Random walks return less light than the base colour along the normal, and more at grazing angles;"
+        " Burley's profile ignores thin parts. All methods use one layer, so the red of layered skin is lost."
+        " EEVEE was not tested."
     )
 
-    def parameters(self, subject: Subject, version: str) -> Rows:
+    def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the radius whose curve is nearest to the true one, by the method's own use of it."""
-        units = self._units(subject, version)
-        fitted = np.array([fit_length(subject.curve, channel, unit) for channel, unit in enumerate(units)])
-        radius = fitted / self._lengths(subject, version)
-        return self._rows(tuple(round(float(x), 5) for x in radius), version)
+        units = self._unit_cdfs(subject, version)
+        fitted = np.array([fit_length_scale(subject.curve, channel, unit) for channel, unit in enumerate(units)])
+        radius = fitted / self._unit_lengths(subject, version)
+        return self._parameters(tuple(round(float(x), 5) for x in radius), version)
 
-    def naive(self, subject: Subject, version: str) -> Rows:
+    def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return published diffuse mean free paths of skin as the radius."""
-        return self._rows(JENSEN_MM, version)
+        return self._parameters(JENSEN_MM, version)
 
-    def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
+    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve by the formulas of Cycles' kernel and of EEVEE's shader."""
-        radius = np.array(numbers_of(rows, _RADIUS)) * numbers_of(rows, _SCALE)[0] / _M
-        length = np.maximum(radius * self._lengths(subject, version), 1e-9)
-        units = self._units(subject, version)
+        metres = np.array(get_numbers(parameters, _RADIUS)) * get_numbers(parameters, _SCALE)[0]
+        lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
+        units = self._unit_cdfs(subject, version)
 
         def within(r: Floats) -> Floats:
-            return np.stack([unit(r / one) for unit, one in zip(units, length, strict=True)], axis=-1)
+            return np.stack([unit(r / length) for unit, length in zip(units, lengths, strict=True)], axis=-1)
 
-        return Curve.of(within, subject.curve.energy * self._returned(subject, version))
+        energy = subject.curve.energy * self._energy_ratio(subject, version)
+        return CumulativeProfile.from_function(within, energy)
 
-    def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
+    def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write a script with the files beside it, or the .blend that it saves.
 
         Raises DermisError when a .blend is asked for and DERMIS_BLENDER_PYTHON names no Python with bpy.
         """
         method = self.variant.replace("-", "_").upper()
-        return write_scene(subject, rows, place, method, self._valid_versions(version))
+        return write_scene(subject, parameters, output, method, self._valid_versions(version))
 
     def _valid_versions(self, version: str) -> Versions:
         """Return the versions that the numbers hold for."""
         if self.variant != "random-walk":
-            return list(_FIRST), None
-        return (list(_MFP), None) if _is_mfp(version) else (list(_FIRST), list(_MFP))
+            return list(_FIRST_VERSION), None
+        return (list(_MFP_VERSION), None) if _is_mfp(version) else (list(_FIRST_VERSION), list(_MFP_VERSION))
 
-    def _rows(self, radius: tuple[float, ...], version: str) -> Rows:
-        rows = [
-            Row("Subsurface Method", self.variant.replace("-", "_").upper(), "-", "of the Principled BSDF"),
-            Row("Subsurface Weight", 1.0, "-", "share of the skin that scatters"),
-            Row(_RADIUS, radius, "mm, times the scale", self._meaning(version)),
-            Row(_SCALE, _M, "m", "metres in a millimetre"),
-            Row("IOR", SKIN_ETA, "-", "of the surface, where it reflects and where walks begin"),
+    def _parameters(self, radius: tuple[float, ...], version: str) -> Parameters:
+        method = self.variant.replace("-", "_").upper()
+        parameters = [
+            Parameter("Subsurface Method", method, "-", "of the Principled BSDF"),
+            Parameter("Subsurface Weight", 1.0, "-", "fraction of the diffuse light that is scattered"),
+            Parameter(_RADIUS, radius, "mm, times the scale", self._radius_meaning(version)),
+            Parameter(_SCALE, _METRES_PER_MM, "m", "metres per millimetre"),
+            Parameter("IOR", SKIN_ETA, "-", "of the surface, for reflection and for the start of random walks"),
         ]
         if self.variant.startswith("random"):
-            rows.append(Row("Subsurface Anisotropy", 0.0, "-", "mean cosine of the deflection in a walk"))
+            parameters.append(Parameter("Subsurface Anisotropy", 0.0, "-", "mean cosine of the scattering angle"))
         if self.variant == "random-walk-skin":
-            rows.append(Row("Subsurface IOR", SKIN_ETA, "-", "from which the walk's mean free path follows"))
-        return tuple(rows)
+            parameters.append(Parameter("Subsurface IOR", SKIN_ETA, "-", "determines the mean free path"))
+        return tuple(parameters)
 
-    def _meaning(self, version: str) -> str:
+    def _radius_meaning(self, version: str) -> str:
         walk = "the mean free path" if _is_mfp(version) else "4 pi mean free paths"
         return {
             "random-walk": walk,
             "random-walk-skin": "the diffuse mean free path",
-            "burley": "4 pi d, whatever the colour",
-            "eevee": "4 pi d s(A), A the colour over its brightest channel",
+            "burley": "4 pi d, independent of the colour",
+            "eevee": "4 pi d s(A), where A is the colour divided by its brightest channel",
         }[self.variant]
 
-    def _lengths(self, subject: Subject, version: str) -> Floats:
+    def _unit_lengths(self, subject: Subject, version: str) -> Floats:
         """Return the curve's lengths (3,), d or mean free paths, at a radius of 1."""
         if self.variant == "random-walk":
-            return np.full(3, 1.0 if _is_mfp(version) else 1.0 / _PI4)
+            return np.full(3, 1.0 if _is_mfp(version) else 1.0 / _4_PI)
         if self.variant == "random-walk-skin":
-            return skin_stretch(subject.colour(), SKIN_ETA)
-        return np.full(3, 1.0 / _PI4) / (burley_stretch(subject.colour()) if self.variant == "eevee" else 1.0)
+            return skin_path_ratio(subject.clipped_albedo(), SKIN_ETA)
+        factor = burley_shape_factor(subject.clipped_albedo()) if self.variant == "eevee" else 1.0
+        return np.full(3, 1.0 / _4_PI) / factor
 
-    def _walks(self, subject: Subject, version: str) -> list[Walk]:
+    def _random_walks(self, subject: Subject, version: str) -> list[RandomWalk]:
         plain = self.variant == "random-walk"
-        found = (albedo if plain and _is_mfp(version) else legacy_albedo)(subject.colour())
-        return [Walk(float(one), "straight" if plain else "skin") for one in found]
+        albedo = hulst_albedo if plain and _is_mfp(version) else legacy_albedo
+        albedos = albedo(subject.clipped_albedo())
+        return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
-    def _units(self, subject: Subject, version: str) -> list[Within]:
+    def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
         """Return the curve of each channel at a length of 1."""
         if self.variant in ("burley", "eevee"):
-            return [burley_within] * 3
-        return [walk.within for walk in self._walks(subject, version)]
+            return [burley_cdf] * 3
+        return [walk.cdf for walk in self._random_walks(subject, version)]
 
-    def _returned(self, subject: Subject, version: str) -> Floats:
+    def _energy_ratio(self, subject: Subject, version: str) -> Floats:
         """Return the light (3,) that leaves along the normal over the base colour."""
         if self.variant in ("burley", "eevee"):
             return np.ones(3)
-        total = np.array([walk.total for walk in self._walks(subject, version)])
+        total = np.array([walk.total for walk in self._random_walks(subject, version)])
         return total / np.maximum(subject.albedo, 1e-6)
 
 
 def _is_mfp(version: str) -> bool:
     """Return whether the radius of a random walk is a mean free path there."""
-    return tuple(map(int, version.split("."))) >= _MFP
+    return tuple(map(int, version.split("."))) >= _MFP_VERSION
 
 
 TARGET = Blender()

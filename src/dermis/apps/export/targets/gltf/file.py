@@ -8,28 +8,28 @@ from dataclasses import asdict
 import numpy as np
 
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.targets.gltf.volume import colour_for
-from dermis.formats.gltf.materials import Added, colours_png
+from dermis.apps.export.targets.gltf.volume import multiscatter_for_reflectance
+from dermis.formats.gltf.materials import SkinAdditions, colours_png
 from dermis.formats.gltf.write import encode_head
-from dermis.human.person_file import numbers_of, relief_slopes
+from dermis.human.person_file import person_numbers, relief_slopes
 from dermis.mesh.head import Head
-from dermis.scene.heads import is_person, person_of
+from dermis.scene.heads import is_person_name, load_person
 
 Extensions = Mapping[str, Mapping[str, object]]
 _MULTISCATTER = "multiscatter"
 _STEPS = 1024
 
 
-def encoded(subject: Subject, extensions: Extensions, draft: str) -> bytes:
+def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
     """Return the bytes of the head, or the ball, with its eyes, hairs, targets and bones.
 
     extensions : of the skin's material, by name
     draft : name of an extension that is not ratified, "" for a file without
     """
-    head = subject.shape
+    head = subject.head_or_ball
     notes: dict[str, object] = {"draft": draft} if draft else {}
-    if is_person(subject.name):
-        notes["person"] = numbers_of(person_of(subject.name))
+    if is_person_name(subject.name):
+        notes["person"] = person_numbers(load_person(subject.name))
     elif head.eyes is not None:
         notes["person"] = {"eyes": asdict(head.eyes.look)}
     return encode_head(
@@ -42,17 +42,17 @@ def encoded(subject: Subject, extensions: Extensions, draft: str) -> bytes:
     )
 
 
-def _added(subject: Subject, head: Head, extensions: Extensions, draft: str) -> Added:
+def _added(subject: Subject, head: Head, extensions: Extensions, draft: str) -> SkinAdditions:
     """Return additions to the skin's material; a colour map gives a map of scattered colours too."""
     if not draft:
         plain = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
-        return Added({} if head.maps.colour is not None else plain, extensions)
+        return SkinAdditions({} if head.maps.colour is not None else plain, extensions)
     white, extras = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, {"draft": draft}
     if head.maps.colour is None:
-        return Added(white, extensions, extras)
+        return SkinAdditions(white, extensions, extras)
     steps = np.linspace(0.0, 1.0, _STEPS)
-    scattered = np.interp(head.maps.colour, steps, colour_for(steps)).astype(np.float32)
+    scattered = np.interp(head.maps.colour, steps, multiscatter_for_reflectance(steps)).astype(np.float32)
     scatter = {**extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
     scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER}
     made = {**extensions, "KHR_materials_scatter": scatter}
-    return Added(white, made, extras, {_MULTISCATTER: colours_png(scattered)})
+    return SkinAdditions(white, made, extras, {_MULTISCATTER: colours_png(scattered)})

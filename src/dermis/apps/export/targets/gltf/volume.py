@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.apps.export.fitting import homogeneous
-from dermis.optics.curve import Curve
-from dermis.optics.half_space import albedo_of, half_space
+from dermis.apps.export.fitting import fit_homogeneous_medium
+from dermis.optics.cumulative_profile import CumulativeProfile
+from dermis.optics.half_space import half_space, tabulated_albedo
 from dermis.optics.media import Floats
 
-_LEAST = 1e-300  # share of the light without an event
-_MOST = 1.0 - 1e-12
+_MIN_COLOUR = 1e-300  # share of the light without an event
+_MAX_COLOUR = 1.0 - 1e-12
 
 
 class Volume(NamedTuple):
@@ -30,10 +30,10 @@ class Volume(NamedTuple):
     @property
     def mean_free_path_mm(self) -> Floats:
         """(3,) between two events [mm]."""
-        return np.asarray(1e3 * self.distance_m / -np.log(np.clip(self.colour, _LEAST, _MOST)))
+        return np.asarray(1e3 * self.distance_m / -np.log(np.clip(self.colour, _MIN_COLOUR, _MAX_COLOUR)))
 
 
-def volume_of(mean_free_path_mm: ArrayLike, multiscatter: ArrayLike) -> Volume:
+def volume_from_paths(mean_free_path_mm: ArrayLike, multiscatter: ArrayLike) -> Volume:
     """The numbers for mean free paths (3,): the longest is the distance, so that no colour underflows."""
     path = np.asarray(mean_free_path_mm, np.float64)
     longest = float(path.max())
@@ -50,26 +50,26 @@ def single_scattering(multiscatter: ArrayLike, anisotropy: float = 0.0) -> Float
     return np.asarray((1.0 - s**2) / (1.0 - anisotropy * s**2))
 
 
-def multiscatter_of(albedo: ArrayLike) -> Floats:
+def multiscatter_colour(albedo: ArrayLike) -> Floats:
     """The colour of an albedo of isotropic single scattering: the same the other way [-]."""
     s = np.sqrt(np.clip(1.0 - np.asarray(albedo, np.float64), 0.0, 1.0))
     return np.asarray((1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s))
 
 
-def colour_for(energy: ArrayLike) -> Floats:
+def multiscatter_for_reflectance(energy: ArrayLike) -> Floats:
     """The colour with which a share (...,) of the light that enters comes back through the surface [-]."""
-    return multiscatter_of(albedo_of("skin", energy))
+    return multiscatter_colour(tabulated_albedo("skin", energy))
 
 
-def volume_curve(volume: Volume) -> Curve:
+def volume_curve(volume: Volume) -> CumulativeProfile:
     """The curve of light that walks through such a volume."""
     return half_space("skin", single_scattering(volume.multiscatter), volume.mean_free_path_mm)
 
 
-def fit_volume(curve: Curve, energy: Floats | None = None) -> Volume:
+def fit_volume(curve: CumulativeProfile, energy: Floats | None = None) -> Volume:
     """The volume whose walk gives back a curve's energy, and is nearest to it cumulatively.
 
     energy : (3,) that it gives back instead, a colour map's [-]
     """
-    found = homogeneous(curve, energy)
-    return volume_of(found.mfp_mm, multiscatter_of(found.albedo))
+    found = fit_homogeneous_medium(curve, energy)
+    return volume_from_paths(found.mfp_mm, multiscatter_colour(found.albedo))

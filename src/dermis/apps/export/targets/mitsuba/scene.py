@@ -10,18 +10,18 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.scene_parts import known_lights
-from dermis.apps.export.targets.maps import exr
-from dermis.apps.export.targets.mitsuba.meshes import surfaces
+from dermis.apps.export.scene_parts import supported_lights
+from dermis.apps.export.targets.maps import encode_map_exr
+from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
 from dermis.apps.export.targets.mitsuba.xml import (
-    Given,
+    CommandLineParameter,
     Ref,
-    Words,
-    default,
-    document,
-    element,
-    include,
-    picture_file,
+    XmlBackend,
+    default_element,
+    xml_document,
+    xml_element,
+    include_element,
+    bitmap_path,
 )
 from dermis.apps.truths.scene_description import SceneDict, rgb, mitsuba_environment
 from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
@@ -33,12 +33,12 @@ Floats = NDArray[np.float32]
 Boundary = Literal["matched", "smooth", "rough"]
 BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rough": SKIN_ETA}
 """Surfaces of the skin and their index of refraction."""
-REFLECTED = 0.03
+MATCHED_REFLECTANCE = 0.03
 """Share of the light that a matched surface reflects, from all directions alike: that of rough skin."""
-_WET = 0.3  # the square root of Beckmann's m
+_EYE_ROUGHNESS = 0.3  # the square root of Beckmann's m
 
 
-class Walked(NamedTuple):
+class IsotropicMedium(NamedTuple):
     """A medium of isotropic scattering.
 
     sigma_t : (3,) extinction [1/mm]
@@ -49,7 +49,7 @@ class Walked(NamedTuple):
     albedo: tuple[float, ...]
 
 
-class Looks(NamedTuple):
+class SkinAppearance(NamedTuple):
     """Medium and surface of the skin.
 
     media : of each boundary
@@ -60,39 +60,39 @@ class Looks(NamedTuple):
     opaque : files of other materials, by their indices
     """
 
-    media: Mapping[Boundary, Walked]
+    media: Mapping[Boundary, IsotropicMedium]
     roughness: float | Floats
-    passing: Floats | None = None
-    held_back: Floats | None = None
+    transmittance: Floats | None = None
+    dimming: Floats | None = None
     opaque: Mapping[int, bytes] = MappingProxyType({})
 
 
 def scene_files(
-    scene: Scene, looks: Looks, boundary: Boundary, size: tuple[int, int], samples: int
+    scene: Scene, appearance: SkinAppearance, boundary: Boundary, size: tuple[int, int], samples: int
 ) -> Iterator[tuple[str, bytes]]:
     """Return names and contents of the files, the scene first.
 
     Raises DermisError for what Mitsuba has no words for: lights without shadows, cameras with shifted lenses,
     skin that encloses no volume.
     """
-    words = Words()
-    made = surfaces(words, scene.head)
-    yield "scene.xml", document(_frame(words, scene, looks, boundary, (*size, samples)))
+    backend = XmlBackend()
+    made = skin_meshes(backend, scene.head)
+    yield "scene.xml", xml_document(_scene_elements(backend, scene, appearance, boundary, (*size, samples)))
     for each in BOUNDARIES:
-        yield f"boundary_{each}.xml", document(_skin(words, each, looks, made))
+        yield f"boundary_{each}.xml", xml_document(_skin_elements(backend, each, appearance, made))
     yield from ((f"meshes/{name}.ply", content) for name, content in made.items())
-    for index, content in looks.opaque.items():
+    for index, content in appearance.opaque.items():
         yield _opaque_file(index), content
-    if looks.passing is not None and looks.held_back is not None:
-        yield "textures/passing.exr", exr("passing", looks.passing)
-        yield "textures/held_back.exr", exr("held_back", looks.held_back)
-    if not isinstance(looks.roughness, float):
-        yield "textures/roughness.exr", exr("roughness", looks.roughness)
-    for index, values in enumerate(words.bitmaps):
-        yield picture_file(index), exr("light", np.asarray(values, np.float32))
+    if appearance.transmittance is not None and appearance.dimming is not None:
+        yield "textures/passing.exr", encode_map_exr("passing", appearance.transmittance)
+        yield "textures/held_back.exr", encode_map_exr("held_back", appearance.dimming)
+    if not isinstance(appearance.roughness, float):
+        yield "textures/roughness.exr", encode_map_exr("roughness", appearance.roughness)
+    for index, values in enumerate(backend.bitmaps):
+        yield bitmap_path(index), encode_map_exr("light", np.asarray(values, np.float32))
 
 
-def medium_words(medium: Walked) -> SceneDict:
+def medium_description(medium: IsotropicMedium) -> SceneDict:
     """Return a homogeneous medium [mm]; colours are at most 1, the largest extinction is the scale."""
     extinction = np.asarray(medium.sigma_t)
     return {
@@ -105,8 +105,8 @@ def medium_words(medium: Walked) -> SceneDict:
     }
 
 
-def surface_words(
-    boundary: Boundary, passing: SceneDict | None = None, roughness: float | SceneDict = 0.3
+def surface_description(
+    boundary: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
     """Return the surface of the skin, as light meets it from outside.
 
@@ -116,16 +116,16 @@ def surface_words(
     rough = {"distribution": "beckmann", "alpha": roughness}
     if boundary == "matched":
         mirror = {"type": "roughconductor", "material": "none", **rough}
-        return {"type": "mask", "opacity": REFLECTED, "bsdf": mirror, "id": "skin_surface"}
+        return {"type": "mask", "opacity": MATCHED_REFLECTANCE, "bsdf": mirror, "id": "skin_surface"}
     index: SceneDict = {"int_ior": SKIN_ETA, "ext_ior": 1.0}
-    if passing is not None:
-        index["specular_transmittance"] = passing
+    if transmittance is not None:
+        index["specular_transmittance"] = transmittance
     if boundary == "smooth":
         return {"type": "dielectric", "id": "skin_surface", **index}
     return {"type": "roughdielectric", "id": "skin_surface", **rough, **index}
 
 
-def _below(dimmed: bool) -> SceneDict:
+def _lower_surface(dimmed: bool) -> SceneDict:
     """Return a matched surface for light from below: it dims what leaves, by the skin's lightness."""
     if not dimmed:
         return {"type": "null", "id": "skin_below"}
@@ -133,48 +133,48 @@ def _below(dimmed: bool) -> SceneDict:
     return {"type": "mask", "opacity": _texture("held_back"), "bsdf": black, "id": "skin_below"}
 
 
-def _frame(
-    words: Words, scene: Scene, looks: Looks, boundary: Boundary, picture: tuple[int, int, int]
+def _scene_elements(
+    backend: XmlBackend, scene: Scene, appearance: SkinAppearance, boundary: Boundary, picture: tuple[int, int, int]
 ) -> list[ET.Element]:
     """Return all parts but the skin.
 
     picture : width, height [pixel], samples of each
     """
     sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
-    sensor = mitsuba_sensor(words, scene.camera, picture[:2])
-    sensor["film"] |= {"width": Given("integer", "width"), "height": Given("integer", "height")}
-    sensor["sampler"]["sample_count"] = Given("integer", "samples")
+    sensor = mitsuba_sensor(backend, scene.camera, picture[:2])
+    sensor["film"] |= {"width": CommandLineParameter("integer", "width"), "height": CommandLineParameter("integer", "height")}
+    sensor["sampler"]["sample_count"] = CommandLineParameter("integer", "samples")
     # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
     parts: list[SceneDict] = [integrator, sensor]
-    lights = known_lights(scene.lights, MITSUBA, "Mitsuba")
-    parts += [mitsuba_emitter(words, light, k) for k, light in enumerate(lights, start=1)]
+    lights = supported_lights(scene.lights, MITSUBA, "Mitsuba")
+    parts += [mitsuba_emitter(backend, light, k) for k, light in enumerate(lights, start=1)]
     if scene.environment is not None:
-        parts.append(mitsuba_environment(words, scene.environment))
+        parts.append(mitsuba_environment(backend, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
-    plain = {"type": "principled", "roughness": _WET, "eta": SKIN_ETA, "base_color": colour}
-    for index in looks.opaque:
+    plain = {"type": "principled", "roughness": _EYE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
+    for index in appearance.opaque:
         parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": plain})
-    described = [element(part, "", words) for part in parts]
-    skin = include("boundary_$boundary.xml")
-    return [*(default(*one) for one in (("boundary", boundary), *sizes)), *described, skin]
+    described = [xml_element(part, "", backend) for part in parts]
+    skin = include_element("boundary_$boundary.xml")
+    return [*(default_element(*one) for one in (("boundary", boundary), *sizes)), *described, skin]
 
 
-def _skin(words: Words, boundary: Boundary, looks: Looks, made: Mapping[str, bytes]) -> list[ET.Element]:
+def _skin_elements(backend: XmlBackend, boundary: Boundary, appearance: SkinAppearance, made: Mapping[str, bytes]) -> list[ET.Element]:
     """Return the skin under a surface."""
-    roughness = looks.roughness if isinstance(looks.roughness, float) else _texture("roughness")
-    passing = None if looks.passing is None else _texture("passing")
-    parts = [medium_words(looks.media[boundary]), surface_words(boundary, passing, roughness)]
+    roughness = appearance.roughness if isinstance(appearance.roughness, float) else _texture("roughness")
+    transmittance = None if appearance.transmittance is None else _texture("passing")
+    parts = [medium_description(appearance.media[boundary]), surface_description(boundary, transmittance, roughness)]
     shapes = dict.fromkeys(("skin", "caps"), "skin_surface")
     if boundary == "matched":
         # Rays inwards meet the upper one and step over the lower one, rays outwards the other way round.
-        parts.append(_below(passing is not None))
+        parts.append(_lower_surface(transmittance is not None))
         shapes = dict.fromkeys(("upper", "upper_caps"), "skin_surface")
         shapes |= dict.fromkeys(("skin", "caps"), "skin_below")
     for name in (one for one in shapes if one in made):
         shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": Ref(shapes[name])}
         parts.append({**shape, "interior": Ref("skin_medium")})
-    return [element(part, "", words) for part in parts]
+    return [xml_element(part, "", backend) for part in parts]
 
 
 def _opaque_file(index: int) -> str:

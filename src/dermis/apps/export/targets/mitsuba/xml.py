@@ -56,7 +56,7 @@ class Bitmap:
 
 
 @dataclass
-class Words:
+class XmlBackend:
     """Replacement of the module `mitsuba` where scenes are described.
 
     bitmaps : pictures, in the order in which they are written
@@ -76,14 +76,14 @@ class Ref:
 
 
 @dataclass(frozen=True)
-class Given:
+class CommandLineParameter:
     """A value that `mitsuba -D NAME=...` replaces, and its kind."""
 
     kind: str
     name: str
 
 
-def element(described: Mapping[str, object], name: str, words: Words) -> ET.Element:
+def xml_element(described: Mapping[str, object], name: str, backend: XmlBackend) -> ET.Element:
     """Return the element of a description, under a name.
 
     words : takes the pictures
@@ -92,16 +92,16 @@ def element(described: Mapping[str, object], name: str, words: Words) -> ET.Elem
     made = ET.Element(_KIND[plugin], {"type": plugin, **_named(name, described)})
     for key, value in described.items():
         if key not in ("type", "id"):
-            made.append(_property(key, value, words))
+            made.append(_property(key, value, backend))
     return made
 
 
-def picture_file(index: int) -> str:
+def bitmap_path(index: int) -> str:
     """Return the file of a picture beside the scene."""
     return f"textures/light_{index}.exr"
 
 
-def document(parts: list[ET.Element]) -> bytes:
+def xml_document(parts: list[ET.Element]) -> bytes:
     """Return a scene of these parts."""
     root = ET.Element("scene", {"version": VERSION})
     root.extend(parts)
@@ -110,12 +110,12 @@ def document(parts: list[ET.Element]) -> bytes:
     return text + b"\n"
 
 
-def default(name: str, value: str) -> ET.Element:
+def default_element(name: str, value: str) -> ET.Element:
     """Return a value that the command line may replace."""
     return ET.Element("default", {"name": name, "value": value})
 
 
-def include(filename: str) -> ET.Element:
+def include_element(filename: str) -> ET.Element:
     """Return a reference to another file."""
     return ET.Element("include", {"filename": filename})
 
@@ -124,22 +124,22 @@ def _named(name: str, described: Mapping[str, object]) -> dict[str, str]:
     return {"id": str(described["id"])} if "id" in described else ({"name": name} if name else {})
 
 
-def _property(key: str, value: object, words: Words) -> ET.Element:
+def _property(key: str, value: object, backend: XmlBackend) -> ET.Element:
     if isinstance(value, Ref):
         return ET.Element("ref", {"name": key, "id": value.name})
-    if isinstance(value, Given):
+    if isinstance(value, CommandLineParameter):
         return ET.Element(value.kind, {"name": key, "value": f"${value.name}"})
     if isinstance(value, Transform):
         made = ET.Element("transform", {"name": key})
         ET.SubElement(made, "matrix", {"value": _numbers(value.matrix)})
         return made
     if isinstance(value, Bitmap):
-        words.bitmaps.append(value.values)
-        return _plain("filename", picture_file(len(words.bitmaps) - 1))
+        backend.bitmaps.append(value.values)
+        return _plain("filename", bitmap_path(len(backend.bitmaps) - 1))
     if isinstance(value, Mapping):
         if value["type"] == "rgb":
             return ET.Element("rgb", {"name": key, "value": _numbers(value["value"])})
-        return element(value, key, words)
+        return xml_element(value, key, backend)
     return _plain(key, value)
 
 

@@ -7,11 +7,11 @@ from functools import cache
 
 import MaterialX
 
-from dermis.apps.export.targets.openpbr.materials import DISTANCES, MAPS, Look, Value, input_name
+from dermis.apps.export.targets.openpbr.materials import DISTANCES, MAPS, OpenPbrMaterial, Value, input_name
 from dermis.base.errors import refuse
 
 
-def document_of(looks: Sequence[Look], shader: str, prefix: str) -> MaterialX.Document:
+def build_document(looks: Sequence[OpenPbrMaterial], shader: str, prefix: str) -> MaterialX.Document:
     """Return the document, checked by MaterialX's own library; lengths in metres, colours linear Rec. 709.
 
     shader : `OPEN_PBR` or `STANDARD`
@@ -19,9 +19,9 @@ def document_of(looks: Sequence[Look], shader: str, prefix: str) -> MaterialX.Do
     """
     made = MaterialX.createDocument()
     made.setColorSpace("lin_rec709")
-    for look in looks:
-        _add_material(made, look, shader, prefix)
-    made.setDataLibrary(library())
+    for material_inputs in looks:
+        _add_material(made, material_inputs, shader, prefix)
+    made.setDataLibrary(standard_library())
     valid, message = made.validate()
     if not valid:
         refuse("MaterialX", "a document that its library takes", message, "Report this with the head")
@@ -29,7 +29,7 @@ def document_of(looks: Sequence[Look], shader: str, prefix: str) -> MaterialX.Do
 
 
 @cache
-def library() -> MaterialX.Document:
+def standard_library() -> MaterialX.Document:
     """Return MaterialX's own definitions."""
     found = MaterialX.createDocument()
     MaterialX.loadLibraries(
@@ -38,24 +38,24 @@ def library() -> MaterialX.Document:
     return found
 
 
-def _add_material(made: MaterialX.Document, look: Look, shader: str, prefix: str) -> None:
-    name = MaterialX.createValidName(look.name) or "material"
+def _add_material(made: MaterialX.Document, material_inputs: OpenPbrMaterial, shader: str, prefix: str) -> None:
+    name = MaterialX.createValidName(material_inputs.name) or "material"
     node = made.addNode(shader, made.createValidChildName(f"{name}_surface"), "surfaceshader")
-    for key, value in look.values.items():
+    for key, value in material_inputs.values.items():
         one = node.setInputValue(input_name(shader, key), _value(value))
         if key in DISTANCES:
             one.setUnitType("distance")
             one.setUnit("meter")
-    if look.maps:
+    if material_inputs.maps:
         graph = made.addNodeGraph(made.createValidChildName(f"{name}_maps"))
-        for key, role in look.maps.items():
+        for key, role in material_inputs.maps.items():
             output = _add_map(graph, role, f"{prefix}{role}.png")
             one = node.addInput(input_name(shader, key), output.getType())
             one.setNodeGraphString(graph.getName())
             one.setOutputString(output.getName())
     material = made.addMaterialNode(made.createValidChildName(name), node)
-    if material.getName() != look.name:
-        material.setAttribute("uiname", look.name)
+    if material.getName() != material_inputs.name:
+        material.setAttribute("uiname", material_inputs.name)
 
 
 def _add_map(graph: MaterialX.NodeGraph, role: str, file: str) -> MaterialX.Output:

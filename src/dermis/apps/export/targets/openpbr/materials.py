@@ -19,7 +19,7 @@ from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material
-from dermis.scene.skin import USUAL_ROUGHNESS, Skin
+from dermis.scene.skin import DEFAULT_ROUGHNESS, Skin
 from dermis.specular.fresnel import SKIN_ETA
 
 Floats = NDArray[np.float32]
@@ -27,7 +27,7 @@ Doubles = NDArray[np.float64]
 Value = float | tuple[float, ...]
 
 OPEN_PBR, STANDARD = "open_pbr_surface", "standard_surface"
-_IN_STANDARD: Mapping[str, str] = {
+_STANDARD_NAMES: Mapping[str, str] = {
     "base_color": "base_color",
     "subsurface_weight": "subsurface",
     "subsurface_color": "subsurface_color",
@@ -39,11 +39,11 @@ _IN_STANDARD: Mapping[str, str] = {
     "specular_roughness": "specular_roughness",
     "geometry_normal": "normal",
 }
-_M = 1e-3
-_LONGEST = 40
+_METRES_PER_MM = 1e-3
+_MAX_NAME_LENGTH = 40
 _EYE_IOR = 1.376
-_ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a word in the name
-_ROUGH_ELSE = 0.8
+_ROUGHNESS = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a word in the name
+_DEFAULT_ROUGHNESS = 0.8
 INPUTS: Mapping[str, str] = {
     "colour": "subsurface_color",
     "roughness": "specular_roughness",
@@ -57,10 +57,10 @@ DISTANCES = ("subsurface_radius",)
 
 def input_name(shader: str, name: str) -> str:
     """Return the name of an input of OpenPBR in a shader."""
-    return name if shader == OPEN_PBR else _IN_STANDARD[name]
+    return name if shader == OPEN_PBR else _STANDARD_NAMES[name]
 
 
-class MapKind(NamedTuple):
+class MapType(NamedTuple):
     """Type and colour space of a map in MaterialX, and its colour space in USD's preview."""
 
     type: str
@@ -68,17 +68,17 @@ class MapKind(NamedTuple):
     preview_space: str
 
 
-MAPS: Mapping[str, MapKind] = {
-    "colour": MapKind("color3", "srgb_texture", "sRGB"),
-    "roughness": MapKind("float", "", "raw"),
-    "specular": MapKind("float", "", "raw"),
-    "normal": MapKind("vector3", "", "raw"),
-    "eye": MapKind("color3", "srgb_texture", "sRGB"),
+MAPS: Mapping[str, MapType] = {
+    "colour": MapType("color3", "srgb_texture", "sRGB"),
+    "roughness": MapType("float", "", "raw"),
+    "specular": MapType("float", "", "raw"),
+    "normal": MapType("vector3", "", "raw"),
+    "eye": MapType("color3", "srgb_texture", "sRGB"),
 }
 
 
 @dataclass(frozen=True)
-class Look:
+class OpenPbrMaterial:
     """A material.
 
     name : any text
@@ -91,13 +91,13 @@ class Look:
     maps: Mapping[str, str]
 
 
-def skin_look(
+def skin_material(
     name: str,
     skin: Skin,
     radius_m: tuple[float, float, float],
     colour: tuple[float, ...],
     roles: Iterable[str],
-) -> Look:
+) -> OpenPbrMaterial:
     """Return the material of skin.
 
     radius_m : mean free paths
@@ -117,26 +117,26 @@ def skin_look(
         "specular_roughness": float(np.sqrt(skin.roughness * skin.smoothing)),
     }
     driven = {INPUTS[role]: role for role in roles}
-    return Look(name, {key: value for key, value in values.items() if key not in driven}, driven)
+    return OpenPbrMaterial(name, {key: value for key, value in values.items() if key not in driven}, driven)
 
 
-def plain_look(one: Material) -> Look:
+def opaque_material(one: Material) -> OpenPbrMaterial:
     """Return the material of what is not skin."""
-    rough = next((value for word, value in _ROUGH.items() if word in one.name.casefold()), _ROUGH_ELSE)
+    rough = next((value for word, value in _ROUGHNESS.items() if word in one.name.casefold()), _DEFAULT_ROUGHNESS)
     ior = _EYE_IOR if "eye" in one.name.casefold() else SKIN_ETA
     red, green, blue = (float(part) for part in one.colour)
-    return Look(
+    return OpenPbrMaterial(
         one.name, {"base_color": (red, green, blue), "specular_roughness": rough, "specular_ior": ior}, {}
     )
 
 
-def eye_look(name: str) -> Look:
+def eye_material(name: str) -> OpenPbrMaterial:
     """Return the material of an eyeball with a map of its colour."""
-    wet: dict[str, Value] = {"specular_roughness": _ROUGH["eye"], "specular_ior": _EYE_IOR}
-    return Look(name, wet, {"base_color": "eye"})
+    wet: dict[str, Value] = {"specular_roughness": _ROUGHNESS["eye"], "specular_ior": _EYE_IOR}
+    return OpenPbrMaterial(name, wet, {"base_color": "eye"})
 
 
-def hair_look(absorption: Floats, radius_mm: float) -> Look:
+def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
     """Return the material of hairs, a plain surface of their mean colour.
 
     absorption : (n, 3) of their inside [1/mm]
@@ -145,12 +145,12 @@ def hair_look(absorption: Floats, radius_mm: float) -> Look:
     """
     depth = np.sqrt(np.maximum(absorption.mean(axis=0), 0.0) * radius_mm)
     red, green, blue = (float(part) for part in np.exp(-5.888 * depth))
-    return Look(
+    return OpenPbrMaterial(
         "hair", {"base_color": (red, green, blue), "specular_roughness": 0.4, "specular_ior": 1.55}, {}
     )
 
 
-def drawn_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
+def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
     """Return the maps of a skin by role, as numbers that go into files.
 
     slopes : (n, n, 2) of the relief, where `maps` has no normals
@@ -159,7 +159,7 @@ def drawn_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
     if maps.colour is not None and skin.albedo == "map":
         found["colour"] = maps.colour
     if maps.roughness is not None:
-        rough = maps.roughness * np.float32(skin.roughness / USUAL_ROUGHNESS * skin.smoothing)
+        rough = maps.roughness * np.float32(skin.roughness / DEFAULT_ROUGHNESS * skin.smoothing)
         found["roughness"] = np.sqrt(np.clip(rough, 0.0, 1.0))
     if maps.specular is not None and (mean := float(maps.specular.mean())) > 0:
         found["specular"] = np.clip(maps.specular * np.float32(skin.strength / mean), 0.0, 1.0)
@@ -170,7 +170,7 @@ def drawn_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
     return found
 
 
-def encoded_maps(found: Mapping[str, Floats]) -> dict[str, bytes]:
+def encode_map_files(found: Mapping[str, Floats]) -> dict[str, bytes]:
     """Return PNG files of 8 bits by role."""
     with ThreadPoolExecutor() as pool:  # zlib does not hold other threads up
         return dict(zip(found, pool.map(_png, found, found.values()), strict=True))
@@ -183,35 +183,35 @@ def _png(role: str, values: Floats) -> bytes:
     return encode_png(levels if levels.ndim == 3 else levels[..., None])
 
 
-def prefix_of(file: Path, subject: Subject) -> str:
+def file_prefix(file: Path, subject: Subject) -> str:
     """Return the prefix of the names of the files beside a target's main file."""
-    plain = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_LONGEST]
+    plain = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_MAX_NAME_LENGTH]
     return f"{plain or subject.identifier}_"
 
 
-def write_pictures(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
+def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
     """Write the maps of the skin; return their paths by role, none for a skin by itself."""
     if subject.head is None:
         return {}
-    found = encoded_maps(drawn_maps(subject.head.maps, subject.skin, relief_slopes(subject.head)))
+    found = encode_map_files(map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head)))
     written = write_files(folder, ((f"{prefix}{role}.png", data) for role, data in found.items()))
     return dict(zip(found, written, strict=True))
 
 
-def looks_of(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, Look]:
+def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
     """Return materials by their number in the subject's mesh.
 
     mfp_mm : (3,) mean free paths of the skin
     roles : of the maps that there are
     """
-    red, green, blue = (_M * float(one) for one in mfp_mm)
-    colour = floats(subject.colour())
-    mesh, known = subject.shape.mesh, list(roles)
+    red, green, blue = (_METRES_PER_MM * float(one) for one in mfp_mm)
+    colour = floats(subject.clipped_albedo())
+    mesh, known = subject.head_or_ball.mesh, list(roles)
     looks = {}
     for kind in sorted(set(mesh.material.tolist())):
         one = mesh.materials[kind]
         if one.kind == "skin":
-            looks[kind] = skin_look(one.name, subject.skin, (red, green, blue), colour, known)
+            looks[kind] = skin_material(one.name, subject.skin, (red, green, blue), colour, known)
         else:
-            looks[kind] = plain_look(one)
+            looks[kind] = opaque_material(one)
     return looks

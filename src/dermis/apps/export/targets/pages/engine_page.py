@@ -16,9 +16,9 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, floats
-from dermis.apps.export.targets.gltf.file import encoded
-from dermis.apps.export.targets.pages.html import inline, page
+from dermis.apps.export.target import Parameter, Parameters, Target, floats
+from dermis.apps.export.targets.gltf.file import encode_glb
+from dermis.apps.export.targets.pages.html import escape_script, render_page
 from dermis.base.errors import refuse
 from dermis.base.reading import read_file
 from dermis.optics.media import SKIN_ETA
@@ -26,18 +26,18 @@ from dermis.scene.lights import DirectionalLight, Light
 from dermis.scene.model import Scene
 
 Json = dict[str, object]
-_CDN = "https://cdn.jsdelivr.net/npm"
-_MOST = 32 << 20  # bytes of a script
+_CDN_URL = "https://cdn.jsdelivr.net/npm"
+_MAX_SCRIPT_BYTES = 32 << 20  # bytes of a script
 _M = 1e-3  # of a millimetre
 _SHADOW_SIDE = 2048
 _WARM_FRAMES = 4  # until all passes' programs are compiled
-_NO_LIBRARY = "{} could not be loaded from {}. Is there no network? Export again with --library."
-_MADE = "img-src blob: data:; connect-src blob: data:"  # textures of the head's file
+_LOAD_ERROR = "{} could not be loaded from {}. Is there no network? Export again with --library."
+_TEXTURE_POLICY = "img-src blob: data:; connect-src blob: data:"  # textures of the head's file
 _HERE = Path(__file__).parent
 
 
 @dataclass(frozen=True)
-class Script:
+class LibraryFile:
     """A file of an npm package.
 
     name : by which a page's modules import it, "" for one that is simply run
@@ -53,7 +53,7 @@ class Script:
     @property
     def url(self) -> str:
         """Address that it is loaded from."""
-        return f"{_CDN}/{self.package}@{self.version}/{self.path}"
+        return f"{_CDN_URL}/{self.package}@{self.version}/{self.path}"
 
     @property
     def integrity(self) -> str:
@@ -72,10 +72,10 @@ class Script:
         """
         expected = f"{self.path} of {self.package} {self.version}, as npm installs it"
         file = folder / self.package / self.path
-        data = read_file(file, expected, _MOST)
+        data = read_file(file, expected, _MAX_SCRIPT_BYTES)
         if base64.b64encode(hashlib.sha384(data).digest()).decode() != self.sha384:
-            remedy = f"Install it: npm install {self.package}@{self.version}"
-            refuse(file, expected, "other bytes came", remedy)
+            advice = f"Install it: npm install {self.package}@{self.version}"
+            refuse(file, expected, "got other bytes", advice)
         return data.decode("utf-8")
 
 
@@ -87,58 +87,58 @@ class EnginePage(Target):
         None loads them from a public server
     """
 
-    installed: Path | None = None
+    library_folder: Path | None = None
 
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
     needs_maps: ClassVar[bool] = True
     licence: ClassVar[str]
     """Of the library."""
-    draw: ClassVar[Path]
+    drawing_script: ClassVar[Path]
     """Script that draws."""
-    scripts: ClassVar[Mapping[str, tuple[Script, ...]]]
+    library_files: ClassVar[Mapping[str, tuple[LibraryFile, ...]]]
     """Files of the library, by version."""
 
     def with_library(self, folder: str | Path) -> EnginePage:
         """Return the same with the library inside the page."""
-        return replace(self, installed=Path(folder))
+        return replace(self, library_folder=Path(folder))
 
-    def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
+    def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the page."""
-        libraries, sources = self.loaded(version)
-        text = page(
+        libraries, sources = self.library_elements(version)
+        text = render_page(
             _HERE,
             title=f"{subject.name} in {self.title}",
-            note=f"{self.title} {version} ({self.licence}). {self.wrong}",
-            script=inline((_HERE / "panel.js").read_text("utf-8") + self.draw.read_text("utf-8")),
-            policy=_MADE,
+            note=f"{self.title} {version} ({self.licence}). {self.limitations}",
+            script=escape_script((_HERE / "panel.js").read_text("utf-8") + self.drawing_script.read_text("utf-8")),
+            policy=_TEXTURE_POLICY,
             sources=sources,
-            settings=json_text(self._settings(subject, rows, version)),
-            head=base64.b64encode(encoded(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
+            settings=html_safe_json(self._settings(subject, parameters, version)),
+            head=base64.b64encode(encode_glb(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
             libraries=libraries,
         )
-        place.write_text(text, encoding="utf-8")
-        return [place]
+        output.write_text(text, encoding="utf-8")
+        return [output]
 
     @abstractmethod
-    def loaded(self, version: str) -> tuple[str, list[str]]:
+    def library_elements(self, version: str) -> tuple[str, list[str]]:
         """Return elements that load or hold the library, and the allowed sources of scripts."""
 
-    def _settings(self, subject: Subject, rows: Rows, version: str) -> Json:
-        scene = subject.scene or Scene(subject.shape)
-        where = self.scripts[version][0].url
+    def _settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
+        scene = subject.scene or Scene(subject.head_or_ball)
+        where = self.library_files[version][0].url
         middle = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # a ball's own
         return {
-            "camera": camera_of(scene, middle),
-            "lights": [light_of(light) for light in scene.lights],
-            "skin": {row.name.rpartition(".")[2]: row.value for row in rows},
+            "camera": page_camera(scene, middle),
+            "lights": [page_light(light) for light in scene.lights],
+            "skin": {row.name.rpartition(".")[2]: row.value for row in parameters},
             "shadow_side": _SHADOW_SIDE,
             "warm_frames": _WARM_FRAMES,
             "smooth": True,
-            "no_library": _NO_LIBRARY.format(self.title, where),
+            "no_library": _LOAD_ERROR.format(self.title, where),
         }
 
 
-def json_text(value: Json) -> str:
+def html_safe_json(value: Json) -> str:
     """Return JSON in which no element of HTML begins or ends."""
     text = json.dumps(value, ensure_ascii=True)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
@@ -154,15 +154,15 @@ def module_url(text: str, names: Mapping[str, str]) -> str:
     return f"data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}"
 
 
-def surface_rows(subject: Subject) -> Rows:
+def material_parameters(subject: Subject) -> Parameters:
     """Return the parameters of the surface in both libraries."""
     return (
-        Row("albedo", floats(subject.albedo), "-", "diffuse; the mean where it is a map"),
-        Row("ior", SKIN_ETA, "-", "of the surface, which reflects 0.028 straight ahead"),
+        Parameter("albedo", floats(subject.albedo), "-", "diffuse; the mean where it is a map"),
+        Parameter("ior", SKIN_ETA, "-", "of the surface, which reflects 0.028 straight ahead"),
     )
 
 
-def camera_of(scene: Scene, middle_mm: Sequence[float]) -> Json:
+def page_camera(scene: Scene, middle_mm: Sequence[float]) -> Json:
     """Return the scene's camera in the head's file: places [m], vertical angle of view [rad].
 
     middle_mm : about which cameras are placed
@@ -173,7 +173,7 @@ def camera_of(scene: Scene, middle_mm: Sequence[float]) -> Json:
     return {"position": floats(position), "target": floats(target), "up": floats(camera.up), "fov": fov}
 
 
-def light_of(light: Light) -> Json:
+def page_light(light: Light) -> Json:
     """Return a light as parallel light with its irradiance at the head."""
     if isinstance(light, DirectionalLight):
         way = np.asarray(light.direction, np.float64)

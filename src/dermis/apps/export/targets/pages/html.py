@@ -14,7 +14,7 @@ _NONE = "default-src 'none'; base-uri 'none'; form-action 'none'"
 _END = re.compile("</(?=script)", re.IGNORECASE)
 
 
-def page(
+def render_page(
     folder: Path,
     *,
     title: str,
@@ -27,14 +27,14 @@ def page(
     """Return the text of page.html in a folder with its page.css, a script and other fields.
 
     title, note : any text, which is escaped
-    script : as `inline` returns it
+    script : as `escape_script` returns it
     policy : directives of the Content-Security-Policy beside those for scripts and styles
     sources : of other scripts, as in a Content-Security-Policy
     """
     style = (folder / "page.css").read_text("utf-8")
-    allowed = " ".join([hash_of(script), *sources])
+    allowed = " ".join([csp_hash(script), *sources])
     return Template((folder / "page.html").read_text("utf-8")).substitute(
-        policy=html.escape(f"{_NONE}; {policy}; style-src {hash_of(style)}; script-src {allowed}"),
+        policy=html.escape(f"{_NONE}; {policy}; style-src {csp_hash(style)}; script-src {allowed}"),
         title=html.escape(title),
         note=html.escape(note),
         style=style,
@@ -43,11 +43,11 @@ def page(
     )
 
 
-def inline(text: str) -> str:
+def escape_script(text: str) -> str:
     """Return a script so that it may be between <script> and </script>: strings keep their meaning."""
     return _END.sub(r"<\\/", text).replace("<!--", r"<\!--")
 
 
-def hash_of(text: str) -> str:
+def csp_hash(text: str) -> str:
     """Return the hash by which a Content-Security-Policy allows an inline script or style."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

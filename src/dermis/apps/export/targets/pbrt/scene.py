@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.export.scene_parts import known_lights, ply
+from dermis.apps.export.scene_parts import supported_lights, encode_ply
 from dermis.apps.truths.lights import facing_irradiance
 from dermis.base.errors import notify
 from dermis.base.registry import Registry
@@ -26,13 +26,13 @@ from dermis.scene.lights import (
     StripeLight,
 )
 
-Parameters = Mapping[str, ArrayLike]
+DirectiveParameters = Mapping[str, ArrayLike]
 Lines = list[str]
 SIDE, SAMPLES = 1024, 256
-_MOST_BOUNCES = 100
+_MAX_BOUNCES = 100
 
 
-def directive(word: str, kind: str, parameters: Parameters | None = None) -> str:
+def directive(word: str, kind: str, parameters: DirectiveParameters | None = None) -> str:
     """Return a line such as `Material "subsurface" "float eta" [ 1.4 ]`.
 
     parameters : values by type and name: text, true or false, numbers, or arrays of them
@@ -49,28 +49,28 @@ def _text(value: ArrayLike) -> str:
     return " ".join(f"{number:.7g}" for number in np.ravel(np.asarray(value)).tolist())
 
 
-def view_of(camera: Camera, file: str) -> Lines:
+def camera_lines(camera: Camera, file: str) -> Lines:
     """Return camera, film and integrator: all before the world begins."""
-    places = np.concatenate([camera.position, camera.target, camera.up])
+    vectors = np.concatenate([camera.position, camera.target, camera.up])
     half, shift = camera.window(1.0)
     screen = [(end + shift[axis]) * half[axis] for axis in (0, 1) for end in (-1.0, 1.0)]
     return [
         "Scale -1 1 1  # pbrt's coordinates are left-handed",
-        f"LookAt {_text(places)}",
+        f"LookAt {_text(vectors)}",
         directive("Camera", "perspective", {"float fov": 90.0, "float screenwindow": screen}),
         directive("Sampler", "zsobol", {"integer pixelsamples": SAMPLES}),
-        directive("Integrator", "volpath", {"integer maxdepth": _MOST_BOUNCES}),
+        directive("Integrator", "volpath", {"integer maxdepth": _MAX_BOUNCES}),
         directive(
             "Film", "rgb", {"string filename": file, "integer xresolution": SIDE, "integer yresolution": SIDE}
         ),
     ]
 
 
-def lights_of(lights: Iterable[Light], environment: Environment | None) -> Lines:
+def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
     """Return the lights; those that pbrt has not are left out with a note."""
     lines: Lines = []
-    for number, light in enumerate(known_lights(lights, PBRT, "pbrt"), start=1):
-        if PBRT[light.kind] is _no_light:
+    for number, light in enumerate(supported_lights(lights, PBRT, "pbrt"), start=1):
+        if PBRT[light.kind] is _unsupported:
             notify(f"pbrt has no {light.kind} light: light {number} is left out")
             continue
         lines += ["AttributeBegin", *PBRT[light.kind](light), "AttributeEnd"]
@@ -81,12 +81,12 @@ def lights_of(lights: Iterable[Light], environment: Environment | None) -> Lines
     return lines
 
 
-def part_of(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float]) -> bytes:
+def mesh_ply(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float]) -> bytes:
     """Return a binary PLY file of some triangles, with normals and uv whose v is upwards."""
     vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
     uv = np.column_stack([mesh.uv[vertex, 0], 1.0 - mesh.uv[vertex, 1].astype("<f4")])
-    places = mesh.positions[vertex] - np.asarray(centre_mm)
-    return ply(corner.reshape(-1, 3), places, mesh.normals[vertex], uv)
+    vectors = mesh.positions[vertex] - np.asarray(centre_mm)
+    return encode_ply(corner.reshape(-1, 3), vectors, mesh.normals[vertex], uv)
 
 
 def _distance(light: PointLight) -> float:
@@ -104,8 +104,8 @@ def _point(light: PointLight) -> Lines:
 def _spot(light: SpotLight) -> Lines:
     cone = {"float coneangle": light.outer_degrees}
     cone["float conedeltaangle"] = light.outer_degrees - light.inner_degrees
-    places = {"point3 from": light.position, "point3 to": light.target}
-    return [directive("LightSource", "spot", {**places, "rgb I": _intensity(light), **cone})]
+    vectors = {"point3 from": light.position, "point3 to": light.target}
+    return [directive("LightSource", "spot", {**vectors, "rgb I": _intensity(light), **cone})]
 
 
 def _rectangle(light: RectangleLight) -> Lines:
@@ -118,28 +118,28 @@ def _rectangle(light: RectangleLight) -> Lines:
     # Seen along the light the second side lies left of the first: the normal then points to the target.
     first, second = -0.5 * light.width_mm * across, 0.5 * light.height_mm * above
     corners = [np.add(light.position, a * first + b * second) for b in (-1, 1) for a in (-1, 1)]
-    given = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
+    irradiance_per_radiance = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
     return [
-        directive("AreaLightSource", "diffuse", {"rgb L": np.divide(light.irradiance, given)}),
+        directive("AreaLightSource", "diffuse", {"rgb L": np.divide(light.irradiance, irradiance_per_radiance)}),
         directive("Shape", "bilinearmesh", {"point3 P": corners}),
     ]
 
 
 def _sphere(light: SphereLight) -> Lines:
-    given = np.pi * (light.radius_mm / _distance(light)) ** 2
+    irradiance_per_radiance = np.pi * (light.radius_mm / _distance(light)) ** 2
     return [
         f"Translate {_text(light.position)}",
-        directive("AreaLightSource", "diffuse", {"rgb L": np.divide(light.irradiance, given)}),
+        directive("AreaLightSource", "diffuse", {"rgb L": np.divide(light.irradiance, irradiance_per_radiance)}),
         directive("Shape", "sphere", {"float radius": light.radius_mm}),
     ]
 
 
 def _directional(light: DirectionalLight) -> Lines:
-    way = {"point3 from": (0.0, 0.0, 0.0), "point3 to": light.direction}
-    return [directive("LightSource", "distant", {**way, "rgb L": light.irradiance})]
+    points = {"point3 from": (0.0, 0.0, 0.0), "point3 to": light.direction}
+    return [directive("LightSource", "distant", {**points, "rgb L": light.irradiance})]
 
 
-def _no_light(light: StripeLight) -> Lines:
+def _unsupported(light: StripeLight) -> Lines:
     return []
 
 
@@ -151,7 +151,7 @@ PBRT: Registry[Callable[[Any], Lines]] = Registry(
         "rectangle": _rectangle,
         "sphere": _sphere,
         "directional": _directional,
-        "stripe": _no_light,
+        "stripe": _unsupported,
     },
 )
 """Writers of a kind of light."""

@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, with_values
-from dermis.apps.export.targets.pages.engine_page import EnginePage, Script, module_url, surface_rows
-from dermis.apps.export.targets.pages.html import hash_of
+from dermis.apps.export.target import Parameter, Parameters, replace_values
+from dermis.apps.export.targets.pages.engine_page import EnginePage, LibraryFile, module_url, material_parameters
+from dermis.apps.export.targets.pages.html import csp_hash
 from dermis.base.tables import read_rows
-from dermis.optics.curve import Curve
+from dermis.optics.cumulative_profile import CumulativeProfile
 
-_IMPORTS = {
+_MODULE_NAMES = {
     "./three.core.js": "three/core",
     "../utils/BufferGeometryUtils.js": "three/buffers",
     "../utils/SkeletonUtils.js": "three/skeletons",
@@ -30,48 +30,48 @@ class Three(EnginePage):
     title = "three.js"
     versions = ("0.187.0",)
     licence = "MIT"
-    draw = Path(__file__).with_name("three.js")
-    wrong = (
+    drawing_script = Path(__file__).with_name("three.js")
+    limitations = (
         "Nothing spreads: its materials send all light back from where it falls, so shadows' edges are sharp "
         "and have no red fringe, and nothing shines through an ear. Transmission would make glass of the "
         "skin and is left at 0. Lights are parallel here."
     )
-    scripts: ClassVar = {
-        "0.187.0": tuple(Script("three", "0.187.0", **row) for row in read_rows(__package__, "scripts"))
+    library_files: ClassVar = {
+        "0.187.0": tuple(LibraryFile("three", "0.187.0", **row) for row in read_rows(__package__, "scripts"))
     }
 
-    def parameters(self, subject: Subject, version: str) -> Rows:
+    def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the surface; there is nothing for what is below."""
         return (
-            *surface_rows(subject),
-            Row("specularIntensity", 1.0, "-", "all that the index of refraction gives"),
-            Row("transmission", 0.0, "-", "of clear glass, which skin is not"),
+            *material_parameters(subject),
+            Parameter("specularIntensity", 1.0, "-", "all that the index of refraction gives"),
+            Parameter("transmission", 0.0, "-", "of clear glass, which skin is not"),
         )
 
-    def naive(self, subject: Subject, version: str) -> Rows:
+    def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the index of refraction that the material begins with."""
-        return with_values(self.parameters(subject, version), {"ior": _DEFAULT_IOR})
+        return replace_values(self.parameters(subject, version), {"ior": _DEFAULT_IOR})
 
-    def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
+    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve of light that leaves where it falls."""
-        return Curve.of(lambda r: np.ones((len(r), 3)), subject.curve.energy)
+        return CumulativeProfile.from_function(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
-    def loaded(self, version: str) -> tuple[str, list[str]]:
+    def library_elements(self, version: str) -> tuple[str, list[str]]:
         """Return six modules and the map of their names."""
-        scripts = self.scripts[version]
-        if self.installed is None:
-            places = {script.name: script.url for script in scripts}
-            checks = {script.url: script.integrity for script in scripts}
-            return _import_map({"imports": places, "integrity": checks}, [script.url for script in scripts])
-        texts = {script.name: script.read(self.installed) for script in scripts}
+        library_files = self.library_files[version]
+        if self.library_folder is None:
+            places = {script.name: script.url for script in library_files}
+            checks = {script.url: script.integrity for script in library_files}
+            return _import_map({"imports": places, "integrity": checks}, [script.url for script in library_files])
+        texts = {script.name: script.read(self.library_folder) for script in library_files}
         return _import_map(
-            {"imports": {name: module_url(text, _IMPORTS) for name, text in texts.items()}}, ["data:"]
+            {"imports": {name: module_url(text, _MODULE_NAMES) for name, text in texts.items()}}, ["data:"]
         )
 
 
 def _import_map(entries: dict[str, dict[str, str]], sources: list[str]) -> tuple[str, list[str]]:
     text = json.dumps(entries)
-    return f'<script type="importmap">{text}</script>', [hash_of(text), *sources]
+    return f'<script type="importmap">{text}</script>', [csp_hash(text), *sources]
 
 
 TARGET = Three()

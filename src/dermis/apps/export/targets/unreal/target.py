@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.apps.export.fitting import fit_d, homogeneous, lobe
+from dermis.apps.export.fitting import fit_burley_width, fit_homogeneous_medium, burley_curve
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, Value, floats, numbers_of, write_files
-from dermis.optics.curve import Curve
+from dermis.apps.export.target import Parameter, Parameters, Target, Value, floats, get_numbers, write_files
+from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import UNREAL_FACTOR, BurleyProfile, shape_factor, unreal_parameters
 from dermis.optics.media import Floats
 
@@ -36,64 +36,64 @@ class Unreal(Target):
     suffixes = ("", ".py")
     versions = (*_BEFORE_58, "5.8")
     needs_maps = True
-    wrong = (
+    limitations = (
         "The base colour of the material colours the light, not the profile. Before 5.8 depths of thin parts "
         "are off by about 100 for light that comes through, and no field mends it; in 5.8 they are right "
         "while r.SSProfiles.Transmission.UseLegacy is 0."
     )
-    not_run = True
+    untested = True
 
-    def parameters(self, subject: Subject, version: str) -> Rows:
+    def parameters(self, subject: Subject, version: str) -> Parameters:
         """Mean free paths that the engine turns into the fitted lobes."""
-        albedo = subject.colour(_LEAST_ALBEDO)
-        told = unreal_parameters(BurleyProfile(albedo, 1.0 / fit_d(subject.curve)))
-        return _rows(albedo, np.array(told.mean_free_path_colour) * told.mean_free_path_distance_cm, version)
+        albedo = subject.clipped_albedo(_LEAST_ALBEDO)
+        told = unreal_parameters(BurleyProfile(albedo, 1.0 / fit_burley_width(subject.curve)))
+        return _parameters(albedo, np.array(told.mean_free_path_colour) * told.mean_free_path_distance_cm, version)
 
-    def naive(self, subject: Subject, version: str) -> Rows:
+    def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """The tissue's own mean free path, reduced, as the name of the field invites."""
-        path = homogeneous(subject.curve, subject.curve.energy).mfp_mm
+        path = fit_homogeneous_medium(subject.curve, subject.curve.energy).mfp_mm
         if subject.tissue is not None and subject.tissue.rgb is None:
             path = subject.tissue.medium.layers[-1].mean_free_path_mm
-        return _rows(subject.colour(_LEAST_ALBEDO), path / _MM_PER_CM, version)
+        return _parameters(subject.clipped_albedo(_LEAST_ALBEDO), path / _MM_PER_CM, version)
 
-    def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
+    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """The lobe that the engine computes from its parameters, at the scale of its screen pass."""
-        colour = np.maximum(numbers_of(rows, COLOUR), _UPLOADED_COLOUR)
-        path = _MM_PER_CM * colour * numbers_of(rows, DISTANCE)[0] * numbers_of(rows, SCALE)[0]
-        albedo = np.array(numbers_of(rows, ALBEDO))
-        return lobe(path / (UNREAL_FACTOR * shape_factor(albedo)), subject.curve.energy)
+        colour = np.maximum(get_numbers(parameters, COLOUR), _UPLOADED_COLOUR)
+        path = _MM_PER_CM * colour * get_numbers(parameters, DISTANCE)[0] * get_numbers(parameters, SCALE)[0]
+        albedo = np.array(get_numbers(parameters, ALBEDO))
+        return burley_curve(path / (UNREAL_FACTOR * shape_factor(albedo)), subject.curve.energy)
 
-    def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
+    def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """The script, and beside it the maps."""
-        file, maps = self.file_in(place, subject), subject.map_pictures()
+        file, maps = self.main_file(output,  subject), subject.encode_maps()
         names = {role: f"{file.stem}_{role}.png" for role in maps}
         imported = {role: name for role, name in names.items() if role in _IMPORTED}
-        file.write_text(_script(subject, rows, imported, version), encoding="utf-8")
+        file.write_text(_script(subject, parameters, imported, version), encoding="utf-8")
         return [file, *write_files(file.parent, zip(names.values(), maps.values(), strict=True))]
 
 
-def _rows(albedo: Floats, path_cm: Floats, version: str) -> Rows:
+def _parameters(albedo: Floats, path_cm: Floats, version: str) -> Parameters:
     distance = float(np.clip(path_cm.max(), 0.1, _MOST_CM))
     colour = np.clip(path_cm / distance, _LEAST_COLOUR, 1.0)
-    depth = Row(DEPTH_SCALE, 0.1, "-", "times the scale it has to be 0.1: depths of light through thin parts")
+    depth = Parameter(DEPTH_SCALE, 0.1, "-", "times the scale it has to be 0.1: depths of light through thin parts")
     return (
-        Row("enable_burley", True, "-", "two exponentials; without it the old six Gaussians"),
-        Row("enable_mean_free_path", True, "-", "without it the editor rewrites these numbers on loading"),
-        Row(ALBEDO, floats(albedo), "-", "A of s(A); it colours nothing"),
-        Row(COLOUR, floats(colour), "-", "mean free path by the distance, 0.6 s(A) d, no gamma"),
-        Row(DISTANCE, distance, "cm", "mean free path where the colour is 1"),
-        Row(SCALE, 1.0, "-", "1: a unit of the scene is a centimetre"),
+        Parameter("enable_burley", True, "-", "two exponentials; without it the old six Gaussians"),
+        Parameter("enable_mean_free_path", True, "-", "without it the editor rewrites these numbers on loading"),
+        Parameter(ALBEDO, floats(albedo), "-", "A of s(A); it colours nothing"),
+        Parameter(COLOUR, floats(colour), "-", "mean free path by the distance, 0.6 s(A) d, no gamma"),
+        Parameter(DISTANCE, distance, "cm", "mean free path where the colour is 1"),
+        Parameter(SCALE, 1.0, "-", "1: a unit of the scene is a centimetre"),
         *(() if version in _BEFORE_58 else (depth,)),
-        Row("ior", 1.4, "-", "of the surface reflection"),
+        Parameter("ior", 1.4, "-", "of the surface reflection"),
     )
 
 
-def _script(subject: Subject, rows: Rows, maps: Mapping[str, str], version: str) -> str:
+def _script(subject: Subject, parameters: Parameters, maps: Mapping[str, str], version: str) -> str:
     """Return a Python script that makes the profile and imports maps that lie beside it.
 
     maps : names of files by role
     """
-    settings = "".join(f"    {json.dumps(row.name)}: {_value(row.value)},  # {row.unit}\n" for row in rows)
+    settings = "".join(f"    {json.dumps(row.name)}: {_value(row.value)},  # {row.unit}\n" for row in parameters)
     files = "".join(f"    {json.dumps(role)}: {json.dumps(name)},\n" for role, name in maps.items())
     text = Path(__file__).with_name("editor_script.txt").read_text("utf-8")
     known = {"NAME": json.dumps(subject.identifier), "SETTINGS": settings, "MAPS": files, "VERSION": version}

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
-from dermis.formats.moved_points import MovedPoints, influences
+from dermis.formats.deformable_mesh import DeformableMesh, influences
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -22,11 +22,11 @@ from dermis.mesh.strands import Strands
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
-METRES = 1e-3
+METRES_PER_MM = 1e-3
 """Of a millimetre."""
 
 
-class Faces(NamedTuple):
+class Polygons(NamedTuple):
     """Polygons: quads first, then triangles that are no half of one.
 
     sides : (f,) corners of each
@@ -34,41 +34,43 @@ class Faces(NamedTuple):
     material : (f,)
     """
 
-    sides: Ints
-    corner: Ints
+    corner_counts: Ints
+    vertices: Ints
     material: Ints
 
 
-def faces_of(mesh: Mesh) -> Faces:
+def mesh_polygons(mesh: Mesh) -> Polygons:
     """Return the polygons of a mesh whose quads are in halves."""
     halves, triangles = mesh.quads, mesh.triangles
     alone = np.delete(np.arange(len(triangles)), halves.ravel())
     quads = np.column_stack([triangles[halves[:, 0]], triangles[halves[:, 1]][:, 1]])
-    return Faces(
+    return Polygons(
         np.concatenate([np.full(len(halves), 4), np.full(len(alone), 3)]).astype(np.int32),
         np.concatenate([quads.ravel(), triangles[alone].ravel()]).astype(np.int32),
         np.concatenate([mesh.material[halves[:, 0]], mesh.material[alone]]),
     )
 
 
-def corner_of_point(mesh: Mesh) -> NDArray[np.intp]:
+def point_vertices(mesh: Mesh) -> NDArray[np.intp]:
     """Return a vertex of each point (p,)."""
     return np.unique(mesh.point, return_index=True)[1]
 
 
-def add_mesh(stage: Usd.Stage, path: Sdf.Path, head: Head, moved: MovedPoints) -> dict[int, UsdGeom.Subset]:
+def add_mesh(
+    stage: Usd.Stage, path: Sdf.Path, head: Head, moved: DeformableMesh
+) -> dict[int, UsdGeom.Subset]:
     """Write the mesh at rest; return the subset of each material that is used.
 
     moved : the head's vertices with all morph targets at 0
     """
-    mesh, faces = head.mesh, faces_of(head.mesh)
-    one = corner_of_point(mesh)
+    mesh, faces = head.mesh, mesh_polygons(head.mesh)
+    one = point_vertices(mesh)
     made = UsdGeom.Mesh.Define(stage, path)
-    points = Vt.Vec3fArray.FromNumpy(metres(moved.positions_mm[one]))
+    points = Vt.Vec3fArray.FromNumpy(to_metres(moved.positions_mm[one]))
     made.CreatePointsAttr(points)
     made.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
-    made.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(faces.sides))
-    made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.point[faces.corner].astype(np.int32)))
+    made.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(faces.corner_counts))
+    made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.point[faces.vertices].astype(np.int32)))
     made.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(moved.normals[one])))
     made.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
@@ -94,14 +96,14 @@ def texture_coordinates(head: Head) -> Floats:
     return found
 
 
-def _add_uv(made: UsdGeom.Mesh, uv: Floats, faces: Faces) -> None:
+def _add_uv(made: UsdGeom.Mesh, uv: Floats, faces: Polygons) -> None:
     """Write texture coordinates (v, 2) with v upwards, one for each vertex of ours."""
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
     primvar = UsdGeom.PrimvarsAPI(made).CreatePrimvar(
         "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
     )
     primvar.Set(Vt.Vec2fArray.FromNumpy(upwards))
-    primvar.SetIndices(Vt.IntArray.FromNumpy(faces.corner))
+    primvar.SetIndices(Vt.IntArray.FromNumpy(faces.vertices))
 
 
 def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) -> UsdGeom.BasisCurves:
@@ -109,8 +111,8 @@ def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) ->
     places = strands.places_mm(head.mesh, head.mesh.points_mm)
     made = UsdGeom.BasisCurves.Define(stage, path)
     count = np.full(len(places), places.shape[1], np.int32)
-    points = Vt.Vec3fArray.FromNumpy(metres(places.reshape(-1, 3)))
-    widths = Vt.FloatArray.FromNumpy((2.0 * METRES * strands.radius_mm.ravel()).astype(np.float32))
+    points = Vt.Vec3fArray.FromNumpy(to_metres(places.reshape(-1, 3)))
+    widths = Vt.FloatArray.FromNumpy((2.0 * METRES_PER_MM * strands.radius_mm.ravel()).astype(np.float32))
     made.CreateTypeAttr(UsdGeom.Tokens.linear)
     made.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(count))
     made.CreatePointsAttr(points)
@@ -120,12 +122,12 @@ def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) ->
     return made
 
 
-def metres(places_mm: NDArray[np.floating]) -> Floats:
+def to_metres(places_mm: NDArray[np.floating]) -> Floats:
     """Return places in metres."""
-    return np.ascontiguousarray(METRES * places_mm.astype(np.float64), np.float32)
+    return np.ascontiguousarray(METRES_PER_MM * places_mm.astype(np.float64), np.float32)
 
 
-def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, moved: MovedPoints) -> None:
+def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, moved: DeformableMesh) -> None:
     """Write blend shapes and bones beside a mesh, and how both rest.
 
     root : path of the UsdSkelRoot
@@ -170,7 +172,7 @@ def _add_joints(made: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
         joints = []
         for name, parent in zip(valid_names(skeleton.names), skeleton.parent.tolist(), strict=True):
             joints.append(f"{joints[parent]}/{name}" if parent >= 0 else name)
-        local, bound = _places(skeleton)
+        local, bound = _bone_transforms(skeleton)
     made.CreateJointsAttr(joints)
     for attribute, matrices in (
         (made.CreateRestTransformsAttr, local),
@@ -180,9 +182,9 @@ def _add_joints(made: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
     return joints
 
 
-def _places(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
+def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
     """Return matrices (b, 4, 4) from bones to their parents at rest, and to the head when bound [m]."""
-    to_file = np.diag([METRES, METRES, METRES, 1.0]) @ skeleton.to_head
+    to_file = np.diag([METRES_PER_MM, METRES_PER_MM, METRES_PER_MM, 1.0]) @ skeleton.to_head
     size = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     grown, shrunk = (np.diag([one, one, one, 1.0]) for one in (size, 1.0 / size))
     above = np.where((skeleton.parent < 0)[:, None, None], to_file, grown)
@@ -190,10 +192,10 @@ def _places(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
     return np.asarray(above @ skeleton.local @ shrunk), np.asarray(bound)
 
 
-def _bind_joints(binding: UsdSkel.BindingAPI, moved: MovedPoints) -> None:
+def _bind_joints(binding: UsdSkel.BindingAPI, moved: DeformableMesh) -> None:
     count = int(moved.head.mesh.point.max()) + 1
     still = np.zeros((count, 1), np.int64), np.ones((count, 1))
-    bone, share = still if moved.rig.skeleton is None else influences(moved.rig, moved.finer)
+    bone, share = still if moved.rig.skeleton is None else influences(moved.rig, moved.refinement)
     bones = Vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
     shares = Vt.FloatArray.FromNumpy(np.ascontiguousarray(share, np.float32).ravel())
     binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(bones)
@@ -201,8 +203,8 @@ def _bind_joints(binding: UsdSkel.BindingAPI, moved: MovedPoints) -> None:
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
 
 
-def _add_shapes(stage: Usd.Stage, mesh: Usd.Prim, moved: MovedPoints, names: Sequence[str]) -> None:
-    one = corner_of_point(moved.head.mesh)
+def _add_shapes(stage: Usd.Stage, mesh: Usd.Prim, moved: DeformableMesh, names: Sequence[str]) -> None:
+    one = point_vertices(moved.head.mesh)
     point = np.full(len(moved.head.mesh.positions), -1, np.int32)
     point[one] = np.arange(len(one))
     own_names = moved.rig.targets.names
@@ -210,7 +212,7 @@ def _add_shapes(stage: Usd.Stage, mesh: Usd.Prim, moved: MovedPoints, names: Seq
         shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(name))
         kept = point[target.vertex] >= 0
         order = np.argsort(point[target.vertex][kept])
-        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(metres(target.delta_mm[kept][order])))
+        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(to_metres(target.delta_mm[kept][order])))
         shape.CreateNormalOffsetsAttr(
             Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(target.normal[kept][order]))
         )

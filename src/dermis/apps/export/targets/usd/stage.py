@@ -10,13 +10,13 @@ from collections.abc import Mapping
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdSkel
 
-from dermis.apps.export.targets.openpbr.materials import MAPS, Look, Value, hair_look
+from dermis.apps.export.targets.openpbr.materials import MAPS, OpenPbrMaterial, Value, hair_material
 from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh, add_motion, valid_names
-from dermis.formats.moved_points import MovedPoints
+from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.mesh.head import Head
 
 _NODES = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
-_PREVIEWED = {
+_PREVIEW_INPUTS = {
     "base_color": "diffuseColor",
     "subsurface_color": "diffuseColor",
     "specular_roughness": "roughness",
@@ -26,7 +26,7 @@ _PREVIEWED = {
 _UV = "st"
 
 
-def stage_of(head: Head, name: str, looks: Mapping[int, Look], prefix: str) -> Usd.Stage:
+def build_stage(head: Head, name: str, looks: Mapping[int, OpenPbrMaterial], prefix: str) -> Usd.Stage:
     """Return the stage.
 
     name : what the head is called
@@ -37,7 +37,7 @@ def stage_of(head: Head, name: str, looks: Mapping[int, Look], prefix: str) -> U
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     root = Sdf.Path("/" + valid_names([name])[0])
-    moved = MovedPoints(head)
+    moved = DeformableMesh(head)
     top = _root(stage, root, moved)
     top.SetDisplayName(name)
     Usd.ModelAPI(top).SetKind("component")
@@ -46,20 +46,20 @@ def stage_of(head: Head, name: str, looks: Mapping[int, Look], prefix: str) -> U
         stage.GetRootLayer().customLayerData = {"attribution": head.attribution}
     path = root.AppendChild("mesh")
     subsets = add_mesh(stage, path, head, moved)
-    if moves(moved):
+    if has_motion(moved):
         add_motion(stage, root, stage.GetPrimAtPath(path), moved)
     _add_materials(stage, root.AppendChild("materials"), subsets, looks, prefix)
     _add_hairs(stage, root, head)
     return stage
 
 
-def moves(moved: MovedPoints) -> bool:
+def has_motion(moved: DeformableMesh) -> bool:
     """Return whether anything moves the head."""
     return bool(moved.rig.targets.names) or moved.rig.skeleton is not None
 
 
-def _root(stage: Usd.Stage, path: Sdf.Path, moved: MovedPoints) -> Usd.Prim:
-    kind = UsdSkel.Root if moves(moved) else UsdGeom.Xform
+def _root(stage: Usd.Stage, path: Sdf.Path, moved: DeformableMesh) -> Usd.Prim:
+    kind = UsdSkel.Root if has_motion(moved) else UsdGeom.Xform
     return kind.Define(stage, path).GetPrim()
 
 
@@ -67,7 +67,7 @@ def _add_materials(
     stage: Usd.Stage,
     scope: Sdf.Path,
     subsets: Mapping[int, UsdGeom.Subset],
-    looks: Mapping[int, Look],
+    looks: Mapping[int, OpenPbrMaterial],
     prefix: str,
 ) -> None:
     UsdGeom.Scope.Define(stage, scope)
@@ -82,35 +82,35 @@ def _add_hairs(stage: Usd.Stage, root: Sdf.Path, head: Head) -> None:
         if strands is None:
             continue
         made = add_hairs(stage, root.AppendChild(name), head, strands)
-        look = hair_look(strands.absorption, float(np.median(strands.radius_mm)))
-        material = _add_material(stage, root.AppendPath(f"materials/{name}"), look, "")
+        material_inputs = hair_material(strands.absorption, float(np.median(strands.radius_mm)))
+        material = _add_material(stage, root.AppendPath(f"materials/{name}"), material_inputs, "")
         UsdShade.MaterialBindingAPI.Apply(made.GetPrim()).Bind(material)
 
 
-def _add_material(stage: Usd.Stage, path: Sdf.Path, look: Look, prefix: str) -> UsdShade.Material:
+def _add_material(stage: Usd.Stage, path: Sdf.Path, material_inputs: OpenPbrMaterial, prefix: str) -> UsdShade.Material:
     """Write a material; return it.
 
     prefix : of the maps' names, which lie beside the stage
     """
     material = UsdShade.Material.Define(stage, path)
-    material.GetPrim().SetDisplayName(look.name)
-    _add_open_pbr(stage, material, look, prefix)
-    _add_preview(stage, material, look, prefix)
+    material.GetPrim().SetDisplayName(material_inputs.name)
+    _add_open_pbr(stage, material, material_inputs, prefix)
+    _add_preview(stage, material, material_inputs, prefix)
     return material
 
 
-def _add_open_pbr(stage: Usd.Stage, material: UsdShade.Material, look: Look, prefix: str) -> None:
+def _add_open_pbr(stage: Usd.Stage, material: UsdShade.Material, material_inputs: OpenPbrMaterial, prefix: str) -> None:
     prim = material.GetPrim()
     prim.AddAppliedSchema("MaterialXConfigAPI")  # of a plug-in that usd-core comes without
     prim.CreateAttribute("config:mtlx:version", Sdf.ValueTypeNames.String, False).Set("1.39")
     surface = _shader(stage, material, "open_pbr", "ND_open_pbr_surface_surfaceshader")
-    for key, value in look.values.items():
+    for key, value in material_inputs.values.items():
         _set(surface, key, value)
-    if look.maps:
+    if material_inputs.maps:
         place = _shader(stage, material, "place", "ND_geompropvalue_vector2")
         place.CreateInput("geomprop", Sdf.ValueTypeNames.String).Set(_UV)
         uv = place.CreateOutput("out", Sdf.ValueTypeNames.Float2)
-    for key, role in look.maps.items():
+    for key, role in material_inputs.maps.items():
         kind, types = MAPS[role], Sdf.ValueTypeNames
         usd_type = {"color3": types.Color3f, "float": types.Float, "vector3": types.Float3}[kind.type]
         image = _shader(stage, material, f"{role}_image", _NODES[kind.type])
@@ -128,16 +128,16 @@ def _add_open_pbr(stage: Usd.Stage, material: UsdShade.Material, look: Look, pre
     material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
 
 
-def _add_preview(stage: Usd.Stage, material: UsdShade.Material, look: Look, prefix: str) -> None:
+def _add_preview(stage: Usd.Stage, material: UsdShade.Material, material_inputs: OpenPbrMaterial, prefix: str) -> None:
     """The preview has no scattering below the surface: its colour alone."""
     types = Sdf.ValueTypeNames
     surface = _shader(stage, material, "preview", "UsdPreviewSurface")
-    for key, value in look.values.items():
-        if key in _PREVIEWED and not (key == "base_color" and "subsurface_color" in look.maps):
-            _set(surface, _PREVIEWED[key], value)
+    for key, value in material_inputs.values.items():
+        if key in _PREVIEW_INPUTS and not (key == "base_color" and "subsurface_color" in material_inputs.maps):
+            _set(surface, _PREVIEW_INPUTS[key], value)
     reader = None
-    for key, role in look.maps.items():
-        if key not in _PREVIEWED:
+    for key, role in material_inputs.maps.items():
+        if key not in _PREVIEW_INPUTS:
             continue
         if reader is None:
             place = _shader(stage, material, "preview_place", "UsdPrimvarReader_float2")
@@ -155,7 +155,7 @@ def _add_preview(stage: Usd.Stage, material: UsdShade.Material, look: Look, pref
         one = role == "roughness"
         output = texture.CreateOutput("r" if one else "rgb", types.Float if one else types.Float3)
         kinds = {"normal": types.Normal3f, "roughness": types.Float}
-        surface.CreateInput(_PREVIEWED[key], kinds.get(role, types.Color3f)).ConnectToSource(output)
+        surface.CreateInput(_PREVIEW_INPUTS[key], kinds.get(role, types.Color3f)).ConnectToSource(output)
     out = surface.CreateOutput("surface", types.Token)
     material.CreateSurfaceOutput().ConnectToSource(out)
 

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.target import floats
-from dermis.apps.export.targets.web.description import Json, MapOfPictures, Mapped, NamedFrame, description
-from dermis.apps.export.targets.web.dials import Dial, changes, node_inputs
-from dermis.apps.export.targets.web.maps import MapPictures, PictureKey, picture_of, round_hairs, texels_of
+from dermis.apps.export.targets.web.describe_frames import Json, PictureMap, PictureMaps, NamedFrame, describe_frames
+from dermis.apps.export.targets.web.dials import Slider, slider_changes, node_inputs
+from dermis.apps.export.targets.web.maps import MapPictures, PictureKey, encode_picture, quantise_hairs, read_texels
 from dermis.apps.export.targets.web.packing import Packer
-from dermis.frame.capture import FORMS, renderer_for, sparser, taken
+from dermis.frame.capture import ADAPTER_KINDS, capture_renderer, reduce_hair, capture_frame
 from dermis.frame.features.shading.view import pinhole
-from dermis.frame.inputs import Inputs
+from dermis.frame.inputs import FrameInputs
 from dermis.frame.renderer import Renderer
 from dermis.gpu.capture import FrameCapture
 from dermis.scene.lights import Light, SpotLight
@@ -23,9 +23,9 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 TECHNIQUES = ("texture-space", "none")
-SIZES = {"gpu": (512, 1024, 1600), "software": (512,)}
+PICTURE_SIDES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures of each form [pixel]."""
-MOVING = {"software": (256, 1, 2)}
+INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
 """Of forms that draw less while hands move: side [pixel], samples, and how many coarse hairs become one."""
 
 
@@ -43,17 +43,17 @@ class PageContent:
     packer: Packer = field(default_factory=Packer)
     maps: MapPictures = field(default_factory=MapPictures)
     pictures: list[bytes] = field(default_factory=list)
-    placed: dict[PictureKey, tuple[int, int, int]] = field(default_factory=dict)
+    picture_entries: dict[PictureKey, tuple[int, int, int]] = field(default_factory=dict)
     poster: NDArray[np.uint8] | None = None
 
-    def place(self, key: PictureKey) -> tuple[int, int, int]:
-        """Add a picture and its curves once; return its entry of `placed`."""
-        if key not in self.placed:
+    def add_picture(self, key: PictureKey) -> tuple[int, int, int]:
+        """Add a picture and its curves once; return its entry of `picture_entries`."""
+        if key not in self.picture_entries:
             one = self.maps.pictures[key]
             curves = self.packer.add(np.ascontiguousarray(one.curves).view(np.uint8).reshape(-1))
-            self.placed[key] = len(self.pictures), curves, 3 if key[0] == "colour_map" else 0
+            self.picture_entries[key] = len(self.pictures), curves, 3 if key[0] == "colour_map" else 0
             self.pictures.append(one.data)
-        return self.placed[key]
+        return self.picture_entries[key]
 
 
 @dataclass(frozen=True)
@@ -61,27 +61,27 @@ class PageRequest:
     """Request for the content of a page.
 
     settings : of all frames, but for size and technique
-    sizes : sides of the pictures of each form, see `SIZES`; forms that are left out are not built
-    moving : what is drawn while hands move, see `MOVING`; forms that are left out draw all
+    sizes : sides of the pictures of each form, see `PICTURE_SIDES`; forms that are left out are not built
+    moving : what is drawn while hands move, see `INTERACTIVE_QUALITY`; forms that are left out draw all
     """
 
     scene: Scene
-    dials: tuple[Dial, ...]
+    dials: tuple[Slider, ...]
     settings: Settings
     sizes: dict[str, tuple[int, ...]]
     adapter: str = "auto"
-    moving: dict[str, tuple[int, int, int]] = field(default_factory=dict)
+    interactive: dict[str, tuple[int, int, int]] = field(default_factory=dict)
 
     def frames(self, form: str) -> Iterator[tuple[Settings, int]]:
         """Yield a form's frames: settings, and how many coarse hairs become one, 0 for frames at rest."""
         for technique in TECHNIQUES:
             for side in self.sizes[form]:
-                yield self.sized(side, technique), 0
-            if form in self.moving:
-                side, samples, fewer = self.moving[form]
-                yield self.sized(side, technique).model_copy(update={"samples": samples}), fewer
+                yield self.settings_for(side, technique), 0
+            if form in self.interactive:
+                side, samples, merged_hairs = self.interactive[form]
+                yield self.settings_for(side, technique).model_copy(update={"samples": samples}), merged_hairs
 
-    def sized(self, side: int, technique: str = TECHNIQUES[0]) -> Settings:
+    def settings_for(self, side: int, technique: str = TECHNIQUES[0]) -> Settings:
         """Return the settings of a frame; before light spreads it does not pass between surfaces either.
 
         Every layout has links of its own: those of a second one would be 0.6 MB of the page.
@@ -90,52 +90,52 @@ class PageRequest:
         return self.settings.model_copy(update={"size": (side, side), **spreads})
 
 
-def page_content(
-    request: PageRequest, look: Callable[[Renderer, Scene, Settings], None] | None = None
+def build_content(
+    request: PageRequest, on_renderer: Callable[[Renderer, Scene, Settings], None] | None = None
 ) -> PageContent:
     """Return the scene for the page.
 
     look : called with each form's renderer, whose maps are then those that the page decodes
     """
-    made = PageContent()
-    for form in (one for one in FORMS if request.sizes.get(one)):
-        renderer = renderer_for(form, request.adapter)
-        made.forms[form] = _form(made, renderer, request, form)
-        settings = request.sized(request.sizes[form][0])
-        if look is not None:
-            look(renderer, request.scene, settings)
-        if made.poster is None:
-            made.poster = renderer.draw(request.scene, settings).srgb8()
-    return made
+    content = PageContent()
+    for form in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
+        renderer = capture_renderer(form, request.adapter)
+        content.forms[form] = _build_form(content, renderer, request, form)
+        settings = request.settings_for(request.sizes[form][0])
+        if on_renderer is not None:
+            on_renderer(renderer, request.scene, settings)
+        if content.poster is None:
+            content.poster = renderer.draw(request.scene, settings).srgb8()
+    return content
 
 
-def _form(made: PageContent, renderer: Renderer, request: PageRequest, form: str) -> Json:
+def _build_form(content: PageContent, renderer: Renderer, request: PageRequest, form: str) -> Json:
     tape, frames, changed = FrameCapture(renderer.device), list[NamedFrame](), list[Json]()
-    base: Inputs | None = None
-    for settings, fewer in request.frames(form):
+    base: FrameInputs | None = None
+    for settings, merged_hairs in request.frames(form):
         inputs = renderer.prepare(request.scene, settings)
         base, picture = base or inputs, inputs.resources.post.picture
-        take = sparser(taken(tape, inputs), fewer)
-        frames.append(NamedFrame(settings.technique, take, picture, settings.size, fewer))
-        changed.append(_dial_changes(made.packer, renderer, request, settings, inputs, frames[-1]))
-    takes = [one.take for one in frames]
-    mapped, steps = made.maps.put(renderer, tape, takes), round_hairs(renderer, tape, takes)
-    found = description(tape, frames, mapped, steps, made.packer)
+        captured = reduce_hair(capture_frame(tape, inputs), merged_hairs)
+        frames.append(NamedFrame(settings.technique, captured, picture, settings.size, merged_hairs))
+        changed.append(_slider_changes(content.packer, renderer, request, settings, inputs, frames[-1]))
+    captured_frames = [one.captured for one in frames]
+    picture_maps, steps = content.maps.replace_textures(renderer, tape, captured_frames), quantise_hairs(renderer, tape, captured_frames)
+    found = describe_frames(tape, frames, picture_maps, steps, content.packer)
     for one, dials in zip(found["frames"], changed, strict=True):
         one["dials"] = dials
-    found["maps"] = {str(number): _mips(made, one) for number, one in mapped.items()}
+    found["maps"] = {str(number): _mip_entries(content, one) for number, one in picture_maps.items()}
     assert base is not None
     found["hands"] = _controls(request.scene, base)
-    found["colours"] = _colours(made, renderer, request, mapped)
+    found["colours"] = _colour_maps(content, renderer, request, picture_maps)
     return found
 
 
-def _dial_changes(
+def _slider_changes(
     packer: Packer,
     renderer: Renderer,
     request: PageRequest,
     settings: Settings,
-    base: Inputs,
+    base: FrameInputs,
     one: NamedFrame,
 ) -> Json:
     """Return the changes of a frame at each dial's nodes."""
@@ -143,48 +143,48 @@ def _dial_changes(
     for dial in request.dials:
         nodes = node_inputs(dial, lambda scene: renderer.prepare(scene, settings), base)
         found[dial.name] = [
-            None if inputs is None else changes(one.take, sparser(taken(beside, inputs), one.fewer), packer)
+            None if inputs is None else slider_changes(one.captured, reduce_hair(capture_frame(beside, inputs), one.merged_hairs), packer)
             for inputs in nodes
         ]
     return found
 
 
-def _mips(made: PageContent, one: MapOfPictures) -> list[list[tuple[int, int, int]]]:
+def _mip_entries(content: PageContent, one: PictureMap) -> list[list[tuple[int, int, int]]]:
     """Return the pictures and curves of the layers of a map's mips."""
-    layers = 1 + max(layer for role, _, layer in made.maps.pictures if role == one.role)
-    return [[made.place((one.role, mip, k)) for k in range(layers)] for mip in range(one.mips)]
+    layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == one.role)
+    return [[content.add_picture((one.role, mip, k)) for k in range(layers)] for mip in range(one.mips)]
 
 
-def _colours(made: PageContent, renderer: Renderer, request: PageRequest, mapped: Mapped) -> Json:
+def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, picture_maps: PictureMaps) -> Json:
     """Return the number of the colour map, and its picture and curves at nodes of dials that change it."""
-    number = next((k for k, one in mapped.items() if one.role == "colour_map"), None)
+    number = next((k for k, one in picture_maps.items() if one.role == "colour_map"), None)
     if number is None:
         return {}
-    settings, found = request.sized(min(map(min, request.sizes.values()))), {}
-    for dial in (one for one in request.dials if not one.moves):
+    settings, found = request.settings_for(min(map(min, request.sizes.values()))), {}
+    for dial in (one for one in request.dials if not one.changes_pose_only):
         scenes = enumerate(dial.scenes)
-        nodes = [_colour(made, renderer, one, settings, f"{dial.name} {k}") for k, one in scenes]
+        nodes = [_colour_entry(content, renderer, one, settings, f"{dial.name} {k}") for k, one in scenes]
         if any(nodes):
             found[dial.name] = nodes
     return {"map": number, "dials": found} if found else {}
 
 
-def _colour(
-    made: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, name: str
+def _colour_entry(
+    content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, name: str
 ) -> tuple[int, int, int] | None:
     """Return the picture of a node's colour map, None where it is the same as at rest."""
     if scene is None:
         return None
-    if (name, 0, 0) not in made.maps.pictures:
-        tape, texture = FrameCapture(renderer.device), renderer.prepare(scene, settings).lit["colour_map"]
-        texels = texels_of(tape, tape.resource(texture), 0)[0]
-        if made.maps.same("colour_map", texels):
+    if (name, 0, 0) not in content.maps.pictures:
+        tape, texture = FrameCapture(renderer.device), renderer.prepare(scene, settings).bindings["colour_map"]
+        texels = read_texels(tape, tape.resource(texture), 0)[0]
+        if content.maps.matches_picture("colour_map", texels):
             return None
-        made.maps.pictures[name, 0, 0] = picture_of(texels, True)
-    return *made.place((name, 0, 0))[:2], 3
+        content.maps.pictures[name, 0, 0] = encode_picture(texels, True)
+    return *content.add_picture((name, 0, 0))[:2], 3
 
 
-def _controls(scene: Scene, inputs: Inputs) -> Json:
+def _controls(scene: Scene, inputs: FrameInputs) -> Json:
     """Return the camera, the lights that can be dragged, and the outline that shadow maps are fitted to."""
     camera, settings = scene.camera, inputs.settings
     seen, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
@@ -197,7 +197,7 @@ def _controls(scene: Scene, inputs: Inputs) -> Json:
             "half": list(seen.window.half),
             "shift": list(seen.window.shift),
         },
-        "samples": inputs.camera.places.tolist(),
+        "samples": inputs.camera_views.places.tolist(),
         "outline": np.asarray(outline.places_mm, np.float32).round(3).ravel().tolist(),
         "slack": outline.slack_mm,
         "middle": list(outline.middle_mm),

@@ -25,13 +25,13 @@ class NamedFrame:
     """
 
     name: str
-    take: CapturedFrame
+    captured: CapturedFrame
     picture: Picture
     size: tuple[int, int]
-    fewer: int = 0
+    merged_hairs: int = 0
 
 
-class MapOfPictures(NamedTuple):
+class PictureMap(NamedTuple):
     """A map whose first mips come as pictures.
 
     halving : passes that fill the other mips; None where these come as texels
@@ -39,30 +39,30 @@ class MapOfPictures(NamedTuple):
 
     role: str
     mips: int
-    halving: CapturedFrame | None
+    mip_passes: CapturedFrame | None
 
 
-Mapped = dict[int, MapOfPictures]
-Stepped = dict[int, tuple[float, ...]]
+PictureMaps = dict[int, PictureMap]
+QuantisedBuffers = dict[int, tuple[float, ...]]
 """Buffers of floats that are multiples of steps."""
 
 
-def description(
-    tape: FrameCapture, frames: list[NamedFrame], mapped: Mapped, steps: Stepped, packer: Packer
+def describe_frames(
+    tape: FrameCapture, frames: list[NamedFrame], picture_maps: PictureMaps, steps: QuantisedBuffers, packer: Packer
 ) -> Json:
     """Return the description of frames; the bytes that it names by number are in the packer.
 
     Resources of zeros, which new ones are, have no content.
     """
     pictures = [[tape.resource(one.picture.bytes), tape.resource(one.picture.exposed)] for one in frames]
-    contents, tables = {}, set(bound_as(tape, [one.take for one in frames], _TABLES))
-    for number in read_before_written(tape, [one.take for one in frames]):
+    contents, tables = {}, set(resources_bound_as(tape, [one.captured for one in frames], _TABLES))
+    for number in read_before_written(tape, [one.captured for one in frames]):
         if number in steps:
-            floats = tape.content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
+            floats = tape.read_content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
             contents[number] = [packer.add_floats(floats, steps[number])]
             continue
-        _, pictured, halving = mapped.get(number, MapOfPictures("", 0, None))
-        mips = [] if halving else _mips(tape, number)[pictured:]
+        _, pictured, mip_passes = picture_maps.get(number, PictureMap("", 0, None))
+        mips = [] if mip_passes else _mips(tape, number)[pictured:]
         if any(one.any() for one in mips):
             add = packer.add if number not in tables else _in_parts(packer)
             contents[number] = [-1] * pictured + [add(one) for one in mips]
@@ -73,7 +73,7 @@ def description(
         "structs": {name: _struct(dtype) for name, dtype in tape.structs.items()},
         "contents": contents,
         "frames": [_frame(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
-        "halved": {k: _passes(one.halving, packer) for k, one in mapped.items() if one.halving},
+        "halved": {k: _passes(one.mip_passes, packer) for k, one in picture_maps.items() if one.mip_passes},
     }
 
 
@@ -84,35 +84,35 @@ def _in_parts(packer: Packer) -> Callable[[Bytes], int]:
 
 def _mips(tape: FrameCapture, number: int) -> list[Bytes]:
     """Return a buffer's bytes, or a texture's mip by mip, each with all its layers."""
-    parts, layers = tape.content(number), tape.resources[number].get("size")
+    parts, layers = tape.read_content(number), tape.resources[number].get("size")
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
 
 def _frame(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
-    records = [(struct, packer.add(record.tobytes())) for struct, record in one.take.records]
+    records = [(struct, packer.add(record.tobytes())) for struct, record in one.captured.records]
     return {
         "name": one.name,
         "size": one.size,
-        "moving": one.fewer > 0,
+        "moving": one.merged_hairs > 0,
         "picture": picture[0],
         "linear": picture[1],
-        "views": {stage: _views(one.take, stage) for stage in ("visibility", "shadows")},
-        "passes": _passes(one.take, packer),
+        "views": {stage: _views(one.captured, stage) for stage in ("visibility", "shadows")},
+        "passes": _passes(one.captured, packer),
         "records": records,
     }
 
 
-def _views(take: CapturedFrame, stage: str) -> int:
+def _views(captured: CapturedFrame, stage: str) -> int:
     """Return the record by which a stage's passes see the head, -1 for none."""
-    views = [k for k, (struct, _) in enumerate(take.records) if struct == "Views"]
-    records = (-1 - k for one in take.passes if one.stage == stage for k in one.bound if k < 0)
+    views = [k for k, (struct, _) in enumerate(captured.records) if struct == "Views"]
+    records = (-1 - k for one in captured.passes if one.stage == stage for k in one.bound if k < 0)
     return next((k for k in records if k in views), -1)
 
 
-def _passes(take: CapturedFrame, packer: Packer) -> list[Json]:
+def _passes(captured: CapturedFrame, packer: Packer) -> list[Json]:
     """Return a frame's passes; a write of the host has its buffer and the number of its bytes."""
-    hosts = ((one, one.written) for one in take.passes)
+    hosts = ((one, one.written) for one in captured.passes)
     return [{**vars(one), "written": host and (host[0], packer.add(host[1]))} for one, host in hosts]
 
 
@@ -145,40 +145,40 @@ def _spelt(name: str) -> str:
     return first + "".join(word.title() for word in others)
 
 
-def read_before_written(tape: FrameCapture, takes: list[CapturedFrame]) -> list[int]:
+def read_before_written(tape: FrameCapture, captured_frames: list[CapturedFrame]) -> list[int]:
     """Return the numbers of textures and buffers that some pass reads before any writes it, in order."""
     found: set[int] = set()
-    for take in takes:
+    for captured in captured_frames:
         written: set[int] = set()
-        for one in take.passes:
-            found |= {whole(tape, k) for k in read_by(tape, one) if not _is_written(tape, k, written)}
-            written |= set(written_by(tape, one))
+        for one in captured.passes:
+            found |= {base_resource(tape, k) for k in read_resources(tape, one) if not _is_written(tape, k, written)}
+            written |= set(written_resources(tape, one))
     return sorted(found)
 
 
-def bound_as(tape: FrameCapture, takes: list[CapturedFrame], names: tuple[str, ...]) -> dict[int, str]:
+def resources_bound_as(tape: FrameCapture, captured_frames: list[CapturedFrame], names: tuple[str, ...]) -> dict[int, str]:
     """Return the resources that are bound by some names."""
     found: dict[int, str] = {}
-    for take in takes:
-        for one in (each for each in take.passes if each.program is not None):
+    for captured in captured_frames:
+        for one in (each for each in captured.passes if each.program is not None):
             known = [name for _, name, _ in tape.programs[one.program or 0]["bindings"]]
             found |= {k: name for k, name in zip(one.bound, known, strict=True) if name in names and k >= 0}
     return found
 
 
-def whole(tape: FrameCapture, number: int) -> int:
+def base_resource(tape: FrameCapture, number: int) -> int:
     """Return the texture of a view; other resources themselves."""
     return int(tape.resources[number].get("of", number))
 
 
-def read_by(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def read_resources(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
     """Yield the resources that a pass may read."""
     yield from (k for k, entry in _entries(tape, one) if _reads(entry))
     if one.raster and one.raster["indices"] >= 0:
         yield int(one.raster["indices"])
 
 
-def written_by(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def written_resources(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
     """Yield the resources that a pass writes."""
     if one.written:
         yield one.written[0]
@@ -203,4 +203,4 @@ def _writes(entry: Json) -> bool:
 
 def _is_written(tape: FrameCapture, number: int, written: set[int]) -> bool:
     """Return whether a pass has written a resource, or any part of it."""
-    return any(whole(tape, k) == whole(tape, number) for k in written)
+    return any(base_resource(tape, k) == base_resource(tape, number) for k in written)

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.targets.web.description import Json
+from dermis.apps.export.targets.web.describe_frames import Json
 from dermis.apps.export.targets.web.packing import Packer
 from dermis.base.errors import refuse
-from dermis.frame.inputs import Inputs
+from dermis.frame.inputs import FrameInputs
 from dermis.gpu.capture import CapturedFrame, CapturedPass
-from dermis.gpu.types import Record
+from dermis.gpu.types import UniformRecord
 from dermis.human.expressions import expression
 from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.pose import Pose
@@ -23,47 +23,47 @@ from dermis.scene.model import Scene
 Floats = NDArray[np.float32]
 _EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown": "full-frown"}
 """Expressions at a dial's end, by the dial's name."""
-_ROUGHER = (0.5, 1.0, 1.7)
-FACTORS = (0.4, 1.0, 3.0)
+_ROUGHNESS_FACTORS = (0.5, 1.0, 1.7)
+PIGMENT_FACTORS = (0.4, 1.0, 3.0)
 """Of a person's own melanin and blood."""
 
 
 @dataclass(frozen=True)
-class Dial:
+class Slider:
     """Something to turn.
 
-    values : of its nodes, increasing; `rest` is the one that the frame was taken with
+    values : of its nodes, increasing; `default_value` is the one that the frame was taken with
     scenes : for each node the scene, None at rest
     moves : whether only the head's motion differs
     """
 
     name: str
     values: tuple[float, ...]
-    rest: float
+    default_value: float
     scenes: tuple[Scene | None, ...]
-    moves: bool = False
+    changes_pose_only: bool = False
 
 
-def node_inputs(dial: Dial, prepare: Callable[[Scene], Inputs], base: Inputs) -> Iterator[Inputs | None]:
+def node_inputs(dial: Slider, prepare: Callable[[Scene], FrameInputs], base: FrameInputs) -> Iterator[FrameInputs | None]:
     """Yield what a frame reads at each node, None at rest."""
     for scene in dial.scenes:
         if scene is None:
             yield None
-        elif dial.moves:
+        elif dial.changes_pose_only:
             posed = prepare(scene)
             yield replace(base, motion=posed.motion, view=posed.view)
         else:
             yield prepare(scene)
 
 
-def changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
+def slider_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
     """Return the changes of a node in records and buffers: first word, and differences as floats.
 
     Whole numbers stay those of the base, as do the pairs of places that light passes between.
 
     DermisError : its passes are others
     """
-    stages = [[one.stage for one in take.passes] for take in (base, node)]
+    stages = [[one.stage for one in captured.passes] for captured in (base, node)]
     if stages[0] != stages[1]:
         refuse("dial", "the same passes at each of its nodes", "they differ", "Leave it out")
     pairs = enumerate(zip(base.records, node.records, strict=True))
@@ -73,7 +73,7 @@ def changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
     return {"records": _parts(records, packer), "written": _parts(written, packer)}
 
 
-def _floats(record: Record) -> Floats:
+def _floats(record: UniformRecord) -> Floats:
     """Return a record as floats, 0 where it has whole numbers."""
     found = np.frombuffer(record.tobytes(), "<f4").copy()
     found[~_is_float(record.dtype)] = 0.0
@@ -110,39 +110,39 @@ def _parts(pairs: list[tuple[int, tuple[Floats, Floats]]], packer: Packer) -> li
     return found
 
 
-def dials_of(scene: Scene) -> tuple[Dial, ...]:
+def scene_sliders(scene: Scene) -> tuple[Slider, ...]:
     """Return a scene's dials: expressions where the head has them, pigments where skin is painted."""
     return (*_pigments(scene), _roughness(scene), *_expressions(scene))
 
 
-def _roughness(scene: Scene) -> Dial:
-    rest = scene.skin.roughness
-    values = tuple(rest * factor for factor in _ROUGHER)
+def _roughness(scene: Scene) -> Slider:
+    default_value = scene.skin.roughness
+    values = tuple(default_value * factor for factor in _ROUGHNESS_FACTORS)
     scenes = [replace(scene, skin=scene.skin.model_copy(update={"roughness": value})) for value in values]
-    return Dial("roughness", values, rest, (scenes[0], None, scenes[2]))
+    return Slider("roughness", values, default_value, (scenes[0], None, scenes[2]))
 
 
-def _expressions(scene: Scene) -> list[Dial]:
+def _expressions(scene: Scene) -> list[Slider]:
     known = set(scene.head.targets)
     ends = {dial: expression(name) for dial, name in _EXPRESSIONS.items()}
     return [
-        Dial(name, (0.0, 1.0), 0.0, (None, replace(scene, pose=Pose(weights))), moves=True)
+        Slider(name, (0.0, 1.0), 0.0, (None, replace(scene, pose=Pose(weights))), changes_pose_only=True)
         for name, weights in ends.items()
         if known >= set(weights)
     ]
 
 
-def _pigments(scene: Scene) -> list[Dial]:
+def _pigments(scene: Scene) -> list[Slider]:
     """Return the dials of melanin and blood, which change the spread of light and the painted colour."""
     pigments, maps = scene.skin.pigments, scene.head.maps
     if pigments is None or not isinstance(maps, PaintedMaps) or scene.skin.albedo != "map":
         return []
     made = []
     for name in ("melanin", "blood"):
-        rest = getattr(maps.look, name)
-        values = tuple(min(1.0, rest * factor) for factor in FACTORS)
-        changed = (None if value == rest else _pigmented(scene, maps, name, value) for value in values)
-        made.append(Dial(name, values, rest, tuple(changed)))
+        default_value = getattr(maps.look, name)
+        values = tuple(min(1.0, default_value * factor) for factor in PIGMENT_FACTORS)
+        changed = (None if value == default_value else _pigmented(scene, maps, name, value) for value in values)
+        made.append(Slider(name, values, default_value, tuple(changed)))
     return made
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.targets.web.description import MapOfPictures, Mapped, bound_as
-from dermis.apps.export.targets.web.packing import stepped
-from dermis.frame.capture import halving, refill
+from dermis.apps.export.targets.web.describe_frames import PictureMap, PictureMaps, resources_bound_as
+from dermis.apps.export.targets.web.packing import quantise
+from dermis.frame.capture import capture_mips, update_map
 from dermis.frame.renderer import Renderer
 from dermis.gpu.capture import CapturedFrame, FrameCapture
 from dermis.images.filters import mip_chain
@@ -21,7 +21,7 @@ from dermis.mesh.maps import Maps
 Halves = NDArray[np.float16]
 PictureKey = tuple[str, int, int]
 """Role, mip and layer."""
-LEAST = 64
+MIN_SIDE = 64
 """Side of the smallest map that becomes a picture [texels]."""
 _QUALITY = 88  # of WebP
 _STEPS = 256
@@ -42,7 +42,7 @@ class Picture:
     texels: Halves
 
 
-def picture_of(texels: Halves, colours: bool) -> Picture:
+def encode_picture(texels: Halves, colours: bool) -> Picture:
     """Return a map as a picture.
 
     texels : (h, w, c)
@@ -93,8 +93,8 @@ def _decoded(data: bytes) -> NDArray[np.uint8]:
 
 _STORABLE = 8  # WebGPU's number of STORAGE_BINDING
 _KNOT_MM = 2.0**-8, 2.0**-8, 2.0**-8, 2.0**-14  # steps of hairs' places and of their radius
-_COLOUR = "colour_map"
-_ROLES = (_COLOUR, "relief_map", "slope_map", "specular_map", "roughness_map", "detail_map")
+_COLOUR_ROLE = "colour_map"
+_MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughness_map", "detail_map")
 
 
 @dataclass
@@ -107,74 +107,74 @@ class MapPictures:
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
     _given: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
-    def same(self, role: str, texels: NDArray[np.float16]) -> bool:
+    def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
         """Return whether a map is the one of its picture."""
         return bool(np.array_equal(self._given[role], texels))
 
-    def put(self, renderer: Renderer, tape: FrameCapture, takes: list[CapturedFrame]) -> Mapped:
+    def replace_textures(self, renderer: Renderer, tape: FrameCapture, captured_frames: list[CapturedFrame]) -> PictureMaps:
         """Encode new maps and decode them into the captured textures; return these by number."""
         found = {}
-        for number, role in _mapped(tape, takes).items():
-            texture, described = tape.object(number), tape.resources[number]
+        for number, role in _picture_textures(tape, captured_frames).items():
+            texture, described = tape.resource_at(number), tape.resources[number]
             side, storable = min(described["size"][:2]), described["usage"] & _STORABLE
-            mips = 1 if storable else sum(side >> mip >= LEAST for mip in range(described["mips"]))
+            mips = 1 if storable else sum(side >> mip >= MIN_SIDE for mip in range(described["mips"]))
             levels = [self._layers(tape, number, role, mip) for mip in range(mips)]
             rest = range(mips, described["mips"] if mips > 1 else 0)
-            refill(renderer, texture, levels + [texels_of(tape, number, mip) for mip in rest])
-            fills = halving(tape, texture) if storable else None
-            found[number] = MapOfPictures(role, mips, fills)
+            update_map(renderer, texture, levels + [read_texels(tape, number, mip) for mip in rest])
+            fills = capture_mips(tape, texture) if storable else None
+            found[number] = PictureMap(role, mips, fills)
         return found
 
     def _layers(self, tape: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
         """Return a mip (l, h, w, c) as it is decoded."""
-        layers = texels_of(tape, number, mip)
+        layers = read_texels(tape, number, mip)
         for layer, texels in enumerate(layers):
             if (role, mip, layer) not in self.pictures:
-                self.pictures[role, mip, layer] = picture_of(texels, role == _COLOUR)
+                self.pictures[role, mip, layer] = encode_picture(texels, role == _COLOUR_ROLE)
                 self._given.setdefault(role, texels)
         return np.stack([self.pictures[role, mip, layer].texels for layer in range(len(layers))])
 
 
-def with_smaller_maps(head: Head, most: int) -> Head:
+def with_reduced_maps(head: Head, most: int) -> Head:
     """Return the head with its maps of files halved until none has a longer side [texels]."""
     maps = head.maps
     if not isinstance(maps, Maps):
         return head
     given = {name: getattr(maps, name) for name in ("colour", "normal", "height", "specular", "roughness")}
-    halved: Any = {name: _halved(one, most) for name, one in given.items() if one is not None}
+    halved: Any = {name: _reduce_map(one, most) for name, one in given.items() if one is not None}
     return replace(head, maps=replace(maps, **halved))
 
 
-def _halved(values: NDArray[np.float32], most: int) -> NDArray[np.float32]:
+def _reduce_map(values: NDArray[np.float32], most: int) -> NDArray[np.float32]:
     times = max(0, (max(values.shape[:2]) - 1).bit_length() - (most - 1).bit_length())
     return np.asarray(mip_chain(values)[times], np.float32)
 
 
-def round_hairs(
-    renderer: Renderer, tape: FrameCapture, takes: list[CapturedFrame]
+def quantise_hairs(
+    renderer: Renderer, tape: FrameCapture, captured_frames: list[CapturedFrame]
 ) -> dict[int, tuple[float, ...]]:
     """Round the places of hairs on a device; of each buffer of them the steps of its columns."""
     found: dict[int, tuple[float, ...]] = {}
-    for number in bound_as(tape, takes, ("knots",)):
-        data = stepped(tape.content(number)[0].view(np.float32).reshape(-1, len(_KNOT_MM)), _KNOT_MM)
-        renderer.device.write(tape.object(number), data.tobytes(), data.nbytes)
+    for number in resources_bound_as(tape, captured_frames, ("knots",)):
+        data = quantise(tape.read_content(number)[0].view(np.float32).reshape(-1, len(_KNOT_MM)), _KNOT_MM)
+        renderer.device.write(tape.resource_at(number), data.tobytes(), data.nbytes)
         found[number] = _KNOT_MM
     return found
 
 
-def texels_of(tape: FrameCapture, number: int, mip: int) -> NDArray[np.float16]:
+def read_texels(tape: FrameCapture, number: int, mip: int) -> NDArray[np.float16]:
     """Return the texels (l, h, w, c) of a texture of halves."""
     width, height, layers = tape.resources[number]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
-    parts = tape.content(number)[mip * layers : (mip + 1) * layers]
+    parts = tape.read_content(number)[mip * layers : (mip + 1) * layers]
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 
-def _mapped(tape: FrameCapture, takes: list[CapturedFrame]) -> dict[int, str]:
+def _picture_textures(tape: FrameCapture, captured_frames: list[CapturedFrame]) -> dict[int, str]:
     """Return textures of halves bound as maps, large enough for pictures, with their roles."""
     return {
         number: role
-        for number, role in bound_as(tape, takes, _ROLES).items()
+        for number, role in resources_bound_as(tape, captured_frames, _MAP_ROLES).items()
         if tape.resources[number].get("format", "").endswith("16float")
-        and min(tape.resources[number]["size"][:2]) >= LEAST
+        and min(tape.resources[number]["size"][:2]) >= MIN_SIDE
     }

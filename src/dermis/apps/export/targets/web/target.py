@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.fitting import gaussian_curve
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Row, Rows, Target, floats, numbers_of
-from dermis.apps.export.targets.pages.html import inline, page
+from dermis.apps.export.target import Parameter, Parameters, Target, floats, get_numbers
+from dermis.apps.export.targets.pages.html import escape_script, render_page
 from dermis.apps.export.targets.web.build import PageContent
-from dermis.apps.export.targets.web.dials import Dial
-from dermis.apps.export.targets.web.packing import seven_bits
+from dermis.apps.export.targets.web.dials import Slider
+from dermis.apps.export.targets.web.packing import encode_seven_bits
 from dermis.base.errors import refuse
-from dermis.optics.curve import Curve
+from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.gaussians import GaussianSum
 
 MODULES = (
@@ -41,11 +41,11 @@ MODULES = (
 _HERE = Path(__file__).parent
 _IMPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
-_ATLAS = 512
-_MAP = 1024  # texels a side, most
+_ATLAS_SIDE = 512
+_MAX_MAP_SIDE = 1024  # texels a side, most
 
 
-def web_page(built: PageContent, dials: tuple[Dial, ...], title: str, note: str) -> str:
+def page_html(built: PageContent, dials: tuple[Slider, ...], title: str, note: str) -> str:
     """Return the text of the page.
 
     title, note : any text, which is escaped
@@ -54,23 +54,23 @@ def web_page(built: PageContent, dials: tuple[Dial, ...], title: str, note: str)
         "forms": built.forms,
         "blobs": built.packer.runs,
         "images": [len(one) for one in built.pictures],
-        "dials": [{"name": one.name, "values": one.values, "rest": one.rest} for one in dials],
+        "dials": [{"name": one.name, "values": one.values, "rest": one.default_value} for one in dials],
     }
     assert built.poster is not None
-    return page(
+    return render_page(
         _HERE,
         title=title,
         note=note,
-        script=inline(player()),
+        script=escape_script(player_script()),
         policy="img-src data:",
         poster=f"data:image/webp;base64,{base64.b64encode(_webp(built.poster)).decode()}",
-        scene=seven_bits(gzip.compress(json.dumps(scene).encode(), 9, mtime=0)),
-        data=seven_bits(built.packer.packed()),
-        pictures=seven_bits(b"".join(built.pictures)),
+        scene=encode_seven_bits(gzip.compress(json.dumps(scene).encode(), 9, mtime=0)),
+        data=encode_seven_bits(built.packer.compressed()),
+        pictures=encode_seven_bits(b"".join(built.pictures)),
     )
 
 
-def player() -> str:
+def player_script() -> str:
     """Return the player's modules as one script."""
     return "".join(
         _EXPORT.sub("", _IMPORT.sub("", (_HERE / f"{name}.js").read_text("utf-8"))) for name in MODULES
@@ -92,51 +92,51 @@ class Web(Target):
     title = "WebGPU"
     versions = ("1",)
     suffixes = (".html",)
-    wrong = (
+    limitations = (
         "The page draws square pictures with an atlas of 512 texels; maps have at most 1024 texels a side, "
         "8 bits a channel, and lose what WebP loses. Expressions move the skin, but their folds and flushes "
         "are not painted; between the nodes of a dial, numbers are interpolated. Hairs keep the thickness of "
         "the first view."
     )
 
-    def parameters(self, subject: Subject, version: str) -> Rows:
+    def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the Gaussians that spread light."""
         profile = self._profile(subject)
         return (
-            Row("atlas", _ATLAS, "texel", "side of the atlas that light spreads on"),
-            Row("variance", floats(profile.variance_mm2), "mm2", "of each Gaussian"),
+            Parameter("atlas", _ATLAS_SIDE, "texel", "side of the atlas that light spreads on"),
+            Parameter("variance", floats(profile.variance_mm2), "mm2", "of each Gaussian"),
             *(
-                Row(f"weight.{colour}", floats(profile.weight[:, k]), "-", "of each Gaussian")
+                Parameter(f"weight.{colour}", floats(profile.weight[:, k]), "-", "of each Gaussian")
                 for k, colour in enumerate(("red", "green", "blue"))
             ),
         )
 
-    def naive(self, subject: Subject, version: str) -> Rows:
+    def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the same: there is nothing to type."""
         return self.parameters(subject, version)
 
-    def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
+    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve of the sum of Gaussians."""
-        _, variance, *weight = (np.array(numbers_of(rows, row.name)) for row in rows)
+        _, variance, *weight = (np.array(get_numbers(parameters, row.name)) for row in parameters)
         return gaussian_curve(variance, np.stack(weight, axis=1), subject.curve.energy)
 
-    def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
+    def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the page."""
-        from dermis.apps.export.targets.web.build import MOVING, SIZES, PageRequest, page_content
-        from dermis.apps.export.targets.web.dials import dials_of
-        from dermis.apps.export.targets.web.maps import with_smaller_maps
-        from dermis.apps.export.targets.web.target import web_page
+        from dermis.apps.export.targets.web.build import INTERACTIVE_QUALITY, PICTURE_SIDES, PageRequest, build_content
+        from dermis.apps.export.targets.web.dials import scene_sliders
+        from dermis.apps.export.targets.web.maps import with_reduced_maps
+        from dermis.apps.export.targets.web.target import page_html
         from dermis.scene.settings import Settings
 
         scene = subject.scene
         if scene is None:
-            came = f"the skin {subject.name} came"
-            refuse("subject", "a head, which the page renders", came, "Name a head")
-        scene = replace(scene, head=with_smaller_maps(scene.head, min(self.side, _MAP)))
-        dials = dials_of(scene)
-        made = page_content(PageRequest(scene, dials, Settings(atlas=_ATLAS), SIZES, self.adapter, MOVING))
-        place.write_text(web_page(made, dials, subject.name, self.wrong), encoding="utf-8")
-        return [place]
+            actual = f"got the skin {subject.name}"
+            refuse("subject", "a head, which the page renders", actual, "Name a head")
+        scene = replace(scene, head=with_reduced_maps(scene.head, min(self.side, _MAX_MAP_SIDE)))
+        dials = scene_sliders(scene)
+        made = build_content(PageRequest(scene, dials, Settings(atlas=_ATLAS_SIDE), PICTURE_SIDES, self.adapter, INTERACTIVE_QUALITY))
+        output.write_text(page_html(made, dials, subject.name, self.limitations), encoding="utf-8")
+        return [output]
 
     @staticmethod
     def _profile(subject: Subject) -> GaussianSum:
@@ -144,7 +144,7 @@ class Web(Target):
         from dermis.optics.profiles import load_profile
 
         scene = subject.scene
-        return SkinProfiles().of(scene.skin) if scene else load_profile(subject.name)
+        return SkinProfiles().profile(scene.skin) if scene else load_profile(subject.name)
 
 
 TARGET = Web()

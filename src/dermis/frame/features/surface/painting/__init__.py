@@ -1,1 +1,1 @@
-"""A human's skin painted by the device: colour, gloss and relief from pigments and texture."""
+"""Human skin painted by the device: colour, gloss and relief from pigments and noise."""

@@ -1,19 +1,19 @@
-// Relief and colour of a face that moves: folds deepen, blood comes and goes.
+// Relief and colour of a face with an expression: folds deepen, and the blood content changes.
 
 struct Expression {
-    folding: array<vec4f, 2>, // how far each movement is made; in the last place flush
-    pressed: f32, // out of the lips
+    folding: array<vec4f, 2>, // amount of each movement; the last component is the flush
+    pressed: f32, // amount by which blood is pressed out of the lips
     side: u32, // of the maps [texels]
 }
 
-// Colour of skin after over before a full flush, and when the blood is pressed out: artist's values.
+// Factors of the skin colour at a full flush, and with the blood pressed out: artistic values.
 const FLUSH: vec3f = vec3f(0.97, 0.80, 0.82);
 const PALE: vec3f = vec3f(1.08, 1.22, 1.20);
 
 @group(0) @binding(0) var<uniform> expression: Expression;
-@group(0) @binding(1) var resting: texture_2d<f32>; // colour at rest
-@group(0) @binding(2) var moved: texture_2d_array<f32>; // height that full movements add [mm]; where blood comes to, or leaves
-@group(0) @binding(3) var<storage, read> at_rest: array<f32>; // heights, with a texel more on all sides [mm]
+@group(0) @binding(1) var colour_at_rest: texture_2d<f32>;
+@group(0) @binding(2) var expression_deltas: texture_2d_array<f32>; // height that full movements add [mm]; gain or loss of blood
+@group(0) @binding(3) var<storage, read> heights_at_rest: array<f32>; // with a border of one texel [mm]
 @group(0) @binding(4) var<storage, read_write> heights: array<f32>;
 @group(0) @binding(5) var colour: texture_storage_2d<rgba16float, write>;
 
@@ -22,13 +22,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= vec2u(expression.side))) {
         return;
     }
-    let first = textureLoad(moved, id.xy, 0, 0);
-    let second = textureLoad(moved, id.xy, 1, 0);
-    let made = expression.folding;
-    let place = (id.y + 1u) * (expression.side + 2u) + id.x + 1u;
-    heights[place] = at_rest[place] + dot(made[0], first) + dot(made[1].xyz, second.xyz);
-    let flushed = pow(FLUSH, vec3f(made[1].w * max(second.w, 0.0)));
+    let first = textureLoad(expression_deltas, id.xy, 0, 0);
+    let second = textureLoad(expression_deltas, id.xy, 1, 0);
+    let amount = expression.folding;
+    let index = (id.y + 1u) * (expression.side + 2u) + id.x + 1u;
+    heights[index] = heights_at_rest[index] + dot(amount[0], first) + dot(amount[1].xyz, second.xyz);
+    let flushed = pow(FLUSH, vec3f(amount[1].w * max(second.w, 0.0)));
     let pale = pow(PALE, vec3f(expression.pressed * max(-second.w, 0.0)));
-    let rest = textureLoad(resting, id.xy, 0);
+    let rest = textureLoad(colour_at_rest, id.xy, 0);
     textureStore(colour, id.xy, vec4f(rest.rgb * flushed * pale, rest.a));
 }

@@ -1,4 +1,4 @@
-"""Painted maps of a human's skin: colour, gloss and relief at rest, and what expressions change."""
+"""Painted maps of human skin: colour, gloss and relief at rest, and their changes by expressions."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.disk import Arrays, array_key, find, stored
+from dermis.base.disk import Arrays, array_key, load_arrays, load_or_make
 from dermis.base.errors import refuse
-from dermis.base.progress import preparing
+from dermis.base.progress import logged_step
 from dermis.frame.features.surface import mips as map_mips
-from dermis.frame.programs import FEATURES, HALVES, each, program, shader_folders
+from dermis.frame.programs import FEATURES, HALVES, program, shader_folders, workgroup_grid
 from dermis.gpu import (
     Bindings,
     Buffer,
@@ -24,109 +24,110 @@ from dermis.gpu import (
     Device,
     Graph,
     MutableBindings,
-    Record,
+    UniformRecord,
     Recorder,
     Texture,
     make_texture,
     upload,
 )
-from dermis.gpu.program import source_of
-from dermis.gpu.shader_types import record_of, struct_dtype
+from dermis.gpu.program import shader_source
+from dermis.gpu.shader_types import make_record, struct_dtype
 from dermis.gpu.textures import download
 from dermis.gpu.wgsl_source import Member
 from dermis.human.skin import face, textures
-from dermis.human.skin.face import AMOUNTS, DEGREES, FOLDING, sizes
+from dermis.human.skin.face import ZONE_AMOUNTS, HAIRLINE_STEP_DEGREES, FOLD_MOVEMENTS, table_sizes
 from dermis.human.skin.look import SkinLook
-from dermis.human.skin.painted import colour_tables
-from dermis.human.skin.surface import Painting
-from dermis.human.skin.textures import DOTS, GROUNDS, NOISES, TILE_MM, WANDERING, noise_table
+from dermis.human.skin.painted import face_and_lip_colours
+from dermis.human.skin.surface import PaintedSurface
+from dermis.human.skin.textures import DOT_LAYERS, NOISE_REGIONS, NOISES, TILE_LENGTH_MM, ZONE_BORDER_NOISES, noise_table
 from dermis.mesh.maps import Maps
-from dermis.scene.skin import USUAL_RHO_S
+from dermis.scene.skin import DEFAULT_RHO_S
 
 _NAMES: dict[str, Sequence[str]] = {
     "noises": [noise.name for noise in NOISES],
-    "dots": [dots.name for dots in DOTS],
-    "amounts": list(AMOUNTS),
-    "grounds": list(GROUNDS),
+    "dots": [dots.name for dots in DOT_LAYERS],
+    "amounts": list(ZONE_AMOUNTS),
+    "grounds": list(NOISE_REGIONS),
 }
 SKIN, OWNER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
-_MOST_TRIANGLES = 1 << 20  # that painted_surface.wgsl has bits for
-_TEXEL = 4  # floats of a vector
+_MAX_TRIANGLES = 1 << 20  # that painted_surface.wgsl has bits for
+_VECTOR_FLOATS = 4
 _FOLDER = "painted"
-_WORD = 4  # bytes
+_WORD_BYTES = 4
 _MAPS = ("colour", "specular", "roughness")
-_FOLDING = FOLDING + 1  # numbers of the shader's record, the last of which is the flush
+_FOLDING = FOLD_MOVEMENTS + 1  # floats of `folding` in the shader record; the last is the flush
 
 
 def texture_names() -> Mapping[str, Callable[[], Sequence[Member]]]:
-    """Lists of the names of noises, dots, amounts and grounds, numbered in order."""
+    """Return the names of noises, dots, amounts and grounds as lists that shaders number in order."""
     return {name: _members(names) for name, names in _NAMES.items()}
 
 
-def painting_numbers() -> dict[str, float]:
-    """Numbers that the shaders fill in."""
+def painting_constants() -> dict[str, float]:
+    """Return the constants of the painting shaders, by their `//#fill` names."""
     names = {name: len(names) for name, names in _NAMES.items()}
-    own = {"degrees": float(DEGREES), "tile_mm": TILE_MM, "folding": FOLDING}
-    rows = {"noise_rows": len(noise_table()), "wander_rows": WANDERING, "amount_rows": len(AMOUNTS) // 4}
-    return own | names | sizes() | rows
+    own = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM, "folding": FOLD_MOVEMENTS}
+    rows = {"noise_rows": len(noise_table()), "wander_rows": ZONE_BORDER_NOISES, "amount_rows": len(ZONE_AMOUNTS) // 4}
+    return own | names | table_sizes() | rows
 
 
 def _members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:
     return lambda: [Member(name, Path()) for name in names]
 
 
-class Given(NamedTuple):
-    """What the shaders read.
+class PaintInputs(NamedTuple):
+    """Inputs of the shader that paints skin.
 
-    paint, tables : their records of numbers
-    colours : (2, n, n, 3) of the face's skin and of the lips'
+    paint, tables : records of the shader
+    colours : (2, n, n, 3) colour tables of the face and of the lips, linear Rec. 709 [-]
+    surface : mesh that is painted
     """
 
-    paint: Record
+    paint: UniformRecord
     tables: NDArray[np.float32]
     colours: NDArray[np.float32]
-    surface: Painting
+    surface: PaintedSurface
 
 
-def given_for(surface: Painting, look: SkinLook, side: int) -> Given:
-    """What maps of a look are painted from.
+def paint_inputs(surface: PaintedSurface, look: SkinLook, side: int) -> PaintInputs:
+    """Return the shader inputs for the maps of a look.
 
-    side : of the maps [texels]
+    side : side of the maps [texels]
 
     Raises DermisError for too many triangles.
     """
-    if surface.count >= _MOST_TRIANGLES:
-        came = f"{surface.count:,} came"
-        refuse("painted skin", f"fewer than {_MOST_TRIANGLES:,} triangles", came, "Subdivide less")
-    text = _text(SKIN)
+    if surface.count >= _MAX_TRIANGLES:
+        actual = f"got {surface.count:,}"
+        refuse("painted skin", f"fewer than {_MAX_TRIANGLES:,} triangles", actual, "Subdivide less")
+    text = _shader_text(SKIN)
     names = set(struct_dtype(text, "Paint").names or ()) & set(vars(look))
-    paint = record_of(text, "Paint", side=side, **{name: getattr(look, name) for name in names})
-    tables = np.ndarray((), struct_dtype(text, "Tables"), _face(look.recession))
-    return Given(paint, tables, colour_tables(look), surface)
+    paint = make_record(text, "Paint", side=side, **{name: getattr(look, name) for name in names})
+    tables = np.ndarray((), struct_dtype(text, "Tables"), _face_tables(look.recession))
+    return PaintInputs(paint, tables, face_and_lip_colours(look), surface)
 
 
-def key_of(given: Given, driver: str) -> str:
-    """The key of what a driver's shaders paint."""
-    form = "\n".join((driver, _text(SKIN), _text(OWNER)))
-    records = (np.frombuffer(record.tobytes(), np.uint8) for record in (given.paint, given.tables))
-    return array_key([*records, given.colours, given.surface.vertices, given.surface.triangles], form)
+def cache_key(inputs: PaintInputs, driver: str) -> str:
+    """Return the disk cache key of painted maps, which covers inputs, shaders and the driver."""
+    source = "\n".join((driver, _shader_text(SKIN), _shader_text(OWNER)))
+    records = (np.frombuffer(record.tobytes(), np.uint8) for record in (inputs.paint, inputs.tables))
+    return array_key([*records, inputs.colours, inputs.surface.vertices, inputs.surface.triangles], source)
 
 
 @cache
-def _text(shader: str) -> str:
-    return source_of(FEATURES / shader, shader_folders()).text
+def _shader_text(shader: str) -> str:
+    return shader_source(FEATURES / shader, shader_folders()).text
 
 
-def _face(recession: float) -> bytes:
-    """Noises, dots, zones, folds and the edge of the hair, as spot.wgsl reads them."""
-    folds, edge = face.folds(), face.hairline(recession)
+def _face_tables(recession: float) -> bytes:
+    """Return all tables of the face for spot.wgsl: noises, dots, zones, folds and the hairline."""
+    folds, edge = face.fold_curves(), face.hairline_heights(recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
-    curves = np.pad(np.hstack([folds.curves, ends]), ((0, 0), (0, _TEXEL - 2)))
-    hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), ((0, 0), (0, _TEXEL - 2)))
+    curves = np.pad(np.hstack([folds.curves, ends]), ((0, 0), (0, _VECTOR_FLOATS - 2)))
+    hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), ((0, 0), (0, _VECTOR_FLOATS - 2)))
     tables = (
         textures.noise_table(),
         textures.dot_table(),
-        face.zones(recession),
+        face.zone_table(recession),
         curves,
         folds.knots,
         hairline,
@@ -134,174 +135,183 @@ def _face(recession: float) -> bytes:
     return b"".join(table.tobytes() for table in tables)
 
 
-class Resting(NamedTuple):
-    """Textures of which only the finest mip is filled, a buffer of heights, and what movements add to them.
+class RestMaps(NamedTuple):
+    """Painted maps at rest; only the finest mip levels are filled.
 
-    moved : None unless requested
+    heights : buffer of heights with a border of one texel [mm]
+    expression_deltas : changes by expressions, None unless requested
     """
 
-    colour: map_mips.Mipped
-    specular: map_mips.Mipped
-    roughness: map_mips.Mipped
+    colour: map_mips.MippedTexture
+    specular: map_mips.MippedTexture
+    roughness: map_mips.MippedTexture
     heights: Buffer
-    moved: Texture | None
+    expression_deltas: Texture | None
 
 
-def resting(device: Device, given: Given, side: int, moving: bool = False) -> Resting:
-    """The maps, found on disk by software adapters, which take a second to paint them.
+def cached_rest_maps(device: Device, inputs: PaintInputs, side: int, animated: bool = False) -> RestMaps:
+    """Return the maps at rest; software adapters, which paint slowly, cache them on disk.
 
-    Only what a device paints first is kept there: who draws many people rarely comes back to one.
+    Only the first maps that a device paints are stored: programs that render many people rarely need one
+    again.
 
-    moving : whether to include what movements add
+    animated : whether to include the changes by expressions
     """
     if device.adapter.kind != "CPU":
-        return painted(device, given, side)
-    key, names = key_of(given, f"{device.adapter.name} {device.adapter.driver}"), [*_MAPS, "heights"]
-    names += ["moved"] if moving else []
-    found = find(_FOLDER, key, names)
-    if found is not None:
-        return _uploaded(device, found, side)
-    made = painted(device, given, side)
-    if device.shared("first painted", lambda: key) == key:
-        stored(_FOLDER, key, names, lambda: _downloaded(device, made, moving))
-    return made
+        return paint_rest_maps(device, inputs, side)
+    key, names = cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"), [*_MAPS, "heights"]
+    names += ["expression_deltas"] if animated else []
+    arrays = load_arrays(_FOLDER, key, names)
+    if arrays is not None:
+        return _uploaded(device, arrays, side)
+    maps = paint_rest_maps(device, inputs, side)
+    if device.cached("first painted", lambda: key) == key:
+        load_or_make(_FOLDER, key, names, lambda: _downloaded(device, maps, animated))
+    return maps
 
 
-@preparing("painting the skin")
-def painted(device: Device, given: Given, side: int) -> Resting:
-    """The maps, painted."""
-    owned: Bindings = {"paint": given.paint, **_owned(device, given, side)}
-    maps = {name: map_mips.empty(device, (side, side)) for name in _MAPS}
-    heights = device.space(_WORD * (side + 2) ** 2)
-    moved = make_texture(device, (side, side), HALVES, layers=2)
+@logged_step("painting the skin")
+def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
+    """Paint the maps at rest."""
+    surface: Bindings = {"paint": inputs.paint, **_surface_buffers(device, inputs, side)}
+    maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAPS}
+    heights = device.storage_buffer(_WORD_BYTES * (side + 2) ** 2)
+    expression_deltas = make_texture(device, (side, side), HALVES, layers=2)
     into = {name: one.levels[0] for name, one in maps.items()}
     tables: Bindings = {
-        "tables": given.tables,
-        "colour_tables": _colours(device, given),
+        "tables": inputs.tables,
+        "colour_tables": _colours(device, inputs),
         "heights": heights,
-        "moved": moved,
+        "expression_deltas": expression_deltas,
     }
     frame = CommandList(device, timed=False)
-    frame.compute("maps", program(device, SKIN), {**owned, **tables, **into}, (side, side))
+    frame.compute("maps", program(device, SKIN), {**surface, **tables, **into}, (side, side))
     frame.submit()
-    return Resting(**maps, heights=heights, moved=moved)
+    return RestMaps(**maps, heights=heights, expression_deltas=expression_deltas)
 
 
-def _owned(device: Device, given: Given, side: int) -> dict[str, Buffer]:
-    """Buffers of the surface, and of whose each texel is; made once for all people with its layout."""
-    surface = given.surface
-    known = device.shared("painted surfaces", WeakKeyDictionary[Painting, dict[int, dict[str, Buffer]]])
-    sides: dict[int, dict[str, Buffer]] = known.setdefault(surface, {})
+def _surface_buffers(device: Device, inputs: PaintInputs, side: int) -> dict[str, Buffer]:
+    """Return the buffers of the surface and of the triangle of each texel, cached for all people."""
+    surface = inputs.surface
+    cache = device.cached("painted surfaces", WeakKeyDictionary[PaintedSurface, dict[int, dict[str, Buffer]]])
+    sides: dict[int, dict[str, Buffer]] = cache.setdefault(surface, {})
     if side not in sides:
         sides.clear()
-        made = {
+        buffers = {
             "vertices": device.buffer(surface.vertices, "STORAGE"),
             "triangles": device.buffer(surface.triangles, "STORAGE"),
-            "owners": device.space(_WORD * side * side),
+            "owners": device.storage_buffer(_WORD_BYTES * side * side),
         }
         frame = CommandList(device, timed=False)
-        bound: Bindings = {"paint": given.paint, **made}
-        frame.dispatch("maps", program(device, OWNER), bound, each(surface.count))
+        bound: Bindings = {"paint": inputs.paint, **buffers}
+        frame.dispatch("maps", program(device, OWNER), bound, workgroup_grid(surface.count))
         frame.submit()
-        sides[side] = made
+        sides[side] = buffers
     return sides[side]
 
 
-def _colours(device: Device, given: Given) -> Texture:
-    nodes = given.colours.shape[1]
-    texture = make_texture(device, (nodes, nodes), "rgba32float", layers=len(given.colours), use="map")
-    for layer, table in enumerate(given.colours):
+def _colours(device: Device, inputs: PaintInputs) -> Texture:
+    nodes = inputs.colours.shape[1]
+    texture = make_texture(device, (nodes, nodes), "rgba32float", layers=len(inputs.colours), use="map")
+    for layer, table in enumerate(inputs.colours):
         upload(device, texture, np.dstack([table, np.ones((nodes, nodes, 1), np.float32)]), layer=layer)
     return texture
 
 
-def _downloaded(device: Device, made: Resting, moving: bool) -> Arrays:
-    found = {name: download(device, getattr(made, name).texture) for name in _MAPS}
-    found["heights"] = np.frombuffer(device.handle.queue.read_buffer(made.heights), np.float32)
-    if moving and made.moved is not None:
-        found["moved"] = np.stack([download(device, made.moved, layer=layer) for layer in range(2)])
-    return found
+def _downloaded(device: Device, maps: RestMaps, animated: bool) -> Arrays:
+    arrays = {name: download(device, getattr(maps, name).texture) for name in _MAPS}
+    arrays["heights"] = np.frombuffer(device.handle.queue.read_buffer(maps.heights), np.float32)
+    if animated and maps.expression_deltas is not None:
+        arrays["expression_deltas"] = np.stack([download(device, maps.expression_deltas, layer=layer) for layer in range(2)])
+    return arrays
 
 
-def _uploaded(device: Device, found: Arrays, side: int) -> Resting:
-    maps = {name: map_mips.empty(device, (side, side)) for name in _MAPS}
+def _uploaded(device: Device, arrays: Arrays, side: int) -> RestMaps:
+    maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAPS}
     for name, one in maps.items():
-        upload(device, one.texture, found[name])
-    moved = None
-    if "moved" in found:
-        moved = make_texture(device, (side, side), HALVES, layers=2)
-        for layer, texels in enumerate(found["moved"]):
-            upload(device, moved, texels, layer=layer)
-    return Resting(**maps, heights=device.buffer(found["heights"], "STORAGE"), moved=moved)
+        upload(device, one.texture, arrays[name])
+    expression_deltas = None
+    if "expression_deltas" in arrays:
+        expression_deltas = make_texture(device, (side, side), HALVES, layers=2)
+        for layer, texels in enumerate(arrays["expression_deltas"]):
+            upload(device, expression_deltas, texels, layer=layer)
+    return RestMaps(**maps, heights=device.buffer(arrays["heights"], "STORAGE"), expression_deltas=expression_deltas)
 
 
 @dataclass(frozen=True, eq=False)
-class Face:
-    """What expressions change, by the names in the shaders.
+class ExpressionMaps:
+    """Maps that expressions change.
 
-    bound : of expression.wgsl
-    heights : buffer that relief is taken from
-    colour, relief : textures with all their mips
+    bindings : resources of expression.wgsl by their names there
+    heights : buffer of heights from which the relief is computed [mm]
+    colour, relief : textures with all mip levels
     """
 
-    bound: MutableBindings
+    bindings: MutableBindings
     heights: Buffer
-    colour: map_mips.Mipped
-    relief: map_mips.Mipped
+    colour: map_mips.MippedTexture
+    relief: map_mips.MippedTexture
 
 
-def make_face(
+def make_expression_maps(
     device: Device,
-    resting: Texture,
-    at_rest: Buffer,
-    moved: Texture,
-    into: tuple[map_mips.Mipped, map_mips.Mipped],
-) -> Face:
-    """Space for a face that moves.
+    colour_at_rest: Texture,
+    heights_at_rest: Buffer,
+    deltas: Texture,
+    into: tuple[map_mips.MippedTexture, map_mips.MippedTexture],
+) -> ExpressionMaps:
+    """Create the maps of a face that moves.
 
-    resting, at_rest, moved : colour and heights at rest, and what full movements do to them
+    colour_at_rest, heights_at_rest : texture and buffer at rest
+    deltas : texture of the changes by full expressions
     into : textures of colour and relief
     """
     colour, relief = into
-    heights = device.space(at_rest.size)
-    bound: MutableBindings = {"resting": resting, "at_rest": at_rest, "moved": moved, "heights": heights}
-    return Face(bound | {"colour": colour.levels[0]}, heights, colour, relief)
+    heights = device.storage_buffer(heights_at_rest.size)
+    bindings: MutableBindings = {
+        "colour_at_rest": colour_at_rest,
+        "heights_at_rest": heights_at_rest,
+        "expression_deltas": deltas,
+        "heights": heights,
+    }
+    return ExpressionMaps(bindings | {"colour": colour.levels[0]}, heights, colour, relief)
 
 
-def draw_expression(graph: Graph, face: Face, made: NDArray[np.float32]) -> None:
-    """Change colour and relief.
+def draw_expression(graph: Graph, maps: ExpressionMaps, amounts: NDArray[np.float32]) -> None:
+    """Declare the passes that compute colour and relief for an expression.
 
-    made : (9,) how far each movement is made, see `movements`
+    amounts : (9,) amount of each movement of the face, see `human.skin.face.movements` [-]
     """
-    shader, side = program(graph.device, "surface/painting/expression.wgsl"), face.colour.size[0]
-    folding = made[:_FOLDING].reshape(2, 4)
-    record = shader.record("Expression", folding=folding, pressed=made[_FOLDING], side=side)
-    graph.compute("maps", shader, face.bound | {"expression": record}, (side, side))
-    graph.repeat(_maps, face)
+    shader, side = program(graph.device, "surface/painting/expression.wgsl"), maps.colour.size[0]
+    folding = amounts[:_FOLDING].reshape(2, 4)
+    record = shader.record("Expression", folding=folding, pressed=amounts[_FOLDING], side=side)
+    graph.compute("maps", shader, maps.bindings | {"expression": record}, (side, side))
+    graph.repeat(_fill_maps, maps)
 
 
-def _maps(graph: Recorder, face: Face) -> None:
-    """Mips of the colour, and the relief from the heights."""
-    map_mips.halve(graph, face.colour)
-    map_mips.relieve(graph, face.relief, face.heights)
+def _fill_maps(graph: Recorder, maps: ExpressionMaps) -> None:
+    """Declare the passes that compute the mip levels of the colour, and the relief from the heights."""
+    map_mips.fill_mips(graph, maps.colour)
+    map_mips.fill_relief(graph, maps.relief, maps.heights)
 
 
 class PaintedTextures(NamedTuple):
-    """Textures with all their mips, as skin.wgsl of the frame reads them."""
+    """Painted textures with all mip levels, for skin.wgsl of the frame."""
 
     colour: Texture
     specular: Texture
     roughness: Texture
     relief: Texture
-    face: Face | None
+    expression_maps: ExpressionMaps | None
 
 
-class PaintedTexels(NamedTuple):
-    """What is painted, as skin.wgsl of the painting keeps it.
+class RawPaintedArrays(NamedTuple):
+    """Painted texels, in the channels of skin.wgsl of the painting.
 
-    colour, specular, roughness : (n, n, 4); beside the specular how much there is of pores, and the binary
-        logarithm of the mm in a unit of uv; beside the roughness furrows, and shares of melanin and of blood
-    height_mm : (n, n)
+    colour : (n, n, 4)
+    specular : (n, n, 4) specular factor, amount of pores, and log2 of the mm per unit of uv
+    roughness : (n, n, 4) roughness factor, amount of furrows, and fractions of melanin and blood
+    height_mm : (n, n) [mm]
     """
 
     colour: NDArray[np.float32]
@@ -310,49 +320,49 @@ class PaintedTexels(NamedTuple):
     height_mm: NDArray[np.float32]
 
 
-def draw(
-    device: Device, painting: Painting, look: SkinLook, side: int, moving: bool = False
+def paint_textures(
+    device: Device, surface: PaintedSurface, look: SkinLook, side: int, animated: bool = False
 ) -> PaintedTextures:
-    """Paint the maps.
+    """Paint the maps of a look.
 
-    side : of the maps [texels]
-    moving : whether expressions change colour and relief: `expression.draw` fills these in then
+    side : side of the maps [texels]
+    animated : whether expressions change colour and relief, which `draw_expression` then fills
     """
-    made = resting(device, given_for(painting, look, side), side, moving)
-    colour = map_mips.empty(device, (side, side)) if moving else made.colour
+    maps = cached_rest_maps(device, paint_inputs(surface, look, side), side, animated)
+    colour = map_mips.empty_map(device, (side, side)) if animated else maps.colour
     frame = CommandList(device, timed=False)
-    for one in (made.specular, made.roughness) if moving else (colour, made.specular, made.roughness):
-        map_mips.halve(frame, one)
+    for one in (maps.specular, maps.roughness) if animated else (colour, maps.specular, maps.roughness):
+        map_mips.fill_mips(frame, one)
     frame.submit()
-    gloss = made.specular.texture, made.roughness.texture
-    if not moving or made.moved is None:
-        relief = map_mips.relief_of(device, [made.heights], (side, side), side)
+    gloss = maps.specular.texture, maps.roughness.texture
+    if not animated or maps.expression_deltas is None:
+        relief = map_mips.relief_from_buffers(device, [maps.heights], (side, side), side)
         return PaintedTextures(colour.texture, *gloss, relief, None)
-    raised = map_mips.empty(device, (side, side))
-    face = make_face(device, made.colour.texture, made.heights, made.moved, (colour, raised))
-    return PaintedTextures(colour.texture, *gloss, raised.texture, face)
+    relief_texture = map_mips.empty_map(device, (side, side))
+    expression_maps = make_expression_maps(device, maps.colour.texture, maps.heights, maps.expression_deltas, (colour, relief_texture))
+    return PaintedTextures(colour.texture, *gloss, relief_texture.texture, expression_maps)
 
 
-def painted_maps(device: Device, painting: Painting, look: SkinLook, side: int) -> Maps:
-    """The same as arrays, for what reads no textures; without the detail that is finer than maps.
+def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: int) -> Maps:
+    """Return painted maps as arrays, without the relief that is finer than maps.
 
-    Heights run out beside the charts, where nothing is drawn.
+    Heights fade to 0 outside the charts.
     """
-    found = painted_texels(device, painting, look, side)
-    rho_s = USUAL_RHO_S * found.specular[..., 0]
+    arrays = paint_raw_arrays(device, surface, look, side)
+    rho_s = DEFAULT_RHO_S * arrays.specular[..., 0]
     return Maps(
-        colour=np.ascontiguousarray(found.colour[..., :3]),
-        height=found.height_mm,
+        colour=np.ascontiguousarray(arrays.colour[..., :3]),
+        height=arrays.height_mm,
         specular=np.clip(rho_s, 0.0, 1.0),
-        roughness=np.ascontiguousarray(found.roughness[..., 0]),
+        roughness=np.ascontiguousarray(arrays.roughness[..., 0]),
     )
 
 
-def painted_texels(device: Device, painting: Painting, look: SkinLook, side: int) -> PaintedTexels:
-    """All that is painted, as arrays."""
-    made = painted(device, given_for(painting, look, side), side)
-    textures = made.colour, made.specular, made.roughness
+def paint_raw_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: int) -> RawPaintedArrays:
+    """Return all channels of the painted maps as arrays."""
+    maps = paint_rest_maps(device, paint_inputs(surface, look, side), side)
+    textures = maps.colour, maps.specular, maps.roughness
     colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)
-    raw = np.frombuffer(device.handle.queue.read_buffer(made.heights), np.float32)
+    raw = np.frombuffer(device.handle.queue.read_buffer(maps.heights), np.float32)
     height = np.ascontiguousarray(raw.reshape(side + 2, side + 2)[1:-1, 1:-1])
-    return PaintedTexels(colour, specular, roughness, height)
+    return RawPaintedArrays(colour, specular, roughness, height)

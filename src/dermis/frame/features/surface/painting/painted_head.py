@@ -1,4 +1,4 @@
-"""A head whose painted maps and eyes are arrays, for files and for programs without these shaders."""
+"""Head whose painted maps and eyes are arrays, for files and for programs without these shaders."""
 
 from __future__ import annotations
 
@@ -11,49 +11,51 @@ from dermis.frame.features.surface.painting import paint
 from dermis.frame.features.surface.record import fill_eye
 from dermis.frame.programs import program
 from dermis.gpu import CommandList, Device, download, make_texture
-from dermis.human.skin.painted import LEAST_SIDE, MOST_SIDE, PaintedMaps
-from dermis.human.skin.surface import painting
+from dermis.human.skin.painted import MIN_SIDE, MAX_SIDE, PaintedMaps
+from dermis.human.skin.surface import painted_surface
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import FALLING, RIM, EyePictures
 from dermis.mesh.head import Head
 
 SIDE = 1024
-"""Of the pictures [texels]; a texel of the iris is a fortieth of a millimetre."""
+"""Side of the pictures [texels]; a texel of the iris is 0.025 mm wide."""
 
 
 def eye_pictures(device: Device, look: EyeLook, side: int = SIDE) -> EyePictures:
-    """What an eye looks like, seen along its axis through the cornea."""
+    """Return pictures of an eye as seen along its axis through the cornea."""
     shader = program(device, "surface/painting/eye_pictures.wgsl")
-    asked = shader.record("Asked", rim=RIM, falling=FALLING)
-    fill_eye(asked["eye"], look)
+    picture = shader.record("EyePicture", rim=RIM, falling=FALLING)
+    fill_eye(picture["eye"], look)
     made = {name: make_texture(device, (side, side), "rgba32float") for name in ("colours", "normals")}
     frame = CommandList(device, timed=False)
-    frame.compute("paint", shader, {"asked": asked, **made}, (side, side))
+    frame.compute("paint", shader, {"picture": picture, **made}, (side, side))
     frame.submit()
     colours, normals = (download(device, texture)[..., :3] for texture in made.values())
     return EyePictures(np.ascontiguousarray(colours, np.float32), np.ascontiguousarray(normals, np.float32))
 
 
 def painted_head(device: Device, head: Head, side: int) -> tuple[Head, EyePictures | None]:
-    """The head `with_painted_maps`, and what its eyes look like, if they are of true shape."""
+    """Return the result of `with_painted_maps`, and pictures of the eyes if they are modelled."""
     eyes = None if head.eyes is None else eye_pictures(device, head.eyes.look)
     return with_painted_maps(device, head, side), eyes
 
 
 def with_painted_maps(device: Device, head: Head, side: int) -> Head:
-    """The head with its painted maps as arrays; maps of its own stay, and other heads are as they were.
+    """Return a head whose painted maps are arrays.
 
-    side : of the painted maps, a power of two from 256 to 4096 [texels]
+    Maps from files and heads without painted maps are unchanged.
+
+    side : side of the painted maps, a power of two from 256 to 4096 [texels]
 
     Raises DermisError for other sides.
     """
-    if not LEAST_SIDE <= side <= MOST_SIDE or side & (side - 1):
-        expected = f"a power of two from {LEAST_SIDE} to {MOST_SIDE}"
-        refuse("size of the maps", expected, f"{side} came", "Take 1024, 2048 or 4096")
+    if not MIN_SIDE <= side <= MAX_SIDE or side & (side - 1):
+        expected = f"a power of two from {MIN_SIDE} to {MAX_SIDE}"
+        refuse("size of the maps", expected, f"got {side}", "Take 1024, 2048 or 4096")
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
         return head
-    found = paint.painted_maps(device, painting(head.mesh, head.control.stencils), maps.look, side)
+    found = paint.paint_arrays(device, painted_surface(head.mesh, head.control.stencils), maps.look, side)
     given = {one.name: getattr(maps, one.name) for one in fields(found)}
     if given["normal"] is not None:
         found = replace(found, height=None)

@@ -4,29 +4,29 @@
 //#include "lines.wgsl"
 
 @group(0) @binding(3) var<storage, read> owners: array<u32>;
-@group(0) @binding(10) var colour_tables: texture_2d_array<f32>; // of skin and of lips, by roots of blood and of melanin
+@group(0) @binding(10) var colour_tables: texture_2d_array<f32>; // of skin and of lips, over the square roots of blood and melanin fractions
 @group(0) @binding(11) var colour: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(12) var specular: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(13) var roughness: texture_storage_2d<rgba16float, write>;
-@group(0) @binding(15) var moved: texture_storage_2d_array<rgba16float, write>; // what movements do, see movements.py
-@group(0) @binding(14) var<storage, read_write> heights: array<f32>; // with a texel more on all sides [mm]
+@group(0) @binding(15) var expression_deltas: texture_storage_2d_array<rgba16float, write>; // changes by movements, see expression.wgsl
+@group(0) @binding(14) var<storage, read_write> heights: array<f32>; // with a border of one texel [mm]
 
-// Artist's values.
+// Artistic values.
 const PATCHES: f32 = 0.22; // of melanin [doublings]
 const BLOTCHES: f32 = 0.40; // of blood
 const FRECKLE: f32 = 1.7;
 const AGE_SPOT: f32 = 1.3;
 const MOLE: f32 = 3.4;
-const TAN: f32 = 1.2; // from under clothes to where the sun shines most
+const TAN: f32 = 1.2; // between covered and most exposed skin
 const LIP_BLOOD: f32 = 1.9;
 const LIP_MELANIN: f32 = 0.5;
 const MUCOSA_BLOOD: f32 = 3.2;
 const RED_LIDS: f32 = 0.8;
 const RED_SLIT: f32 = 1.0;
-const STUBBLE_COLOUR: vec3f = vec3f(0.095, 0.085, 0.08); // hair seen through skin, which makes it blueish
+const STUBBLE_COLOUR: vec3f = vec3f(0.095, 0.085, 0.08); // hair below the surface; scattering makes it blueish
 const BEARD_COLOUR: vec3f = vec3f(0.11, 0.10, 0.095);
 const VEIN_COLOUR: vec3f = vec3f(0.80, 0.90, 1.0); // factor
-const STRENGTH: f32 = 0.86; // of the reflection, in parts of the usual one
+const STRENGTH: f32 = 0.86; // of the specular reflection, relative to the default
 const OILY_STRENGTH: f32 = 0.44;
 const ROUGHNESS: f32 = 0.36;
 const OILY_ROUGHNESS: f32 = -0.10;
@@ -34,11 +34,11 @@ const LIP_STRENGTH: f32 = 0.28;
 const LIP_ROUGHNESS: f32 = -0.07;
 const WET_STRENGTH: f32 = 0.55; // of the inside of the mouth and the lids' edges
 const WET_ROUGHNESS: f32 = -0.12;
-const INNER_LID: vec3f = vec3f(0.46, 0.19, 0.155); // where lids face the eye, and the caruncle
+const INNER_LID: vec3f = vec3f(0.46, 0.19, 0.155); // inner side of the lids, and the caruncle
 const TEARS: f32 = 0.11; // roughness there
 const UNEVEN: f32 = 0.15; // of the oil
 
-// The table's colour for shares of melanin and blood, bilinear in their roots.
+// Colour for fractions of melanin and blood, bilinear in their square roots.
 fn colour_of(table: u32, melanin: f32, blood: f32) -> vec3f {
     let nodes = f32(textureDimensions(colour_tables).x);
     let place = sqrt(saturate(vec2f(blood, melanin))) * (nodes - 1.0);
@@ -54,13 +54,13 @@ fn entry(table: u32, at: vec2u) -> vec3f {
     return textureLoad(colour_tables, at, table, 0).rgb;
 }
 
-// Thin branching lines, where noise is near zero.
+// Thin branching lines along the zeros of a noise.
 fn veins() -> f32 {
     let near = 1.0 - smoothstep(0.0, 0.10, abs(noise[NOISE_VEINS] + 0.08 * noise[NOISE_SUN]));
     return near * saturate(zone_of(ZONE_VEINS)) * paint.veins;
 }
 
-// Where lids face the eye, pink and covered by tears.
+// Weight of the inner side of the lids, which is pink and wet.
 fn inner_lid(spot: Spot) -> f32 {
     return smoothstep(0.1, -0.45, spot.fields.z);
 }
@@ -80,10 +80,10 @@ fn pigments(spot: Spot, lip: f32, mucosa: f32) -> vec2f {
 }
 
 fn over(below: vec3f, above: vec3f, share: f32) -> vec3f {
-    return mix(below, min(above, below), share); // what is dark already does not turn lighter
+    return mix(below, min(above, below), share); // dark colours do not become lighter
 }
 
-// Strength, in parts of the usual one, and roughness.
+// Specular strength relative to the default, and roughness.
 fn gloss(lip: f32, wet: f32, hair: f32, tears: f32) -> vec2f {
     let film = noise[NOISE_OIL_FILM] + 0.7 * noise[NOISE_FINE_FILM];
     let zones = 0.5 + 1.25 * paint.oil;
@@ -94,16 +94,16 @@ fn gloss(lip: f32, wet: f32, hair: f32, tears: f32) -> vec2f {
     return vec2f(clamp(strength, 0.3, 2.2), mix(clamp(m, 0.15, 0.6), TEARS, tears));
 }
 
-// flush, pressed: where blood comes to, and where it is pressed out
-fn keep_moved(at: vec2u, share: f32, flush: f32, pressed: f32) {
-    textureStore(moved, at, 0, share * vec4f(deepened[0], deepened[1], deepened[2], deepened[3]));
-    textureStore(moved, at, 1, vec4f(share * vec3f(deepened[4], deepened[5], deepened[6]), flush - pressed));
+// flush, pressed: gain of blood, and loss by pressure [-]
+fn store_deltas(at: vec2u, share: f32, flush: f32, pressed: f32) {
+    textureStore(expression_deltas, at, 0, share * vec4f(deepened[0], deepened[1], deepened[2], deepened[3]));
+    textureStore(expression_deltas, at, 1, vec4f(share * vec3f(deepened[4], deepened[5], deepened[6]), flush - pressed));
 }
 
-fn keep(at: vec2u, rgb: vec3f, shine: vec2f, height: f32, amounts: vec3f, shares: vec2f) {
+fn store_texel(at: vec2u, rgb: vec3f, shine: vec2f, height: f32, amounts: vec3f, pigments: vec2f) {
     textureStore(colour, at, vec4f(rgb, 1.0));
     textureStore(specular, at, vec4f(shine.x, amounts.x, amounts.z, 0.0));
-    textureStore(roughness, at, vec4f(shine.y, amounts.y, saturate(shares)));
+    textureStore(roughness, at, vec4f(shine.y, amounts.y, saturate(pigments)));
     heights[(at.y + 1u) * (paint.side + 2u) + at.x + 1u] = height;
 }
 
@@ -115,8 +115,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let owner = owners[id.y * paint.side + id.x];
     if (owner == 0u) {
         let shine = vec2f(STRENGTH + OILY_STRENGTH * paint.oil, ROUGHNESS + OILY_ROUGHNESS * paint.oil);
-        keep_moved(id.xy, 0.0, 0.0, 0.0);
-        keep(id.xy, colour_of(0u, paint.melanin, paint.blood), shine, 0.0, vec3f(0.0), vec2f(paint.melanin, paint.blood));
+        store_deltas(id.xy, 0.0, 0.0, 0.0);
+        store_texel(id.xy, colour_of(0u, paint.melanin, paint.blood), shine, 0.0, vec3f(0.0), vec2f(paint.melanin, paint.blood));
         return;
     }
     let spot = spot_of(owner, id.xy);
@@ -136,11 +136,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let wet = max(mucosa, 1.0 - smoothstep(0.2, 1.2, spot.fields.z));
     rgb = mix(rgb, INNER_LID * (1.0 + 0.15 * noise[NOISE_BLOTCHES]), 0.85 * inner);
     let away = f32(NEAREST - (owner >> ID_BITS)) / STEPS;
-    let runs_out = 1.0 - smoothstep(0.5 * MARGIN, MARGIN, away); // beside the charts
-    let height = relief(spot, lip) * runs_out * (1.0 - inner);
-    keep_moved(id.xy, runs_out, saturate(zone_of(ZONE_BLOOD)) * (1.0 - lip), lip);
+    let fade = 1.0 - smoothstep(0.5 * MARGIN, MARGIN, away); // to 0 outside the charts
+    let height = relief(spot, lip) * fade * (1.0 - inner);
+    store_deltas(id.xy, fade, saturate(zone_of(ZONE_BLOOD)) * (1.0 - lip), lip);
     let bare = (1.0 - lip) * (1.0 - mucosa) * (1.0 - inner);
     let pores = saturate(0.45 + zone_of(ZONE_PORES)) * bare;
     let furrows = max(1.0 + zone_of(ZONE_FURROWS), 0.2) * bare * (0.8 + 2.2 * paint.age * paint.age);
-    keep(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard), inner), height, vec3f(pores, furrows, spot.density), p);
+    store_texel(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard), inner), height, vec3f(pores, furrows, spot.density), p);
 }

@@ -1,1 +1,1 @@
-"""The search for translucent pairs of places, on the device."""
+"""Search for translucent pairs on the device."""

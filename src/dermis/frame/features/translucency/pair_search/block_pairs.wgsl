@@ -1,8 +1,8 @@
-// Which blocks may have translucent pairs with each other, a bit for each.
+// Bits that tell between which blocks of tiles translucent pairs are possible.
 //#include "bounds.wgsl"
 
 @group(0) @binding(3) var<storage, read> blocks: array<Bounds>;
-@group(0) @binding(4) var<storage, read_write> near: array<u32>; // of each block a row of words
+@group(0) @binding(4) var<storage, read_write> block_pairs: array<u32>; // a row of words for each block
 
 @compute @workgroup_size(EACH)
 fn main(
@@ -22,5 +22,5 @@ fn main(
     for (var k = first; k < min(first + 32u, all); k++) {
         bits |= select(0u, 1u, may_pair(block, blocks[k])) << (k - first);
     }
-    near[index] = bits;
+    block_pairs[index] = bits;
 }

@@ -1,4 +1,4 @@
-// What each block of tiles shows: a box and a cone around theirs.
+// Bounding box and normal cone of each block of tiles, from those of its tiles.
 //#include "bounds.wgsl"
 
 @group(0) @binding(3) var<storage, read> tiles: array<Bounds>;
@@ -16,36 +16,36 @@ fn main(
     }
     let begin = search.block * vec2u(index % search.blocks, index / search.blocks);
     let end = min(begin + search.block, vec2u(search.tiles));
-    var made = nothing();
+    var bounds = empty_bounds();
     for (var y = begin.y; y < end.y; y++) {
         for (var x = begin.x; x < end.x; x++) {
             let tile = tiles[y * search.tiles + x];
-            made.low = min(made.low, tile.low);
-            made.high = max(made.high, tile.high);
-            made.axis += tile.axis;
-            made.any |= tile.any;
+            bounds.low = min(bounds.low, tile.low);
+            bounds.high = max(bounds.high, tile.high);
+            bounds.axis += tile.axis;
+            bounds.occupied |= tile.occupied;
         }
     }
-    made.axis = unit_or_zero(made.axis);
+    bounds.axis = unit_or_zero(bounds.axis);
     var cosine = 1.0;
     for (var y = begin.y; y < end.y; y++) {
         for (var x = begin.x; x < end.x; x++) {
             let tile = tiles[y * search.tiles + x];
-            if (tile.any > 0u) {
-                cosine = min(cosine, farthest(made.axis, tile));
+            if (tile.occupied > 0u) {
+                cosine = min(cosine, widest_cosine(bounds.axis, tile));
             }
         }
     }
-    if (made.any > 0u) {
-        made = coned(made, cosine);
+    if (bounds.occupied > 0u) {
+        bounds = with_cone(bounds, cosine);
     }
-    blocks[index] = made;
+    blocks[index] = bounds;
 }
 
-// Cosine of the widest angle between an axis and a tile's normals.
-fn farthest(axis: vec3f, tile: Bounds) -> f32 {
+// Cosine of the widest angle between an axis and the normals of a tile.
+fn widest_cosine(axis: vec3f, tile: Bounds) -> f32 {
     let between = clamp(dot(axis, tile.axis), -1.0, 1.0);
     let sine = sqrt(1.0 - between * between);
-    let past = sine * tile.cosine + between * tile.sine < 0.0; // more than a half turn
-    return select(between * tile.cosine - sine * tile.sine, -1.0, past);
+    let beyond = sine * tile.cosine + between * tile.sine < 0.0; // more than a half turn
+    return select(between * tile.cosine - sine * tile.sine, -1.0, beyond);
 }

@@ -1,22 +1,22 @@
-// Which sources lie across the flesh from each receiver: a word of bits for each tile that its own one faces.
+// Sources that form a pair with each receiver, as a word of bits for each tile that is a partner of the receiver's tile.
 //#include "bounds.wgsl"
 
 @group(0) @binding(3) var<storage, read> receiver_points: array<Receiver>;
 @group(0) @binding(4) var<storage, read> source_points: array<Source>;
-@group(0) @binding(5) var<storage, read> looks: array<vec4u>; // of receivers: tiles that are faced, first and end; first word
-@group(0) @binding(6) var<storage, read> facing: array<u32>; // tiles
+@group(0) @binding(5) var<storage, read> receiver_ranges: array<vec4u>; // range in `partners` of each receiver's tile, and the first word of its hits
+@group(0) @binding(6) var<storage, read> partners: array<u32>; // tiles
 @group(0) @binding(7) var<storage, read> tiles: array<Bounds>;
-@group(0) @binding(8) var<storage, read> sources_of: array<vec2u>; // first and end of each tile's
+@group(0) @binding(8) var<storage, read> source_ranges: array<vec2u>; // range of sources of each tile
 @group(0) @binding(9) var<storage, read_write> hits: array<u32>;
-@group(0) @binding(10) var<storage, read_write> counts: array<u32>; // of each receiver
+@group(0) @binding(10) var<storage, read_write> counts: array<u32>; // pairs of each receiver
 
 const PI: f32 = 3.14159265358979;
 
-// Whether a pair within reach lets light pass that counts, by the widest Gaussian.
-fn counts_ever(lie: Lie, area: f32) -> bool {
-    let share = share_of(lie.cosine - TURN, lie.inward + TURN);
+// Whether a pair may transmit a relevant fraction of light, by the widest Gaussian.
+fn may_matter(geometry: PairGeometry, area: f32) -> bool {
+    let fraction = pair_fraction(geometry.cosine - TURN_MARGIN, geometry.inward + TURN_MARGIN);
     let v = search.variance_mm2;
-    return share * area * exp(-0.5 * lie.square / v) > LEAST * 2.0 * PI * v;
+    return fraction * area * exp(-0.5 * geometry.distance2 / v) > MIN_FRACTION * 2.0 * PI * v;
 }
 
 @compute @workgroup_size(EACH)
@@ -29,26 +29,26 @@ fn main(
     if (index >= search.count) {
         return;
     }
-    let place = receiver_points[index].position;
+    let position = receiver_points[index].position;
     let normal = receiver_points[index].normal;
-    let point = Bounds(place, 1.0, place, 0.0, normal, 1u);
-    let look = looks[index];
+    let point = Bounds(position, 1.0, position, 0.0, normal, 1u);
+    let range = receiver_ranges[index];
     var count = 0u;
-    for (var k = look.x; k < look.y; k++) {
-        let other = facing[k];
-        let listed = sources_of[other];
-        let end = select(listed.x, listed.y, may_pair(point, tiles[other]));
+    for (var k = range.x; k < range.y; k++) {
+        let other = partners[k];
+        let sources = source_ranges[other];
+        let end = select(sources.x, sources.y, may_pair(point, tiles[other]));
         var bits = 0u;
-        for (var j = listed.x; j < end; j++) {
+        for (var j = sources.x; j < end; j++) {
             let source = source_points[j];
-            let to = source.centre - place;
-            // the rest takes longer, and most are out of reach
-            if (dot(to, to) < search.radius_mm * search.radius_mm && dot(normal, source.normal) < ASKEW + TURN) {
-                let counted = counts_ever(lie_of(place, normal, source), source.area);
-                bits |= select(0u, 1u, counted) << (j - listed.x);
+            let to = source.centre - position;
+            // cheap tests first: most sources are out of reach
+            if (dot(to, to) < search.radius_mm * search.radius_mm && dot(normal, source.normal) < MAX_COSINE + TURN_MARGIN) {
+                let matters = may_matter(pair_geometry(position, normal, source), source.area);
+                bits |= select(0u, 1u, matters) << (j - sources.x);
             }
         }
-        hits[look.z + k - look.x] = bits;
+        hits[range.z + k - range.x] = bits;
         count += countOneBits(bits);
     }
     counts[index] = count;

@@ -1,7 +1,7 @@
-// Places in the map.
+// Positions in the atlas, as integers.
 
-const FINE: i32 = 8; // parts of a texel
-const COPIES: u32 = 8u; // in gutters, of each source at most
+const FINE: i32 = 8; // steps per texel
+const COPIES: u32 = 8u; // of a source in gutters, at most
 
 fn unpacked(word: u32) -> vec2i {
     return vec2i(vec2u(word & 0xffffu, word >> 16u));

@@ -1,4 +1,4 @@
-"""The search for translucent pairs: tiles that face each other, cells in them, then pairs of places."""
+"""Search for translucent pairs: pairs of tiles whose normals oppose, their cells, then pairs of cells."""
 
 from __future__ import annotations
 
@@ -7,156 +7,139 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.translucency.cells import BESIDE, TILE, Cells
+from dermis.atlas.translucency.cells import TILE_CELLS, TILE_MARGIN_TEXELS, Cells
 from dermis.frame.features.translucency.passes import (
     RECEIVER_BYTES,
     SOURCE_BYTES,
     draw_receivers,
     draw_sources,
-    space,
+    make_buffer,
 )
-from dermis.frame.programs import each, program
+from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Bindings, Buffer, CommandList, Constants, Device
 
 Words = NDArray[np.uint32]
 Index = NDArray[np.int64]
-_MOST_BLOCKS = 40  # along a side
+_MAX_BLOCKS = 40  # along a side
 _BOUNDS_BYTES = 48  # as in bounds.wgsl
-_LISTED: Constants = (("LISTED", 1),)
-_COPIES = 8  # in gutters, of each source at most, as in map_positions.wgsl
+_COPIES = 8  # of a source in gutters, at most, as in map_positions.wgsl
 _PAIR_BYTES = 12
 
 
-@dataclass(frozen=True, eq=False)
-class CellTables:
-    """What all searches on an atlas read of its cells, as buffers.
-
-    every : all tiles, as tile_pairs.wgsl reads them
-    triangle_first, triangles : as tiles.wgsl reads them
-    gutters : as gutter_copies.wgsl reads it
-    """
-
-    every: Buffer
-    triangle_first: Buffer
-    triangles: Buffer
-    gutters: Buffer
-
-
-def cell_tables(device: Device, cells: Cells) -> CellTables:
-    """The tables of an atlas' cells."""
-    count = cells.tiles**2
-    lists = (np.arange(count), np.zeros(count, np.int64)), (cells.triangle_first,), (cells.triangle,)
-    return CellTables(*(upload_words(device, *columns) for columns in (*lists, cells.copy.T)))
-
-
 class SearchPasses:
-    """Passes that run at once, for what they count decides the next ones.
+    """Passes of a search, which are submitted whenever the next ones depend on their results.
 
-    frame : that they are recorded in
-    blocks : of tiles, along a side of the atlas
+    commands : command list of the passes that are not yet submitted
+    blocks : number of blocks of tiles along a side of the atlas
     """
 
     def __init__(self, device: Device, cells: Cells) -> None:
-        block = -(-cells.tiles // _MOST_BLOCKS)
-        self.device, self.frame = device, CommandList(device, timed=False)
-        self.blocks = -(-cells.tiles // block)
-        self._told = {
+        block = -(-cells.tiles_per_side // _MAX_BLOCKS)
+        self.device, self.commands = device, CommandList(device, timed=False)
+        self.blocks = -(-cells.tiles_per_side // block)
+        self._parameters = {
             "radius_mm": cells.radius_mm,
-            "variance_mm2": cells.widest_mm**2,
-            "tile": TILE / cells.side,
-            "beside": BESIDE / cells.size,
-            "tiles": cells.tiles,
+            "variance_mm2": cells.max_sigma_mm**2,
+            "tile": TILE_CELLS / cells.side,
+            "margin": TILE_MARGIN_TEXELS / cells.size,
+            "tiles": cells.tiles_per_side,
             "blocks": self.blocks,
             "block": block,
         }
 
-    def add(self, name: str, count: int, bound: Bindings, constants: Constants = ()) -> None:
-        """Add a pass of `count` invocations; its shader reads the parameters of the search."""
+    def add(self, name: str, count: int, bindings: Bindings, constants: Constants = ()) -> None:
+        """Add a pass with an invocation for each of `count` elements."""
         shader = program(self.device, f"translucency/pair_search/{name}.wgsl", constants)
-        record = shader.record("Search", **self._told, count=count)
-        self.frame.dispatch("pair search", shader, {**bound, "search": record}, each(count))
+        record = shader.record("Search", **self._parameters, count=count)
+        self.commands.dispatch("pair search", shader, {**bindings, "search": record}, workgroup_grid(count))
 
     def read(self, buffer: Buffer, count: int) -> Index:
-        """The first words that the passes so far leave there."""
-        self.frame.submit()
-        self.frame = CommandList(self.device, timed=False)
+        """Submit the passes so far, and return the first words of a buffer."""
+        self.commands.submit()
+        self.commands = CommandList(self.device, timed=False)
         words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
         return words[:count].astype(np.int64)
 
     def upload(self, *columns: NDArray[np.integer]) -> Buffer:
-        """Buffer of a table of words, with zeros where there are no rows."""
+        """Upload a table of words, see `upload_words`."""
         return upload_words(self.device, *columns)
 
 
 def upload_words(device: Device, *columns: NDArray[np.integer]) -> Buffer:
-    """Buffer of a table of words, given by its columns; one row of zeros where there are none."""
+    """Upload a table of words, given by its columns; a table without rows becomes one row of zeros."""
     table = np.zeros((max(1, len(columns[0])), len(columns)), np.uint32)
     for k, column in enumerate(columns):
         table[: len(column), k] = column
     return device.buffer(table, "STORAGE")
 
 
-def starts(counts: Index) -> Index:
-    """(n + 1,) where each of some lists begins in all of them, and where the last one ends."""
+def list_offsets(counts: Index) -> Index:
+    """Return (n + 1,) the offset of each of n concatenated lists, and their total length."""
     return np.concatenate([[0], np.cumsum(counts)])
 
 
 @dataclass(frozen=True, eq=False)
-class Facing:
-    """Tiles that may have pairs.
+class TilePairs:
+    """Pairs of tiles between which translucent pairs are possible.
 
-    bounds : buffer of boxes and cones of all tiles
-    tile : (t,) those that face any
-    first : (t + 1,) where the list of each begins
-    listed : buffer of the tiles that they face
+    bounds : buffer of the bounding box and normal cone of each tile
+    tile : (t,) tiles that are part of any pair
+    first : (t + 1,) range of each in `partners`
+    partners : buffer of the other tiles of the pairs
     """
 
     bounds: Buffer
     tile: Index
     first: Index
-    listed: Buffer
+    partners: Buffer
 
 
-def find_facing(passes: SearchPasses, surface: Bindings, cells: Cells, tables: CellTables) -> Facing:
-    """Which tiles may have pairs with which.
+def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> TilePairs:
+    """Return the pairs of tiles between which translucent pairs are possible.
 
     surface : resources of geometry.wgsl
     """
-    device, count = passes.device, cells.tiles**2
-    tiles, counts = space(device, count, _BOUNDS_BYTES), space(device, count)
-    bound = {"tiles": tiles, "near": _near(passes, surface, tables, tiles, count)}
-    passes.add("facing", count, {**bound, "asked": tables.every, "facing": counts})
-    number = passes.read(counts, count)
-    tile = np.flatnonzero(number)
-    first = starts(number[tile])
-    asked, listed = passes.upload(tile, first[:-1]), space(device, int(first[-1]))
-    passes.add("facing", len(tile), {**bound, "asked": asked, "facing": listed}, _LISTED)
-    return Facing(tiles, tile, first, listed)
+    device, count = passes.device, cells.tiles_per_side**2
+    tiles, counts = make_buffer(device, count, _BOUNDS_BYTES), make_buffer(device, count)
+    bindings = {"tiles": tiles, "block_pairs": _find_block_pairs(passes, surface, cells, tiles)}
+    every_tile = passes.upload(np.arange(count), np.zeros(count, np.int64))
+    passes.add("tile_pairs", count, {**bindings, "queries": every_tile, "partners": counts})
+    partner_count = passes.read(counts, count)
+    tile = np.flatnonzero(partner_count)
+    first = list_offsets(partner_count[tile])
+    partners = make_buffer(device, int(first[-1]))
+    bindings |= {"queries": passes.upload(tile, first[:-1]), "partners": partners}
+    passes.add("tile_pairs", len(tile), bindings, (("LISTED", 1),))
+    return TilePairs(tiles, tile, first, partners)
 
 
-def _near(passes: SearchPasses, surface: Bindings, tables: CellTables, tiles: Buffer, count: int) -> Buffer:
-    """Buffer of the blocks of tiles that may have pairs with each other.
+def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, tiles: Buffer) -> Buffer:
+    """Return a buffer of bits: whether translucent pairs are possible between two blocks of tiles.
 
-    tiles, count : buffer to fill with the bounds of tiles, and how many there are
+    tiles : buffer to fill with the bounds of the tiles
     """
     blocks = passes.blocks**2
     words = blocks * -(-blocks // 32)
-    boxes, near = space(passes.device, blocks, _BOUNDS_BYTES), space(passes.device, words)
-    shown = {"triangle_first": tables.triangle_first, "triangles": tables.triangles}
-    passes.add("tiles", count, {**surface, **shown, "tiles": tiles})
-    passes.add("blocks", blocks, {"tiles": tiles, "blocks": boxes})
-    passes.add("near", words, {"blocks": boxes, "near": near})
-    return near
+    bounds = make_buffer(passes.device, blocks, _BOUNDS_BYTES)
+    block_pairs = make_buffer(passes.device, words)
+    triangles = {
+        "triangle_first": passes.upload(cells.triangle_first),
+        "triangles": passes.upload(cells.triangles),
+    }
+    passes.add("tiles", cells.tiles_per_side**2, {**surface, **triangles, "tiles": tiles})
+    passes.add("blocks", blocks, {"tiles": tiles, "blocks": bounds})
+    passes.add("block_pairs", words, {"blocks": bounds, "block_pairs": block_pairs})
+    return block_pairs
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
-    """Cells in tiles that may have pairs, one tile after the other.
+class CandidateCells:
+    """Cells that may be part of pairs, in the order of their tiles.
 
-    receiver : (r,) among the cells that take light
-    source : (s,) cells that give it
-    first, end : (r,) where each receiver's tile begins and ends in the list of the tiles that it faces
-    sources_first, sources_end : (t,) those of each tile of the atlas
+    receiver : (r,) indices among the cells that receive light
+    source : (s,) cells that emit light
+    first, end : (r,) range in `TilePairs.partners` of the tile of each receiver
+    sources_first, sources_end : (t,) range in `source` of each tile of the atlas
     """
 
     receiver: Index
@@ -167,89 +150,96 @@ class Places:
     sources_end: Index
 
 
-def places_of(cells: Cells, facing: Facing) -> Places:
-    """The cells of tiles that face others."""
-    tile = facing.tile
-    receiver, of = _runs(cells.taking_first, tile)
-    source, _ = _runs(cells.giving_first, tile)
-    count = np.zeros(cells.tiles**2, np.int64)
-    count[tile] = cells.giving_first[tile + 1] - cells.giving_first[tile]
+def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
+    """Return the cells of all tiles that are part of a pair."""
+    tile = tile_pairs.tile
+    receiver, receiver_tile = _expand_ranges(cells.receiver_first, tile)
+    source, _ = _expand_ranges(cells.source_first, tile)
+    count = np.zeros(cells.tiles_per_side**2, np.int64)
+    count[tile] = cells.source_first[tile + 1] - cells.source_first[tile]
     end = np.cumsum(count)
-    ranges = facing.first[:-1][of], facing.first[1:][of]
-    return Places(receiver, cells.giving[source], *ranges, end - count, end)
+    ranges = tile_pairs.first[:-1][receiver_tile], tile_pairs.first[1:][receiver_tile]
+    return CandidateCells(receiver, cells.sources[source], *ranges, end - count, end)
 
 
-def _runs(first: Index, chosen: Index) -> tuple[Index, Index]:
-    """All numbers of some of the runs that begin and end there, and which of those each belongs to."""
+def _expand_ranges(first: Index, chosen: Index) -> tuple[Index, Index]:
+    """Return all numbers in ranges first[i] to first[i + 1] for the chosen i, and the position of i in chosen."""
     count = first[chosen + 1] - first[chosen]
-    of = np.repeat(np.arange(len(chosen)), count)
-    return np.arange(len(of)) + np.repeat(first[chosen] - starts(count)[:-1], count), of
+    position = np.repeat(np.arange(len(chosen)), count)
+    numbers = np.arange(len(position)) + np.repeat(first[chosen] - list_offsets(count)[:-1], count)
+    return numbers, position
 
 
-def draw_places(passes: SearchPasses, surface: Bindings, cells: Cells, places: Places) -> Bindings:
-    """Buffers of where receivers and sources lie, by the names in the shaders.
+def draw_points(
+    passes: SearchPasses, surface: Bindings, cells: Cells, candidates: CandidateCells
+) -> Bindings:
+    """Return the buffers of the positions of receivers and sources, by their names in the shaders.
 
     surface : resources of geometry.wgsl and of the atlas
     """
-    device, frame = passes.device, passes.frame
-    taken = space(device, len(places.receiver), RECEIVER_BYTES)
-    given = space(device, len(places.source), SOURCE_BYTES)
-    receivers = upload_receivers(device, cells, places.receiver)
-    draw_receivers(frame, surface, cells, receivers, taken, facets=True)
-    draw_sources(frame, surface, cells, upload_sources(device, cells, places.source), given)
-    return {"receiver_points": taken, "source_points": given}
+    device, commands = passes.device, passes.commands
+    receiver_points = make_buffer(device, len(candidates.receiver), RECEIVER_BYTES)
+    source_points = make_buffer(device, len(candidates.source), SOURCE_BYTES)
+    receivers = upload_receivers(device, cells, candidates.receiver)
+    draw_receivers(commands, surface, cells, receivers, receiver_points, facets=True)
+    draw_sources(commands, surface, cells, upload_sources(device, cells, candidates.source), source_points)
+    return {"receiver_points": receiver_points, "source_points": source_points}
 
 
-def looks(passes: SearchPasses, places: Places) -> tuple[Bindings, int]:
-    """Buffers of what each receiver looks at, as hits.wgsl reads them, and how many words its hits take."""
-    word = starts(places.end - places.first)
-    none = np.zeros(len(places.receiver), np.int64)
-    ranges = places.sources_first, places.sources_end
-    bound = {
-        "looks": passes.upload(places.first, places.end, word[:-1], none),
-        "sources_of": passes.upload(*ranges),
+def upload_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
+    """Upload the ranges that hits.wgsl reads, and return their buffers and the number of words of all hits."""
+    word = list_offsets(candidates.end - candidates.first)
+    unused = np.zeros(len(candidates.receiver), np.int64)
+    ranges = candidates.sources_first, candidates.sources_end
+    bindings = {
+        "receiver_ranges": passes.upload(candidates.first, candidates.end, word[:-1], unused),
+        "source_ranges": passes.upload(*ranges),
     }
-    return bound, int(word[-1])
+    return bindings, int(word[-1])
 
 
-def draw_copies(passes: SearchPasses, cells: Cells, source: Index, bound: Bindings) -> Buffer:
-    """Buffer of the places in gutters that show sources, as gutter_copies.wgsl writes it.
+def draw_gutter_copies(passes: SearchPasses, cells: Cells, source: Index, bindings: Bindings) -> Buffer:
+    """Return the buffer of positions in gutters that show sources, see gutter_copies.wgsl.
 
     source : (n,) cells
-    bound : what gutter_copies.wgsl reads besides
+    bindings : further resources of gutter_copies.wgsl
     """
     side, ranges = cells.side, list[Index]()
     y, x = np.divmod(source, side)
     for row in (y - 1, y, y + 1):
         within = (row >= 0) & (row < side)
         begin = np.clip(row, 0, side - 1) * side
-        first = cells.copy_first[begin + np.maximum(x - 1, 0)]
-        end = cells.copy_first[begin + np.minimum(x + 1, side - 1) + 1]
+        first = cells.gutter_copy_first[begin + np.maximum(x - 1, 0)]
+        end = cells.gutter_copy_first[begin + np.minimum(x + 1, side - 1) + 1]
         ranges += [first, np.where(within, end, first)]
-    copies = space(passes.device, _COPIES * len(source))
-    passes.add("copies", len(source), {**bound, "rows": passes.upload(*ranges), "copies": copies})
+    copies = make_buffer(passes.device, _COPIES * len(source))
+    resources = {**bindings, "rows": passes.upload(*ranges), "copies": copies}
+    passes.add("gutter_copies", len(source), resources)
     return copies
 
 
 def upload_receivers(device: Device, cells: Cells, receiver: Index) -> tuple[Buffer, int]:
-    """Buffer of triangles, weights and cells of some of the cells that take light, and how many there are."""
-    columns = *cells.middle[receiver].T, cells.taking[receiver], np.zeros(len(receiver), np.int64)
+    """Upload triangle, weights and cell of receivers; return the buffer and their number.
+
+    receiver : (n,) indices among the cells that receive light
+    """
+    columns = *cells.receiver_points[receiver].T, cells.receivers[receiver], np.zeros(len(receiver), np.int64)
     return upload_words(device, *columns), len(receiver)
 
 
 def upload_sources(device: Device, cells: Cells, cell: Index) -> tuple[Buffer, int]:
-    """Buffer of cells that give light, and how many there are."""
+    """Upload the packed (x, y) of cells that emit light; return the buffer and their number."""
     return upload_words(device, cell % cells.side | (cell // cells.side << 16)), len(cell)
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """Pairs, and what they join.
+class PairTable:
+    """Translucent pairs as the search returns them, ordered by receiver.
 
-    receiver : (m,) those that have any, among the cells that take light
-    first : (m + 1,) where the pairs of each begin
-    source : (n,) cells that give light
-    pairs : buffer of three words each: source, receiver, offset in the map
+    receiver : (m,) receivers of any pair, as indices among the cells that receive light
+    first : (m + 1,) range of pairs of each receiver
+    source : (n,) cells that emit light in any pair
+    pairs : buffer of three words for each pair: source, receiver, offset in the atlas
     """
 
     receiver: Index
@@ -258,50 +248,59 @@ class Found:
     pairs: Buffer
 
 
-def search(device: Device, surface: Bindings, cells: Cells, tables: CellTables) -> Found | None:
-    """All pairs that let light pass that counts; None where a buffer cannot hold them.
+def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable | None:
+    """Return all pairs that transmit a relevant amount of light, None if a buffer cannot hold them.
 
-    surface : resources of geometry.wgsl, for the shape to search on, and of the atlas
+    surface : resources of geometry.wgsl for the shape to search in, and of the atlas
     """
     passes = SearchPasses(device, cells)
-    facing = find_facing(passes, surface, cells, tables)
-    places = places_of(cells, facing)
-    seen, words = looks(passes, places)
-    count = len(places.receiver)
+    tile_pairs = find_tile_pairs(passes, surface, cells)
+    candidates = candidate_cells(cells, tile_pairs)
+    ranges, words = upload_ranges(passes, candidates)
+    count = len(candidates.receiver)
     if max(4 * words, RECEIVER_BYTES * count) > device.max_storage_bytes:
         return None
-    points = draw_places(passes, surface, cells, places)
-    hits, counts = space(device, words), space(device, count)
-    seen = {**seen, "facing": facing.listed, "hits": hits}
-    passes.add("hits", count, {**seen, **points, "tiles": facing.bounds, "counts": counts})
-    number = passes.read(counts, count)
-    if _PAIR_BYTES * number.sum() > device.max_storage_bytes:
+    points = draw_points(passes, surface, cells, candidates)
+    hits, counts = make_buffer(device, words), make_buffer(device, count)
+    hit_bindings = {**ranges, "partners": tile_pairs.partners, "hits": hits}
+    passes.add("hits", count, {**hit_bindings, **points, "tiles": tile_pairs.bounds, "counts": counts})
+    pair_count = passes.read(counts, count)
+    if _PAIR_BYTES * pair_count.sum() > device.max_storage_bytes:
         return None
-    bound = {**points, "reach_map": surface["reach_map"], "gutters": tables.gutters}
-    return _listed(passes, cells, places, number, seen, bound)
+    gutters = passes.upload(*cells.gutter_copies.T)
+    map_bindings = {**points, "reach_map": surface["reach_map"], "gutters": gutters}
+    return _list_pairs(passes, cells, candidates, pair_count, hit_bindings, map_bindings)
 
 
-def _listed(
-    passes: SearchPasses, cells: Cells, places: Places, number: Index, seen: Bindings, bound: Bindings
-) -> Found:
-    """The hits as pairs, without the cells that have none.
+def _list_pairs(
+    passes: SearchPasses,
+    cells: Cells,
+    candidates: CandidateCells,
+    pair_count: Index,
+    hit_bindings: Bindings,
+    map_bindings: Bindings,
+) -> PairTable:
+    """Return the hits as a list of pairs, without the cells that have none.
 
-    number : (r,) pairs of each receiver
-    seen : what hits.wgsl has read and written
-    bound : what gutter_copies.wgsl and offsets.wgsl read besides
+    pair_count : (r,) pairs of each receiver
+    hit_bindings : resources that hits.wgsl and pairs.wgsl share
+    map_bindings : resources that gutter_copies.wgsl and offsets.wgsl share
     """
-    device, sources, first = passes.device, len(places.source), starts(number)
-    count, begins = int(first[-1]), passes.upload(first)
-    pairs, used = space(device, count, _PAIR_BYTES), space(device, sources)
-    passes.add("pairs", len(number), {**seen, "first": begins, "pairs": pairs, "used": used})
-    taken, given = number > 0, passes.read(used, sources) > 0
-    asked = np.flatnonzero(given)
-    looked_up = {**bound, "asked": passes.upload(asked)}
-    numbers = {
-        "number_of_receiver": passes.upload(np.cumsum(taken) - taken),
-        "number_of_source": passes.upload(np.cumsum(given) - given),
-        "copies": draw_copies(passes, cells, places.source[asked], looked_up),
+    device, sources, first = passes.device, len(candidates.source), list_offsets(pair_count)
+    count, first_pair = int(first[-1]), passes.upload(first)
+    pairs, used = make_buffer(device, count, _PAIR_BYTES), make_buffer(device, sources)
+    passes.add("pairs", len(pair_count), {**hit_bindings, "first": first_pair, "pairs": pairs, "used": used})
+    is_receiver, is_source = pair_count > 0, passes.read(used, sources) > 0
+    chosen = np.flatnonzero(is_source)
+    copy_bindings = {**map_bindings, "queries": passes.upload(chosen)}
+    bindings = {
+        **map_bindings,
+        "receiver_index": passes.upload(np.cumsum(is_receiver) - is_receiver),
+        "source_index": passes.upload(np.cumsum(is_source) - is_source),
+        "copies": draw_gutter_copies(passes, cells, candidates.source[chosen], copy_bindings),
+        "pairs": pairs,
     }
-    passes.add("offsets", count, {**bound, **numbers, "pairs": pairs})
-    passes.frame.submit()
-    return Found(places.receiver[taken], starts(number[taken]), places.source[asked], pairs)
+    passes.add("offsets", count, bindings)
+    passes.commands.submit()
+    receiver = candidates.receiver[is_receiver]
+    return PairTable(receiver, list_offsets(pair_count[is_receiver]), candidates.source[chosen], pairs)

@@ -1,17 +1,17 @@
-// What a search for translucent pairs is told.
+// Parameters of a search for translucent pairs.
 
 struct Search {
-    radius_mm: f32,
+    radius_mm: f32, // largest distance of a pair
     variance_mm2: f32, // of the widest Gaussian
-    tile: f32, // side in the map, which has 1
-    beside: f32, // by which it may show more than it covers, likewise
-    tiles: u32, // along a side of the atlas
-    blocks: u32, // along a side, each of some tiles
-    block: u32, // tiles along the side of a block
-    count: u32, // of what is looked at: tiles, receivers, pairs
+    tile: f32, // side of a tile, in units of the side of the atlas
+    margin: f32, // by which a tile may show more than it covers, in the same unit
+    tiles: u32, // tiles along a side of the atlas
+    blocks: u32, // blocks of tiles along a side of the atlas
+    block: u32, // tiles along a side of a block
+    count: u32, // number of invocations: tiles, receivers, pairs
 }
 
 @group(0) @binding(2) var<uniform> search: Search;
 
-const TURN: f32 = 0.05; // cosines by which normals may turn when the surface moves
-const LEAST: f32 = 4e-5; // share of a source's light that a pair must let pass to count
+const TURN_MARGIN: f32 = 0.05; // tolerance of cosines, for normals that turn when the surface moves
+const MIN_FRACTION: f32 = 4e-5; // least fraction of the light of a source that a pair has to transmit

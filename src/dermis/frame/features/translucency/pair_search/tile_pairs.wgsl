@@ -1,31 +1,31 @@
-// The tiles that each tile may have translucent pairs with: how many there are, or which.
+// For each tile, the number or the list of tiles with which translucent pairs are possible.
 //#include "bounds.wgsl"
 
-override LISTED: bool = false; // whether they are written down
+override LISTED: bool = false; // whether to write the list instead of the number
 
 @group(0) @binding(3) var<storage, read> tiles: array<Bounds>;
-@group(0) @binding(4) var<storage, read> near: array<u32>; // blocks, as block_pairs.wgsl has them
-@group(0) @binding(5) var<storage, read> asked: array<vec2u>; // tile, and where its list begins
-@group(0) @binding(6) var<storage, read_write> facing: array<u32>; // counts, or lists
+@group(0) @binding(4) var<storage, read> block_pairs: array<u32>; // see block_pairs.wgsl
+@group(0) @binding(5) var<storage, read> queries: array<vec2u>; // tile, and offset of its list
+@group(0) @binding(6) var<storage, read_write> partners: array<u32>; // numbers, or lists of tiles
 
 var<private> tile: Bounds;
 var<private> next: u32;
 
-fn add(other: u32) {
+fn add_partner(other: u32) {
     if (may_pair(tile, tiles[other])) {
         if (LISTED) {
-            facing[next] = other;
+            partners[next] = other;
         }
         next++;
     }
 }
 
-fn add_block(index: u32) {
+fn add_block_partners(index: u32) {
     let begin = search.block * vec2u(index % search.blocks, index / search.blocks);
     let end = min(begin + search.block, vec2u(search.tiles));
     for (var y = begin.y; y < end.y; y++) {
         for (var x = begin.x; x < end.x; x++) {
-            add(y * search.tiles + x);
+            add_partner(y * search.tiles + x);
         }
     }
 }
@@ -40,20 +40,20 @@ fn main(
     if (index >= search.count) {
         return;
     }
-    let own = asked[index];
-    tile = tiles[own.x];
-    next = own.y;
-    let block = (own.x / search.tiles / search.block) * search.blocks + (own.x % search.tiles) / search.block;
+    let query = queries[index];
+    tile = tiles[query.x];
+    next = query.y;
+    let block = (query.x / search.tiles / search.block) * search.blocks + (query.x % search.tiles) / search.block;
     let words = (search.blocks * search.blocks + 31u) / 32u;
     for (var k = 0u; k < words; k++) {
-        var bits = near[block * words + k];
+        var bits = block_pairs[block * words + k];
         while (bits != 0u) {
             let bit = firstTrailingBit(bits);
             bits &= bits - 1u;
-            add_block(32u * k + bit);
+            add_block_partners(32u * k + bit);
         }
     }
     if (!LISTED) {
-        facing[index] = next - own.y;
+        partners[index] = next - query.y;
     }
 }

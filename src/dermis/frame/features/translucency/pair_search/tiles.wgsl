@@ -1,4 +1,4 @@
-// What each tile of the atlas shows: a box around the parts of triangles in it, and a cone around their normals.
+// Bounding box and normal cone of each tile of the atlas, from the triangles clipped to it.
 //#include "shape/geometry.wgsl"
 //#include "bounds.wgsl"
 
@@ -6,50 +6,50 @@
 @group(0) @binding(4) var<storage, read> triangles: array<u32>;
 @group(0) @binding(5) var<storage, read_write> tiles: array<Bounds>;
 
-// Four places, or three, around the part of a triangle that a tile shows.
-struct Part {
+// Bounds of the part of a triangle that lies in a tile: its box, and normals at three or four corners.
+struct ClippedTriangle {
     low: vec3f,
     high: vec3f,
     normals: array<vec3f, 4>,
 }
 
-// Between the corners of a rectangle of the map positions and normals are between those there.
-fn part_of(index: u32, tile_low: vec2f, tile_high: vec2f) -> Part {
+// Within a rectangle of the atlas positions and normals are linear, so that its corners bound them.
+fn clip_triangle(index: u32, tile_low: vec2f, tile_high: vec2f) -> ClippedTriangle {
     let t = triangle_at(index);
     let a = corner_at(t.x);
     let b = corner_at(t.y);
     let c = corner_at(t.z);
     let ab = bitcast<vec4f>(triangle_row(index, 1u));
     let third = bitcast<vec2f>(triangle_row(index, 2u).xy);
-    let beside = vec2f(search.beside);
-    let least = min(min(ab.xy, ab.zw), third) - beside;
-    let most = max(max(ab.xy, ab.zw), third) + beside;
-    let low = clamp(tile_low - beside, least, most);
-    let high = clamp(tile_high + beside, least, most);
-    var part: Part;
-    part.low = min(min(a.position, b.position), c.position);
-    part.high = max(max(a.position, b.position), c.position);
-    part.normals = array<vec3f, 4>(a.normal, b.normal, c.normal, c.normal);
+    let margin = vec2f(search.margin);
+    let low_uv = min(min(ab.xy, ab.zw), third) - margin;
+    let high_uv = max(max(ab.xy, ab.zw), third) + margin;
+    let low = clamp(tile_low - margin, low_uv, high_uv);
+    let high = clamp(tile_high + margin, low_uv, high_uv);
+    var clipped: ClippedTriangle;
+    clipped.low = min(min(a.position, b.position), c.position);
+    clipped.high = max(max(a.position, b.position), c.position);
+    clipped.normals = array<vec3f, 4>(a.normal, b.normal, c.normal, c.normal);
     let flat = mat2x2f(ab.zw - ab.xy, third - ab.xy);
     let area = determinant(flat);
-    let size = most - least;
+    let size = high_uv - low_uv;
     let inner = high - low;
     if (inner.x * inner.y > 0.9 * size.x * size.y || abs(area) < 1e-3 * size.x * size.y) {
-        return part;
+        return clipped;
     }
-    var lowest = vec3f(FAR);
-    var highest = vec3f(-FAR);
+    var clipped_low = vec3f(FAR);
+    var clipped_high = vec3f(-FAR);
     for (var k = 0u; k < 4u; k++) {
         let from_a = select(low, high, vec2<bool>((k & 1u) > 0u, (k & 2u) > 0u)) - ab.xy;
         let w = vec2f(determinant(mat2x2f(from_a, flat[1])), determinant(mat2x2f(flat[0], from_a))) / area;
-        let place = a.position + w.x * (b.position - a.position) + w.y * (c.position - a.position);
-        lowest = min(lowest, place);
-        highest = max(highest, place);
-        part.normals[k] = a.normal + w.x * (b.normal - a.normal) + w.y * (c.normal - a.normal);
+        let position = a.position + w.x * (b.position - a.position) + w.y * (c.position - a.position);
+        clipped_low = min(clipped_low, position);
+        clipped_high = max(clipped_high, position);
+        clipped.normals[k] = a.normal + w.x * (b.normal - a.normal) + w.y * (c.normal - a.normal);
     }
-    part.low = max(part.low, lowest);
-    part.high = min(part.high, highest);
-    return part;
+    clipped.low = max(clipped.low, clipped_low);
+    clipped.high = min(clipped.high, clipped_high);
+    return clipped;
 }
 
 @compute @workgroup_size(EACH)
@@ -66,26 +66,26 @@ fn main(
     let high = low + search.tile;
     let first = triangle_first[tile];
     let end = triangle_first[tile + 1u];
-    var made = nothing();
+    var bounds = empty_bounds();
     for (var k = first; k < end; k++) {
-        let part = part_of(triangles[k], low, high);
-        made.low = min(made.low, part.low);
-        made.high = max(made.high, part.high);
+        let clipped = clip_triangle(triangles[k], low, high);
+        bounds.low = min(bounds.low, clipped.low);
+        bounds.high = max(bounds.high, clipped.high);
         for (var c = 0u; c < 4u; c++) {
-            made.axis += unit_or_zero(part.normals[c]);
+            bounds.axis += unit_or_zero(clipped.normals[c]);
         }
-        made.any = 1u;
+        bounds.occupied = 1u;
     }
-    made.axis = unit_or_zero(made.axis);
+    bounds.axis = unit_or_zero(bounds.axis);
     var cosine = 1.0;
     for (var k = first; k < end; k++) {
-        let part = part_of(triangles[k], low, high);
+        let clipped = clip_triangle(triangles[k], low, high);
         for (var c = 0u; c < 4u; c++) {
-            cosine = min(cosine, dot(made.axis, unit_or_zero(part.normals[c])));
+            cosine = min(cosine, dot(bounds.axis, unit_or_zero(clipped.normals[c])));
         }
     }
-    if (made.any > 0u) {
-        made = coned(made, cosine);
+    if (bounds.occupied > 0u) {
+        bounds = with_cone(bounds, cosine);
     }
-    tiles[tile] = made;
+    tiles[tile] = bounds;
 }

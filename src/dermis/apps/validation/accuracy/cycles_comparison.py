@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 import dermis
 from dermis.apps.truths.cycles import BeckmannSurface, PrincipledSkin, cycles_passes
 from dermis.apps.validation.accuracy.person import sheet_bytes
-from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_figures, write_figures
+from dermis.apps.validation.pages import DOCS, RESULTS, require_in_checkout, read_results, write_results
 from dermis.atlas.build import build_atlas
 from dermis.base.console import print_lines
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
@@ -31,18 +31,18 @@ from dermis.specular.two_lobe import NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 HIGHLIGHTS, LOOKS = RESULTS / "highlights.json", RESULTS / "look.json"
 PICTURE = DOCS / "images" / "look.webp"
 MODELS = ("torrance-sparrow-smith", "kelemen", "two-lobe")
-VIEWS = ("cheek", "portrait")
+HIGHLIGHT_VIEWS = ("cheek", "portrait")
 ROUGHNESS, PATHS = 0.3, 64
 LIGHT = PointLight(position=(-300, 250, 600), irradiance=(3, 3, 3))
-ONE_KIND = ((1.0, ROUGHNESS),)
-TWO_KINDS = ((NARROW_WEIGHT, NARROW_FACTOR * ROUGHNESS), (1.0 - NARROW_WEIGHT, WIDE_FACTOR * ROUGHNESS))
-BRIGHT = 0.6  # share of the lit pixels that are darker than those that count
-GRAIN = 6.0  # standard deviation of what counts as the picture without its grain [pixel]
+ONE_LOBE = ((1.0, ROUGHNESS),)
+TWO_LOBES = ((NARROW_WEIGHT, NARROW_FACTOR * ROUGHNESS), (1.0 - NARROW_WEIGHT, WIDE_FACTOR * ROUGHNESS))
+LIT_QUANTILE = 0.6  # share of the lit pixels that are darker than those that count
+GRAIN_BLUR_PX = 6.0  # standard deviation of what counts as the picture without its grain [pixel]
 
 HEADS = {"scan": "lee_perry_smith", "human": "human"}
 LOOK_VIEWS = ("portrait", "three-quarter", "cheek", "profile")
 COLUMNS = ("deck-2007", "default", "Cycles")
-SIDE, PATHS_OF_SURFACE, MAP_SIDE = 256, 16, 1024
+SIDE, SURFACE_PATHS, MAP_SIDE = 256, 16, 1024
 
 Picture = NDArray[np.float32]
 
@@ -53,12 +53,12 @@ class HighlightRow(TypedDict):
     view: str
     model: str
     energy: float
-    grain: float
+    grain_contrast: float
     grain_of_cycles: float
     correlation: float
 
 
-class Look(NamedTuple):
+class SkinRender(NamedTuple):
     """A picture in linear light, and the share of its light that the surface reflects [-]."""
 
     picture: Picture
@@ -67,29 +67,29 @@ class Look(NamedTuple):
 
 def highlights(adapter: str = "auto") -> None:
     """Measure highlights beside those of Cycles; writes benchmarks/results/highlights.json."""
-    in_checkout(RESULTS)
-    renderer, head = dermis.Renderer(adapter), bumpy_head()
-    rows = [row for view in VIEWS for row in highlight_rows(renderer, head, view)]
-    write_figures(HIGHLIGHTS, {"paths": PATHS, "rows": rows})
+    require_in_checkout(RESULTS)
+    renderer, head = dermis.Renderer(adapter), scan_with_normal_map()
+    rows = [row for view in HIGHLIGHT_VIEWS for row in highlight_rows(renderer, head, view)]
+    write_results(HIGHLIGHTS, {"paths": PATHS, "rows": rows})
 
 
 def looks(adapter: str = "auto") -> None:
     """Draw skins beside Cycles; writes benchmarks/results/look.json and docs/images/look.webp."""
-    in_checkout(PICTURE.parent)
+    require_in_checkout(PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
-    found = {head: looks_of(renderer, head) for head in HEADS}
+    found = {head: skin_renders(renderer, head) for head in HEADS}
     for view in LOOK_VIEWS:
         for head in HEADS:
             rows.append({"head": head, "view": view, "shares": [one.share for one in found[head][view]]})
             for column, one in zip(COLUMNS, found[head][view], strict=True):
                 panels[f"{head} {view}, {column}: {100 * one.share:.1f} %"] = one.picture
-    write_figures(LOOKS, {"paths": PATHS, "rows": rows})
+    write_results(LOOKS, {"paths": PATHS, "rows": rows})
     PICTURE.write_bytes(sheet_bytes(panels, 2 * len(COLUMNS)))
 
 
 def tables() -> dict[str, object]:
     """Return the rows of docs/accuracy.md by their names in its template, from what was measured last."""
-    found, seen = read_figures(HIGHLIGHTS)["rows"], read_figures(LOOKS)["rows"]
+    found, seen = read_results(HIGHLIGHTS)["rows"], read_results(LOOKS)["rows"]
     shares = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in seen)
     return {
         "highlights": "\n".join(
@@ -105,7 +105,7 @@ def tables() -> dict[str, object]:
     }
 
 
-def bumpy_head() -> Head:
+def scan_with_normal_map() -> Head:
     """Return the scan with its relief as a normal map, which both programs take, and no other map."""
     head = dermis.load_head("lee_perry_smith", subdivide=1, regions="none")
     assert head.maps.height is not None
@@ -119,13 +119,13 @@ def slopes(mesh: Mesh, height: Picture) -> Picture:
     return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)
 
 
-def grain(picture: Picture, lit: NDArray[np.bool_]) -> float:
+def grain_contrast(picture: Picture, lit: NDArray[np.bool_]) -> float:
     """Return the contrast of fine detail: root mean square of picture less its blur, over the mean."""
-    smooth = gaussian_filter(picture, GRAIN)
+    smooth = gaussian_filter(picture, GRAIN_BLUR_PX)
     return float(np.sqrt((((picture - smooth) / np.maximum(smooth, 1e-9))[lit] ** 2).mean()))
 
 
-def traced(scene: Scene, settings: Settings, kinds: tuple[tuple[float, float], ...]) -> Picture:
+def traced_highlights(scene: Scene, settings: Settings, kinds: tuple[tuple[float, float], ...]) -> Picture:
     """Return the green light that facets reflect, path-traced.
 
     kinds : share and roughness of each kind of facets
@@ -142,10 +142,10 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
     camera = load_camera(view, head)
     settings = Settings(size=(384, 384), atlas=512, samples=16, parts="specular", transmission="none")
     scene, rows = Scene(head, [LIGHT], camera), list[HighlightRow]()
-    alike, mixed = (traced(scene, settings, kinds) for kinds in (ONE_KIND, TWO_KINDS))
+    alike, mixed = (traced_highlights(scene, settings, kinds) for kinds in (ONE_LOBE, TWO_LOBES))
     for model in MODELS:
         truth = mixed if model == "two-lobe" else alike
-        lit = truth > np.quantile(truth[truth > 0], BRIGHT)
+        lit = truth > np.quantile(truth[truth > 0], LIT_QUANTILE)
         skin = Skin.model_validate(
             {"specular": model, "fresnel": "exact", "rho_s": 1.0, "roughness": ROUGHNESS}
         )
@@ -155,47 +155,47 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
                 "view": view,
                 "model": model,
                 "energy": float(ours.sum() / truth.sum()),
-                "grain": grain(ours, lit),
-                "grain_of_cycles": grain(truth, lit),
+                "grain": grain_contrast(ours, lit),
+                "grain_of_cycles": grain_contrast(truth, lit),
                 "correlation": float(np.corrcoef(ours[lit], truth[lit])[0, 1]),
             }
         )
     return rows
 
 
-def of_frame(renderer: dermis.Renderer, scene: Scene) -> Look:
+def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
     """Return the scene as the frame draws it."""
     how = {"size": (SIDE, SIDE), "atlas": 1024, "strands": False}
     settings = Settings.model_validate(how), Settings.model_validate(how | {"parts": "specular"})
     picture, surface = (renderer.draw(scene, one).linear() for one in settings)
-    return Look(picture, float(surface.sum() / picture.sum()))
+    return SkinRender(picture, float(surface.sum() / picture.sum()))
 
 
-def of_cycles(scene: Scene, skin: PrincipledSkin) -> Look:
+def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
     """Return the scene by Cycles; a second pass with black skin shows what the surface reflects."""
     settings = Settings(size=(SIDE, SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
     (whole,) = cycles_passes(scene, skin, [PATHS], settings)
-    (surface,) = cycles_passes(scene, black, [PATHS_OF_SURFACE], settings)
-    return Look(whole.image, float(surface.image.sum() / whole.image.sum()))
+    (surface,) = cycles_passes(scene, black, [SURFACE_PATHS], settings)
+    return SkinRender(whole.image, float(surface.image.sum() / whole.image.sum()))
 
 
-def reduced(values: Picture) -> Picture:
+def downsampled(values: Picture) -> Picture:
     """Return a map (h, w, ...) as means over squares of texels, at most `MAP_SIDE` rows."""
     step = max(1, len(values) // MAP_SIDE)
     blocks = values.reshape(len(values) // step, step, values.shape[1] // step, step, *values.shape[2:])
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
 
 
-def bumpy(head: Head) -> Head:
+def with_normal_map(head: Head) -> Head:
     """Return the head with its relief as one normal map."""
     if head.maps.height is None:
         return head
-    relief = slopes(head.mesh, reduced(head.maps.height))
+    relief = slopes(head.mesh, downsampled(head.maps.height))
     return replace(head, maps=replace(head.maps, normal=relief, height=None))
 
 
-def coated(head: Head) -> PrincipledSkin:
+def principled_skin(head: Head) -> PrincipledSkin:
     """Return Cycles' skin of a head: its colours, and the mean offset of exit points of the frame's profile.
 
     By Burley's profile that is 2.5 d, d the mean free path over a factor of the colour.
@@ -205,19 +205,19 @@ def coated(head: Head) -> PrincipledSkin:
     spread_mm = (profile.weight * np.sqrt(0.5 * np.pi * profile.variance_mm2[:, None])).sum(axis=0)
     walk_mm = spread_mm / 2.5 * (1.9 - colour + 3.5 * (colour - 0.8) ** 2)
     red, green, blue = (float(part) for part in 4.0 * np.pi * walk_mm)
-    return PrincipledSkin(reduced(head.maps.colour), (red, green, blue), ROUGHNESS)
+    return PrincipledSkin(downsampled(head.maps.colour), (red, green, blue), ROUGHNESS)
 
 
-def looks_of(renderer: dermis.Renderer, title: str) -> dict[str, list[Look]]:
+def skin_renders(renderer: dermis.Renderer, title: str) -> dict[str, list[SkinRender]]:
     """Return the columns of a head's views."""
     name = HEADS[title]
     usual, alike = (dermis.load_head(name, subdivide=1, regions=regions) for regions in ("auto", "none"))
-    plain = bumpy(with_painted_maps(renderer.device, usual, MAP_SIDE))
-    skin, found = coated(plain), dict[str, list[Look]]()
+    plain = with_normal_map(with_painted_maps(renderer.device, usual, MAP_SIDE))
+    skin, found = principled_skin(plain), dict[str, list[SkinRender]]()
     for view in LOOK_VIEWS:
         camera = PRESETS[view](usual)
-        deck = of_frame(renderer, Scene(alike, camera=camera, skin=Skin.preset("deck-2007")))
-        ours = of_frame(renderer, Scene(usual, camera=camera))
-        found[view] = [deck, ours, of_cycles(Scene(plain, camera=camera), skin)]
+        deck = render_skin(renderer, Scene(alike, camera=camera, skin=Skin.preset("deck-2007")))
+        ours = render_skin(renderer, Scene(usual, camera=camera))
+        found[view] = [deck, ours, render_cycles_skin(Scene(plain, camera=camera), skin)]
         print_lines(f"{title} {view} {' '.join(f'{one.share:.3f}' for one in found[view])}")
     return found

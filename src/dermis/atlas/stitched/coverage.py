@@ -7,24 +7,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.stitched.gutter import Border, GutterTexels, GutterWidth, Packing, walk_gutter
-from dermis.atlas.stitched.surface import Flags, FlatSurface, Index, read
+from dermis.atlas.stitched.gutter import Border, GutterTexels, GutterWidth, Packing, trace_gutter
+from dermis.atlas.stitched.surface import Flags, FlatSurface, Index, interpolate_corners
 from dermis.atlas.stitched.texels import (
-    Rooted,
+    AnchoredTexels,
+    anchors_diverge,
+    centre_weights,
     gap_mm,
-    lengths,
-    lost,
-    opposed,
-    owners,
-    unsure,
-    weights_at,
+    run_lengths,
+    mostly_hidden,
+    rasterise_owners,
+    unconnected_pairs,
 )
 
 Singles = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Cover:
+class Coverage:
     """Texels of a grid and the surface they show.
 
     triangle, weights : (h, w), (h, w, 2) -1 where nothing is; weights of the second and third corner
@@ -40,10 +40,10 @@ class Cover:
     roots: NDArray[np.float32]
     piece: NDArray[np.int32]
     gutter: Flags
-    away_mm: NDArray[np.float32]
+    distance_mm: NDArray[np.float32]
 
 
-def cover(
+def compute_coverage(
     surface: FlatSurface,
     piece: Index,
     own: Index,
@@ -51,36 +51,36 @@ def cover(
     packing: Packing,
     width: GutterWidth,
     shape: tuple[int, int],
-) -> Cover:
+) -> Coverage:
     """The texels of pieces that are placed apart from each other.
 
     piece, own : (f,) and numbers of triangles, as for `find_border`
     """
-    owner = owners(packing.places, _drawn(surface, piece, own), shape)
-    weights = weights_at(packing.places, owner)
-    made = Cover(
+    owner = rasterise_owners(packing.corners, _drawn(surface, piece, own), shape)
+    weights = centre_weights(packing.corners, owner)
+    made = Coverage(
         owner,
         weights,
         rooted=owner.copy(),
         roots=weights.copy(),
         piece=np.empty(shape, np.int32),
         gutter=np.zeros(shape, np.bool_),
-        away_mm=np.zeros(shape, np.float32),
+        distance_mm=np.zeros(shape, np.float32),
     )
-    _add_gutters(made, piece, walk_gutter(surface, border, packing, width, owner))
+    _add_gutters(made, piece, trace_gutter(surface, border, packing, width, owner))
     made.piece[:] = np.where(made.rooted >= 0, piece[np.maximum(made.rooted, 0)], -1)
     return made
 
 
-def _add_gutters(made: Cover, piece: Index, found: GutterTexels) -> None:
+def _add_gutters(made: Coverage, piece: Index, found: GutterTexels) -> None:
     """Write rims and gutters into a cover of pieces alone."""
     y, x = found.y, found.x
-    made.rooted[y, x], made.roots[y, x], made.away_mm[y, x] = found.root, found.root_weights, found.away_mm
+    made.rooted[y, x], made.roots[y, x], made.distance_mm[y, x] = found.root, found.root_weights, found.distance_mm
     made.triangle[y, x], made.weights[y, x] = found.triangle, found.weights
     made.gutter[y, x] = ~found.rim
     ended = np.zeros(made.gutter.shape, np.bool_)
-    ended[y, x] = ~found.whole
-    astray = ~found.whole & ~found.rim
+    ended[y, x] = ~found.complete
+    astray = ~found.complete & ~found.rim
     made.triangle[y[astray], x[astray]] = -1
     _repeat_edge(made, piece, ended, y[astray], x[astray])
     # gutters end where the atlas does not hold their light
@@ -90,11 +90,11 @@ def _add_gutters(made: Cover, piece: Index, found: GutterTexels) -> None:
     made.gutter[gone] = False
 
 
-def hidden(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Flags:
+def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Flags:
     """Triangles (f,) most of whose texels others of their piece own."""
     own = np.flatnonzero(piece >= 0)
-    owner = owners(packing.places, _drawn(surface, piece, own), (size, size))
-    return lost(packing.places, own, owner)
+    owner = rasterise_owners(packing.corners, _drawn(surface, piece, own), (size, size))
+    return mostly_hidden(packing.corners, own, owner)
 
 
 def _drawn(surface: FlatSurface, piece: Index, own: Index) -> Index:
@@ -104,11 +104,11 @@ def _drawn(surface: FlatSurface, piece: Index, own: Index) -> Index:
 
 def _mirrored(surface: FlatSurface, piece: Index, own: Index) -> Flags:
     """Which of the triangles `own` face the other way than most of their piece."""
-    whole = np.bincount(piece, surface.area_uv[own])
-    return np.asarray(np.sign(whole)[piece] != np.sign(surface.area_uv[own]))
+    complete = np.bincount(piece, surface.area_uv[own])
+    return np.asarray(np.sign(complete)[piece] != np.sign(surface.area_uv[own]))
 
 
-def _repeat_edge(made: Cover, piece: Index, ended: Flags, y: Index, x: Index) -> None:
+def _repeat_edge(made: Coverage, piece: Index, ended: Flags, y: Index, x: Index) -> None:
     """Gutter texels just beyond the end of the surface repeat their neighbours.
 
     A blur along the edge then reads the same from a gutter as from the rim of a piece.
@@ -126,49 +126,49 @@ def _repeat_edge(made: Cover, piece: Index, ended: Flags, y: Index, x: Index) ->
     made.triangle[y, x], made.weights[y, x] = made.triangle[from_y, from_x], made.weights[from_y, from_x]
 
 
-def metric_of(surface: FlatSurface, packing: Packing, made: Cover) -> Singles:
+def texel_metric(surface: FlatSurface, packing: Packing, made: Coverage) -> Singles:
     """(h, w, 3) texels per mm along u and v and the cosine between them; in gutters those at the border."""
     metric, there = np.zeros((*made.rooted.shape, 3), np.float32), made.rooted >= 0
-    found = read(surface.lengths.astype(np.float32), made.rooted[there], made.roots[there])
-    per_uv = packing.per_uv[made.rooted[there]].astype(np.float32)
-    found[:, :2] = per_uv[:, None] / np.maximum(found[:, :2], 1e-3)
+    found = interpolate_corners(surface.uv_metric.astype(np.float32), made.rooted[there], made.roots[there])
+    texels_per_uv = packing.texels_per_uv[made.rooted[there]].astype(np.float32)
+    found[:, :2] = texels_per_uv[:, None] / np.maximum(found[:, :2], 1e-3)
     metric[there] = found
     return metric
 
 
-def runs_of(surface: FlatSurface, packing: Packing, made: Cover) -> NDArray[np.uint16]:
+def edge_distances(surface: FlatSurface, packing: Packing, made: Coverage) -> NDArray[np.uint16]:
     """(h, w, 4) texels to the left, right, up and down of the same piece, while the surface continues.
 
     It ends between texels whose points are farther apart than `gap_mm`, and whose roots are farther apart
     than either texel is from its root.
     """
-    owner = np.where(made.rooted >= 0, np.where(made.away_mm > 0, -1, made.rooted), -2)
+    owner = np.where(made.rooted >= 0, np.where(made.distance_mm > 0, -1, made.rooted), -2)
     reach = np.empty((*owner.shape, 4), np.uint16)
     for axis in (0, 1):
         joined = np.zeros(owner.shape, np.bool_)
         here, before = np.moveaxis(joined, 1 - axis, 0)[1:], np.moveaxis(made.piece, 1 - axis, 0)
         here[:] = (before[1:] >= 0) & (before[1:] == before[:-1])
-        first, second = unsure(surface, owner, axis)
+        first, second = unconnected_pairs(surface, owner, axis)
         same = joined.ravel()[second]
         joined.ravel()[second[same]] = ~_parted(surface, packing, made, first[same], second[same], axis)
-        found = lengths(np.moveaxis(joined, 1 - axis, 1))
+        found = run_lengths(np.moveaxis(joined, 1 - axis, 1))
         reach[..., 2 * axis], reach[..., 2 * axis + 1] = (np.moveaxis(one, 1, 1 - axis) for one in found)
     return reach
 
 
 def _parted(
-    surface: FlatSurface, packing: Packing, made: Cover, first: Index, second: Index, axis: int
+    surface: FlatSurface, packing: Packing, made: Coverage, first: Index, second: Index, axis: int
 ) -> Flags:
     """Whether there is a gap between texels, by their flat indices."""
     one, other = (_rooted(surface, packing, made, texel) for texel in (first, second))
     triangle, weights = made.triangle.ravel(), made.weights.reshape(-1, 2)
-    points = [surface.at(triangle[texel], weights[texel]) for texel in (first, second)]
+    points = [surface.points(triangle[texel], weights[texel]) for texel in (first, second)]
     apart_mm = np.linalg.norm(points[0] - points[1], axis=1)
-    return np.asarray(opposed(one, other) & (apart_mm > gap_mm(one, other, axis)))
+    return np.asarray(anchors_diverge(one, other) & (apart_mm > gap_mm(one, other, axis)))
 
 
-def _rooted(surface: FlatSurface, packing: Packing, made: Cover, texel: Index) -> Rooted:
+def _rooted(surface: FlatSurface, packing: Packing, made: Coverage, texel: Index) -> AnchoredTexels:
     root, weights = made.rooted.ravel()[texel], made.roots.reshape(-1, 2)[texel]
     texels = np.column_stack(np.divmod(texel, made.rooted.shape[1])[::-1]).astype(np.float64)
-    steps = surface.lengths[root, 0, :2] / packing.per_uv[root, None]
-    return Rooted(texels, read(packing.places, root, weights), steps)
+    steps = surface.uv_metric[root, 0, :2] / packing.texels_per_uv[root, None]
+    return AnchoredTexels(texels, interpolate_corners(packing.corners, root, weights), steps)

@@ -14,16 +14,16 @@ Complex = NDArray[np.complex128]
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-INWARD = 1e-3
+START_SHIFT = 1e-3
 """Of the way to a place inside the triangle: so that a walk from a corner starts inside."""
 
-INNER = 0.3547, 0.3141, 0.3312
+INNER_WEIGHTS = 0.3547, 0.3141, 0.3312
 """Weights of that place: from the very middle, walks meet corners more often."""
 
 _MOST_STEPS = 4096
 
 
-class Walkers(NamedTuple):
+class Geodesics(NamedTuple):
     """Those who still walk; places are complex numbers in the plane of the first triangle, 0 is the start.
 
     number : which walk it is
@@ -41,12 +41,12 @@ class Walkers(NamedTuple):
     way: Complex
     hand: Doubles
 
-    def those(self, chosen: Flags) -> Walkers:
+    def select(self, chosen: Flags) -> Geodesics:
         """Some of them."""
-        return Walkers._make(part[chosen] for part in self)
+        return Geodesics._make(part[chosen] for part in self)
 
 
-class Ends(NamedTuple):
+class GeodesicEnds(NamedTuple):
     """Where walks (n,) end.
 
     triangle : there
@@ -56,25 +56,25 @@ class Ends(NamedTuple):
 
     triangle: NDArray[np.int32]
     weights: Doubles
-    whole: Flags
+    complete: Flags
 
-    def write(self, who: Walkers, first: Index, b: Doubles, c: Doubles, whole: bool) -> None:
+    def write(self, who: Geodesics, first: Index, b: Doubles, c: Doubles, complete: bool) -> None:
         """The end of some walks: weights of the corners after the corner `first` of their triangle."""
         three = np.column_stack((1.0 - b - c, b, c))
         places = (np.arange(3) - first[:, None]) % 3
         self.triangle[who.number] = who.triangle
         self.weights[who.number] = np.take_along_axis(three, places, axis=1)[:, 1:]
-        self.whole[who.number] = whole
+        self.complete[who.number] = complete
 
 
-def walk(adjacency: Adjacency, triangle: NDArray[np.integer], start: Doubles, target: Doubles) -> Ends:
+def trace_geodesics(adjacency: Adjacency, triangle: NDArray[np.integer], start: Doubles, target: Doubles) -> GeodesicEnds:
     """Walk straight from a place in each triangle to a target in its plane, unfolding triangles on the way.
 
     triangle : (n,)
     start : (n, 2) in the triangle or on its border [mm]
     target : (n, 2) [mm]
     """
-    ends = Ends(
+    ends = GeodesicEnds(
         np.array(triangle, np.int32), np.full((len(triangle), 2), 1 / 3), np.zeros(len(triangle), bool)
     )
     who = _begin(adjacency, np.asarray(triangle, np.int64), _complex(start), _complex(target), ends)
@@ -85,51 +85,51 @@ def walk(adjacency: Adjacency, triangle: NDArray[np.integer], start: Doubles, ta
     return ends
 
 
-def _begin(adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: Ends) -> Walkers:
+def _begin(adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: GeodesicEnds) -> Geodesics:
     """Those who leave their first triangle, and the ends of the others."""
     corners = _complex(adjacency.flat[triangle])
-    start = start + INWARD * (corners @ np.array(INNER) - start)
+    start = start + START_SHIFT * (corners @ np.array(INNER_WEIGHTS) - start)
     corners, way = corners - start[:, None], target - start
     after = np.roll(corners, -1, axis=1)
     passes = (_cross(way[:, None], corners) <= 0.0) & (_cross(way[:, None], after) >= 0.0)
     passes &= _cross(after - corners, way[:, None] - corners) < 0.0
     rows, side = np.arange(len(triangle)), passes.argmax(axis=1)
-    all_of_them = Walkers(
+    all_of_them = Geodesics(
         rows, triangle, side, corners[rows, side], after[rows, side], way, np.ones(len(triangle))
     )
     leaves = np.asarray(passes.any(axis=1))
-    stay, (a, b, c) = all_of_them.those(~leaves), corners[~leaves].T
+    stay, (a, b, c) = all_of_them.select(~leaves), corners[~leaves].T
     ends.write(stay, np.zeros(len(a), np.int64), *_weights(a, b, c, stay.way), True)
-    return all_of_them.those(leaves)
+    return all_of_them.select(leaves)
 
 
-def _step(adjacency: Adjacency, who: Walkers, ends: Ends) -> Walkers:
+def _step(adjacency: Adjacency, who: Geodesics, ends: GeodesicEnds) -> Geodesics:
     """Into the next triangle: those who walk on from there, and the ends of the others."""
-    beside = adjacency.beside[who.triangle, who.side]
-    ended = (beside < 0) | ~adjacency.free[beside]
+    neighbour = adjacency.neighbour[who.triangle, who.side]
+    ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():
-        stopped = who.those(ended)
+        stopped = who.select(ended)
         ends.write(stopped, stopped.side, _met(stopped), np.zeros(len(stopped.number)), False)
-        who, beside = who.those(~ended), beside[~ended]
-    entry = adjacency.entry[who.triangle, who.side].astype(np.int64)
+        who, neighbour = who.select(~ended), neighbour[~ended]
+    neighbour_side = adjacency.neighbour_side[who.triangle, who.side].astype(np.int64)
     flipped = adjacency.flipped[who.triangle, who.side]
     hand = np.where(flipped, -who.hand, who.hand)
-    # where the corners `entry` and `entry` + 1 of the next triangle come to lie, and its apex
+    # where the corners `neighbour_side` and `neighbour_side` + 1 of the next triangle come to lie, and its apex
     a, b = np.where(flipped, who.a, who.b), np.where(flipped, who.b, who.a)
-    forth, up = adjacency.apex[beside, entry].T
+    forth, up = adjacency.apex[neighbour, neighbour_side].T
     apex = a + (forth + 1j * hand * up) * (b - a)
     # it leaves between the apex and the end on the other side
     left, a_left = _cross(who.way, apex) > 0.0, _cross(who.way, a) > 0.0
     by_a = left != a_left
-    side = (entry + np.where(by_a, 2, 1)) % 3
+    side = (neighbour_side + np.where(by_a, 2, 1)) % 3
     off, p, q = np.where(by_a, b, a), np.where(by_a, apex, b), np.where(by_a, a, apex)
     inner = _cross(q - p, off - p)
     arrived = (inner != 0.0) & (_cross(q - p, who.way - p) * inner >= 0.0)
-    who = Walkers(who.number, beside.astype(np.int64), side, p, q, who.way, hand)
-    there = who.those(arrived)
+    who = Geodesics(who.number, neighbour.astype(np.int64), side, p, q, who.way, hand)
+    there = who.select(arrived)
     found = _weights(a[arrived], b[arrived], apex[arrived], there.way)
-    ends.write(there, entry[arrived], *found, True)
-    return who.those(~arrived)
+    ends.write(there, neighbour_side[arrived], *found, True)
+    return who.select(~arrived)
 
 
 def _complex(places: Doubles) -> Complex:
@@ -141,7 +141,7 @@ def _cross(a: Complex, b: Complex) -> Doubles:
     return np.asarray(a.real * b.imag - a.imag * b.real)
 
 
-def _met(who: Walkers) -> Doubles:
+def _met(who: Geodesics) -> Doubles:
     """How far along the side from a to b the way meets it, 0 to 1."""
     here, there = _cross(who.way, who.a), _cross(who.way, who.b)
     return np.clip(here / np.where(here == there, np.inf, here - there), 0.0, 1.0)
