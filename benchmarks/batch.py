@@ -23,20 +23,20 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from dermis.apps.batch.dask_cluster import Cluster
+from dermis.apps.batch.dask_cluster import DaskCluster
 from dermis.apps.batch.records import encode_record
-from dermis.apps.batch.run import Crew, Progress
+from dermis.apps.batch.run import Progress, WorkerPool
 from dermis.apps.batch.run import run as run_batch
-from dermis.apps.batch.scenes import SceneMaker
-from dermis.apps.batch.spec import Spec, example_text, spec_of
-from dermis.apps.batch.worker import Work
-from dermis.apps.batch.worker_pool import Processes, SlotRequest, available_cores
-from dermis.apps.validation.pages import Figures, write_figures
+from dermis.apps.batch.scenes import SceneBuilder
+from dermis.apps.batch.spec import Spec, example_toml, parse_spec
+from dermis.apps.batch.worker import RunOptions
+from dermis.apps.batch.worker_pool import ProcessPool, SlotRequest, available_cores
+from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.atomic_write import check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import note, print_lines
 from dermis.base.errors import DermisError
-from dermis.base.extras import needed
+from dermis.base.extras import import_extra
 from dermis.cli.options import parse_size
 from dermis.frame.renderer import Renderer
 
@@ -68,14 +68,14 @@ class Plan:
 
 def spec_for(plan: Plan, images: int, shards: int, *, moving: bool = False) -> Spec:
     """The example's people, faces, light and cameras; or one person, moving in one light."""
-    tables: Figures = tomllib.loads(example_text())
+    tables: JsonObject = tomllib.loads(example_toml())
     tables |= {"count": images, "size": list(plan.size), "shard_size": max(1, images // shards)}
     tables |= {"outputs": list(OUTPUTS), "landmarks": list(LANDMARKS)}
     tables["render"] = {**tables["render"], "atlas": plan.atlas, "shadow_size": plan.atlas}
     if moving:
         tables |= {"images_per_person": images, **_STILL}
         tables.pop("correlated", None)
-    return spec_of(tables)
+    return parse_spec(tables)
 
 
 @dataclass
@@ -95,7 +95,7 @@ class Clock:
         for mark in MARKS:
             if mark not in self.resident and progress.images >= mark * self.workers:
                 self.resident[mark] = max((_resident(one.pid) for one in active_children()), default=0)
-        share = progress.images / progress.to_draw
+        share = progress.images / progress.total
         if (len(self.memory) == 0 and share >= _FROM) or (len(self.memory) == 1 and share >= _TO):
             self.memory.append(max((_resident(one.pid) for one in active_children()), default=0))
 
@@ -107,11 +107,11 @@ class Clock:
         return (last - first) / (ended - began) if ended > began else 0.0
 
 
-def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int, count: int = 1) -> Figures:
+def measured_run(plan: Plan, pool: WorkerPool, spec: Spec, encoders: int, count: int = 1) -> JsonObject:
     """Images/s of a run, bytes of an image, and memory of a worker at its begin and end [byte]."""
     clock, began = Clock(workers=count), time.monotonic()
     with _folder(plan) as out:
-        report = run_batch(Work(spec, out, encoders), crew, told=clock.told)
+        report = run_batch(RunOptions(spec, out, encoders), pool, on_progress=clock.told)
         size = sum(path.stat().st_size for path in out.rglob("shard-*") if path.is_file())
     return {
         "images": report.images,
@@ -123,25 +123,25 @@ def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int, count: int =
     }
 
 
-def workers(plan: Plan, count: int, *, moving: bool = False) -> Figures:
+def workers(plan: Plan, count: int, *, moving: bool = False) -> JsonObject:
     """Plain processes, so many of them."""
     slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
     spec = spec_for(plan, plan.images * count, 2 * count, moving=moving)
-    found = measured_run(plan, Processes(slots), spec, encoders, count)
+    found = measured_run(plan, ProcessPool(slots), spec, encoders, count)
     return {"workers": count, "encoders": encoders, "adapters": len({one.adapter for one in slots}), **found}
 
 
-def dask(plan: Plan, count: int) -> Figures:
+def dask(plan: Plan, count: int) -> JsonObject:
     """The same work by plain processes and by as many workers of dask, each timed by whole shards."""
-    distributed = needed("distributed", "the comparison with dask")
+    distributed = import_extra("distributed", "the comparison with dask")
     slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
     spec = spec_for(plan, plan.images * count, _SHARDS * count)
     threads = {"LP_NUM_THREADS": str(slots[0].threads)} if slots[0].threads else {}
-    plain = measured_run(plan, Processes(slots), spec, encoders)
+    plain = measured_run(plan, ProcessPool(slots), spec, encoders)
     quiet = {"distributed.worker.profile.enabled": False}  # as docs/batch.md says
     with (
         _environment(threads),
-        needed("dask", "the comparison with dask").config.set(quiet),
+        import_extra("dask", "the comparison with dask").config.set(quiet),
         distributed.LocalCluster(
             count,
             threads_per_worker=1,
@@ -150,19 +150,19 @@ def dask(plan: Plan, count: int) -> Figures:
             memory_limit=0,  # of its own dask pauses workers at a share of what the machine had at first
         ) as made,
     ):
-        there = measured_run(plan, Cluster(made.scheduler_address, None, plan.adapter), spec, encoders)
+        there = measured_run(plan, DaskCluster(made.scheduler_address, None, plan.adapter), spec, encoders)
     rates = plain["images_per_s"], there["images_per_s"]
     return {"workers": count, "plain": rates[0], "dask": rates[1], "dask_over_plain": rates[1] / rates[0]}
 
 
-def steps(plan: Plan) -> Figures:
+def steps(plan: Plan) -> JsonObject:
     """Milliseconds of each step of an image by itself, in one process: medians."""
     spec = spec_for(plan, min(_MOST_STEPS, plan.images), 1)
-    maker, renderer = SceneMaker(spec), Renderer(plan.adapter, rounds=16)
+    maker, renderer = SceneBuilder(spec), Renderer(plan.adapter, cache_ttl=16)
     told: dict[str, list[float]] = {}
     for number in range(spec.count):
         parameters = _timed(told, "parameters", lambda: spec.parameters(number))  # noqa: B023
-        scene, settings = _timed(told, "scene", lambda: maker.scene(parameters))  # noqa: B023
+        scene, settings = _timed(told, "scene", lambda: maker.build(parameters))  # noqa: B023
 
         def seen(scene: Any = scene, settings: Any = settings) -> Any:
             return next(renderer.observe([scene], settings, outputs=spec.outputs, landmarks=spec.landmarks))
@@ -172,7 +172,7 @@ def steps(plan: Plan) -> Figures:
     return {name: median(times[2:]) for name, times in told.items()}  # the first ones fill caches
 
 
-def disk(plan: Plan) -> Figures:
+def disk(plan: Plan) -> JsonObject:
     """Bytes/s that a file takes, to the disk itself."""
     block = os.urandom(1 << 24)
     with _folder(plan) as out:
@@ -184,7 +184,7 @@ def disk(plan: Plan) -> Figures:
         return {"bytes_per_s": _DISK_BYTES / (time.perf_counter() - began)}
 
 
-def machine_of(plan: Plan) -> Figures:
+def machine_of(plan: Plan) -> JsonObject:
     """What all of it is measured on."""
     adapters = SlotRequest(plan.adapter).adapters()
     return {
@@ -276,14 +276,16 @@ def main(
     target = check_output(output, (".json",), "Choose such a name")
     plan = Plan(adapter, parse_size(size), atlas, images, encoders, disk)
     counts = [int(one) for one in workers.split(",")]
-    told = measure(plan, counts, parts.split(","), lambda told: write_figures(target, told, _DIGITS))
+    told = measure(plan, counts, parts.split(","), lambda told: write_results(target, told, _DIGITS))
     print_lines(*table(told))
     return 0
 
 
-def measure(plan: Plan, counts: list[int], parts: list[str], keep: Callable[[Figures], None]) -> Figures:
+def measure(
+    plan: Plan, counts: list[int], parts: list[str], keep: Callable[[JsonObject], None]
+) -> JsonObject:
     """All figures; `keep` gets those known so far after each part."""
-    told: Figures = {"machine": machine_of(plan), **_about()}
+    told: JsonObject = {"machine": machine_of(plan), **_about()}
     jobs: dict[str, Callable[[], Any]] = {
         "steps": lambda: steps(plan),
         "new": lambda: [workers(plan, count) for count in counts],
@@ -293,14 +295,14 @@ def measure(plan: Plan, counts: list[int], parts: list[str], keep: Callable[[Fig
     }
     for part in parts:
         if part not in jobs:
-            raise DermisError(f"--parts: expected some of {', '.join(PARTS)}, but {part!r} came. Correct it.")
+            raise DermisError(f"--parts: expected some of {', '.join(PARTS)}, but got {part!r}. Correct it.")
         note(part)
         told[part] = jobs[part]()
         keep(told)
     return told
 
 
-def table(told: Figures) -> list[str]:
+def table(told: JsonObject) -> list[str]:
     """Lines for people."""
     machine = told["machine"]
     lines = [
@@ -323,7 +325,7 @@ def table(told: Figures) -> list[str]:
     return lines
 
 
-def _about() -> Figures:
+def _about() -> JsonObject:
     load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     versions = {name: version(name) for name in ("dermis", "wgpu", "numpy")}
     return {

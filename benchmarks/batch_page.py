@@ -9,8 +9,8 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from dermis.apps.validation.pages import Figures
-from dermis.base.atomic_write import replacing
+from dermis.apps.validation.pages import JsonObject
+from dermis.base.atomic_write import atomic_file
 from dermis.base.command_line import run_script
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -25,16 +25,16 @@ _HEADS = "what", "workers", "adapters", "encoders of each", "images/s", "over th
 def main() -> None:
     """Write the page."""
     measured = [json.loads(path.read_text("utf-8")) for path in sorted(RESULTS.glob("scale_*.json"))]
-    with replacing(PAGE) as trial:
+    with atomic_file(PAGE) as trial:
         trial.write_text(page(measured), encoding="utf-8")
 
 
-def page(machines: Sequence[Figures]) -> str:
+def page(machines: Sequence[JsonObject]) -> str:
     """The page's text."""
     return "\n".join([_HEAD, *map(_machine, machines)])
 
 
-def _machine(told: Figures) -> str:
+def _machine(told: JsonObject) -> str:
     machine, versions = told["machine"], told["versions"]
     width, height = machine["size"]
     parts = [
@@ -52,12 +52,12 @@ def _machine(told: Figures) -> str:
     return "\n".join(parts)
 
 
-def _noted(told: Figures) -> str:
+def _noted(told: JsonObject) -> str:
     """What is to be said of the machine's figures besides, after a sentence."""
     return f" {told['note']}" if "note" in told else ""
 
 
-def _memory(told: Figures) -> str:
+def _memory(told: JsonObject) -> str:
     """How much a worker holds after so many images, where that was read."""
     rows = [
         (_KINDS[name], one["workers"], mark, f"{size / 1e6:.0f}")
@@ -69,7 +69,7 @@ def _memory(told: Figures) -> str:
     return f"\n{_table(heads, rows)}" if rows else ""
 
 
-def _rates(told: Figures) -> str:
+def _rates(told: JsonObject) -> str:
     rows = []
     for name, words in _KINDS.items():
         runs = told.get(name, [])
@@ -87,7 +87,7 @@ def _rates(told: Figures) -> str:
     return text
 
 
-def paper(told: Figures) -> list[tuple[str, str]]:
+def paper(told: JsonObject) -> list[tuple[str, str]]:
     """What so many images take where the fastest measured run goes on like that."""
     best = max(told["new"], key=lambda one: float(one["images_per_s"]))
     rate, size = best["images_per_s"], best["bytes_per_image"]
@@ -105,7 +105,7 @@ def paper(told: Figures) -> list[tuple[str, str]]:
     return rows
 
 
-def ceilings(told: Figures, run: Figures) -> dict[str, float]:
+def ceilings(told: JsonObject, run: JsonObject) -> dict[str, float]:
     """Images/s that each part could do if the others took no time, of those that were measured."""
     found, encoders = {}, run["workers"] * run["encoders"]
     if steps := told.get("steps"):

@@ -25,7 +25,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from dermis.apps.truths.blender_process import blender_python
-from dermis.apps.validation.pages import Figures, write_figures
+from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.apps.validation.peers.report import cpu_model
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
@@ -78,24 +78,26 @@ def main(
         "versions": {"dermis": version("dermis"), "python": platform.python_version()},
         "rows": rows,
     }
-    write_figures(output, report, _DIGITS)
+    write_results(output, report, _DIGITS)
     print_lines(table(report))
     return 0
 
 
-def table(report: Figures) -> str:
+def table(report: JsonObject) -> str:
     """The rows as Markdown."""
     head = "| renderer | setting | s an image, by the clock | of all cores | noise |\n|---|---|---|---|---|"
     return "\n".join([head, *map(_line, report["rows"])])
 
 
-def _line(row: Figures) -> str:
+def _line(row: JsonObject) -> str:
     noise = f"{row['noise']:.1%}" if row["noise"] else "none"
     times = f"{row['seconds']:.3g} | {row['core_seconds']:.3g}"
     return f"| {row['renderer']} | {row['setting']} | {times} | {noise} |"
 
 
-def _cycles(python: Path, folder: Path, people: int, side: int, settings: list[Figures]) -> list[Figures]:
+def _cycles(
+    python: Path, folder: Path, people: int, side: int, settings: list[JsonObject]
+) -> list[JsonObject]:
     """A row for each setting, reading a person and building its scene included."""
     for seed in range(people):
         _run([*_DERMIS, "head", "--seed", str(seed), "--size", "1024", "-o", str(folder / f"{seed}.glb")])
@@ -113,7 +115,7 @@ def _cycles(python: Path, folder: Path, people: int, side: int, settings: list[F
     return rows
 
 
-def _ours(folder: Path, images: int, side: int, adapter: str) -> Figures:
+def _ours(folder: Path, images: int, side: int, adapter: str) -> JsonObject:
     """A row: what a run takes with its start, less what one of a single image takes."""
     spec = folder / "spec.toml"
     spec.write_text(_run([*_DERMIS, "batch", "--example"]), encoding="utf-8")
@@ -130,7 +132,7 @@ def _batch(spec: Path, out: Path, count: int, side: int, adapter: str) -> tuple[
     return time.perf_counter() - began, _cores_s() - worked
 
 
-def _row(renderer: str, setting: str, clock: float, cores: float, noise: float) -> Figures:
+def _row(renderer: str, setting: str, clock: float, cores: float, noise: float) -> JsonObject:
     return {
         "renderer": renderer,
         "setting": setting,

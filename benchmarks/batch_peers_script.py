@@ -141,5 +141,5 @@ if __name__ == "__main__":
     parser.add_argument("folder", type=Path)
     given = parser.parse_args()
     if not (given.folder / "plan.json").is_file() or "bpy" not in globals():
-        parser.error(f"expected Blender's Python and a folder with plan.json, but {given.folder} came")
+        parser.error(f"expected Blender's Python and a folder with plan.json, but got {given.folder}")
     main(given.folder)

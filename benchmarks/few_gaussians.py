@@ -12,10 +12,10 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
-from dermis.apps.validation.benchmarks.cases import Case, scenes_of, settings_of
-from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, stage_ms
-from dermis.apps.validation.pages import Figures
-from dermis.base.atomic_write import check_output, replacing
+from dermis.apps.validation.benchmarks.cases import Case, case_scenes, case_settings
+from dermis.apps.validation.benchmarks.measure import CPU_FRAME_COUNTS, FrameCounts, stage_ms
+from dermis.apps.validation.pages import JsonObject
+from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import print_json
 from dermis.frame.renderer import Renderer
@@ -62,24 +62,24 @@ def main(
     software = renderer.device.adapter.kind == "CPU"
     usual = _ON_CPU if software else _ON_GPU
     usual = replace(usual, atlas=atlas or usual.atlas)
-    effort = ON_CPU if software else Effort(warming=60, row=1, timed=15)
+    effort = CPU_FRAME_COUNTS if software else FrameCounts(warming=60, row=1, timed=15)
     rows = [measured(renderer, loaded, replace(usual, gaussians=count), effort) for count in _COUNTS]
     found = {"adapter": renderer.device.adapter.name, "atlas": usual.atlas, "rows": rows}
     if output is not None:
-        with replacing(output) as partial:
+        with atomic_file(output) as partial:
             partial.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     print_json(found)
     return 0
 
 
-def measured(renderer: Renderer, head: Head, case: Case, effort: Effort) -> Figures:
+def measured(renderer: Renderer, head: Head, case: Case, effort: FrameCounts) -> JsonObject:
     """Device time in steps and at once [ms], and how far the pictures are apart (relative RMSE)."""
-    row: Figures = {"gaussians": case.gaussians}
+    row: JsonObject = {"gaussians": case.gaussians}
     pictures = []
     with tempfile.TemporaryDirectory() as folder, TECHNIQUES.including(_AT_ONCE, AtOnce()):
-        scenes = scenes_of(case, head, Path(folder), 8)
+        scenes = case_scenes(case, head, Path(folder), 8)
         for name, technique in (("in steps", case.technique), ("at once", _AT_ONCE)):
-            settings = settings_of(replace(case, technique=technique))
+            settings = case_settings(replace(case, technique=technique))
             pictures.append(renderer.draw(scenes[0], settings).linear())
             blur = renderer.prepare(scenes[0], settings).blurs[0]
             drawn = stage_ms(renderer, cycle([*scenes[1:], scenes[0]]), settings, effort)

@@ -18,7 +18,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.atomic_write import check_output, replacing
+from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import print_json
 
@@ -53,7 +53,7 @@ def main(
     found = {f"atlas {side}": pictures(head, side, adapter, runs) for side in atlas}
     print_json({"head": head, "seconds": found})
     if output is not None:
-        with replacing(output) as trial:
+        with atomic_file(output) as trial:
             trial.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
     return 0
 

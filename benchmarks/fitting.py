@@ -20,9 +20,9 @@ from dermis.apps.inverse.fitting.fit import fit
 from dermis.apps.inverse.fitting.result import FitResult
 from dermis.apps.truths.half_space import diffuse_albedo, reflected_radiance
 from dermis.apps.truths.path_traced import PathTraced, Variant
-from dermis.apps.validation.comparisons.person import traced
-from dermis.apps.validation.comparisons.person_paint import paint_of
-from dermis.apps.validation.pages import Figures, write_figures
+from dermis.apps.validation.comparisons.person import trace_view
+from dermis.apps.validation.comparisons.person_textures import person_textures
+from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.environment.panorama import directions, solid_angles
@@ -35,7 +35,7 @@ from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.settings import Settings
-from dermis.scene.skin import USUAL_ROUGHNESS, Pigments
+from dermis.scene.skin import DEFAULT_ROUGHNESS, Pigments
 
 FOLDER = Path(gettempdir()) / "dermis-fitting"
 """Of panoramas, which scenes name as files."""
@@ -124,11 +124,11 @@ def photograph(
     and eye face it. The painted colours are those that colorimeters find: light at 45 degrees, seen from
     the front.
     """
-    paint = paint_of(renderer, one.scene, _PAINT)
+    paint = person_textures(renderer, one.scene, _PAINT)
     paint = replace(paint, colour=_measured(paint.colour))
-    rough = np.clip(paint.roughness * (one.roughness / USUAL_ROUGHNESS), 0.05, 1.0).astype(np.float32)
+    rough = np.clip(paint.roughness * (one.roughness / DEFAULT_ROUGHNESS), 0.05, 1.0).astype(np.float32)
     paint = replace(paint, roughness=rough)
-    return traced(renderer, one.scene, paint, (side, side), samples, variant=variant)
+    return trace_view(renderer, one.scene, paint, (side, side), samples, variant=variant)
 
 
 def _measured(colour: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -174,7 +174,7 @@ def main(
         Trace the pictures that are not kept on disk yet, and fit none.
     """
     renderer = Renderer(adapter)
-    told: Figures = {"side": side, "samples": samples}
+    told: JsonObject = {"side": side, "samples": samples}
     told |= {"adapter": renderer.device.adapter.name, "traced": [], "own": []}
     for number in range(scenes):
         one, began = case(number), time.perf_counter()
@@ -187,10 +187,10 @@ def main(
             told["own"].append(fitted(one, renderer.draw(one.scene, settings).linear(), adapter))
         told["traced"].append(fitted(one, image, adapter))
         print_lines(str(told["traced"][-1]))
-        write_figures(output, told, 4)
+        write_results(output, told, 4)
 
 
-def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> Figures:
+def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
     """What is found of a case, beside what is true; nothing of the true skin is given but its eumelanin, its
     oxygen and the kind of its surface.
     """
@@ -208,8 +208,8 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> Figures:
     }
 
 
-def _against(one: Case, found: FitResult) -> Figures:
-    told: Figures = {}
+def _against(one: Case, found: FitResult) -> JsonObject:
+    told: JsonObject = {}
     for name in ("melanin", "blood", "roughness"):
         true = float(getattr(one, name))
         told[name] = {"true": true, "found": found.values[name], "relative_sd": found.certainty.sd[name]}

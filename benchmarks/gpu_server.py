@@ -31,17 +31,17 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 import dermis
-from dermis.apps.validation.benchmarks.cases import FRAGMENTS, PRESETS, Case, scenes_of
+from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, PRESETS, Case, case_scenes
 from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
-from dermis.apps.validation.benchmarks.measure import Effort, row_ms, stage_ms
+from dermis.apps.validation.benchmarks.measure import FrameCounts, sequence_ms, stage_ms
 from dermis.apps.validation.benchmarks.report import as_json
-from dermis.apps.validation.benchmarks.run import run as run_benchmark
-from dermis.apps.validation.pages import Figures, write_figures
+from dermis.apps.validation.benchmarks.run import run_benchmark as run_benchmark
+from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.atomic_write import check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import note
 from dermis.base.errors import DermisError
-from dermis.formats.samples import cached
+from dermis.formats.samples import is_available
 from dermis.frame.renderer import Renderer
 from dermis.images.writer import ImageWriter
 from dermis.mesh.head import Head
@@ -69,8 +69,8 @@ def lasted_s(words: list[str], longest_s: float = LONGEST_S) -> float:
         try:
             failed = program.wait(longest_s)
         except subprocess.TimeoutExpired as fault:
-            came = f"expected it to end within {longest_s:g} s, but it did not. Last words: {last[0]}"
-            raise DermisError(f"{name}: {came}") from fault
+            actual = f"expected it to end within {longest_s:g} s, but it did not. Last words: {last[0]}"
+            raise DermisError(f"{name}: {actual}") from fault
         finally:
             with suppress(ProcessLookupError):  # and what it has started
                 os.killpg(program.pid, signal.SIGKILL)
@@ -93,7 +93,7 @@ ENVIRONMENTS: dict[str, tuple[bool, str | None]] = {
     "royal_esplanade": (False, "royal_esplanade"),
 }
 """Whether the studio's lights are on, and the panorama."""
-OPTIONS: dict[str, Figures] = {
+OPTIONS: dict[str, JsonObject] = {
     "usual": {},
     "seams alpha": {"seams": "alpha"},
     "seams alpha, stretch axes, transmission none": {
@@ -123,9 +123,9 @@ class Plan:
     usual: Case
     cases: list[Case]
     film: list[Case]
-    effort: Effort
+    effort: FrameCounts
     images: int
-    image: Figures
+    image: JsonObject
     viewer: tuple[str, ...] = ()
 
 
@@ -134,36 +134,38 @@ def plan_of(adapter: str, head: str) -> Plan:
     film = PRESETS["film"]
     usual, *others = film.cases()
     largest = [
-        case for case in others if case.technique == FRAGMENTS or case.subdivide == max(film.subdivide)
+        case
+        for case in others
+        if case.technique == FRAGMENT_TECHNIQUE or case.subdivide == max(film.subdivide)
     ]
     settings = {"size": (512, 512), "atlas": 1024}
     interactive = PRESETS["interactive"]
     return Plan(
-        adapter, head, interactive.usual, interactive.cases(), [usual, *largest], Effort(), 500, settings
+        adapter, head, interactive.usual, interactive.cases(), [usual, *largest], FrameCounts(), 500, settings
     )
 
 
 def quick_plan(adapter: str, head: str) -> Plan:
     """Sizes that any machine renders in a moment."""
     usual = Case((48, 32), atlas=64, gaussians=2, lights=1, samples=1)
-    cases = [usual, replace(usual, technique=FRAGMENTS, varies="technique")]
-    effort = Effort(warming=0, between=0, timed=1, row=1)
+    cases = [usual, replace(usual, technique=FRAGMENT_TECHNIQUE, varies="technique")]
+    effort = FrameCounts(warming=0, between=0, timed=1, row=1)
     image = {"size": (32, 32), "atlas": 64}
     small = ("--size", "240x160", "--atlas", "64", "--frames", "2")
     return Plan(adapter, head, usual, cases, cases[:1], effort, 4, image, small)
 
 
-def bench(plan: Plan, head: Head, renderer: Renderer) -> Figures:
+def bench(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """`dermis bench`: all sizes and the passes of 2007."""
     return as_json(run_benchmark(plan.cases, plan.head, plan.adapter))
 
 
-def film(plan: Plan, head: Head, renderer: Renderer) -> Figures:
+def film(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Frames for film: the usual one, by the fragments of 2007, and with most triangles."""
     return as_json(run_benchmark(plan.film, plan.head, plan.adapter))
 
 
-def lights(plan: Plan, head: Head, renderer: Renderer) -> Figures:
+def lights(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Device time of each stage [ms] under lamps, in a room, and in the sun."""
     settings, found = _settings(plan.usual), {}
     for name, (lamps, panorama) in ENVIRONMENTS.items():
@@ -176,7 +178,7 @@ def lights(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     return found
 
 
-def options(plan: Plan, head: Head, renderer: Renderer) -> Figures:
+def options(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Device time of each stage [ms] by technique and remedy."""
     scenes, found = _scenes(plan.usual, head, plan.effort.row), {}
     for name, chosen in OPTIONS.items():
@@ -185,7 +187,7 @@ def options(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     return found
 
 
-def sequences(plan: Plan, head: Head, renderer: Renderer) -> Figures:
+def sequences(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Images per second, each with its own camera and lights: as arrays, PNG files and EXR files."""
     scenes = _scenes(replace(plan.usual, lights=1), head, plan.images)
 
@@ -203,12 +205,12 @@ def sequences(plan: Plan, head: Head, renderer: Renderer) -> Figures:
     return {"images": plan.images, **plan.image, "threads": os.cpu_count(), "per_second": rates}
 
 
-def lobes(plan: Plan, head: Head, renderer: Renderer) -> Figures:
+def lobes(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """An evaluation of each surface lobe [ns]."""
     return {", ".join(names): ns for names, ns in lobe_cost_ns(renderer.device).items()}
 
 
-def start(plan: Plan, head: Head, renderer: Renderer) -> Figures:
+def start(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Time of a process that renders one image [s]; the second one finds everything in the disk cache."""
     size = "x".join(map(str, plan.image["size"]))
     with tempfile.TemporaryDirectory() as folder:
@@ -218,7 +220,7 @@ def start(plan: Plan, head: Head, renderer: Renderer) -> Figures:
         return {name: lasted_s([sys.executable, "-m", "dermis", *words]) for name in ("first", "second")}
 
 
-def viewer(plan: Plan, head: Head, renderer: Renderer) -> Figures:
+def viewer(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """`benchmarks/viewer.py` without its long memory test; partial results when it ends early."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "viewer.json"
@@ -233,7 +235,7 @@ def viewer(plan: Plan, head: Head, renderer: Renderer) -> Figures:
                 raise
             note(str(fault))
             reason = {"ended": str(fault)}
-        figures: Figures = json.loads(told.read_text(encoding="utf-8"))
+        figures: JsonObject = json.loads(told.read_text(encoding="utf-8"))
         return figures | reason
 
 
@@ -244,17 +246,19 @@ def _settings(case: Case) -> Settings:
 def _scenes(case: Case, head: Head, count: int) -> list[Scene]:
     """Moving scenes with a profile named rather than in a file, because they outlive the folder."""
     with tempfile.TemporaryDirectory() as folder:
-        moving = scenes_of(case, head, Path(folder), max(2, count))
+        moving = case_scenes(case, head, Path(folder), max(2, count))
     return [replace(scene, skin=scene.skin.model_copy(update={"profile": "gpu-gems-3"})) for scene in moving]
 
 
-def _stages(renderer: Renderer, scenes: list[Scene], settings: Settings, effort: Effort) -> dict[str, float]:
+def _stages(
+    renderer: Renderer, scenes: list[Scene], settings: Settings, effort: FrameCounts
+) -> dict[str, float]:
     moving = cycle(scenes)
-    row_ms(renderer, moving, 1 + effort.warming, settings)
+    sequence_ms(renderer, moving, 1 + effort.warming, settings)
     return stage_ms(renderer, moving, settings, effort)
 
 
-def _or_reason(measured: Callable[[], Figures | float]) -> Figures | float:
+def _or_reason(measured: Callable[[], JsonObject | float]) -> JsonObject | float:
     """The measurements, or why there are none."""
     try:
         return measured()
@@ -306,12 +310,12 @@ def main(
         Tiny sizes.
     """
     target = check_output(output, (".json",), "Choose such a name")
-    name = ("lee_perry_smith" if cached("lee_perry_smith") else "human") if head == "auto" else head
+    name = ("lee_perry_smith" if is_available("lee_perry_smith") else "human") if head == "auto" else head
     plan = (quick_plan if quick else plan_of)(adapter, name)
-    measure(plan, _chosen(parts), minutes, lambda told: write_figures(target, told, _DIGITS))
+    measure(plan, _chosen(parts), minutes, lambda told: write_results(target, told, _DIGITS))
 
 
-def measure(plan: Plan, parts: list[str], minutes: float, keep: Callable[[Figures], None]) -> Figures:
+def measure(plan: Plan, parts: list[str], minutes: float, keep: Callable[[JsonObject], None]) -> JsonObject:
     """All figures; `keep` gets those known so far after each part."""
     began = time.perf_counter()
     head, renderer = dermis.load_head(plan.head, subdivide=0), dermis.Renderer(plan.adapter)
@@ -326,21 +330,21 @@ def measure(plan: Plan, parts: list[str], minutes: float, keep: Callable[[Figure
     return told
 
 
-def _measured(part: str, plan: Plan, head: Head, renderer: Renderer, left: float) -> Figures:
+def _measured(part: str, plan: Plan, head: Head, renderer: Renderer, left: float) -> JsonObject:
     """A part's figures, or why there are none."""
     if left < _NEEDED_S.get(part, 20):
         return {"left_out": f"{left:.0f} s were left"}
     try:
-        figures: Figures = globals()[part](plan, head, renderer)
+        figures: JsonObject = globals()[part](plan, head, renderer)
         return figures
     except DermisError as fault:
         note(f"left out: {fault}")
         return {"left_out": str(fault)}
     finally:
-        renderer.forget()  # the next part may need all of the memory
+        renderer.clear_cache()  # the next part may need all of the memory
 
 
-def _about(plan: Plan, renderer: Renderer) -> Figures:
+def _about(plan: Plan, renderer: Renderer) -> JsonObject:
     device = renderer.device
     return {
         "head": plan.head,
@@ -357,9 +361,7 @@ def _chosen(parts: str) -> list[str]:
     names = parts.split(",")
     for name in names:
         if name not in PARTS:
-            raise DermisError(
-                f"--parts: expected names of {', '.join(PARTS)}, but {name!r} came. Correct it."
-            )
+            raise DermisError(f"--parts: expected names of {', '.join(PARTS)}, but got {name!r}. Correct it.")
     return names
 
 

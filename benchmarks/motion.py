@@ -18,14 +18,14 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
-from dermis.apps.validation.benchmarks.cases import Case, pose_at, rigged, scenes_of, settings_of
-from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, row_ms, stage_ms
-from dermis.apps.validation.pages import Figures
-from dermis.base.atomic_write import check_output, replacing
+from dermis.apps.validation.benchmarks.cases import Case, case_scenes, case_settings, test_pose, with_test_rig
+from dermis.apps.validation.benchmarks.measure import CPU_FRAME_COUNTS, FrameCounts, sequence_ms, stage_ms
+from dermis.apps.validation.pages import JsonObject
+from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import print_json
 from dermis.frame.renderer import Renderer
-from dermis.gpu.memory import held_bytes
+from dermis.gpu.memory import allocated_bytes
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.scene import Scene, Settings, Skin
@@ -65,10 +65,10 @@ def main(
         check_output(output, (".json",))
     renderer, loaded = Renderer(adapter), load_head(head, subdivide=0)
     software = renderer.device.adapter.kind == "CPU"
-    case, effort = (_ON_CPU, ON_CPU) if software else (_ON_GPU, Effort())
+    case, effort = (_ON_CPU, CPU_FRAME_COUNTS) if software else (_ON_GPU, FrameCounts())
     with tempfile.TemporaryDirectory() as folder:
-        found: Figures = {"adapter": renderer.device.adapter.name, "head": head}
-        settings = settings_of(case).model_copy(update={"interreflection": interreflection})
+        found: JsonObject = {"adapter": renderer.device.adapter.name, "head": head}
+        settings = case_settings(case).model_copy(update={"interreflection": interreflection})
         found |= moving(renderer, case, settings, loaded, Path(folder), effort)
         found |= {"another_person_ms": people(renderer, case, loaded)}
         if frames:
@@ -77,30 +77,30 @@ def main(
             }
     print_json(found)
     if output is not None:
-        with replacing(output) as trial:
+        with atomic_file(output) as trial:
             trial.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
     return 0
 
 
 def moving(
-    renderer: Renderer, case: Case, settings: Settings, head: Head, folder: Path, effort: Effort
-) -> Figures:
+    renderer: Renderer, case: Case, settings: Settings, head: Head, folder: Path, effort: FrameCounts
+) -> JsonObject:
     """Frames that each have another skin, other lights and another camera; at rest, and with a new shape."""
-    found = Figures()
+    found = JsonObject()
     scenes = {
-        "still": scenes_of(case, head, folder, _MOMENTS),
-        "moving": scenes_of(replace(case, targets=_TARGETS), head, folder, _MOMENTS),
+        "still": case_scenes(case, head, folder, _MOMENTS),
+        "moving": case_scenes(replace(case, targets=_TARGETS), head, folder, _MOMENTS),
     }
     endless = {name: anew(several) for name, several in scenes.items()}
     for each in endless.values():
-        row_ms(renderer, each, max(2, effort.warming), settings)
+        sequence_ms(renderer, each, max(2, effort.warming), settings)
     times: dict[str, list[float]] = {name: [] for name in endless}
     for _ in range(3):  # in turn, so that a busy machine slows both down
         for name, each in endless.items():
-            row_ms(renderer, each, 2, settings)  # another head: its tables
-            times[name].append(row_ms(renderer, each, effort.row, settings) / effort.row)
+            sequence_ms(renderer, each, 2, settings)  # another head: its tables
+            times[name].append(sequence_ms(renderer, each, effort.row, settings) / effort.row)
     for name, each in endless.items():
-        row_ms(renderer, each, 2, settings)
+        sequence_ms(renderer, each, 2, settings)
         found[name] = {"frame_ms": min(times[name]), "device_ms": stage_ms(renderer, each, settings, effort)}
         found[name]["python_ms"] = python_ms(renderer, each, settings, effort)
     ratio = statistics.median(a / b for a, b in zip(times["moving"], times["still"], strict=True))
@@ -114,7 +114,7 @@ def anew(scenes: list[Scene]) -> Iterator[Scene]:
         yield replace(scene, skin=skin)
 
 
-def python_ms(renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: Effort) -> float:
+def python_ms(renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: FrameCounts) -> float:
     """Median of Python's time for a frame while the device is idle [ms]."""
     found = []
     for _ in range(max(effort.row, 3)):
@@ -128,7 +128,7 @@ def python_ms(renderer: Renderer, scenes: Iterator[Scene], settings: Settings, e
 
 def people(renderer: Renderer, case: Case, head: Head) -> list[float]:
     """Time to the first frame of other people of the same topology, one after the other [ms]."""
-    settings, found = settings_of(case), []
+    settings, found = case_settings(case), []
     renderer.draw(Scene(head), settings)
     for number in range(_PEOPLE):
         stretched = head.positions_mm * np.array([1.0 + 0.02 * number, 0.97, 1.0], np.float32)
@@ -147,15 +147,15 @@ def resident_mb() -> float:
     return pages * 4096 / 1e6
 
 
-def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int) -> Figures:
+def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int) -> JsonObject:
     """Memory of the process and of the device over frames of a motion that never repeats [MB]."""
-    scene, settings = scenes_of(case, head, folder, 1)[0], settings_of(case)
-    moving, taken = rigged(head, case.targets), list[tuple[int, float, float]]()
+    scene, settings = case_scenes(case, head, folder, 1)[0], case_settings(case)
+    moving, taken = with_test_rig(head, case.targets), list[tuple[int, float, float]]()
     for number in range(frames):
-        posed = replace(scene, head=moving, pose=pose_at(moving, number))
+        posed = replace(scene, head=moving, pose=test_pose(moving, number))
         renderer.draw(posed, settings, timed=False)
         if number * _SAMPLES // frames >= len(taken):
-            taken.append((number, resident_mb(), held_bytes() / 1e6))
+            taken.append((number, resident_mb(), allocated_bytes() / 1e6))
     renderer.device.wait()
     later = [one for one in taken if one[0] >= min(200, frames // 2)]
     growth = {

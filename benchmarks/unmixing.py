@@ -21,12 +21,12 @@ from scipy.ndimage import gaussian_filter
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer
 from dermis.apps.inverse.unmixing.skin_model import SkinModel, Third, skin_model, solve, weights_of
 from dermis.apps.inverse.unmixing.unmix import unmix
-from dermis.apps.truths.slab_mc import counted_profile
-from dermis.apps.validation.pages import Figures, write_figures
+from dermis.apps.truths.slab_mc import monte_carlo_profile
+from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.gpu import CommandList, Device, open_device
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.images.colour import delta_e_2000
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import diffusion_profile
@@ -67,7 +67,7 @@ def main(
     """
     told = json.loads(output.read_text("utf-8")) if output.exists() else {}
     if supplied_folder:
-        write_figures(output, told | {"supplied": supplied(supplied_folder)}, 4)
+        write_results(output, told | {"supplied": supplied(supplied_folder)}, 4)
         return 0
     device = open_device(adapter)
     speed = {"adapter": device.adapter.name} | {str(side): speed_ms(device, side) for side in SIDES}
@@ -80,7 +80,7 @@ def main(
     told["counted"] = counted()
     told["shading"] = shading(adapter)
     told["speed"] = speed
-    write_figures(output, told, 4)
+    write_results(output, told, 4)
     return 0
 
 
@@ -96,7 +96,7 @@ def colour_of(skin: SkinParameters) -> Floats:
     return np.asarray((1.0 - normal_reflectance(1.4)) * total @ rgb_weights(WAVELENGTHS_NM).T)
 
 
-def known(skin: SkinParameters) -> list[Figures]:
+def known(skin: SkinParameters) -> list[JsonObject]:
     """Errors on skins of the model itself, by bands of melanin, without noise and with it."""
     m, b = skins()
     colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
@@ -137,7 +137,7 @@ def bound(model: SkinModel, m: Floats, b: Floats, colours: Floats) -> Floats:
     return np.asarray(2.0 * np.sqrt(np.linalg.inv(weighed)[:, 1, 1] / b))
 
 
-def mistaken() -> Figures:
+def mistaken() -> JsonObject:
     """What melanin and blood come out as when the skin is not quite the one that was believed."""
     cases: dict[str, dict[str, float]] = {
         "oxygen 0.6 for 0.75": {"oxygen": 0.6},
@@ -162,13 +162,13 @@ def _off(third: Third, colours: Floats, m: Floats, b: Floats) -> dict[str, float
     return {name: float(np.median(one)) for name, one in ratios.items()} | {"delta_e": float(np.median(left))}
 
 
-def counted() -> list[Figures]:
+def counted() -> list[JsonObject]:
     """Skins whose colour was counted photon by photon: what diffusion itself is off by is in it."""
     told = []
     for m, b in _COUNTED:
         pigments = {"melanin": m, "blood": b}
         tissue = load_tissue("spectral", pigments=pigments)
-        colour = counted_profile(tissue.medium, tissue.rgb, _PHOTONS, seed=SEED).total[None]
+        colour = monte_carlo_profile(tissue.medium, tissue.rgb, _PHOTONS, seed=SEED).total[None]
         found = solve(skin_model(), colour, NOISE)
         own = skin_model().colours(np.array([m]), np.array([b]))
         told.append(
@@ -184,7 +184,7 @@ def counted() -> list[Figures]:
     return told
 
 
-def supplied(folder: Path) -> list[Figures]:
+def supplied(folder: Path) -> list[JsonObject]:
     """Skins whose colour another program computed, by bands of melanin: medians."""
     table = np.genfromtxt(
         folder / "spectral_srgb_diffusion.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
@@ -211,7 +211,7 @@ def supplied(folder: Path) -> list[Figures]:
     return told
 
 
-def shading(adapter: str) -> Figures:
+def shading(adapter: str) -> JsonObject:
     """A made-up map under light that is not even: what is taken out, and what melanin and blood gain."""
     random = np.random.default_rng(SEED)
     fields = [gaussian_filter(random.standard_normal((_SIDE, _SIDE)), s, mode="wrap") for s in (3, 4, 40)]
@@ -220,7 +220,7 @@ def shading(adapter: str) -> Figures:
     colours = skin_model().colours(m.ravel(), b.ravel()).reshape(_SIDE, _SIDE, 3) * light[..., None]
     colours *= 1.0 + NOISE * random.standard_normal(colours.shape)
     colours = np.clip(colours, 0.0, 1.0)
-    told: Figures = {"light": float(np.log(light).std())}
+    told: JsonObject = {"light": float(np.log(light).std())}
     for name, taken in (("kept", False), ("divided", True)):
         found = unmix(colours, shading=taken, adapter=adapter)
         told[name] = {
@@ -241,7 +241,7 @@ def speed_ms(device: Device, side: int) -> float:
     tiled = np.ones((side, side, 4), np.float32)
     tiled[..., :3] = np.tile(tile, (side // 256, side // 256, 1))
     unmixer = Unmixer(device, skin_model(), NOISE)
-    colours = texture_from(device, tiled, "rgba32float")
+    colours = texture_from_array(device, tiled, "rgba32float")
     times = []
     for _ in range(6):
         started = time.process_time()

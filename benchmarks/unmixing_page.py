@@ -8,8 +8,8 @@ import statistics
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from dermis.apps.validation.pages import Figures
-from dermis.base.atomic_write import replacing
+from dermis.apps.validation.pages import JsonObject
+from dermis.base.atomic_write import atomic_file
 from dermis.base.command_line import run_script
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -24,17 +24,17 @@ _TRUE_STRENGTH = 1.0  # of the surface of all faces that are fitted, as fitting.
 
 def main() -> None:
     """Write the page."""
-    with replacing(PAGE) as trial:
+    with atomic_file(PAGE) as trial:
         trial.write_text(page(*figures()), encoding="utf-8")
 
 
-def figures() -> tuple[Figures, Figures]:
+def figures() -> tuple[JsonObject, JsonObject]:
     """What was measured of unmixing, and of widths."""
     told, widths = (json.loads(path.read_text("utf-8")) for path in (RESULTS, WIDTHS))
     return told, widths
 
 
-def page(told: Figures, widths: Figures) -> str:
+def page(told: JsonObject, widths: JsonObject) -> str:
     """The page's text."""
     text = TEXT.read_text("utf-8")
     tables = {"known": _known(told), "mistaken": _mistaken(told), "counted": _counted(told)}
@@ -49,7 +49,7 @@ def page(told: Figures, widths: Figures) -> str:
     return text
 
 
-def _known(told: Figures) -> str:
+def _known(told: JsonObject) -> str:
     heads = (
         "epidermis [mm]",
         "melanin",
@@ -72,7 +72,7 @@ def _known(told: Figures) -> str:
     return _table(heads, rows)
 
 
-def _mistaken(told: Figures) -> str:
+def _mistaken(told: JsonObject) -> str:
     heads = "the skin is", "oxygen", "melanin found over true", "blood found over true", "CIEDE2000 left"
     words = {"none": "held", "oxygen": "found too"}
     rows = [
@@ -83,7 +83,7 @@ def _mistaken(told: Figures) -> str:
     return _table(heads, rows)
 
 
-def _counted(told: Figures) -> str:
+def _counted(told: JsonObject) -> str:
     heads = "melanin", "found", "blood", "found", "CIEDE2000 left", "of the true skin's colour by diffusion"
     rows = [
         (
@@ -99,7 +99,7 @@ def _counted(told: Figures) -> str:
     return _table(heads, rows)
 
 
-def _shading(told: Figures) -> str:
+def _shading(told: JsonObject) -> str:
     rows = [
         (words, _percent(told[key]["melanin"]), _percent(told[key]["blood"]))
         for key, words in (("kept", "left in the colours"), ("divided", "found and divided by"))
@@ -110,7 +110,7 @@ def _shading(told: Figures) -> str:
     return _table(("light", "melanin off by (median)", "blood"), rows) + "\n" + light
 
 
-def _supplied(told: Sequence[Figures]) -> str:
+def _supplied(told: Sequence[JsonObject]) -> str:
     heads = "melanin", "skins", "CIEDE2000 of the colour", "left when found", "melanin off by", "blood"
     rows = [
         (
@@ -126,7 +126,7 @@ def _supplied(told: Sequence[Figures]) -> str:
     return _table(heads, rows)
 
 
-def _borders(told: Figures) -> str:
+def _borders(told: JsonObject) -> str:
     heads = "media", "weights of", "mean error", "worst", "light in all", "white skin's light"
     rows = [
         (name, rule, *(_percent(one[key]) for key in ("rms", "worst", "energy", "white")))
@@ -136,13 +136,13 @@ def _borders(told: Figures) -> str:
     return _table(heads, rows)
 
 
-def _grid(told: Figures) -> str:
+def _grid(told: JsonObject) -> str:
     words = {"one_profile": "one profile, at the middle", "mixed": "three, mixed by the map"}
     rows = [(words[key], *map(_percent, told["grid"][key])) for key in words]
     return _table(("", "red", "green", "blue"), rows)
 
 
-def _speed(*machines: Figures) -> str:
+def _speed(*machines: JsonObject) -> str:
     rows = [
         (f"{side} x {side}", *(f"{told[side]:.3g}" for told in machines))
         for side in machines[0]
@@ -151,7 +151,7 @@ def _speed(*machines: Figures) -> str:
     return _table(("texels", *(f"{told['adapter']} [ms]" for told in machines)), rows)
 
 
-def _fitting(told: Figures) -> str:
+def _fitting(told: JsonObject) -> str:
     heads = "pictures", "number", "median error", "90 %", "worst", "bias (median)"
     rows = [
         row
@@ -165,7 +165,7 @@ def _fitting(told: Figures) -> str:
     return _table(heads, rows) + f"\n{size}, fitted at 128 across. {took}.\n\n{_stated(told['traced'])}"
 
 
-def _errors(cases: Sequence[Figures], words: str) -> list[tuple[str, ...]]:
+def _errors(cases: Sequence[JsonObject], words: str) -> list[tuple[str, ...]]:
     """Rows of the errors of each number."""
     rows = []
     for name in ("melanin", "blood", "roughness", "rho_s"):
@@ -178,11 +178,11 @@ def _errors(cases: Sequence[Figures], words: str) -> list[tuple[str, ...]]:
     return [*rows, (words, "direction of the sun", *_spread(turns, lambda x: f"{x:.1f} degrees"), "")]
 
 
-def _pair(one: Figures) -> tuple[float, float]:
+def _pair(one: JsonObject) -> tuple[float, float]:
     return one["found"], one["true"]
 
 
-def _stated(cases: Sequence[Figures]) -> str:
+def _stated(cases: Sequence[JsonObject]) -> str:
     """How far off pigments are over the deviations that the fits state."""
     words = []
     for name in ("melanin", "blood"):

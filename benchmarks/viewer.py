@@ -23,8 +23,8 @@ from viewer_input import Clock, Plan, offscreen, slider_position, speeds
 from viewer_memory import delays, endured
 from viewer_page import through_the_page
 
-from dermis.apps.validation.pages import Figures
-from dermis.base.atomic_write import check_output, replacing
+from dermis.apps.validation.pages import JsonObject
+from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import note, print_lines
 from dermis.cli.options import parse_size
@@ -33,7 +33,7 @@ from dermis.gpu import Device, open_device
 _SECTIONS = ("speed", "delay", "page", "memory")
 
 
-def tables(found: Figures) -> str:
+def tables(found: JsonObject) -> str:
     """All of it that there is."""
     parts = [_title(found), _speed(found), _delay(found)]
     if "samples" in found.get("memory", {}):
@@ -44,19 +44,19 @@ def tables(found: Figures) -> str:
     return "\n\n".join([*parts, *ended])
 
 
-def _figures(found: Figures, section: str) -> Figures:
+def _figures(found: JsonObject, section: str) -> JsonObject:
     """A section's, without the reason why it ended."""
     return {name: one for name, one in found.get(section, {}).items() if name != "ended"}
 
 
-def _title(found: Figures) -> str:
+def _title(found: JsonObject) -> str:
     plan = found["plan"]
     size = " x ".join(map(str, plan["size"]))
     what = f"{plan['head']}, {size}, atlas {plan['atlas']}, samples {plan['samples']}"
     return f"{found['adapter']}, {what}, {found['date'][:10]}"
 
 
-def _speed(found: Figures) -> str:
+def _speed(found: JsonObject) -> str:
     rows = [
         "| motion | frames/s | frame [ms] | 95 % within, longest [ms] | processor time [ms] | stages |",
         "|---|---|---|---|---|---|",
@@ -77,7 +77,7 @@ def _late(one: dict[str, float]) -> str:
     return f"{one['late_frame_ms']:.1f}, {one['longest_frame_ms']:.1f}"
 
 
-def _delay(found: Figures) -> str:
+def _delay(found: JsonObject) -> str:
     rows = ["| latency from a move to the picture | median [ms] | 95 % within [ms] |", "|---|---|---|"]
     page, several = _figures(found, "page"), _figures(found, "delay")
     if "delay" in page:
@@ -92,7 +92,7 @@ def _delay(found: Figures) -> str:
     return "\n".join(rows)
 
 
-def _memory(memory: Figures) -> str:
+def _memory(memory: JsonObject) -> str:
     taken = memory["samples"]
     size = " x ".join(map(str, memory["plan"]["size"]))
     rows = [
@@ -191,13 +191,13 @@ class Found:
     ended : sections that ended early; the reason is among their figures
     """
 
-    def __init__(self, told: Figures, output: Path, clock: Clock) -> None:
+    def __init__(self, told: JsonObject, output: Path, clock: Clock) -> None:
         self.told, self.ended = told, list[str]()
         self._output, self._clock = output, clock
 
     def take(self, section: str, measured: Callable[[Clock], Iterable[tuple[str, Any]]]) -> None:
         """The figures of a section; a fault ends it and leaves what came before."""
-        figures = self.told[section] = Figures()
+        figures = self.told[section] = JsonObject()
         self._say(section)
         try:
             for name, figure in measured(self._clock.share(_SHARES.get(section, 1.0))):
@@ -212,7 +212,7 @@ class Found:
 
     def keep(self) -> None:
         """Write all."""
-        with replacing(self._output) as whole:
+        with atomic_file(self._output) as whole:
             whole.write_text(json.dumps(self.told, indent=1) + "\n", encoding="utf-8")
 
     def _say(self, what: str) -> None:
@@ -224,7 +224,7 @@ def _halved(plan: Plan) -> Plan:
     return replace(plan, size=(width // 2, height // 2), atlas=max(64, plan.atlas // 2))
 
 
-def _about(device: Device, plan: Plan) -> Figures:
+def _about(device: Device, plan: Plan) -> JsonObject:
     """What was measured on what."""
     return {
         "adapter": device.adapter.name,

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.benchmarks.cases import pose_at, rigged
-from dermis.apps.validation.pages import Figures
+from dermis.apps.validation.benchmarks.cases import test_pose, with_test_rig
+from dermis.apps.validation.pages import JsonObject
 from dermis.apps.viewer.navigation import drag_light, orbit
-from dermis.apps.viewer.state import ViewerState, changed
-from dermis.apps.viewer.studio import Pace
+from dermis.apps.viewer.state import ViewerState, validated_copy
+from dermis.apps.viewer.view_renderer import QualityController
 from dermis.apps.viewer.viewer import Viewer
 from dermis.scene.heads import load_head
 from dermis.scene.model import Scene
@@ -89,12 +89,12 @@ class Motion:
     change: Change
 
 
-class Steady(Pace):
+class Steady(QualityController):
     """The same quality for every frame: what the settings ask for."""
 
     def settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
         """The wanted ones at the window's size."""
-        return changed(wanted, size=size)
+        return validated_copy(wanted, size=size)
 
 
 class InputDriver:
@@ -152,18 +152,20 @@ def offscreen(plan: Plan) -> InputDriver:
     canvas = OffscreenRenderCanvas(size=plan.size)
     state = ViewerState(Scene(load_head(plan.head, subdivide=0)), settings, {"name": plan.head})
     viewer = Viewer(state, canvas, plan.adapter)
-    viewer.panel.visible = False
-    viewer.session.studio.pace = Steady(viewer.session.studio.pace.software)
+    viewer.panel.is_visible = False
+    viewer.session.view_renderer.quality_controller = Steady(
+        viewer.session.view_renderer.quality_controller.software
+    )
     return InputDriver(viewer, canvas)
 
 
 def slider_position(driver: InputDriver, name: str) -> tuple[float, float] | None:
     """Position of a pigment's slider in the window, None when it would have to be scrolled to."""
-    driver.viewer.panel.visible = True
+    driver.viewer.panel.is_visible = True
     driver.go_on(driver.first.with_skin(profile=PIGMENTED))
     for _ in range(FEWEST):
         driver.frame()
-    driver.viewer.panel.visible = False
+    driver.viewer.panel.is_visible = False
     place = driver.viewer.session.positions[name]
     return place if place[1] < driver.canvas.get_logical_size()[1] else None
 
@@ -177,7 +179,7 @@ def _unmapped(state: ViewerState) -> ViewerState:
 
 def _with_targets(state: ViewerState) -> ViewerState:
     """With as many morph targets as faces have, and bones."""
-    return replace(state, scene=replace(state.scene, head=rigged(state.scene.head, _TARGETS)))
+    return replace(state, scene=replace(state.scene, head=with_test_rig(state.scene.head, _TARGETS)))
 
 
 def _to_and_fro(k: int) -> float:
@@ -196,18 +198,18 @@ MOTIONS: dict[str, Motion] = {
         lambda state: state.with_skin(profile=PIGMENTED).with_pigments(melanin=0.05),
         lambda state, k: state.with_pigments(melanin=0.05 + 0.01 * _to_and_fro(k)),
     ),
-    "expression": Motion(_with_targets, lambda state, k: state.with_pose(pose_at(state.scene.head, k))),
+    "expression": Motion(_with_targets, lambda state, k: state.with_pose(test_pose(state.scene.head, k))),
     "exposure": Motion(_same, lambda state, k: state.with_settings(exposure=1.0 + 0.2 * _to_and_fro(k))),
 }
 
 
-def speeds(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, Figures]]:
+def speeds(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, JsonObject]]:
     """Of each kind of motion, one after the other."""
     for done, (name, motion) in enumerate(MOTIONS.items()):
         yield name, _speed(driver, motion, plan.frames, clock.share(1.0 / (len(MOTIONS) - done)))
 
 
-def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> Figures:
+def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> JsonObject:
     session = driver.viewer.session
     driver.go_on(motion.start(driver.first))
     for k in range(_SETTLING):
@@ -219,8 +221,8 @@ def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> Fi
         driver.go_on(motion.change(session.state, _SETTLING + k))
         driver.frame()
         times.append(time.perf_counter() - began)
-        prepared.append(session.studio.rendered.setup_ms if session.studio.rendered else 0.0)
-    rendered = session.studio.rendered
+        prepared.append(session.view_renderer.rendered.setup_ms if session.view_renderer.rendered else 0.0)
+    rendered = session.view_renderer.rendered
     return {
         "frames": len(times),
         "frames_per_s": len(times) / sum(times),

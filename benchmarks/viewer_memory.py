@@ -12,11 +12,11 @@ import numpy as np
 from viewer_input import FEWEST, MOTIONS, STEP, Clock, InputDriver, Plan, counted, spread
 from viewer_page import resident_mb
 
-from dermis.apps.validation.pages import Figures
+from dermis.apps.validation.pages import JsonObject
 from dermis.apps.viewer.controls import CAMERAS
 from dermis.apps.viewer.navigation import dolly, drag_light, orbit, pan
 from dermis.apps.viewer.state import ViewerState
-from dermis.gpu.memory import held_bytes
+from dermis.gpu.memory import allocated_bytes
 from dermis.scene.environment import Environment
 from dermis.scene.lights import light_presets
 
@@ -68,11 +68,11 @@ def _delay(driver: InputDriver, x: float, y: float) -> float:
 
 def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> float:
     """Of a move that comes while a frame is drawn [s]."""
-    came: list[float] = []
+    actual: list[float] = []
 
     def move() -> None:
         time.sleep(wait_s)
-        came.append(time.perf_counter())
+        actual.append(time.perf_counter())
         driver.event("pointer_move", x, y)
 
     mover = threading.Thread(target=move)
@@ -83,7 +83,7 @@ def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> f
     driver.frame()
     mover.join()
     driver.frame()
-    return time.perf_counter() - came[0]
+    return time.perf_counter() - actual[0]
 
 
 Kind = Callable[[ViewerState, random.Random], ViewerState]
@@ -124,12 +124,14 @@ KINDS: dict[str, Kind] = {
     "bloom": lambda s, r: s.with_settings(bloom=_one(r, 0.0, 0.1)),
     "samples": lambda s, r: s.with_settings(samples=_one(r, 1, 2)),
     "atlas": lambda s, r: s.with_settings(atlas=_one(r, s.settings.atlas, 256, 512)),
-    "view": lambda s, r: s.in_view(_one(r, "picture", "diffuse", "irradiance", "blur 1", "normals", "atlas")),
+    "view": lambda s, r: s.with_view(
+        _one(r, "picture", "diffuse", "irradiance", "blur 1", "normals", "atlas")
+    ),
 }
 """Changes of a state; what cannot be rendered together leaves the last picture, as it does for a user."""
 
 
-def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> Figures:
+def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> JsonObject:
     """The memory over at least so many minutes and changes; each change is drawn."""
     chance, session = random.Random(11), driver.viewer.session
     done, taken = 0, list[dict[str, float]]()
@@ -154,7 +156,12 @@ def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> Fi
 
 
 def _sample(seconds: float, changes: int) -> dict[str, float]:
-    return {"s": seconds, "changes": changes, "resident_mb": resident_mb(), "device_mb": held_bytes() / 1e6}
+    return {
+        "s": seconds,
+        "changes": changes,
+        "resident_mb": resident_mb(),
+        "device_mb": allocated_bytes() / 1e6,
+    }
 
 
 def _change(driver: InputDriver, kind: str, chance: random.Random, plan: Plan) -> None:
@@ -162,22 +169,22 @@ def _change(driver: InputDriver, kind: str, chance: random.Random, plan: Plan) -
     if kind in KINDS:
         session.change(KINDS[kind](session.state, chance))
     elif kind == "split":
-        session.split.release() if session.split.before else session.split.freeze(session.state)
+        session.split.release() if session.split.frozen_state else session.split.freeze(session.state)
     elif kind == "undo":
         session.history.undo()
     elif kind == "redo":
         session.history.redo()
     elif kind == "panel":
-        driver.viewer.panel.visible = not driver.viewer.panel.visible
+        driver.viewer.panel.is_visible = not driver.viewer.panel.is_visible
     elif kind == "size":
         driver.canvas.set_logical_size(*(round(side * chance.choice((0.5, 0.75, 1.0))) for side in plan.size))
     elif kind == "preset":
-        session.controls.look(chance.choice(CAMERAS))
+        session.controls.set_camera_preset(chance.choice(CAMERAS))
     else:
         session.change(driver.first)
 
 
-def growth(taken: Sequence[dict[str, float]]) -> Figures:
+def growth(taken: Sequence[dict[str, float]]) -> JsonObject:
     """Slopes of the second half of the samples [MB per 1000 changes]."""
     late = taken[len(taken) // 2 :]
     x = [one["changes"] / 1e3 for one in late]

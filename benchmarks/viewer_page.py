@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from viewer_input import PIGMENTED, Clock, Plan, spread
 
-from dermis.apps.viewer.browser.canvas import encoded
+from dermis.apps.viewer.browser.canvas import encode_image
 
 _START_S = 120.0
 
@@ -234,10 +234,10 @@ def _dragged(
         if now >= due_s:
             due_s += 1.0 / _MOVES_PER_S
             page.pointer("pointer_move", x + 1.5 * (100 - abs(next(moves) % 200 - 100)), y, *modifiers)
-        came = page.next_picture(due_s - now)
-        if came and came.name != known:
-            known = came.name
-            yield came
+        actual = page.next_picture(due_s - now)
+        if actual and actual.name != known:
+            known = actual.name
+            yield actual
 
 
 def _slide(page: Page, place: Place) -> dict[str, float]:
@@ -273,11 +273,11 @@ def _delays(page: Page, place: Place) -> list[float]:
         seen = {page.settle().name}
         began = time.perf_counter()
         page.pointer("pointer_move", x + _PIXELS * (1 - len(found) % 2), y)
-        while (came := page.next_picture(page.patience_s)) and came.name in seen:
+        while (actual := page.next_picture(page.patience_s)) and actual.name in seen:
             pass
-        if came is None:
+        if actual is None:
             raise RuntimeError("no picture comes")
-        found.append(came.at - began)
+        found.append(actual.at - began)
         one_s = time.perf_counter() - first
     page.pointer("pointer_up", x, y)
     return found
@@ -290,7 +290,7 @@ def _encoding(still: Picture) -> dict[str, float]:
         runs = []
         for _ in range(9):
             began = time.perf_counter()
-            encoded(array, lossless=lossless)
+            encode_image(array, lossless=lossless)
             runs.append(1e3 * (time.perf_counter() - began))
         times[name] = float(np.median(runs))
     return times

@@ -13,16 +13,16 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from web_page import FLAGS, SOFTWARE, STATE
+from page_html import FLAGS, SOFTWARE, STATE
 
 import dermis
-from dermis.apps.export.targets.web.build import PageRequest, page_content
-from dermis.apps.export.targets.web.maps import with_smaller_maps
-from dermis.apps.export.targets.web.target import web_page
+from dermis.apps.export.targets.web.build import PageRequest, build_content
+from dermis.apps.export.targets.web.maps import with_reduced_maps
+from dermis.apps.export.targets.web.target import page_html
 from dermis.apps.validation.pages import chromium_page
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
-from dermis.frame.capture import renderer_for
+from dermis.frame.capture import capture_renderer
 
 ATLAS, MAP = 512, 1024  # as exported
 SHOWN = ("software", 512), ("gpu", 256)
@@ -44,20 +44,22 @@ LINEAR = """async () => {
 def main(head: str, adapter: str = "auto") -> None:
     """Print a row for each form and size."""
     scene = dermis.Scene(dermis.load_head(head))
-    scene = replace(scene, head=with_smaller_maps(scene.head, MAP))
+    scene = replace(scene, head=with_reduced_maps(scene.head, MAP))
     settings = dermis.Settings(atlas=ATLAS)
     print_lines("| head | form | size | difference | what maps and hairs lose |", "|---|---|---|---|---|")
     for form, side in SHOWN:
-        sized = settings.model_copy(update={"size": (side, side)})
-        given = renderer_for(form, adapter).draw(scene, sized).linear()
+        settings_for = settings.model_copy(update={"size": (side, side)})
+        given = capture_renderer(form, adapter).draw(scene, settings_for).linear()
         wanted = list[NDArray[np.float32]]()
-        made = page_content(
+        made = build_content(
             PageRequest(scene, (), settings, {form: (side,)}, adapter),
-            lambda renderer, *_, sized=sized: wanted.append(renderer.draw(scene, sized).linear()),  # noqa: B023
+            lambda renderer, *_, settings_for=settings_for: wanted.append(
+                renderer.draw(scene, settings_for).linear()
+            ),  # noqa: B023
         )
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "head.html"
-            file.write_text(web_page(made, (), head, ""), encoding="utf-8")
+            file.write_text(page_html(made, (), head, ""), encoding="utf-8")
             found = drawn(file, side)
         off, lost = distance(found, wanted[0]), distance(wanted[0], given)
         print_lines(f"| {head} | {form} | {side} x {side} | {off:.2%} | {lost:.2%} |")

@@ -21,8 +21,8 @@ import dermis
 from dermis.apps.inverse.unmixing.profile_widths import widths_of
 from dermis.apps.inverse.unmixing.skin_model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
-from dermis.apps.truths.two_media import exchange
-from dermis.apps.validation.pages import Figures, write_figures
+from dermis.apps.truths.two_media import strip_transfer
+from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer
@@ -65,16 +65,16 @@ def main(
         print_lines(json.dumps(cost(adapter, atlas)))
         return 0
     told = {"pairs": {name: border(*pair) for name, pair in PAIRS.items()}, "grid": grid(adapter)}
-    write_figures(output, told | {"photons": PHOTONS}, 3)
+    write_results(output, told | {"photons": PHOTONS}, 3)
     return 0
 
 
-def border(sigma_a: tuple[float, float], sigma_s: tuple[float, float]) -> Figures:
+def border(sigma_a: tuple[float, float], sigma_s: tuple[float, float]) -> JsonObject:
     """Errors of each rule at the border of two media: root mean square over the true maximum, and energy."""
     edges = np.linspace(-HALF_MM, HALF_MM, STRIPS + 1)
     a, s = np.array(sigma_a), np.array(sigma_s)
-    true = exchange(a, s, edges, PHOTONS, SEED)
-    alone = [along(exchange(np.full(2, a[k]), np.full(2, s[k]), edges, PHOTONS, SEED)) for k in (0, 1)]
+    true = strip_transfer(a, s, edges, PHOTONS, SEED)
+    alone = [along(strip_transfer(np.full(2, a[k]), np.full(2, s[k]), edges, PHOTONS, SEED)) for k in (0, 1)]
     colour = [one[0] + 2.0 * one[1:].sum() for one in alone]
     right = edges[:-1] >= 0.0
     apart = np.abs(np.subtract.outer(np.arange(STRIPS), np.arange(STRIPS)))
@@ -130,18 +130,18 @@ def errors(light: Floats, kernel: Floats, tint: Floats, true: Floats) -> tuple[f
     return float(off), float(energy), float((near @ kernel[_JUDGED]).sum() / near.sum() - 1.0)
 
 
-def grid(adapter: str) -> Figures:
+def grid(adapter: str) -> JsonObject:
     """What three profiles leave of the widths of skins with 1 to 15 % of melanin and 0.2 to 6 % of blood."""
     m, b = np.meshgrid(np.geomspace(0.01, 0.15, 64), np.geomspace(0.002, 0.06, 64))
     colours = skin_model().colours(m.ravel(), b.ravel()).reshape(64, 64, 3)
     return widths_of(unmix(colours, adapter=adapter)).summary()
 
 
-def cost(adapter: str, atlas: int) -> Figures:
+def cost(adapter: str, atlas: int) -> JsonObject:
     """Median milliseconds of a human's frames by how many profiles its skin has, lit anew each time."""
     renderer, head = Renderer(adapter), dermis.load_head("human")
     settings = dermis.Settings(size=(1920, 1080), atlas=atlas)
-    told: Figures = {"adapter": renderer.device.adapter.name, "atlas": atlas}
+    told: JsonObject = {"adapter": renderer.device.adapter.name, "atlas": atlas}
     with TemporaryDirectory() as folder:
         mask = Path(folder) / "mask.png"
         write_png(mask, np.random.default_rng(SEED).integers(0, 127, (64, 64, 3)).astype(np.uint8))

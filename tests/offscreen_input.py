@@ -31,7 +31,7 @@ class InputDriver:
         self.now += seconds
         self.canvas._process_events()
         drawn = np.array(self.canvas.draw())[..., :3]
-        coming = self.viewer._preparation._coming
+        coming = self.viewer._preparation._future
         if coming is None or not self.patient:
             return drawn
         coming.exception(_LONGEST_S)

@@ -21,7 +21,7 @@ def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[A
     from rendercanvas.http import asgi
 
     from dermis.apps.viewer.browser.canvas import PageCanvas
-    from dermis.apps.viewer.browser.server import bind, server
+    from dermis.apps.viewer.browser.server import bind, make_server
     from dermis.apps.viewer.viewer import Viewer
 
     listener, address = bind("127.0.0.1", 0)
@@ -30,7 +30,7 @@ def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[A
     def run() -> None:  # in whose event loop the canvas belongs
         one: Any = Viewer(state, PageCanvas(size=size, max_fps=60), ADAPTER)
         one.folder = folder
-        one.url, running = address.url, server(address, one.canvas, Path(folder))
+        one.url, running = address.url, make_server(address, one.canvas, Path(folder))
         made.extend((one, running))
         running.run(sockets=[listener])
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dermis.base.command_line import run_script
-from dermis.formats.samples import SAMPLES, cached
+from dermis.formats.samples import SAMPLES, is_available
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.images.io import write_png
@@ -17,7 +17,7 @@ from dermis.scene import Environment, Scene, Settings, load_lights
 from dermis.scene.camera import preset
 from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.lights import NO_LIGHTS, light_presets
-from dermis.scene.settings import PHOTOGRAPHED
+from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS
 
 TURNS = (0.0, 90.0, 180.0, -90.0)
 
@@ -27,7 +27,7 @@ def heads() -> dict[str, Head]:
     own = {"usual": load_head(HUMAN)}
     own["light"] = Human(african=0.0, asian=0.0, caucasian=1.0).head()
     own["dark"] = Human(african=1.0, asian=0.0, caucasian=0.0).head()
-    samples = [name for name, sample in SAMPLES.items() if sample.kind == "head" and cached(name)]
+    samples = [name for name, sample in SAMPLES.items() if sample.kind == "head" and is_available(name)]
     return own | {name: load_head(name, subdivide=1) for name in samples}
 
 
@@ -36,7 +36,7 @@ def lit() -> Iterator[dict[str, object]]:
     for rig in light_presets():
         if rig != NO_LIGHTS:
             yield {"lights": load_lights(rig)}
-    rooms = [name for name, sample in SAMPLES.items() if sample.kind == "environment" and cached(name)]
+    rooms = [name for name, sample in SAMPLES.items() if sample.kind == "environment" and is_available(name)]
     yield {"lights": (), "environment": Environment(name="uniform")}
     for room in rooms:
         for turn in TURNS:
@@ -54,7 +54,7 @@ def main(output: Path, *, side: int = 160, camera: str = "portrait", adapter: st
     side:
         Of each picture [pixel].
     """
-    settings = Settings(size=(side, side), atlas=512, shadow_size=1024, **PHOTOGRAPHED)
+    settings = Settings(size=(side, side), atlas=512, shadow_size=1024, **PHOTOGRAPHIC_SETTINGS)
     renderer, columns = Renderer(adapter), []
     for head in heads().values():
         scenes = [Scene(head, camera=preset(camera, head), **light) for light in lit()]  # type: ignore[arg-type]

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.photon import Words, deflect, uniform
+from dermis.apps.truths.photon import RandomState, deflect, uniform
 from dermis.base.command_line import run_script
 from dermis.base.compiled import compiled
 
@@ -39,7 +39,7 @@ entry,root,radius,within
 
 
 @compiled
-def _entering(skin: bool, rng: Words) -> tuple[float, float, float]:
+def _entering(skin: bool, rng: RandomState) -> tuple[float, float, float]:
     """Where a walk begins, z downwards."""
     if not skin:
         return 0.0, 0.0, 1.0
@@ -52,7 +52,7 @@ def _entering(skin: bool, rng: Words) -> tuple[float, float, float]:
 
 
 @compiled
-def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: Words, found: Floats) -> None:
+def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomState, found: Floats) -> None:
     """Add to `found` (albedos, radii + 1) the weights of photons that leave, by their ring.
 
     powers : (albedos, MOST) albedo^n

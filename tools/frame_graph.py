@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import dermis
-from dermis.apps.validation.benchmarks.cases import pose_at, rigged
-from dermis.apps.validation.pages import template_of
+from dermis.apps.validation.benchmarks.cases import test_pose, with_test_rig
+from dermis.apps.validation.pages import template_path
 from dermis.base.command_line import run_script
-from dermis.formats.samples import cached
+from dermis.formats.samples import is_available
 from dermis.gpu.graph import ListedPass, Listing
 
 PAGE = Path(__file__).parent.parent / "docs" / "frame_graph.md"
@@ -23,7 +23,7 @@ def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Setting
     moved = key.model_copy(update={"position": tuple(c + 20.0 for c in key.position)})  # type: ignore[union-attr]
     rough = scene.skin.model_copy(update={"roughness": 0.4})
     return {
-        "a pose": (replace(scene, pose=pose_at(scene.head, 1)), SETTINGS),
+        "a pose": (replace(scene, pose=test_pose(scene.head, 1)), SETTINGS),
         "camera": (replace(scene, camera=dermis.three_quarter(scene.head)), SETTINGS),
         "a light": (replace(scene, lights=(moved, *others)), SETTINGS),
         "exposure": (scene, SETTINGS.model_copy(update={"exposure": 2.0})),
@@ -36,7 +36,7 @@ def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Setting
 def listed(renderer: dermis.Renderer, scene: dermis.Scene) -> Listing:
     """A frame of which everything runs."""
     renderer.graph.listing = listing = Listing()
-    renderer.draw(scene, SETTINGS, anew=True)
+    renderer.draw(scene, SETTINGS, force=True)
     return listing
 
 
@@ -60,17 +60,17 @@ def pass_row(one: ListedPass) -> str:
 def main(adapter: str = "auto", page: Path = PAGE) -> None:
     """Draw and write."""
     renderer = dermis.Renderer(adapter)
-    name = "lee_perry_smith" if cached("lee_perry_smith") else "human"
-    scene = dermis.Scene(rigged(dermis.load_head(name, subdivide=0), TARGETS))
+    name = "lee_perry_smith" if is_available("lee_perry_smith") else "human"
+    scene = dermis.Scene(with_test_rig(dermis.load_head(name, subdivide=0), TARGETS))
     renderer.draw(scene, SETTINGS)
     ms = renderer.draw_warm(scene, SETTINGS).gpu_ms or {}
     listing, marks = listed(renderer, scene), dict[str, set[str]]()
     for change, frame in changes(scene).items():
         renderer.draw(scene, SETTINGS)
         renderer.draw(*frame)
-        marks[change] = set(renderer.graph.ran)
+        marks[change] = set(renderer.graph.executed_stages)
     page.write_text(
-        template_of(PAGE)
+        template_path(PAGE)
         .read_text(encoding="utf-8")
         .format(
             head=name,

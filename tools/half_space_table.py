@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.photon import deflect, refract, uniform
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 from dermis.base.command_line import run_script
 from dermis.base.compiled import compiled
 
@@ -52,7 +52,7 @@ def main(photons: int = PHOTONS) -> None:
         for i, absorbed in enumerate(ABSORBED):
             shares = ",".join(f"{share:.5f}" for share in within[:, i] / total[i])
             lines.append(f"{kind},{1.0 - absorbed:.6g},{total[i]:.6g},{shares}")
-    with replacing(OUT) as trial:
+    with atomic_file(OUT) as trial:
         trial.write_text("\n".join([*lines, ""]), encoding="utf-8")
 
 

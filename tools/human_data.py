@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array, eye_array, vstack
 
 from dermis.base.command_line import run_script
-from dermis.human.published import DELTA_MM
+from dermis.human.makehuman import DELTA_UNIT_MM
 from dermis.mesh.rig import INFLUENCES
 
 Doubles = NDArray[np.float64]
@@ -83,7 +83,7 @@ class Shape(NamedTuple):
 def displacements(data: Arrays, index: int) -> tuple[Index, Doubles]:
     """Points that a target moves, and by how much [mm]."""
     part = slice(*data["target_offset"][index : index + 2])
-    return data["target_vertex"][part].astype(np.int64), DELTA_MM * data["target_delta_um10"][part]
+    return data["target_vertex"][part].astype(np.int64), DELTA_UNIT_MM * data["target_delta_um10"][part]
 
 
 def person(data: Arrays, weights: dict[str, float]) -> Doubles:
@@ -220,7 +220,7 @@ def bust(data: Arrays, shape: Shape) -> Arrays:
         point, delta = displacements(data, index)
         dense = np.zeros((published, 3))
         dense[point] = delta
-        moved = np.rint((mix @ dense) / DELTA_MM)
+        moved = np.rint((mix @ dense) / DELTA_UNIT_MM)
         which = np.flatnonzero(moved.any(axis=1))
         points.append(which)
         deltas.append(moved[which])

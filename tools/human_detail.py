@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from dermis.base.command_line import run_script
-from dermis.human.skin.textures import FULL_MM, SIDE, TILE_MM
+from dermis.human.skin.textures import MAX_HEIGHT_MM, TILE_LENGTH_MM, TILE_SIDE
 
 Doubles = NDArray[np.float64]
 
@@ -33,11 +33,13 @@ SOFT = 0.6
 def main() -> None:
     """Make the file."""
     rng = np.random.default_rng(0)
-    across = (np.arange(SIDE) + 0.5) * TILE_MM / SIDE
+    across = (np.arange(TILE_SIDE) + 0.5) * TILE_LENGTH_MM / TILE_SIDE
     places = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
     layers = [pores(places, rng), furrows(places, rng), np.zeros(len(places))]
-    heights = gaussian_filter(np.stack(layers, axis=-1).reshape(SIDE, SIDE, 3), (SOFT, SOFT, 0), mode="wrap")
-    levels = np.clip(np.rint(255 * (heights / FULL_MM + 0.75)), 0, 255).astype(np.uint8)
+    heights = gaussian_filter(
+        np.stack(layers, axis=-1).reshape(TILE_SIDE, TILE_SIDE, 3), (SOFT, SOFT, 0), mode="wrap"
+    )
+    levels = np.clip(np.rint(255 * (heights / MAX_HEIGHT_MM + 0.75)), 0, 255).astype(np.uint8)
     Image.fromarray(levels).save(OUT, optimize=True)
     sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
 
@@ -45,7 +47,9 @@ def main() -> None:
 def scattered(count: int, rng: np.random.Generator, spread: float = 0.85) -> Doubles:
     """(count², 2) places, one in each cell of a grid over the tile [mm]."""
     cell = np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=-1).reshape(-1, 2)
-    return np.asarray((cell + 0.5 + spread * (rng.random(cell.shape) - 0.5)) * TILE_MM / count % TILE_MM)
+    return np.asarray(
+        (cell + 0.5 + spread * (rng.random(cell.shape) - 0.5)) * TILE_LENGTH_MM / count % TILE_LENGTH_MM
+    )
 
 
 def pores(places: Doubles, rng: np.random.Generator) -> Doubles:
@@ -79,20 +83,20 @@ def net(places: Doubles, count: int, size: float, rng: np.random.Generator) -> D
     distance, near = nearest(places, middle, 2)
     between = distance[:, 1] - distance[:, 0]
     depth = FURROW_DEPTH_MM * 0.5 * uneven[near].sum(axis=1)
-    cushion = CUSHION_MM * np.minimum(between / (TILE_MM / count), 1.0)
+    cushion = CUSHION_MM * np.minimum(between / (TILE_LENGTH_MM / count), 1.0)
     return np.asarray(cushion - depth * np.exp(-((between / (size * FURROW_MM)) ** 2)))
 
 
 def nearest(places: Doubles, middle: Doubles, k: int) -> tuple[Doubles, NDArray[np.intp]]:
     """(n, k) distances to the nearest of some places on the tile, and which these are."""
-    box: Any = TILE_MM
+    box: Any = TILE_LENGTH_MM
     distance, which = cKDTree(middle, boxsize=box).query(places, k=k)
     return np.asarray(distance), np.asarray(which)
 
 
 def wrapped(off: Doubles) -> Doubles:
     """Differences of places on the tile, the shortest way over its edges [mm]."""
-    return np.asarray((off + TILE_MM / 2) % TILE_MM - TILE_MM / 2)
+    return np.asarray((off + TILE_LENGTH_MM / 2) % TILE_LENGTH_MM - TILE_LENGTH_MM / 2)
 
 
 if __name__ == "__main__":

@@ -19,9 +19,9 @@ from scipy.sparse.linalg import lsqr
 from scipy.spatial import cKDTree
 
 from dermis.base.command_line import run_script
+from dermis.human.makehuman import DELTA_UNIT_MM, mesh_point_count, morphed_points_mm
 from dermis.human.person import Human
-from dermis.human.published import DELTA_MM, count, places_mm
-from dermis.human.skin.surface import FIELDS
+from dermis.human.skin.surface import BORDER_FIELDS
 from dermis.mesh.mesh import Mesh
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "average.npz"
@@ -42,8 +42,10 @@ def main(folder: Path) -> None:
     head = AVERAGE.head(layout="hm08", subdivide=LEVEL)
     assert head.rig is not None and head.rig.stencils is not None
     stencils = head.rig.stencils
-    places = places_mm(AVERAGE.weights())[: count()]  # with the published lids: strips of lashes fit them
-    points = stencils.points(np.concatenate([places, head.positions_mm[count() :]]))
+    places = morphed_points_mm(AVERAGE.weights())[
+        : mesh_point_count()
+    ]  # with the published lids: strips of lashes fit them
+    points = stencils.points(np.concatenate([places, head.positions_mm[mesh_point_count() :]]))
     mesh = replace(head.mesh, positions=points[head.mesh.point].astype(np.float32))
     skin = skin_vertices(mesh)
     masks = {name: mask(folder, name, mesh.uv) for name in ("lips", "inside-mouth")}
@@ -53,19 +55,19 @@ def main(folder: Path) -> None:
         "mouth": -signed(mesh, skin, inside),
         "lids": away(mesh, lash_roots(folder, mesh, skin)),
     }
-    assert tuple(found) == FIELDS
+    assert tuple(found) == BORDER_FIELDS
     values = np.stack([np.clip(one, -FARTHEST_MM, FARTHEST_MM) for one in found.values()], axis=1)
     first, point, weight = stencils.first, stencils.point, stencils.weight
     matrix = csr_array((weight, point, first), shape=(len(first) - 1, len(head.positions_mm)))
     fields = fit(matrix, mesh.point[skin].astype(np.int64), values[skin])
-    fields = fields[: count()]  # without eyeballs
+    fields = fields[: mesh_point_count()]  # without eyeballs
     np.savez_compressed(OUT, places=hundredths(places), fields=hundredths(fields))
     sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
 
 
 def hundredths(values_mm: NDArray[np.floating]) -> NDArray[np.int32]:
     """The same in units of the published displacements; the breast is too far down for 16 bits."""
-    return np.asarray(np.rint(values_mm / DELTA_MM), np.int32)
+    return np.asarray(np.rint(values_mm / DELTA_UNIT_MM), np.int32)
 
 
 def skin_vertices(mesh: Mesh) -> Index:

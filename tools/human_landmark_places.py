@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from dermis.human.hair import brows
 from dermis.human.model import MATERIALS
-from dermis.human.regions.average import AVERAGE, average_head, parts
-from dermis.human.skin.surface import FIELDS, average, lid_rings
+from dermis.human.regions.average import AVERAGE_HUMAN, average_head, part_quads
+from dermis.human.skin.surface import BORDER_FIELDS, average_surface, lid_rings
 from dermis.mesh.strands import Roots, corners, finer_roots, weights
 
 Doubles = NDArray[np.float64]
@@ -39,7 +39,7 @@ class Surface:
     """
 
     def __init__(self) -> None:
-        self.head = AVERAGE.head(subdivide=LEVELS)
+        self.head = AVERAGE_HUMAN.head(subdivide=LEVELS)
         grid = np.arange(STEPS + 1) / STEPS
         steps = np.stack(np.meshgrid(grid, grid, indexing="ij"), axis=-1).reshape(-1, 2)
         quads = len(average_head().mesh.quads)
@@ -55,9 +55,9 @@ class Surface:
         return np.asarray(np.einsum("nk,nkc->nc", self._share, values[self._corner]))
 
     def _fields(self) -> Doubles:
-        """(p, 3) `FIELDS` at the points of the fine mesh."""
-        told = average()[1].astype(np.float64)
-        control = np.zeros((len(self.head.control.positions_mm), len(FIELDS)))
+        """(p, 3) `BORDER_FIELDS` at the points of the fine mesh."""
+        told = average_surface()[1].astype(np.float64)
+        control = np.zeros((len(self.head.control.positions_mm), len(BORDER_FIELDS)))
         control[: len(told)] = told
         assert self.head.control.stencils is not None
         return self.head.control.stencils.points(control)
@@ -71,7 +71,7 @@ class Surface:
     @cached_property
     def face(self) -> NDArray[np.bool_]:
         """(n,) skin outside of mouth and ears."""
-        return self.skin & ~np.isin(self.quad, np.concatenate([parts()["mouth"], parts()["ears"]]))
+        return self.skin & ~np.isin(self.quad, np.concatenate([part_quads()["mouth"], part_quads()["ears"]]))
 
     def nearest(self, wanted: Doubles, among: NDArray[np.bool_] | None = None) -> int:
         """Number of the candidate nearest to a place (3,) [mm]."""
@@ -96,7 +96,7 @@ class Surface:
         """(r, 3) the edge of the lid that borders on the eye, from the inner to the outer corner [mm]."""
         rows = lid_rings()[0][_UPPER if upper else _LOWER[::-1]]
         edge, crest = (self.points_mm[rows[:, column]] for column in (_EDGE, _CREST))
-        told = average()[1][:, FIELDS.index("lids")].astype(np.float64)
+        told = average_surface()[1][:, BORDER_FIELDS.index("lids")].astype(np.float64)
         low, high = told[rows[:, _EDGE]], told[rows[:, _CREST]]
         part = (-low / (high - low))[:, None]
         return np.asarray((1 - part) * edge + part * crest)

@@ -1,15 +1,20 @@
 """Makes src/dermis/environment/data/mirrors.csv: surface lobes as round ones about the plane of view.
 
-Takes two or three minutes. `dermis.environment.mirror_fits` says how they are found.
+Takes two or three minutes. `dermis.environment.isotropic_fits` says how they are found.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from dermis.base.atomic_write import replacing
+from dermis.base.atomic_write import atomic_file
 from dermis.base.command_line import run_script
-from dermis.environment.mirror_fits import LOBES, MIRROR_ROUGHNESSES, MIRROR_VIEWS, fitted_mirrors
+from dermis.environment.isotropic_fits import (
+    LOBE_COUNT,
+    LOBE_TABLE_COSINES,
+    LOBE_TABLE_ROUGHNESSES,
+    fit_isotropic_lobes,
+)
 from dermis.specular.models import MODELS
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "environment" / "data" / "mirrors.csv"
@@ -25,16 +30,18 @@ HEAD = """\
 
 def main() -> None:
     """Fit all and write the table."""
-    columns = [f"{name}_{k}" for k in range(LOBES) for name in ("angle", "beside", "roughness", "weight")]
+    columns = [
+        f"{name}_{k}" for k in range(LOBE_COUNT) for name in ("angle", "beside", "roughness", "weight")
+    ]
     lines = [",".join(["model", "m", "cosine", *columns])]
     for model in MODELS:
-        table = fitted_mirrors(MODELS[model].lobe)
-        for i, m in enumerate(MIRROR_ROUGHNESSES):
-            for j, cosine in enumerate(MIRROR_VIEWS):
+        table = fit_isotropic_lobes(MODELS[model].lobe)
+        for i, m in enumerate(LOBE_TABLE_ROUGHNESSES):
+            for j, cosine in enumerate(LOBE_TABLE_COSINES):
                 values = ",".join(f"{x:.4f}" for x in table[i, j].ravel())
                 lines.append(f"{model},{m:.5g},{cosine:.5g},{values}")
     OUT.parent.mkdir(exist_ok=True)
-    with replacing(OUT) as trial:
+    with atomic_file(OUT) as trial:
         trial.write_text(HEAD + "\n".join([*lines, ""]), encoding="utf-8")
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import dermis
 from dermis.base.command_line import run_script
 from dermis.formats.maps import load_maps
-from dermis.images.movie import exact_rate
+from dermis.images.movie import parse_frame_rate
 from dermis.mesh.head import Head
 
 DATA = Path(os.environ.get("DERMIS_DATA", "../shared")) / "heads"
@@ -69,7 +69,7 @@ def main(output: Path, side: int = SIDE, fps: str = FPS) -> None:
     fps:
         Pictures a second, as 30 or 30000/1001.
     """
-    rate = exact_rate(fps)
+    rate = parse_frame_rate(fps)
     take = output.with_suffix(".csv")
     take.write_text(capture(), encoding="utf-8")
     head = MAN.head(load_maps(colour=SKIN), layout="hm08")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dermis.apps.export.run import export_skin
 from dermis.base.command_line import run_script
-from dermis.formats.samples import cached
+from dermis.formats.samples import is_available
 
 HEADS = {"human": "the human", "human-7": "human:7", "human-12": "human:12", "scan": "lee_perry_smith"}
 VIEWPORT = '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -26,7 +26,7 @@ def main(folder: Path) -> None:
     shown = []
     for name, title in HEADS.items():
         word = "human" if title.startswith("the") else title
-        if word == "lee_perry_smith" and not cached(word):
+        if word == "lee_perry_smith" and not is_available(word):
             word = title = "human:19"
         export_skin(word, "web", folder / f"{name}.html")
         text = (folder / f"{name}.html").read_text(encoding="utf-8")

@@ -149,10 +149,10 @@ def test_all_kinds_of_change_are_drawn_and_the_memory_is_watched(
 def test_each_kind_of_change_makes_another_state(driver: Any) -> None:
     from viewer_memory import KINDS
 
-    from dermis.apps.viewer.state import same
+    from dermis.apps.viewer.state import states_equal
 
     for kind in KINDS.values():
-        assert any(not same(kind(driver.first, random.Random(seed)), driver.first) for seed in range(6))
+        assert any(not states_equal(kind(driver.first, random.Random(seed)), driver.first) for seed in range(6))
 
 
 def test_growth_is_that_of_the_second_half() -> None:

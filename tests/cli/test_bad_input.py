@@ -84,7 +84,7 @@ NAMES = {
     "unknown option": Bad("head.obj --colors red.png", "--colors", "Did you mean --colour"),
     "option without value": Bad("head.obj --colour", "--colour", "none"),
     "option given twice": Bad("head.obj --mix 0 --mix 1", "--mix", "twice"),
-    "two heads": Bad("head.obj head.obj", "head.obj", "got this word"),
+    "two heads": Bad("head.obj head.obj", "head.obj", "got this argument"),
     "unknown technique": Bad("head.obj --technique wet", "--technique", "got 'wet'"),
     "unknown profile": Bad("head.obj --profile milk", "profile milk", "no such file"),
     "profile of words": Bad("head.obj --profile words.csv", "profile words.csv", "rows"),

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from small_set import COUNT, SHARD_SIZE, write_spec
 
-from dermis.cli.batch import ProgressLog, ImageRate
+from dermis.cli.batch import ImageRate, ProgressLog
 
 Run = Callable[..., Any]
 
@@ -81,7 +81,7 @@ def test_the_example_is_a_spec(run: Run, tmp_path: Path) -> None:
         ("spec.toml -o out --adapters 99", "adapter '#99': expected one of this machine's"),
         ("spec.toml -o out --scheduler tcp://a --cluster b.json", "--cluster: expected no such option"),
         ("spec.toml -o out --cluster b.json --workers 2", "--workers: expected no such option"),
-        ("spec.toml -o spec.toml --workers 1 --adapter cpu", "spec.toml: expected a place to write"),
+        ("spec.toml -o spec.toml --workers 1 --adapter cpu", "spec.toml: expected a writable path"),
     ],
 )
 def test_what_cannot_be_is_refused(run: Run, spec: Path, words: str, says: str) -> None:

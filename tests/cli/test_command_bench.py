@@ -11,11 +11,11 @@ import pytest
 
 from dermis.apps.validation.benchmarks import cases
 from dermis.apps.validation.benchmarks.cases import Case, Preset
-from dermis.apps.validation.benchmarks.measure import Effort, measure
+from dermis.apps.validation.benchmarks.measure import FrameCounts, measure_case
 from dermis.base.errors import DermisError
 
 Run = Callable[..., Any]
-BRIEF = Effort(warming=0, between=0, timed=1, row=1)
+BRIEF = FrameCounts(warming=0, between=0, timed=1, row=1)
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def test_interrupted_it_leaves_nothing(bench: Run, monkeypatch: pytest.MonkeyPat
     def interrupted(renderer: Any, case: Case, *rest: Any) -> Any:
         if case.technique == "gpu-gems-3":
             raise KeyboardInterrupt
-        return measure(renderer, case, *rest)
+        return measure_case(renderer, case, *rest)
 
     monkeypatch.setattr("dermis.apps.validation.benchmarks.run.measure", interrupted)
     ended = bench("--preset", "cpu", "--json", "-o", "report.html")

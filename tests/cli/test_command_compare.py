@@ -92,7 +92,7 @@ def test_lobes_of_other_packages_have_panels_of_their_own() -> None:
         (("head.obj", "-o", "report.pdf"), "expected a name that ends in .html"),
         ((), "expected a value"),
         (("specular", "--roughness", "2"), "--roughness: expected a number from 0.05 to 1 "),
-        (("specular", "-o", "taken/plots"), "expected a place to write"),
+        (("specular", "-o", "taken/plots"), "expected a writable path"),
         (("head.obj", "--roughness", "0.4"), "--roughness: expected no such option here"),
         (("head.obj", "--samples", "8"), "--samples: expected no such option here"),
         (("head.obj", "--against", "heat", "--samples", "8"), "only path-traced and cycles trace paths"),

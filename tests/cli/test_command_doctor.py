@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from dermis.frame.renderer import Rendered
+from dermis.frame.rendered_frame import RenderedFrame
 from dermis.gpu.adapters import OPTIONAL_FEATURES, Adapter
 
 Run = Callable[..., Any]
@@ -78,8 +78,8 @@ def test_healthy_machine_in_words(run: Run, opened: None, device: Any) -> None:
 def test_frame_that_is_lit_wrongly_is_no_health(
     run: Run, opened: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = Rendered.linear
-    monkeypatch.setattr(Rendered, "linear", lambda self: 0.5 * whole(self))
+    whole = RenderedFrame.linear
+    monkeypatch.setattr(RenderedFrame, "linear", lambda self: 0.5 * whole(self))
     ended = run("doctor")
     assert ended.code == 2
     assert "test frame: FAILED" in ended.stdout and "NOT healthy: the test frame" in ended.stdout

@@ -57,7 +57,7 @@ def test_bench_takes_unit_and_maps(run: Run, in_cm: str, monkeypatch: pytest.Mon
         heads.append(head)
         raise DermisError("seen")
 
-    monkeypatch.setattr(measured, "measure", measure)
+    monkeypatch.setattr(measured, "measure_case", measure)
     monkeypatch.setattr(measured, "copy_rate", lambda device: 1.0)
     bench = "bench", "--preset", "cpu", "--adapter", "cpu", "--head", in_cm, "--unit-mm", "10"
     assert "seen" in run(*bench, "--colour", "skin.png", "--roughness-map", "skin.png").stderr

@@ -18,8 +18,8 @@ from dermis.cli.head_options import HEAD_OPTION_NAMES
 from dermis.cli.options import check_fields, model_options
 from dermis.cli.scene_options import ENVIRONMENT_OPTION_NAMES
 from dermis.scene import Camera, Environment, Settings, Skin, files
-from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.frozen_model import FrozenModel, field_choices, field_help, field_slider_range, slider
+from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.skin import Pigments, TissueLayer
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -95,7 +95,7 @@ def driver(shared_driver: InputDriver, caplog: pytest.LogCaptureFixture) -> Iter
     history = shared_driver.viewer.session.history
     while history.can_undo:
         history.undo()
-    shared_driver.viewer.panel.visible = True
+    shared_driver.viewer.panel.is_visible = True
     shared_driver.viewer.session.split.release()
     yield shared_driver
     assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []

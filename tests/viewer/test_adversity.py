@@ -17,7 +17,7 @@ from dermis.apps.viewer.windows import _raise_failure
 from dermis.base.errors import DermisError
 from dermis.frame import renderer as renderer_module
 from dermis.gpu import Device
-from dermis.gpu.memory import held_bytes
+from dermis.gpu.memory import allocated_bytes
 
 SIZE, ON_HEAD = (400, 480), (300.0, 240.0)
 PICTURE = slice(0, 380), slice(205, 400)  # neither the panel nor the text at the lower edge
@@ -27,7 +27,9 @@ FEW_BYTES = 1.02  # of what was held: a picture of another size may have taken t
 @pytest.fixture(autouse=True)
 def steady(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures in motion that are alike, and take the same memory, on quick and on busy machines."""
-    monkeypatch.setattr("dermis.apps.viewer.studio.Pace.note", lambda *_: None)
+    monkeypatch.setattr(
+        "dermis.apps.viewer.view_renderer.QualityController.record_frame_time", lambda *_: None
+    )
 
 
 def resized(driver: InputDriver, width: int, height: int) -> None:
@@ -40,9 +42,9 @@ def move(driver: InputDriver, x: float, y: float = ON_HEAD[1], kind: str = "poin
 
 
 def lose_device(driver: InputDriver) -> Any:
-    studio = driver.viewer.session.studio
-    studio.renderer.device.handle.destroy()
-    return studio
+    view_renderer = driver.viewer.session.view_renderer
+    view_renderer.renderer.device.handle.destroy()
+    return view_renderer
 
 
 def test_a_storm_of_sizes_ends_in_the_same_picture_and_memory(driver: InputDriver) -> None:
@@ -50,7 +52,7 @@ def test_a_storm_of_sizes_ends_in_the_same_picture_and_memory(driver: InputDrive
     for width, height in ((300, 200), SIZE):  # both sizes of everything have been there
         resized(driver, width, height)
         driver.settled()
-    held, chance = held_bytes(), random.Random(5)
+    held, chance = allocated_bytes(), random.Random(5)
     move(driver, ON_HEAD[0], kind="pointer_down")
     for _ in range(20):
         for _ in range(chance.randrange(3)):  # some sizes are never drawn
@@ -68,7 +70,7 @@ def test_a_storm_of_sizes_ends_in_the_same_picture_and_memory(driver: InputDrive
     resized(driver, *SIZE)
     assert np.array_equal(driver.settled()[PICTURE], before[PICTURE])
     gc.collect()
-    assert held_bytes() <= FEW_BYTES * held
+    assert allocated_bytes() <= FEW_BYTES * held
 
 
 @pytest.mark.parametrize("how", ["picture", "split", ATLAS, "normals"])
@@ -78,7 +80,7 @@ def test_a_minimised_window_goes_on_where_it_was(driver: InputDriver, how: str) 
         session.split.freeze(session.state)
         session.change(session.state.with_skin(mix=0.0))
     else:
-        session.change(session.state.in_view(how))
+        session.change(session.state.with_view(how))
     before = driver.settled()
     move(driver, ON_HEAD[0], kind="pointer_down")
     for size in ((0, 0), (0, 300), (1, 1), (290, 2)):
@@ -96,10 +98,10 @@ def test_a_device_lost_in_a_drag_comes_back(make_driver: Callable[[], InputDrive
     session = driver.viewer.session
     if how == "split":
         session.split.freeze(session.state)
-        session.split.share = 0.2  # away from the hand
+        session.split.divider_position = 0.2  # away from the hand
         session.change(session.state.with_skin(mix=0.0))
     elif how == ATLAS:
-        session.change(session.state.in_view(ATLAS))
+        session.change(session.state.with_view(ATLAS))
     driver.settled()
     move(driver, ON_HEAD[0], kind="pointer_down")
     move(driver, ON_HEAD[0] - 20.0)
@@ -114,10 +116,13 @@ def test_a_device_lost_in_a_drag_comes_back(make_driver: Callable[[], InputDrive
     move(driver, ON_HEAD[0] - 60.0)
     move(driver, ON_HEAD[0] - 60.0, kind="pointer_up")
     after = driver.settled()
-    assert session.studio is not lost and driver.viewer.failure is None
+    assert session.view_renderer is not lost and driver.viewer.failure is None
     same = make_driver()
     copy = same.viewer.session
-    copy.split.before, copy.split.share = session.split.before, session.split.share
+    copy.split.frozen_state, copy.split.divider_position = (
+        session.split.frozen_state,
+        session.split.divider_position,
+    )
     copy.change(session.state)
     same.event("pointer_move", x=ON_HEAD[0] - 60.0, y=ON_HEAD[1], button=0, buttons=())
     found = same.settled()
@@ -130,7 +135,7 @@ def test_devices_that_go_one_after_the_other_leave_nothing_behind(
     driver = make_driver()
     before = driver.settled()
     gc.collect()
-    held = held_bytes()
+    held = allocated_bytes()
     for k in range(3):
         lose_device(driver)
         driver.viewer.session.change(driver.viewer.session.state.with_skin(mix=0.1 * k))
@@ -140,7 +145,7 @@ def test_devices_that_go_one_after_the_other_leave_nothing_behind(
         driver.viewer.session.history.undo()
     assert np.array_equal(driver.settled()[PICTURE], before[PICTURE])
     gc.collect()
-    assert held_bytes() <= FEW_BYTES * held
+    assert allocated_bytes() <= FEW_BYTES * held
 
 
 def test_a_device_that_never_works_again_closes_the_window(
@@ -152,7 +157,7 @@ def test_a_device_that_never_works_again_closes_the_window(
     def fail(*_: Any) -> Any:
         raise wgpu.GPUError("lost")
 
-    monkeypatch.setattr("dermis.apps.viewer.studio.Studio.pictures", fail)
+    monkeypatch.setattr("dermis.apps.viewer.view_renderer.ViewRenderer.render_images", fail)
     for _ in range(6):
         if not driver.canvas.get_closed():
             driver.viewer.draw()
@@ -193,7 +198,7 @@ def test_a_state_that_takes_too_much_memory_leaves_the_last_picture(
 ) -> None:
     """It is no loss: another device would have no more."""
     before, session = driver.settled(), driver.viewer.session
-    studio = session.studio
+    view_renderer = session.view_renderer
 
     def fail(*_: Any, **__: Any) -> Any:
         raise wgpu.GPUOutOfMemoryError("Out of memory")
@@ -202,7 +207,7 @@ def test_a_state_that_takes_too_much_memory_leaves_the_last_picture(
         patch.setattr("dermis.frame.renderer.Renderer._submit", fail)
         session.change(session.state.with_skin(mix=0.4))
         after = driver.settled()
-    assert session.studio is studio and "memory" in session.message
+    assert session.view_renderer is view_renderer and "memory" in session.message
     assert np.array_equal(after[:100, 205:], before[:100, 205:])
 
 
@@ -212,7 +217,7 @@ def test_input_during_a_frame_is_in_the_next_one(
     """All of it at once: nothing queues, and it is one step of the history."""
     driver.settled()
     session = driver.viewer.session
-    start, image, frames = session.state, session.studio.image, []
+    start, image, frames = session.state, session.view_renderer.render_image, []
 
     def long_frame(*given: Any) -> Any:
         if not frames:
@@ -221,7 +226,7 @@ def test_input_during_a_frame_is_in_the_next_one(
         frames.append(session.state)
         return image(*given)
 
-    monkeypatch.setattr(session.studio, "image", long_frame)
+    monkeypatch.setattr(session.view_renderer, "render_image", long_frame)
     move(driver, ON_HEAD[0], kind="pointer_down")
     driver.frame()
     assert session.state is start

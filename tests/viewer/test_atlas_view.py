@@ -6,39 +6,39 @@ import numpy as np
 import pytest
 from offscreen_input import ADAPTER, InputDriver
 
-from dermis.apps.viewer.state import ATLAS, Chart, ViewerState
-from dermis.apps.viewer.studio import Studio
+from dermis.apps.viewer.state import ATLAS, AtlasView, ViewerState
+from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.gpu import download
 
 SIDE = 128  # of the tests' atlas
 
 
-def place_at(chart: Chart, x: float, y: float) -> tuple[float, float]:
-    return chart.centre[0] + chart.span * x, chart.centre[1] + chart.span * y
+def place_at(atlas_view: AtlasView, x: float, y: float) -> tuple[float, float]:
+    return atlas_view.centre[0] + atlas_view.span * x, atlas_view.centre[1] + atlas_view.span * y
 
 
 def test_zooming_keeps_the_place_under_the_cursor() -> None:
-    chart = Chart(centre=(0.4, 0.6), span=0.3)
-    near = chart.zoomed(0.25, 0.2, -0.3)
+    atlas_view = AtlasView(centre=(0.4, 0.6), span=0.3)
+    near = atlas_view.zoomed(0.25, 0.2, -0.3)
     assert near.span == pytest.approx(0.075)
-    assert place_at(near, 0.2, -0.3) == pytest.approx(place_at(chart, 0.2, -0.3))
+    assert place_at(near, 0.2, -0.3) == pytest.approx(place_at(atlas_view, 0.2, -0.3))
 
 
 def test_panning_carries_the_place_along() -> None:
-    chart = Chart(span=0.2)
-    assert place_at(chart.panned(0.1, -0.2), 0.1, -0.2) == pytest.approx(chart.centre)
+    atlas_view = AtlasView(span=0.2)
+    assert place_at(atlas_view.panned(0.1, -0.2), 0.1, -0.2) == pytest.approx(atlas_view.centre)
 
 
 def test_each_texel_is_a_square_with_the_layer_s_own_light(state: ViewerState) -> None:
-    studio = Studio(ADAPTER)
-    shown = state.in_view(ATLAS).with_chart(Chart("irradiance", (0.5, 0.5), 1.0))
-    image = studio.image(shown, state.scene.camera, (2 * SIDE, 2 * SIDE), moving=True)
-    found = studio.read(image).astype(float)
+    view_renderer = ViewRenderer(ADAPTER)
+    shown = state.with_view(ATLAS).with_atlas_view(AtlasView("irradiance", (0.5, 0.5), 1.0))
+    image = view_renderer.render_image(shown, state.scene.camera, (2 * SIDE, 2 * SIDE), moving=True)
+    found = view_renderer.read(image).astype(float)
     assert np.array_equal(found[::2, ::2], found[1::2, 1::2])
-    levels = studio.renderer.prepare(
+    levels = view_renderer.renderer.prepare(
         state.scene, state.settings.model_copy(update={"size": (2 * SIDE, 2 * SIDE)})
     ).resources.diffusion.levels
-    light = download(studio.renderer.device, levels.stacks[0])
+    light = download(view_renderer.renderer.device, levels.stacks[0])
     light = (light if light.ndim == 3 else light[0])[..., :3] / np.pi
     assert light.max() > 0.1
     c = np.clip(light, 0.0, 1.0)
@@ -47,10 +47,12 @@ def test_each_texel_is_a_square_with_the_layer_s_own_light(state: ViewerState) -
 
 
 def test_pixels_over_many_texels_show_their_mean(state: ViewerState) -> None:
-    studio = Studio(ADAPTER)
-    shown = state.in_view(ATLAS).with_chart(Chart("irradiance", (0.5, 0.5), 1.0))
+    view_renderer = ViewRenderer(ADAPTER)
+    shown = state.with_view(ATLAS).with_atlas_view(AtlasView("irradiance", (0.5, 0.5), 1.0))
     fine, coarse = (
-        studio.read(studio.image(shown, state.scene.camera, (side, side), moving=False)).astype(float)
+        view_renderer.read(
+            view_renderer.render_image(shown, state.scene.camera, (side, side), moving=False)
+        ).astype(float)
         for side in (SIDE, SIDE // 4)
     )
     mean = fine.reshape(SIDE // 4, 4, SIDE // 4, 4, 3).mean(axis=(1, 3))
@@ -58,16 +60,19 @@ def test_pixels_over_many_texels_show_their_mean(state: ViewerState) -> None:
 
 
 def test_another_part_of_the_atlas_takes_no_frame(state: ViewerState) -> None:
-    studio = Studio(ADAPTER)
-    shown = state.in_view(ATLAS)
-    first = studio.read(studio.image(shown, state.scene.camera, (64, 64), moving=False))
-    rendered = studio.rendered
-    near = shown.with_chart(Chart(span=0.2))
-    assert (studio.read(studio.image(near, state.scene.camera, (64, 64), moving=False)) != first).any()
-    assert studio.rendered is rendered
+    view_renderer = ViewRenderer(ADAPTER)
+    shown = state.with_view(ATLAS)
+    first = view_renderer.read(view_renderer.render_image(shown, state.scene.camera, (64, 64), moving=False))
+    rendered = view_renderer.rendered
+    near = shown.with_atlas_view(AtlasView(span=0.2))
+    assert (
+        view_renderer.read(view_renderer.render_image(near, state.scene.camera, (64, 64), moving=False))
+        != first
+    ).any()
+    assert view_renderer.rendered is rendered
     dark = near.with_light(0, irradiance=(0.0, 0.0, 0.0))
-    studio.image(dark, state.scene.camera, (64, 64), moving=False)
-    assert studio.rendered is not rendered
+    view_renderer.render_image(dark, state.scene.camera, (64, 64), moving=False)
+    assert view_renderer.rendered is not rendered
 
 
 def test_wheel_and_drag_move_the_atlas_and_not_the_camera(driver: InputDriver) -> None:
@@ -77,7 +82,7 @@ def test_wheel_and_drag_move_the_atlas_and_not_the_camera(driver: InputDriver) -
     assert whole[60, 202:230].max() == whole[60, 202:230].min() == 33  # beside the atlas
     driver.event("wheel", x=350.0, y=240.0, dx=0.0, dy=-1000.0)
     near = driver.settled()
-    assert session.state.chart.span == pytest.approx(1.05 / np.e)
+    assert session.state.atlas_view.span == pytest.approx(1.05 / np.e)
     assert near[60, 202:230].max() > 33 or near[60, 202:230].min() < 33
     driver.drag((350.0, 240.0), (330.0, 250.0))
     moved = driver.settled()
@@ -86,4 +91,4 @@ def test_wheel_and_drag_move_the_atlas_and_not_the_camera(driver: InputDriver) -
     assert np.abs(driver.settled()[110:400, 210:370].astype(int) - moved[110:400, 210:370]).mean() > 5.0
     driver.event("double_click", x=300.0, y=240.0)
     driver.settled()
-    assert session.state.chart == Chart("stretch") and session.state.scene.camera == camera
+    assert session.state.atlas_view == AtlasView("stretch") and session.state.scene.camera == camera

@@ -64,7 +64,7 @@ def test_a_chosen_file_is_sent_and_shown_and_others_are_refused(
         choose(good)
         assert wait(page, lambda: session.state.scene.head is not first.scene.head)
         (opened,) = session.heads.recent
-        assert opened.startswith(shown.folder) and session.heads.called(opened) == "mine.obj"
+        assert opened.startswith(shown.folder) and session.heads.display_name(opened) == "mine.obj"
         page.wait_for_function("() => document.querySelector('#files').innerText === ''")
         with page.expect_download() as coming:
             page.keyboard.press("Control+s")

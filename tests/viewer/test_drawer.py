@@ -18,7 +18,7 @@ def phone(driver: InputDriver) -> Iterator[InputDriver]:
     driver.canvas.set_logical_size(*PHONE)
     driver.frame()
     yield driver
-    driver.viewer.panel.opened = False
+    driver.viewer.panel.is_drawer_open = False
     driver.canvas.set_logical_size(400, 480)
 
 
@@ -35,7 +35,7 @@ def test_the_drawer_opens_over_the_picture_and_has_the_pointer_there(phone: Inpu
     closed, camera = phone.settled(), session.state.scene.camera
     phone.press("panel")
     opened = phone.settled()
-    assert panel.opened and panel.visible and session.view_size == PHONE
+    assert panel.is_drawer_open and panel.is_visible and session.view_size == PHONE
     assert (opened[:, 320:] == closed[:, 320:]).all() and (opened[:, :300] != closed[:, :300]).any()
     x, y = phone.position("mix")
     phone.drag((x, y), (x + 300.0, y))
@@ -43,7 +43,7 @@ def test_the_drawer_opens_over_the_picture_and_has_the_pointer_there(phone: Inpu
     phone.drag((340.0, 300.0), (330.0, 330.0))
     assert session.state.scene.camera != camera
     phone.press("hide")
-    assert not panel.opened and panel.visible
+    assert not panel.is_drawer_open and panel.is_visible
 
 
 @pytest.mark.parametrize(
@@ -71,5 +71,5 @@ def test_a_phone_s_fingers_turn_the_head_and_open_the_drawer(browser: Any, shown
         touch(page, [(150, 300)], *([(150, 300 - 10 * k), (210, 340 + 10 * k)] for k in range(4)))
         assert wait(page, lambda: session.state.scene.camera.frame_mm < 0.9 * turned.frame_mm)
         page.touchscreen.tap(*session.positions["panel"])
-        assert wait(page, lambda: panel.opened)
+        assert wait(page, lambda: panel.is_drawer_open)
         assert session.view_size == PHONE and wait(page, lambda: pixels(page)[300, 5].max() > 15)

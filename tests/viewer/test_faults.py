@@ -84,12 +84,12 @@ def test_a_state_that_cannot_be_drawn_leaves_the_last_picture(
     calm: InputDriver, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     before, session = calm.settled(), calm.viewer.session
-    good, image = session.state, session.studio.image
+    good, image = session.state, session.view_renderer.render_image
 
     def fail_for_others(state: Any, *given: Any) -> Any:
         return image(state, *given) if state is good else np.zeros(2).reshape(3)
 
-    monkeypatch.setattr(session.studio, "image", fail_for_others)
+    monkeypatch.setattr(session.view_renderer, "render_image", fail_for_others)
     session.change(session.state.with_skin(mix=0.1))
     assert unlike(calm.settled(), before, PICTURE) == 0.0
     assert "cannot reshape" in session.message and len(caplog.records) == 1
@@ -118,9 +118,9 @@ def test_a_head_or_a_button_that_fails_is_told(calm: InputDriver, monkeypatch: p
     def fail(*_: Any) -> None:
         raise MemoryError("too large")
 
-    monkeypatch.setattr(session.heads, "take", fail)
+    monkeypatch.setattr(session.heads, "take_loaded", fail)
     calm.frame()
-    assert session.message == "That cannot be opened (MemoryError: too large)"
+    assert session.message == "The head cannot be opened (MemoryError: too large)"
     monkeypatch.undo()
     monkeypatch.setattr(session, "save", fail)
     calm.event("key_down", key="s", modifiers=("Control",))

@@ -124,7 +124,7 @@ ASKED = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"
 def test_headers_that_do_not_come_are_not_waited_for(
     shown: Any, said: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "HEADERS_S", 0.3)
+    monkeypatch.setattr(server, "HEADER_TIMEOUT_S", 0.3)
     with socket.create_connection(address(shown)) as one:
         one.sendall(said)
         stop = threading.Event()
@@ -177,7 +177,7 @@ def test_a_page_may_be_silent(shown: Any, made: list[Any]) -> None:
 def test_only_so_many_connections_are_open(
     shown: Any, made: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "MOST_CONNECTIONS", 3)
+    monkeypatch.setattr(server, "MAX_CONNECTIONS", 3)
     with contextlib.ExitStack() as crowd:
         for _ in range(3):
             crowd.enter_context(socket.create_connection(address(shown)))
@@ -196,7 +196,7 @@ def is_answered(shown: Any) -> bool:
 def test_only_so_many_pages_are_shown(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from websockets.exceptions import InvalidStatus
 
-    monkeypatch.setattr("dermis.apps.viewer.browser.guard.MOST_PAGES", 2)
+    monkeypatch.setattr("dermis.apps.viewer.browser.request_filter.MAX_PAGES", 2)
     with contextlib.ExitStack() as crowd:
         for _ in range(2):
             crowd.enter_context(visit(shown))

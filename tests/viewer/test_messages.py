@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from dermis.apps.viewer.browser.guard import checked
+from dermis.apps.viewer.browser.request_filter import checked_message
 
 POINTER = {"type": "pointer_move", "x": 1, "y": 2.5, "button": 1, "buttons": [1], "modifiers": ["Shift"]}
 RESIZE = {"type": "resize", "width": 960, "height": 540, "pwidth": 1920, "pheight": 1080, "ratio": 2}
@@ -35,7 +35,7 @@ TOUCHES = {"0": {"x": 1, "y": 2, "pressure": 0.5}, "1": {"x": 3, "y": 4}}
     ],
 )
 def test_what_a_page_sends_passes(event: dict[str, Any]) -> None:
-    passed = json.loads(str(checked(json.dumps(event | {"timestamp": 12.5}))))
+    passed = json.loads(str(checked_message(json.dumps(event | {"timestamp": 12.5}))))
     assert {name: passed[name] for name in event if name != "touches"} == {
         name: value for name, value in event.items() if name != "touches"
     }
@@ -59,13 +59,13 @@ FIELDS = [
 @pytest.mark.parametrize(("event", "field"), FIELDS, ids=[field for _, field in FIELDS])
 @pytest.mark.parametrize("value", NUMBERS, ids=[str(value)[:5] for value in NUMBERS])
 def test_numbers_are_finite_and_possible(event: dict[str, Any], field: str, value: Any) -> None:
-    assert checked(json.dumps({"timestamp": 1.0} | event)) is not None
-    assert checked(json.dumps({"timestamp": 1.0} | event | {field: value})) is None
+    assert checked_message(json.dumps({"timestamp": 1.0} | event)) is not None
+    assert checked_message(json.dumps({"timestamp": 1.0} | event | {field: value})) is None
 
 
 @pytest.mark.parametrize("ratio", [1e-300, 5e-324, 0, -0.0, -1, 0.01, 21])
 def test_pixel_ratios_are_those_of_screens(ratio: float) -> None:
-    assert checked(json.dumps(RESIZE | {"timestamp": 1, "ratio": ratio})) is None
+    assert checked_message(json.dumps(RESIZE | {"timestamp": 1, "ratio": ratio})) is None
 
 
 @pytest.mark.parametrize(
@@ -97,11 +97,13 @@ def test_pixel_ratios_are_those_of_screens(ratio: float) -> None:
     ],
 )
 def test_other_events_are_dropped(event: dict[str, Any]) -> None:
-    assert checked(json.dumps({"timestamp": 1.0} | event)) is None
+    assert checked_message(json.dumps({"timestamp": 1.0} | event)) is None
 
 
 def test_fields_that_an_event_does_not_have_are_dropped() -> None:
-    passed = json.loads(str(checked(json.dumps(KEY | {"timestamp": 1, "event_type": "close", "more": [1]}))))
+    passed = json.loads(
+        str(checked_message(json.dumps(KEY | {"timestamp": 1, "event_type": "close", "more": [1]})))
+    )
     assert passed == KEY | {"timestamp": 1.0}
 
 
@@ -111,4 +113,4 @@ def test_fields_that_an_event_does_not_have_are_dropped() -> None:
     ids=lambda text: str(text)[:6],
 )
 def test_what_is_no_event_is_dropped(text: Any) -> None:
-    assert checked(text) is None
+    assert checked_message(text) is None

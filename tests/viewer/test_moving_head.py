@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from offscreen_input import SETTINGS, InputDriver
 
 from dermis.apps.viewer.player import MotionFile
-from dermis.apps.viewer.posing import weight_of
+from dermis.apps.viewer.posing import target_weight
 from dermis.apps.viewer.state import ViewerState
-from dermis.apps.viewer.studio import QUALITY_LEVELS
+from dermis.apps.viewer.view_renderer import QUALITY_LEVELS
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.scene import Scene
@@ -25,7 +25,9 @@ PICTURE = np.s_[:380, 205:]
 @pytest.fixture(autouse=True)
 def steady(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures in motion that are alike on quick and on busy machines."""
-    monkeypatch.setattr("dermis.apps.viewer.studio.Pace.note", lambda *_: None)
+    monkeypatch.setattr(
+        "dermis.apps.viewer.view_renderer.QualityController.record_frame_time", lambda *_: None
+    )
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +77,7 @@ def test_a_slider_moves_the_head_and_is_one_step(faces: InputDriver) -> None:
     before, session = faces.settled(), faces.viewer.session
     x, y = faces.position("jawOpen##target")
     faces.drag((x, y), (x + 60.0, y))
-    assert 0.3 < weight_of(session.state.scene, "jawOpen") < 1.0
+    assert 0.3 < target_weight(session.state.scene, "jawOpen") < 1.0
     assert difference(before, faces.settled()) > 0.3
     session.history.undo()
     assert not session.history.can_undo
@@ -88,12 +90,12 @@ def test_a_slider_held_shows_each_of_its_weights(faces: InputDriver) -> None:
     faces.event("pointer_move", x=x, y=y, button=0, buttons=())
     faces.event("pointer_down", x=x, y=y, button=1, buttons=(1,))
     faces.frame()
-    studio, ran, last = faces.viewer.session.studio, [], faces.frame()
+    view_renderer, ran, last = faces.viewer.session.view_renderer, [], faces.frame()
     for k in range(1, 5):
         faces.event("pointer_move", x=x + 9.0 * k, y=y, button=1, buttons=(1,))
         faces.frame()
         shown = faces.frame()  # the panel is drawn after the picture, so the next one shows it
-        ran.append(set(studio.rendered.gpu_ms or {}))
+        ran.append(set(view_renderer.rendered.gpu_ms or {}))
         assert difference(last, shown) > 0.0
         last = shown
     faces.event("pointer_up", x=x + 36.0, y=y, button=1, buttons=())
@@ -137,17 +139,17 @@ def test_rest_takes_all_back_in_one_step(faces: InputDriver) -> None:
 
 
 def test_the_key_plays_and_pauses_and_the_last_pose_is_refined(faces: InputDriver) -> None:
-    session, studio = faces.viewer.session, faces.viewer.session.studio
+    session, view_renderer = faces.viewer.session, faces.viewer.session.view_renderer
     rest = faces.settled()
     faces.event("key_down", key=" ")
     faces.frame()
     for _ in range(21):  # the clock begins with the first of them
         faces.frame()
         assert not faces.viewer.is_still
-        assert studio.settings.samples == QUALITY_LEVELS[2].samples < SETTINGS.samples
+        assert view_renderer.settings.samples == QUALITY_LEVELS[2].samples < SETTINGS.samples
     faces.event("key_down", key=" ")
     paused = faces.settled()
-    assert studio.settings.samples == SETTINGS.samples and difference(rest, paused) > 1.0
+    assert view_renderer.settings.samples == SETTINGS.samples and difference(rest, paused) > 1.0
     assert session.state.seconds == pytest.approx(1.0) and session.history.can_undo
     again = session.state
     session.history.undo()
@@ -163,7 +165,7 @@ def test_buttons_and_the_slider_of_time(faces: InputDriver) -> None:
     x, y = faces.position("time")
     faces.drag((x, y), (x + 30.0, y))
     assert not session.player.is_playing and len(session.history.states) == 2
-    assert weight_of(session.state.scene, "jawOpen") == pytest.approx(_talk(session.state.seconds))
+    assert target_weight(session.state.scene, "jawOpen") == pytest.approx(_talk(session.state.seconds))
     faces.press("loop")
     faces.press("play##motion")
     for _ in range(5):
@@ -184,14 +186,14 @@ def test_what_plays_is_what_is_saved_and_frozen(faces: InputDriver, tmp_path: Pa
     faces.frame(0.7)
     session.save(tmp_path / "scene.toml")
     assert "jawOpen" in (tmp_path / "scene.toml").read_text()
-    session.split.freeze(session.shown)
-    moving: Any = session.shown
+    session.split.freeze(session.displayed_state)
+    moving: Any = session.displayed_state
     faces.frame(0.2)
-    assert session.split.before is moving and session.shown is not moving
+    assert session.split.frozen_state is moving and session.displayed_state is not moving
     session.split.release()
     session.load(tmp_path / "scene.toml")
     assert not session.player.is_playing
-    assert weight_of(session.state.scene, "jawOpen") == weight_of(moving.scene, "jawOpen")
+    assert target_weight(session.state.scene, "jawOpen") == target_weight(moving.scene, "jawOpen")
 
 
 def test_a_motion_is_opened_by_name(faces: InputDriver, tmp_path: Path) -> None:

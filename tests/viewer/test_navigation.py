@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from dermis.apps.viewer.navigation import (
-    Easing,
-    axes,
-    between,
+    CameraEasing,
+    camera_axes,
     dolly,
     drag_light,
     focus,
+    interpolate_cameras,
     orbit,
     orbit_light,
     pan,
@@ -47,7 +47,7 @@ def test_orbit_keeps_the_distance_and_never_goes_over_the_top() -> None:
         assert distance(camera) == pytest.approx(1000.0)
     away = np.subtract(camera.position, camera.target) / 1000.0
     assert math.asin(away[1]) == pytest.approx(math.radians(85.0))
-    assert np.isfinite(axes(camera)).all()
+    assert np.isfinite(camera_axes(camera)).all()
 
 
 def test_orbits_there_and_back_end_where_they_began() -> None:
@@ -94,7 +94,7 @@ def test_a_picked_place_is_where_its_pixel_looks(head: Head) -> None:
     x, y, aspect = 0.2, -0.3, 1.5
     place = pick(Scene(head), CAMERA, x, y, aspect)
     assert place is not None
-    right, up, forward = axes(CAMERA)
+    right, up, forward = camera_axes(CAMERA)
     ray = place - np.array(CAMERA.position)
     half = 0.5 * CAMERA.frame_mm / distance(CAMERA)
     assert ray @ right / (ray @ forward) == pytest.approx(aspect * x * half)
@@ -106,10 +106,10 @@ def test_a_picked_place_follows_the_pose(rigged_head: Head) -> None:
     degrees = 40.0
     turned = Scene(rigged_head, pose=Pose({"jawOpen": 0.8}, {"neck": (0.0, degrees, 0.0)}))
     open_jaw = pick(Scene(rigged_head, pose={"jawOpen": 0.8}), CAMERA, 0.1, -0.3, 1.0)
-    at_rest = pick(Scene(rigged_head), CAMERA, 0.1, -0.3, 1.0)
+    rest_pose = pick(Scene(rigged_head), CAMERA, 0.1, -0.3, 1.0)
     found = pick(turned, orbit(CAMERA, math.radians(degrees), 0.0), 0.1, -0.3, 1.0)
-    assert open_jaw is not None and at_rest is not None and found is not None
-    assert abs(open_jaw - at_rest).max() > 1.0
+    assert open_jaw is not None and rest_pose is not None and found is not None
+    assert abs(open_jaw - rest_pose).max() > 1.0
     assert np.allclose(found, np.array(angles_matrix((0.0, degrees, 0.0))) @ open_jaw, atol=0.01)
 
 
@@ -119,7 +119,7 @@ def test_beside_the_head_there_is_nothing(head: Head) -> None:
 
 def test_easing_is_alike_at_every_frame_rate() -> None:
     wanted = dolly(orbit(CAMERA, 0.4, 0.2), 0.6)
-    slow, fast = Easing(CAMERA), Easing(CAMERA)
+    slow, fast = CameraEasing(CAMERA), CameraEasing(CAMERA)
     slow.advance(wanted, 0.06)
     for _ in range(12):
         fast.advance(wanted, 0.005)
@@ -128,7 +128,7 @@ def test_easing_is_alike_at_every_frame_rate() -> None:
 
 
 def test_easing_arrives_and_stays() -> None:
-    easing, wanted = Easing(CAMERA), pan(orbit(CAMERA, 1.0, 0.3), 0.2, 0.1)
+    easing, wanted = CameraEasing(CAMERA), pan(orbit(CAMERA, 1.0, 0.3), 0.2, 0.1)
     for _ in range(40):
         easing.advance(wanted, 0.03)
     assert easing.camera is wanted
@@ -136,7 +136,7 @@ def test_easing_arrives_and_stays() -> None:
 
 def test_between_opposite_sides_does_not_go_through_the_head() -> None:
     behind = orbit(CAMERA, math.pi, 0.0)
-    assert distance(between(CAMERA, behind, 0.5)) == pytest.approx(1000.0)
+    assert distance(interpolate_cameras(CAMERA, behind, 0.5)) == pytest.approx(1000.0)
 
 
 def test_a_light_is_carried_around_its_target() -> None:

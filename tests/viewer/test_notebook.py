@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from offscreen_input import ADAPTER
 
 import dermis
-from dermis.apps.viewer.state import ViewerState, state_of
+from dermis.apps.viewer.state import ViewerState, make_state
 from dermis.apps.viewer.windows import view
 from dermis.mesh.head import Head
 from dermis.scene.camera import preset
@@ -87,11 +87,11 @@ def test_heads_people_and_scenes_are_shown(head: Head) -> None:
     assert dermis.view(scene, ADAPTER, SIZE).viewer.session.state.scene is scene
     assert dermis.view(head, ADAPTER, SIZE).viewer.session.state.scene.head is head
     person = dermis.Human(age=60)
-    assert state_of(person).scene.skin == skin_of(person)
+    assert make_state(person).scene.skin == skin_of(person)
 
 
 def test_something_else_is_refused_by_name() -> None:
-    with pytest.raises(dermis.DermisError, match=r"a head, a person, a scene or a name, but a list came"):
+    with pytest.raises(dermis.DermisError, match=r"a head, a person, a scene or a name, but got a list"):
         dermis.view([1, 2])  # type: ignore[arg-type]
 
 

@@ -36,8 +36,8 @@ Start = Callable[[Callable[[], Any]], Any]
 def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
     """Begins to serve what a function loads, in a thread; `url` is the page, `ended` waits for its end."""
     made, threads, told = list[Any](), list[threading.Thread](), list[str]()
-    usual, begun = server.server, SimpleNamespace(error=None)
-    monkeypatch.setattr(server, "server", lambda *given: made.append(usual(*given)) or made[0])
+    usual, begun = server.make_server, SimpleNamespace(error=None)
+    monkeypatch.setattr(server, "make_server", lambda *given: made.append(usual(*given)) or made[0])
 
     def run(load: Callable[[], Any]) -> None:
         try:
@@ -83,7 +83,11 @@ def test_the_page_is_there_while_a_head_is_read_and_hears_each_stage(
     with visit(shown) as one, visit(shown) as other:
         for socket in (one, other):
             told = heard(socket, "stage")
-            assert (told["text"], told["number"], told["of"]) == ("reading the head", 1, len(server.STAGES))
+            assert (told["text"], told["number"], told["total"]) == (
+                "reading the head",
+                1,
+                len(server.STAGES),
+            )
         one.send('{"type": "pointer_down", "timestamp": 1, "x": 5, "y": 5, "button": 1}')  # harms nothing
         gate.set()
         stages = dict[int, str]()  # some come twice, as a page that comes hears the stage of now

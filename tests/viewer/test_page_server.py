@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.apps.viewer.browser.guard import MOST_PAGES, Guard, is_local
+from dermis.apps.viewer.browser.request_filter import MAX_PAGES, RequestFilter, is_local
 from dermis.apps.viewer.browser.server import Address, bind
 from dermis.base.errors import DermisError
 
@@ -27,7 +27,7 @@ async def _app(scope: Any, receive: Any, send: Any) -> None:
 
 
 def ask(
-    guard: Guard,
+    request_filter: RequestFilter,
     query: str = "",
     kind: str = "http",
     host: str = HOST,
@@ -49,7 +49,7 @@ def ask(
     all_headers = [(name.encode(), value.encode()) for name, value in {"host": host, **headers}.items()]
     scope = {"type": kind, "path": "/", "query_string": query.encode(), "headers": all_headers}
     usual = {"http": "http", "websocket": "ws"}[kind]
-    asyncio.run(guard(scope | {"scheme": scheme or usual}, receive, send))
+    asyncio.run(request_filter(scope | {"scheme": scheme or usual}, receive, send))
     return answers
 
 
@@ -62,11 +62,11 @@ KINDS = pytest.mark.parametrize("kind", ["http", "websocket"])
 
 
 def test_this_machine_needs_no_token() -> None:
-    guard = Guard(_app, "")
-    assert status(ask(guard)) == 200
-    assert status(ask(guard, host="localhost:8765")) == 200
-    assert status(ask(guard, host="[::1]:8765")) == 200
-    assert status(ask(guard, kind="websocket")) == "websocket.accept"
+    request_filter = RequestFilter(_app, "")
+    assert status(ask(request_filter)) == 200
+    assert status(ask(request_filter, host="localhost:8765")) == 200
+    assert status(ask(request_filter, host="[::1]:8765")) == 200
+    assert status(ask(request_filter, kind="websocket")) == "websocket.accept"
 
 
 @KINDS
@@ -75,26 +75,26 @@ def test_this_machine_needs_no_token() -> None:
 )
 @pytest.mark.parametrize("cookie", ["", "dermis=", "dermis=secrets", "other=secret; a", "dermis", "=secret"])
 def test_without_the_token_nothing_is_answered(kind: str, query: str, cookie: str) -> None:
-    answers = ask(Guard(_app, "secret"), query, kind, cookie=cookie)
+    answers = ask(RequestFilter(_app, "secret"), query, kind, cookie=cookie)
     assert status(answers) in REFUSED
     if kind == "http":
         assert b"dermis view has printed" in answers[1]["body"] and b"secret" not in answers[1]["body"]
 
 
 def test_the_token_of_the_address_becomes_a_cookie_that_opens_all_else() -> None:
-    guard = Guard(_app, "secret", "dermis-80")
-    headers = ask(guard, "token=secret", host="gpu.example:8765")[0]["headers"]
+    request_filter = RequestFilter(_app, "secret", "dermis-80")
+    headers = ask(request_filter, "token=secret", host="gpu.example:8765")[0]["headers"]
     assert headers == [(b"set-cookie", b"dermis-80=secret; Path=/; HttpOnly; SameSite=Strict")]
     for kind in ("http", "websocket"):
-        answers = ask(guard, kind=kind, host="gpu.example:8765", cookie="a=b; dermis-80=secret")
+        answers = ask(request_filter, kind=kind, host="gpu.example:8765", cookie="a=b; dermis-80=secret")
         assert status(answers) in PASSED and not answers[0].get("headers")
-        assert status(ask(guard, kind=kind, cookie="dermis-81=secret")) in REFUSED
-    assert status(ask(guard, "token=secret", "websocket")) == "websocket.accept"
+        assert status(ask(request_filter, kind=kind, cookie="dermis-81=secret")) in REFUSED
+    assert status(ask(request_filter, "token=secret", "websocket")) == "websocket.accept"
 
 
 @KINDS
 def test_pages_of_other_sites_are_refused(kind: str) -> None:
-    guard = Guard(_app, "")
+    request_filter = RequestFilter(_app, "")
     for origin in (
         "http://evil.example",
         f"https://{HOST}",
@@ -103,38 +103,38 @@ def test_pages_of_other_sites_are_refused(kind: str) -> None:
         "null",
         "",
     ):
-        assert status(ask(guard, kind=kind, origin=origin)) in REFUSED
-    assert status(ask(guard, kind=kind, host="evil.example:8765")) in REFUSED
-    assert status(ask(guard, kind=kind, origin=f"http://{HOST}")) in PASSED
+        assert status(ask(request_filter, kind=kind, origin=origin)) in REFUSED
+    assert status(ask(request_filter, kind=kind, host="evil.example:8765")) in REFUSED
+    assert status(ask(request_filter, kind=kind, origin=f"http://{HOST}")) in PASSED
 
 
 @KINDS
 def test_with_the_token_too(kind: str) -> None:
-    guard, cookie = Guard(_app, "secret"), "dermis=secret"
-    assert status(ask(guard, kind=kind, cookie=cookie, origin="http://127.0.0.1:9000")) in REFUSED
-    assert status(ask(guard, "token=secret", kind=kind, origin="http://evil.example")) in REFUSED
+    request_filter, cookie = RequestFilter(_app, "secret"), "dermis=secret"
+    assert status(ask(request_filter, kind=kind, cookie=cookie, origin="http://127.0.0.1:9000")) in REFUSED
+    assert status(ask(request_filter, "token=secret", kind=kind, origin="http://evil.example")) in REFUSED
 
 
 @pytest.mark.parametrize(("kind", "scheme"), [("http", "https"), ("websocket", "wss")])
 def test_behind_a_proxy_the_origin_is_the_one_that_it_tells(kind: str, scheme: str) -> None:
-    guard = Guard(_app, "secret")
+    request_filter = RequestFilter(_app, "secret")
     given = {"host": "skin.example", "origin": "https://skin.example", "cookie": "dermis=secret"}
-    assert status(ask(guard, kind=kind, scheme=scheme, **given)) in PASSED
-    assert status(ask(guard, kind=kind, **given)) in REFUSED
+    assert status(ask(request_filter, kind=kind, scheme=scheme, **given)) in PASSED
+    assert status(ask(request_filter, kind=kind, **given)) in REFUSED
 
 
 def test_only_so_many_pages_are_open() -> None:
-    guard = Guard(_app, "")
-    guard._pages = MOST_PAGES
-    assert status(ask(guard, kind="websocket")) == 1008 and status(ask(guard)) == 200
-    guard._pages -= 1
+    request_filter = RequestFilter(_app, "")
+    request_filter._pages = MAX_PAGES
+    assert status(ask(request_filter, kind="websocket")) == 1008 and status(ask(request_filter)) == 200
+    request_filter._pages -= 1
     for _ in range(2):  # it counts those that leave
-        assert status(ask(guard, kind="websocket")) == "websocket.accept"
+        assert status(ask(request_filter, kind="websocket")) == "websocket.accept"
 
 
 def test_bad_messages_do_not_reach_the_canvas() -> None:
     good = '{"timestamp":1.0,"type":"show"}'
-    answers = ask(Guard(_app, ""), kind="websocket", texts=('{"type": "close"}', "{", good))
+    answers = ask(RequestFilter(_app, ""), kind="websocket", texts=('{"type": "close"}', "{", good))
     assert answers[1]["text"] == good
 
 
@@ -169,7 +169,7 @@ def test_other_hosts_get_a_token_that_is_new_each_time() -> None:
 
 
 def test_this_machine_gets_a_token_when_asked() -> None:
-    listener, address = bind("127.0.0.1", 0, secret=True)
+    listener, address = bind("127.0.0.1", 0, require_token=True)
     with listener:
         assert len(address.token) >= 20 and address.url.endswith(f"/?token={address.token}")
 
@@ -197,14 +197,14 @@ def test_frames_are_jpeg_while_moving_and_exact_when_still() -> None:
     from PIL import Image
 
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
-    from dermis.apps.viewer.browser.canvas import encoded
+    from dermis.apps.viewer.browser.canvas import encode_image
 
     array = np.random.default_rng(1).integers(0, 255, (8, 12, 4), dtype=np.uint8)
-    exact = np.array(Image.open(io.BytesIO(encoded(array, lossless=True))))
+    exact = np.array(Image.open(io.BytesIO(encode_image(array, lossless=True))))
     assert (exact == array[..., :3]).all()
-    assert Image.open(io.BytesIO(encoded(array, lossless=False))).format == "JPEG"
+    assert Image.open(io.BytesIO(encode_image(array, lossless=False))).format == "JPEG"
     shades = np.linspace(0.0, 255.0, 40)
     smooth = np.stack(np.broadcast_arrays(shades[:, None], shades, 90.0, 7.0), axis=-1).astype(np.uint8)
     for one in (smooth, smooth[3:, 5:]):  # of which the last one has gaps between its rows
-        close = np.array(Image.open(io.BytesIO(encoded(one, lossless=False))), dtype=int)
+        close = np.array(Image.open(io.BytesIO(encode_image(one, lossless=False))), dtype=int)
         assert np.abs(close - one[..., :3]).max() < 12

@@ -24,14 +24,14 @@ def test_stages_without_a_time_in_a_frame_have_none_there() -> None:
 
 
 def test_the_studio_keeps_the_times_of_the_last_frames(driver: InputDriver) -> None:
-    times, session = driver.viewer.session.studio.times, driver.viewer.session
+    times, session = driver.viewer.session.view_renderer.stage_times, driver.viewer.session
     for k in range(130):
         times.append({"shade": float(k)})
     assert len(times) == 120
     session.change(session.state.with_settings(exposure=1.5))
     driver.frame()
-    assert len(times) == 120 and session.studio.rendered is not None
-    assert times[-1] == (session.studio.rendered.gpu_ms or {})
+    assert len(times) == 120 and session.view_renderer.rendered is not None
+    assert times[-1] == (session.view_renderer.rendered.gpu_ms or {})
 
 
 def test_the_profile_is_drawn_in_three_colours_and_follows_it(driver: InputDriver) -> None:

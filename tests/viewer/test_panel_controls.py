@@ -13,10 +13,10 @@ from offscreen_input import InputDriver
 from pydantic import Field
 
 from dermis.apps.viewer.panel.sections import SECTIONS
-from dermis.apps.viewer.state import ViewerState, same
+from dermis.apps.viewer.state import ViewerState, states_equal
 from dermis.mesh.pose import Pose
 from dermis.scene.environment import Environment
-from dermis.scene.plain import Plain, help_of, slider
+from dermis.scene.frozen_model import FrozenModel, field_help, slider
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 from dermis.scene.talk import COMPARISONS
@@ -51,9 +51,9 @@ def tall(make_driver: Callable[[], InputDriver]) -> InputDriver:
     """A window that holds the whole panel, whose picture is not drawn again: the panel alone is looked at."""
     driver = make_driver()
     driver.settled()
-    studio: Any = driver.viewer.session.studio
-    image = studio.last_image
-    studio.pictures = lambda *_: (image, None)
+    view_renderer: Any = driver.viewer.session.view_renderer
+    image = view_renderer.last_image
+    view_renderer.render_images = lambda *_: (image, None)
     driver.canvas.set_logical_size(500, 1500)
     for section in SECTIONS:
         if section.applies(driver.viewer.session) and not section.is_open and section.title != "Timing":
@@ -77,13 +77,13 @@ def move(driver: InputDriver, label: str) -> None:
         driver.event(kind, x=x + way, y=y, button=1, buttons=(1,))
         driver.frame()
     driver.frame()
-    if same(session.state, before) and not names_of(driver, label):
+    if states_equal(session.state, before) and not names_of(driver, label):
         driver.press(label)  # a button, which the drag left
     for name in names_of(driver, label)[1::-1]:
-        if same(session.state, before):
+        if states_equal(session.state, before):
             driver.click(session.positions[name])
             driver.frame()
-        if same(session.state, before):  # it is what was chosen already
+        if states_equal(session.state, before):  # it is what was chosen already
             driver.press(label)
     for key in names_of(driver, label):
         del session.positions[key]
@@ -113,7 +113,7 @@ def test_every_control_is_a_step_that_undo_takes_back(
         before = session.state
         move(tall, label)
         after = session.state
-        assert not same(before, after), label
+        assert not states_equal(before, after), label
         session.history.undo()
         assert session.state is before, label
         session.history.redo()
@@ -123,8 +123,8 @@ def test_every_control_is_a_step_that_undo_takes_back(
 
 
 @pytest.mark.parametrize("kind", [Skin, Pigments, TissueLayer, Settings, Environment])
-def test_every_field_has_a_help_text(kind: type[Plain]) -> None:
-    assert all(help_of(kind, name) for name in kind.model_fields)
+def test_every_field_has_a_help_text(kind: type[FrozenModel]) -> None:
+    assert all(field_help(kind, name) for name in kind.model_fields)
 
 
 def test_comparisons_of_the_talk_are_a_section_of_their_own_last_and_closed(driver: InputDriver) -> None:
@@ -184,10 +184,10 @@ def test_a_new_field_of_a_model_gets_a_slider_with_its_range(tall: InputDriver) 
 
 def test_the_panel_can_be_hidden_and_brought_back_without_keys(driver: InputDriver) -> None:
     driver.press("hide")
-    assert not driver.viewer.panel.visible
+    assert not driver.viewer.panel.is_visible
     camera = driver.viewer.session.state.scene.camera
     driver.press("panel")
-    assert driver.viewer.panel.visible and driver.viewer.session.state.scene.camera == camera
+    assert driver.viewer.panel.is_visible and driver.viewer.session.state.scene.camera == camera
 
 
 def test_a_finger_scrolls_the_panel_beside_its_controls(driver: InputDriver) -> None:
@@ -221,7 +221,7 @@ def test_a_screenshot_that_cannot_be_is_told_and_the_viewer_goes_on(
     name: str, view: str, size: tuple[int, int], said: str, driver: InputDriver, tmp_path: Path
 ) -> None:
     session = driver.viewer.session
-    session.change(session.state.in_view(view))
+    session.change(session.state.with_view(view))
     before = driver.settled()
     session.picture_file, session.picture_size = str(tmp_path / name), size
     for section in ("Profile", "Surface"):  # closed, else the button would be below the window's edge

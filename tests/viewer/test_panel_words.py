@@ -6,10 +6,10 @@ import pytest
 from offscreen_input import InputDriver
 
 from dermis.apps.viewer.panel import fields
-from dermis.apps.viewer.panel.fields import Style
+from dermis.apps.viewer.panel.fields import FieldStyle
 from dermis.optics.profiles import preset_names
+from dermis.scene.frozen_model import FrozenModel, field_choices
 from dermis.scene.lights import LIGHTS
-from dermis.scene.plain import Plain, choices_of
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin, TissueLayer
 
@@ -21,10 +21,10 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_words_are_about_fields_and_choices_that_exist(kind: type[Plain]) -> None:
+def test_words_are_about_fields_and_choices_that_exist(kind: type[FrozenModel]) -> None:
     for name, style in KINDS[kind].items():
         assert name in kind.model_fields
-        assert set(style.called) <= set(choices_of(kind, name)), name
+        assert set(style.display_names) <= set(field_choices(kind, name)), name
 
 
 def test_words_are_about_kinds_of_light_that_exist() -> None:
@@ -39,7 +39,7 @@ def test_labels_fit_beside_their_controls(driver: InputDriver) -> None:
     driver.canvas.set_logical_size(1280, 480)
     driver.frame()
     room = driver.viewer.panel.label_width
-    styles: list[Style] = [one for table in KINDS.values() for one in table.values()]
+    styles: list[FieldStyle] = [one for table in KINDS.values() for one in table.values()]
     labels = [style.label.partition("###")[0] for style in (*styles, *fields.LIGHT.values())]
     wide = {label: imgui.calc_text_size(label).x for label in labels}
     driver.canvas.set_logical_size(400, 480)

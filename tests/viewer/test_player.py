@@ -8,9 +8,9 @@ import pytest
 from rigged_head import write_take
 
 from dermis.apps.viewer.navigation import orbit
-from dermis.apps.viewer.player import MotionFile, Player
-from dermis.apps.viewer.posing import weight_of, with_weight
-from dermis.apps.viewer.state import History, ViewerState
+from dermis.apps.viewer.player import MotionFile, MotionPlayer
+from dermis.apps.viewer.posing import target_weight, with_target_weight
+from dermis.apps.viewer.state import UndoHistory, ViewerState
 from dermis.base.errors import DermisError
 
 JAW = 0.0, 0.2, 0.4, 0.6, 0.8, 1.0
@@ -35,37 +35,37 @@ def take(tmp_path: Path) -> MotionFile:
 
 
 @pytest.fixture
-def history(rigged: ViewerState) -> History:
-    return History(rigged)
+def history(rigged: ViewerState) -> UndoHistory:
+    return UndoHistory(rigged)
 
 
 @pytest.fixture
-def player(history: History, take: MotionFile, clock: Clock) -> Player:
-    return Player(history, take, clock)
+def player(history: UndoHistory, take: MotionFile, clock: Clock) -> MotionPlayer:
+    return MotionPlayer(history, take, clock)
 
 
-def jaw(player: Player) -> float:
-    return weight_of(player.shown.scene, "jawOpen")
+def jaw(player: MotionPlayer) -> float:
+    return target_weight(player.displayed_state.scene, "jawOpen")
 
 
-def after(player: Player, clock: Clock, seconds: float) -> float:
+def after(player: MotionPlayer, clock: Clock, seconds: float) -> float:
     clock.now += seconds
     player.advance()
     return jaw(player)
 
 
-def start(player: Player, clock: Clock) -> None:
+def start(player: MotionPlayer, clock: Clock) -> None:
     """Play, up to the picture from which the clock counts."""
     player.play()
     player.advance()
     after(player, clock, 0.0)
 
 
-def test_it_rests_until_it_is_played(player: Player, rigged: ViewerState, clock: Clock) -> None:
-    assert after(player, clock, 1.0) == 0.0 and player.shown is rigged and not player.is_playing
+def test_it_rests_until_it_is_played(player: MotionPlayer, rigged: ViewerState, clock: Clock) -> None:
+    assert after(player, clock, 1.0) == 0.0 and player.displayed_state is rigged and not player.is_playing
 
 
-def test_it_runs_by_the_clock_however_long_frames_take(player: Player, clock: Clock) -> None:
+def test_it_runs_by_the_clock_however_long_frames_take(player: MotionPlayer, clock: Clock) -> None:
     player.play()
     assert after(player, clock, 5.0) == 0.0
     assert after(player, clock, 5.0) == 0.0  # the first picture took so long
@@ -74,13 +74,15 @@ def test_it_runs_by_the_clock_however_long_frames_take(player: Player, clock: Cl
     assert player.seconds == pytest.approx(0.45)
 
 
-def test_it_begins_again(player: Player, clock: Clock) -> None:
+def test_it_begins_again(player: MotionPlayer, clock: Clock) -> None:
     start(player, clock)
     assert after(player, clock, 0.6) == pytest.approx(0.2)
     assert after(player, clock, 50.1) == pytest.approx(0.4)
 
 
-def test_without_loop_it_stops_at_its_end_and_plays_from_the_beginning(player: Player, clock: Clock) -> None:
+def test_without_loop_it_stops_at_its_end_and_plays_from_the_beginning(
+    player: MotionPlayer, clock: Clock
+) -> None:
     player.loops = False
     start(player, clock)
     assert after(player, clock, 0.7) == 1.0 and not player.is_playing and player.seconds == 0.5
@@ -88,7 +90,9 @@ def test_without_loop_it_stops_at_its_end_and_plays_from_the_beginning(player: P
     assert player.is_playing and after(player, clock, 0.1) == 0.0
 
 
-def test_a_run_is_one_step(player: Player, history: History, rigged: ViewerState, clock: Clock) -> None:
+def test_a_run_is_one_step(
+    player: MotionPlayer, history: UndoHistory, rigged: ViewerState, clock: Clock
+) -> None:
     start(player, clock)
     for _ in range(3):
         after(player, clock, 0.1)
@@ -102,7 +106,9 @@ def test_a_run_is_one_step(player: Player, history: History, rigged: ViewerState
     assert after(player, clock, 0.1) == pytest.approx(0.8)
 
 
-def test_what_changes_meanwhile_is_a_step_of_its_own(player: Player, history: History, clock: Clock) -> None:
+def test_what_changes_meanwhile_is_a_step_of_its_own(
+    player: MotionPlayer, history: UndoHistory, clock: Clock
+) -> None:
     start(player, clock)
     camera = history.state.scene.camera
     for k in range(3):
@@ -110,24 +116,28 @@ def test_what_changes_meanwhile_is_a_step_of_its_own(player: Player, history: Hi
         history.change(turned, "drag 1")
         after(player, clock, 0.1)
     assert len(history.states) == 2
-    assert player.shown.scene.camera == history.state.scene.camera != camera
+    assert player.displayed_state.scene.camera == history.state.scene.camera != camera
     assert jaw(player) == pytest.approx(0.6)
     history.undo()
-    assert player.shown.scene.camera == camera and jaw(player) == pytest.approx(0.6)
+    assert player.displayed_state.scene.camera == camera and jaw(player) == pytest.approx(0.6)
 
 
-def test_a_slider_keeps_what_the_motion_does_not_move(player: Player, history: History, clock: Clock) -> None:
+def test_a_slider_keeps_what_the_motion_does_not_move(
+    player: MotionPlayer, history: UndoHistory, clock: Clock
+) -> None:
     start(player, clock)
-    brow = with_weight(history.state.scene, "browInnerUp", 0.5)
+    brow = with_target_weight(history.state.scene, "browInnerUp", 0.5)
     history.change(history.state.with_pose(brow))
     after(player, clock, 0.2)
-    assert weight_of(player.shown.scene, "browInnerUp") == 0.5 and jaw(player) == pytest.approx(0.4)
+    assert target_weight(player.displayed_state.scene, "browInnerUp") == 0.5 and jaw(player) == pytest.approx(
+        0.4
+    )
 
 
-def test_scrubbing_stops_and_stays_there(player: Player, history: History, clock: Clock) -> None:
+def test_scrubbing_stops_and_stays_there(player: MotionPlayer, history: UndoHistory, clock: Clock) -> None:
     start(player, clock)
     for seconds in (0.1, 0.25, 0.35):
-        history.change(player.scrubbed(seconds), "hold time")
+        history.change(player.state_at(seconds), "hold time")
     assert after(player, clock, 1.0) == pytest.approx(0.7) and player.seconds == 0.35
     assert len(history.states) == 2
     start(player, clock)
@@ -135,11 +145,11 @@ def test_scrubbing_stops_and_stays_there(player: Player, history: History, clock
 
 
 def test_a_head_without_its_names_is_told_and_the_first_one_plays_on(
-    player: Player, history: History, state: ViewerState, rigged: ViewerState, clock: Clock
+    player: MotionPlayer, history: UndoHistory, state: ViewerState, rigged: ViewerState, clock: Clock
 ) -> None:
     start(player, clock)
     history.change(state)
-    assert player.clip is None and player.shown is state and "JawOpen" in player.note
+    assert player.clip is None and player.displayed_state is state and "JawOpen" in player.note
     after(player, clock, 0.1)
     assert not player.is_playing
     player.toggle()
@@ -148,7 +158,9 @@ def test_a_head_without_its_names_is_told_and_the_first_one_plays_on(
     assert player.clip is not None and player.note == ""
 
 
-def test_another_motion_plays_from_its_beginning(player: Player, clock: Clock, rigged_file: Path) -> None:
+def test_another_motion_plays_from_its_beginning(
+    player: MotionPlayer, clock: Clock, rigged_file: Path
+) -> None:
     start(player, clock)
     after(player, clock, 0.3)
     player.open(MotionFile(rigged_file))
@@ -162,7 +174,7 @@ def test_another_motion_plays_from_its_beginning(player: Player, clock: Clock, r
 
 
 def test_a_frame_that_cannot_be_read_stops_it(
-    player: Player, clock: Clock, monkeypatch: pytest.MonkeyPatch
+    player: MotionPlayer, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(seconds: float) -> None:
         raise DermisError("frame 3 is broken")
@@ -176,6 +188,6 @@ def test_a_frame_that_cannot_be_read_stops_it(
 
 
 def test_a_motion_of_one_frame_stands(rigged: ViewerState, clock: Clock, tmp_path: Path) -> None:
-    player = Player(History(rigged), MotionFile(write_take(tmp_path / "one.csv", 0.5)), clock)
+    player = MotionPlayer(UndoHistory(rigged), MotionFile(write_take(tmp_path / "one.csv", 0.5)), clock)
     start(player, clock)
     assert after(player, clock, 0.1) == 0.5 and not player.is_playing

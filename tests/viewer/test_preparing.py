@@ -14,7 +14,7 @@ from rigged_head import write_rigged_head
 
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.state import ViewerState
-from dermis.apps.viewer.studio import Studio
+from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.base.errors import DermisError
 from dermis.scene.heads import load_head
 
@@ -30,13 +30,13 @@ def other(tmp_path: Path) -> Any:
 @pytest.fixture
 def gate(driver: InputDriver, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     """Heads are prepared when it is set."""
-    one, usual = threading.Event(), Studio.prepare
+    one, usual = threading.Event(), ViewRenderer.prepare
 
-    def slowly(studio: Studio, *given: Any) -> None:
+    def slowly(view_renderer: ViewRenderer, *given: Any) -> None:
         assert one.wait(20.0)
-        usual(studio, *given)
+        usual(view_renderer, *given)
 
-    monkeypatch.setattr(Studio, "prepare", slowly)
+    monkeypatch.setattr(ViewRenderer, "prepare", slowly)
     driver.patient = False
     yield one
     one.set()
@@ -95,10 +95,10 @@ def test_a_head_that_cannot_be_prepared_is_told_and_can_be_undone(
     def fail(*_: Any) -> None:
         raise DermisError("head.obj: expected a head, but it is a hat.")
 
-    monkeypatch.setattr(session.studio.renderer, "prepare", fail)
+    monkeypatch.setattr(session.view_renderer.renderer, "prepare", fail)
     show(session, other)
     assert np.array_equal(driver.settled()[PICTURE], before[PICTURE])
-    assert "it is a hat" in session.message and not session.studio.is_preparing
+    assert "it is a hat" in session.message and not session.view_renderer.is_preparing
     monkeypatch.undo()
     session.history.undo()
     assert np.array_equal(driver.settled()[PICTURE], before[PICTURE])
@@ -109,7 +109,7 @@ def test_a_device_that_is_lost_meanwhile_is_opened_again(
 ) -> None:
     driver.settled()
     session = driver.viewer.session
-    lost = session.studio
+    lost = session.view_renderer
     state = show(session, other)
     driver.frame()
     lost.renderer.device.handle.destroy()
@@ -118,4 +118,4 @@ def test_a_device_that_is_lost_meanwhile_is_opened_again(
     driver.patient = True
     gate.set()
     assert driver.settled()[PICTURE].max() > 50
-    assert session.studio is not lost and session.state is state and driver.viewer.failure is None
+    assert session.view_renderer is not lost and session.state is state and driver.viewer.failure is None

@@ -2,55 +2,59 @@
 
 from __future__ import annotations
 
-from dermis.apps.viewer.studio import QUALITY_LEVELS, Pace
+from dermis.apps.viewer.view_renderer import QUALITY_LEVELS, QualityController
 from dermis.scene.settings import Settings
 
 WANTED = Settings(atlas=2048, samples=4, shadow_size=2048)
 
 
-def noted(pace: Pace, *frames_ms: float) -> Pace:
+def noted(quality_controller: QualityController, *frames_ms: float) -> QualityController:
     for frame_ms in frames_ms:
-        pace.note(frame_ms)
-    return pace
+        quality_controller.record_frame_time(frame_ms)
+    return quality_controller
 
 
 def test_a_still_frame_has_all_that_was_asked_for() -> None:
-    found = noted(Pace(software=True), *[900.0] * 20).settings(WANTED, (640, 480), moving=False)
+    found = noted(QualityController(software=True), *[900.0] * 20).limited_settings(
+        WANTED, (640, 480), moving=False
+    )
     assert (found.size, found.atlas, found.samples, found.shadow_size) == ((640, 480), 2048, 4, 2048)
 
 
 def test_a_software_adapter_begins_with_one_sample_and_a_small_atlas() -> None:
-    found = Pace(software=True).settings(WANTED, (640, 480), moving=True)
+    found = QualityController(software=True).limited_settings(WANTED, (640, 480), moving=True)
     assert (found.size, found.atlas, found.samples) == ((640, 480), 512, 1)
 
 
 def test_a_gpu_begins_with_everything() -> None:
-    assert Pace(software=False).settings(WANTED, (640, 480), moving=True).samples == 4
+    assert QualityController(software=False).limited_settings(WANTED, (640, 480), moving=True).samples == 4
 
 
 def test_slow_frames_lower_the_effort_and_fast_ones_raise_it_again() -> None:
-    pace = noted(Pace(software=True), *[400.0] * 20)
-    assert pace.quality is QUALITY_LEVELS[-1]
-    assert noted(pace, *[10.0] * 20).quality is QUALITY_LEVELS[2]
+    quality_controller = noted(QualityController(software=True), *[400.0] * 20)
+    assert quality_controller.quality is QUALITY_LEVELS[-1]
+    assert noted(quality_controller, *[10.0] * 20).quality is QUALITY_LEVELS[2]
 
 
 def test_one_slow_frame_alone_changes_nothing() -> None:
-    pace = noted(Pace(software=True), 400.0, 90.0, 400.0, 90.0)
-    assert pace.quality is QUALITY_LEVELS[2]
+    quality_controller = noted(QualityController(software=True), 400.0, 90.0, 400.0, 90.0)
+    assert quality_controller.quality is QUALITY_LEVELS[2]
 
 
 def test_frames_within_the_budget_stay_as_they_are() -> None:
-    pace = noted(Pace(software=True), *[400.0] * 2)
-    level = pace.quality
-    assert noted(pace, *[95.0] * 20).quality is level
+    quality_controller = noted(QualityController(software=True), *[400.0] * 2)
+    level = quality_controller.quality
+    assert noted(quality_controller, *[95.0] * 20).quality is level
 
 
 def test_less_than_asked_for_is_not_raised() -> None:
     small = Settings(atlas=128, samples=1, shadow_size=64)
-    found = Pace(software=False).settings(small, (8, 8), moving=True)
+    found = QualityController(software=False).limited_settings(small, (8, 8), moving=True)
     assert (found.atlas, found.samples, found.shadow_size) == (128, 1, 64)
 
 
 def test_a_huge_window_takes_fewer_samples() -> None:
-    found = Pace(software=False).settings(Settings(samples=64), (8192, 4096), moving=False)
+    found = QualityController(software=False).limited_settings(
+        Settings(samples=64), (8192, 4096), moving=False
+    )
     assert found.size == (8192, 4096) and found.samples == 4

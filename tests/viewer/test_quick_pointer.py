@@ -47,9 +47,9 @@ def test_the_head_turns_as_far_as_the_pointer_went(driver: InputDriver) -> None:
 def test_the_divider_stays_where_it_is_let_go(driver: InputDriver) -> None:
     session = driver.viewer.session
     session.split.freeze(session.state)
-    session.split.share = 0.5
+    session.split.divider_position = 0.5
     in_one_frame(driver, (300.0, 200.0), (350.0, 200.0))
-    assert session.split.share == 0.75 and not session.split.held
+    assert session.split.divider_position == 0.75 and not session.split.is_dragged
 
 
 def test_keys_between_two_frames_are_all_seen(rigged: ViewerState, driver: InputDriver) -> None:

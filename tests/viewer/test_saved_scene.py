@@ -16,9 +16,9 @@ from rigged_head import write_rigged_head
 from dermis.apps.viewer.navigation import orbit
 from dermis.apps.viewer.session import apply_regions
 from dermis.apps.viewer.state import ViewerState, load_state, save_state
-from dermis.apps.viewer.studio import Studio
+from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.cli import main
-from dermis.human.regions.zones import REGIONS
+from dermis.human.regions.region_table import REGIONS
 from dermis.images.io import read_image
 from dermis.mesh.pose import Pose
 from dermis.scene import Environment, Scene
@@ -61,8 +61,8 @@ def with_light(state: ViewerState, folder: Path) -> ViewerState:
 def with_settings(state: ViewerState, folder: Path) -> ViewerState:
     del folder
     chosen = {"stretch": "axes", "seams": "clear-colour", "seam_colour": (0.9, 0.1, 0.1), "occlusion": "none"}
-    encoded = {"exposure": 1.7, "bloom": 0.2, "tone": "filmic", "background": (0.1, 0.0, 0.3)}
-    return state.with_settings(technique="one-blur", transmission="none", **chosen, **encoded)
+    encode_image = {"exposure": 1.7, "bloom": 0.2, "tone": "filmic", "background": (0.1, 0.0, 0.3)}
+    return state.with_settings(technique="one-blur", transmission="none", **chosen, **encode_image)
 
 
 def with_expression(state: ViewerState, folder: Path) -> ViewerState:
@@ -80,23 +80,27 @@ STATES: dict[str, Change] = {
     "structure": lambda state, _: state.with_skin(profile="light", albedo="profile").with_pigments(
         structure="donner2008", epidermal_blood=0.02, melanin=0.03
     ),
-    "part": lambda state, _: state.in_view("specular"),
+    "part": lambda state, _: state.with_view("specular"),
     "pose": with_expression,
 }
 
 
 @pytest.fixture(scope="module")
-def studio() -> Studio:
-    return Studio(ADAPTER)
+def view_renderer() -> ViewRenderer:
+    return ViewRenderer(ADAPTER)
 
 
 @pytest.mark.parametrize("name", STATES)
 def test_the_command_renders_what_the_viewer_shows(
-    name: str, studio: Studio, state: ViewerState, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    view_renderer: ViewRenderer,
+    state: ViewerState,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("dermis.human.regions.apply.SIZE", 64)
     shown = STATES[name](state, tmp_path).with_settings(size=SIZE)
-    studio.screenshot(tmp_path / "shown.png", shown, SIZE)
+    view_renderer.screenshot(tmp_path / "shown.png", shown, SIZE)
     save_state(tmp_path / "scene.toml", shown)
     words = ["render", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "made.png"), "--adapter", ADAPTER]
     monkeypatch.setattr(sys, "argv", ["dermis", *words])
@@ -108,6 +112,6 @@ def test_the_command_renders_what_the_viewer_shows(
 
 
 def test_a_part_that_was_looked_at_is_looked_at_again(state: ViewerState, tmp_path: Path) -> None:
-    save_state(tmp_path / "scene.toml", state.in_view("specular"))
+    save_state(tmp_path / "scene.toml", state.with_view("specular"))
     loaded = load_state(tmp_path / "scene.toml", state)
     assert loaded.view == "specular" and loaded.settings.parts == "all"

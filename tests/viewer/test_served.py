@@ -65,19 +65,19 @@ def test_a_lossless_frame_keeps_nothing_waiting_and_is_not_sent_late(
 ) -> None:
     from dermis.apps.viewer.browser import canvas
 
-    begun, gate, encoded = threading.Event(), threading.Event(), canvas.encoded
+    begun, gate, encode_image = threading.Event(), threading.Event(), canvas.encode_image
 
     def slowly(array: NDArray[np.uint8], *, lossless: bool) -> bytes:
         if lossless:
             begun.set()
             gate.wait(PATIENCE_S)
-        return encoded(array, lossless=lossless)
+        return encode_image(array, lossless=lossless)
 
     with visit(viewer) as socket:
         page = Page(socket)
         page.show()
         page.still()
-        monkeypatch.setattr(canvas, "encoded", slowly)
+        monkeypatch.setattr(canvas, "encode_image", slowly)
         page.drag(300, 260)
         page.wait(begun.is_set, confirming=True)
         page.drag(260, 300)
@@ -154,10 +154,10 @@ def test_a_lost_device_is_told_in_the_page_and_the_head_turns_on(viewer: Any) ->
         page = Page(socket)
         page.show()
         before = page.still()
-        viewer.session.studio.renderer.device.handle.destroy()
+        viewer.session.view_renderer.renderer.device.handle.destroy()
         page.drag(300, 330)
         after = page.still()
-        assert "lost and opened again" in viewer.session.message and viewer.failure is None
+        assert "lost and has been reopened" in viewer.session.message and viewer.failure is None
         assert difference(before, after) > 0.5
         lines = np.s_[255:, 205:]  # where messages are
         assert np.abs(after[lines] - before[lines]).max() > 100

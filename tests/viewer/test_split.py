@@ -29,12 +29,12 @@ def frozen(driver: InputDriver) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     driver.press("Before and after")
     driver.press("freeze")
     driver.press("Before and after")
-    assert driver.viewer.session.split.before is driver.viewer.session.state
+    assert driver.viewer.session.split.frozen_state is driver.viewer.session.state
     driver.viewer.session.split.release()
     driver.viewer.session.change(driver.viewer.session.state.with_skin(mix=0.0, roughness=0.7))
     after = driver.settled()
     driver.viewer.session.split.freeze(driver.viewer.session.history.states[-2])
-    driver.viewer.session.split.share = 0.5
+    driver.viewer.session.split.divider_position = 0.5
     return before, after
 
 
@@ -58,7 +58,7 @@ def test_the_camera_turns_both_sides(driver: InputDriver) -> None:
     turned = driver.settled()
     for old, new in zip(sides(still, 300), sides(turned, 300), strict=True):
         assert np.abs(old.astype(int) - new).mean() > 0.5
-    live, was = session.state, split.before
+    live, was = session.state, split.frozen_state
     assert was is not None
     split.release()
     after = driver.settled()
@@ -69,7 +69,7 @@ def test_the_camera_turns_both_sides(driver: InputDriver) -> None:
 def test_a_divider_at_the_edge_shows_one_side(driver: InputDriver) -> None:
     before, after = frozen(driver)
     for share, whole in ((0.0, after), (1.0, before)):
-        driver.viewer.session.split.share = share
+        driver.viewer.session.split.divider_position = share
         driver.event("pointer_move", x=5.0, y=5.0, button=0, buttons=())
         found = driver.settled()[ROWS, LEFT + 2 : RIGHT - 2]
         assert np.array_equal(found, whole[ROWS, LEFT + 2 : RIGHT - 2])

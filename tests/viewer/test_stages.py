@@ -12,7 +12,7 @@ from offscreen_input import ADAPTER
 
 from dermis.apps.viewer.navigation import orbit
 from dermis.apps.viewer.state import ViewerState
-from dermis.apps.viewer.studio import QUALITY_LEVELS, Studio
+from dermis.apps.viewer.view_renderer import QUALITY_LEVELS, ViewRenderer
 from dermis.gpu.replay import Recording
 from dermis.mesh.pose import Pose
 from dermis.scene.environment import Environment
@@ -24,18 +24,18 @@ WEIGHED = {"pairs"}
 
 
 @pytest.fixture(scope="module")
-def studio() -> Studio:
+def view_renderer() -> ViewRenderer:
     """Whose pictures in motion are alike on quick and on busy machines."""
-    studio = Studio(ADAPTER)
-    studio.pace.note = lambda _: None  # type: ignore[method-assign]
-    return studio
+    view_renderer = ViewRenderer(ADAPTER)
+    view_renderer.quality_controller.record_frame_time = lambda _: None  # type: ignore[method-assign]
+    return view_renderer
 
 
-def stages(studio: Studio, state: ViewerState, moving: bool = False) -> set[str]:
+def stages(view_renderer: ViewRenderer, state: ViewerState, moving: bool = False) -> set[str]:
     """What ran to show a state."""
-    studio.image(state, state.scene.camera, SIZE, moving)
-    assert studio.rendered is not None and studio.rendered.gpu_ms is not None
-    return set(studio.rendered.gpu_ms) - {"total"}
+    view_renderer.render_image(state, state.scene.camera, SIZE, moving)
+    assert view_renderer.rendered is not None and view_renderer.rendered.gpu_ms is not None
+    return set(view_renderer.rendered.gpu_ms) - {"total"}
 
 
 def turned(state: ViewerState, angle: float = 0.3) -> ViewerState:
@@ -71,7 +71,7 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
         lambda state: state.with_settings(stretch="none"),
         {"stretch", "surface", "irradiance"} | WEIGHED | SPREAD | PICTURE,
     ),
-    "part": (lambda state: state.in_view("specular"), PICTURE),
+    "part": (lambda state: state.with_view("specular"), PICTURE),
     "background": (lambda state: state.with_settings(background=(0.1, 0.2, 0.3)), {"background", "post"}),
     "meter": (lambda state: state.with_settings(exposure="auto"), {"meter", "post"}),
     "exposure": (lambda state: state.with_settings(exposure=2.0), {"post"}),
@@ -82,10 +82,12 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_a_change_runs_only_what_depends_on_it(name: str, studio: Studio, state: ViewerState) -> None:
+def test_a_change_runs_only_what_depends_on_it(
+    name: str, view_renderer: ViewRenderer, state: ViewerState
+) -> None:
     change, expected = CHANGES[name]
-    stages(studio, state)
-    assert stages(studio, change(state)) == expected
+    stages(view_renderer, state)
+    assert stages(view_renderer, change(state)) == expected
 
 
 SHAPE = {"shape", "stretch", "surface", "shadows", "irradiance", "pairs", "visibility"} | SPREAD | PICTURE
@@ -95,41 +97,43 @@ def jaw_open(state: ViewerState, weight: float) -> ViewerState:
     return state.with_pose(Pose({"jawOpen": weight}, {"neck": (0.0, 10.0, 0.0)}))
 
 
-def test_a_pose_runs_what_depends_on_the_shape(studio: Studio, rigged: ViewerState) -> None:
-    stages(studio, jaw_open(rigged, 0.1))
-    assert stages(studio, jaw_open(rigged, 0.2)) == SHAPE
-    assert stages(studio, jaw_open(rigged, 0.2)) == set()
-    assert stages(studio, turned(jaw_open(rigged, 0.2))) == {"visibility"} | PICTURE
-    assert stages(studio, turned(rigged)) == SHAPE
+def test_a_pose_runs_what_depends_on_the_shape(view_renderer: ViewRenderer, rigged: ViewerState) -> None:
+    stages(view_renderer, jaw_open(rigged, 0.1))
+    assert stages(view_renderer, jaw_open(rigged, 0.2)) == SHAPE
+    assert stages(view_renderer, jaw_open(rigged, 0.2)) == set()
+    assert stages(view_renderer, turned(jaw_open(rigged, 0.2))) == {"visibility"} | PICTURE
+    assert stages(view_renderer, turned(rigged)) == SHAPE
 
 
-def test_a_pose_loads_nothing(studio: Studio, rigged: ViewerState, made: list[str]) -> None:
+def test_a_pose_loads_nothing(view_renderer: ViewRenderer, rigged: ViewerState, made: list[str]) -> None:
     for weight in (0.1, 0.2):
-        stages(studio, jaw_open(rigged, weight), moving=True)
+        stages(view_renderer, jaw_open(rigged, weight), moving=True)
     made.clear()
-    stages(studio, jaw_open(rigged, 0.3), moving=True)
+    stages(view_renderer, jaw_open(rigged, 0.3), moving=True)
     assert [one for one in made if one != "create_buffer_with_data"] == []
     assert len(made) <= 1
 
 
-def test_the_atlas_view_follows_the_pose(studio: Studio, rigged: ViewerState) -> None:
-    flat = jaw_open(rigged, 0.2).in_view("atlas")
-    stages(studio, flat)
-    assert stages(studio, flat.with_pose(Pose({"jawOpen": 0.9}))) >= {"shape", "irradiance"}
+def test_the_atlas_view_follows_the_pose(view_renderer: ViewRenderer, rigged: ViewerState) -> None:
+    flat = jaw_open(rigged, 0.2).with_view("atlas")
+    stages(view_renderer, flat)
+    assert stages(view_renderer, flat.with_pose(Pose({"jawOpen": 0.9}))) >= {"shape", "irradiance"}
 
 
-def test_light_all_around_is_told_the_profile_and_lights_anew(studio: Studio, state: ViewerState) -> None:
+def test_light_all_around_is_told_the_profile_and_lights_anew(
+    view_renderer: ViewRenderer, state: ViewerState
+) -> None:
     """Skin around a place throws light back, the more the paler its profile."""
     around = state.with_environment(Environment(name="uniform"))
-    stages(studio, around)
-    assert "irradiance" in stages(studio, around.with_skin(profile="skin1"))
-    assert stages(studio, turned(around)) >= {"visibility", "shade"}
+    stages(view_renderer, around)
+    assert "irradiance" in stages(view_renderer, around.with_skin(profile="skin1"))
+    assert stages(view_renderer, turned(around)) >= {"visibility", "shade"}
 
 
 @pytest.fixture
-def made(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+def made(view_renderer: ViewRenderer, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """Textures and buffers that are made on the device, and what is written into them."""
-    handle, log = studio.renderer.device.handle, list[str]()
+    handle, log = view_renderer.renderer.device.handle, list[str]()
     for owner, name in (
         (handle, "create_texture"),
         (handle, "create_buffer_with_data"),
@@ -149,29 +153,33 @@ def _counted(call: Callable[..., Any], name: str, log: list[str]) -> Callable[..
 
 
 @pytest.mark.parametrize("name", ["camera", "light", "roughness", "mix", "exposure", "nothing"])
-def test_a_move_loads_nothing(name: str, studio: Studio, state: ViewerState, made: list[str]) -> None:
+def test_a_move_loads_nothing(
+    name: str, view_renderer: ViewRenderer, state: ViewerState, made: list[str]
+) -> None:
     change, _ = CHANGES[name]
-    stages(studio, state)
-    stages(studio, change(state))  # what this kind of frame needs once
-    stages(studio, state)
+    stages(view_renderer, state)
+    stages(view_renderer, change(state))  # what this kind of frame needs once
+    stages(view_renderer, state)
     made.clear()
-    stages(studio, change(turned(state, -0.2)))
+    stages(view_renderer, change(turned(state, -0.2)))
     assert [one for one in made if one != "create_buffer_with_data"] == []
     assert len(made) <= 1 + (name == "light")  # the lights' records
 
 
-def test_pigments_load_no_texture(studio: Studio, state: ViewerState, made: list[str]) -> None:
-    stages(studio, skin_of(0.05)(state))
-    stages(studio, skin_of(0.051)(state))
+def test_pigments_load_no_texture(view_renderer: ViewRenderer, state: ViewerState, made: list[str]) -> None:
+    stages(view_renderer, skin_of(0.05)(state))
+    stages(view_renderer, skin_of(0.051)(state))
     made.clear()
-    stages(studio, skin_of(0.052)(state))
+    stages(view_renderer, skin_of(0.052)(state))
     assert "write_texture" not in made
 
 
-def both(studio: Studio, state: ViewerState, before: ViewerState, moving: bool = True) -> list[set[str]]:
+def both(
+    view_renderer: ViewRenderer, state: ViewerState, before: ViewerState, moving: bool = True
+) -> list[set[str]]:
     """What ran for the frozen state and for the live one."""
     ran: list[set[str]] = []
-    draw = studio.renderer.draw
+    draw = view_renderer.renderer.draw
 
     def noted(*args: Any, **kwargs: Any) -> Any:
         rendered = draw(*args, **kwargs)
@@ -179,17 +187,17 @@ def both(studio: Studio, state: ViewerState, before: ViewerState, moving: bool =
         ran.append(set(rendered.gpu_ms) - {"total"})
         return rendered
 
-    studio.renderer.draw = noted  # type: ignore[method-assign]
+    view_renderer.renderer.draw = noted  # type: ignore[method-assign]
     try:
-        studio.pictures(state, before, state.scene.camera, SIZE, moving)
+        view_renderer.render_images(state, before, state.scene.camera, SIZE, moving)
     finally:
-        studio.renderer.draw = draw  # type: ignore[method-assign]
+        view_renderer.renderer.draw = draw  # type: ignore[method-assign]
     return ran
 
 
 @pytest.mark.parametrize("name", ["light", "mix", "pigments", "stretch"])
 def test_a_camera_lights_neither_side_of_the_divider(
-    name: str, studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+    name: str, view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Seen from the same place the second side needs no visibility either."""
     recorded: list[int] = []
@@ -200,67 +208,77 @@ def test_a_camera_lights_neither_side_of_the_divider(
         begin(self, device)
 
     live = CHANGES[name][0](state)
-    both(studio, live, state)
+    both(view_renderer, live, state)
     monkeypatch.setattr(Recording, "__init__", counted)
     for angle in (0.1, 0.2, 0.3):
-        assert both(studio, turned(live, angle), state) == [{"visibility"} | PICTURE, PICTURE]
+        assert both(view_renderer, turned(live, angle), state) == [{"visibility"} | PICTURE, PICTURE]
     assert recorded == []
 
 
 def test_shadows_of_another_size_have_light_of_their_own(
-    studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+    view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where frames in motion differ from still ones in nothing else."""
     coarse = replace(QUALITY_LEVELS[2], shadow_size=64)
     monkeypatch.setattr(
-        "dermis.apps.viewer.studio.QUALITY_LEVELS", (QUALITY_LEVELS[0], coarse, coarse, coarse)
+        "dermis.apps.viewer.view_renderer.QUALITY_LEVELS", (QUALITY_LEVELS[0], coarse, coarse, coarse)
     )
     for moving in (True, False):
-        stages(studio, turned(state, 0.1), moving)
+        stages(view_renderer, turned(state, 0.1), moving)
     for angle, moving in ((0.2, True), (0.2, False), (0.3, True)):
-        assert stages(studio, turned(state, angle), moving) == {"visibility"} | PICTURE
+        assert stages(view_renderer, turned(state, angle), moving) == {"visibility"} | PICTURE
 
 
 def test_only_frames_that_shade_set_the_pace(
-    studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+    view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     noted: list[float] = []
-    monkeypatch.setattr(studio.pace, "note", noted.append)
-    stages(studio, state, moving=True)
+    monkeypatch.setattr(view_renderer.quality_controller, "record_frame_time", noted.append)
+    stages(view_renderer, state, moving=True)
     noted.clear()
-    stages(studio, CHANGES["exposure"][0](state), moving=True)
+    stages(view_renderer, CHANGES["exposure"][0](state), moving=True)
     assert noted == []
-    stages(studio, turned(state, 0.7), moving=True)
+    stages(view_renderer, turned(state, 0.7), moving=True)
     assert len(noted) == 1
 
 
-def test_a_slider_leaves_the_frozen_side(studio: Studio, state: ViewerState) -> None:
-    both(studio, state.with_skin(mix=0.4), state)
-    assert both(studio, state.with_skin(mix=0.3), state) == [{"irradiance"} | SPREAD | PICTURE]
+def test_a_slider_leaves_the_frozen_side(view_renderer: ViewRenderer, state: ViewerState) -> None:
+    both(view_renderer, state.with_skin(mix=0.4), state)
+    assert both(view_renderer, state.with_skin(mix=0.3), state) == [{"irradiance"} | SPREAD | PICTURE]
 
 
 def test_states_in_motion_and_still_are_recorded_once(
-    studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+    view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = replace(QUALITY_LEVELS[2], atlas=64)
-    monkeypatch.setattr("dermis.apps.viewer.studio.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
+    monkeypatch.setattr(
+        "dermis.apps.viewer.view_renderer.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small)
+    )
     live = state.with_skin(mix=0.9)
     for moving in (True, False):
-        both(studio, live, state, moving)
+        both(view_renderer, live, state, moving)
     for angle, moving in ((0.1, True), (0.1, False), (0.2, True), (0.2, False)):
-        ran = both(studio, turned(live, angle), state, moving)
+        ran = both(view_renderer, turned(live, angle), state, moving)
         assert not any({"irradiance", "diffuse"} & one for one in ran)
 
 
 @pytest.mark.parametrize("view", ["irradiance", "blur 1", "atlas"])
-def test_views_of_levels_show_the_live_state_s_light(view: str, studio: Studio, state: ViewerState) -> None:
+def test_views_of_levels_show_the_live_state_s_light(
+    view: str, view_renderer: ViewRenderer, state: ViewerState
+) -> None:
     """Also after another state's light has been spread in between, and after its profile came back."""
-    plain = studio.read(studio.image(state.in_view(view), state.scene.camera, SIZE, False)).astype(int)
+    plain = view_renderer.read(
+        view_renderer.render_image(state.with_view(view), state.scene.camera, SIZE, False)
+    ).astype(int)
     other = state.with_skin(profile="skin1", mix=1.0).with_light(0, irradiance=(0.1, 0.1, 0.1))
-    both(studio, state, other, moving=False)
-    again = studio.read(studio.image(state.in_view(view), state.scene.camera, SIZE, False)).astype(int)
+    both(view_renderer, state, other, moving=False)
+    again = view_renderer.read(
+        view_renderer.render_image(state.with_view(view), state.scene.camera, SIZE, False)
+    ).astype(int)
     assert np.array_equal(plain, again)
-    studio.image(state.with_skin(profile="dj3"), state.scene.camera, SIZE, False)
-    studio.image(state, state.scene.camera, SIZE, False)
-    back = studio.read(studio.image(state.in_view(view), state.scene.camera, SIZE, False)).astype(int)
+    view_renderer.render_image(state.with_skin(profile="dj3"), state.scene.camera, SIZE, False)
+    view_renderer.render_image(state, state.scene.camera, SIZE, False)
+    back = view_renderer.read(
+        view_renderer.render_image(state.with_view(view), state.scene.camera, SIZE, False)
+    ).astype(int)
     assert np.array_equal(plain, back)

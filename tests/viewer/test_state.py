@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dermis.apps.viewer.state import History, ViewerState, load_state, same, save_state
+from dermis.apps.viewer.state import UndoHistory, ViewerState, load_state, save_state, states_equal
 from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.scene import Environment, Scene, load_scene
@@ -27,7 +27,7 @@ def test_a_saved_state_comes_back_whole(state: ViewerState, tmp_path: Path) -> N
     before = full_state(state)
     save_state(tmp_path / "scene.toml", before)
     after = load_state(tmp_path / "scene.toml", before)
-    assert same(replace(before, rig=""), after)
+    assert states_equal(replace(before, rig=""), after)
 
 
 def test_render_takes_the_saved_file(state: ViewerState, tmp_path: Path) -> None:
@@ -73,7 +73,7 @@ def test_the_same_head_is_not_loaded_again(state: ViewerState, tmp_path: Path) -
 
 
 def test_a_head_made_in_memory_cannot_be_saved(head: Head, tmp_path: Path) -> None:
-    with pytest.raises(DermisError, match="it was made in memory"):
+    with pytest.raises(DermisError, match="it was created in memory"):
         save_state(tmp_path / "scene.toml", ViewerState(Scene(head)))
     assert not (tmp_path / "scene.toml").exists()
 
@@ -89,7 +89,7 @@ def test_pigments_add_up(state: ViewerState) -> None:
 
 
 def test_undo_and_redo_walk_through_the_states(state: ViewerState) -> None:
-    history = History(state)
+    history = UndoHistory(state)
     states = [state] + [state.with_skin(mix=mix) for mix in (0.1, 0.2, 0.3)]
     for one in states[1:]:
         history.change(one)
@@ -104,7 +104,7 @@ def test_undo_and_redo_walk_through_the_states(state: ViewerState) -> None:
 
 
 def test_a_gesture_is_one_step(state: ViewerState) -> None:
-    history = History(state)
+    history = UndoHistory(state)
     for mix in (0.1, 0.2, 0.3):
         history.change(state.with_skin(mix=mix), "slide")
     history.end_gesture()
@@ -116,7 +116,7 @@ def test_a_gesture_is_one_step(state: ViewerState) -> None:
 
 
 def test_a_change_forgets_what_was_undone(state: ViewerState) -> None:
-    history = History(state)
+    history = UndoHistory(state)
     history.change(state.with_skin(mix=0.1))
     history.undo()
     history.change(state.with_skin(mix=0.2))
@@ -124,7 +124,7 @@ def test_a_change_forgets_what_was_undone(state: ViewerState) -> None:
 
 
 def test_no_change_is_no_step_and_the_past_has_an_end(state: ViewerState) -> None:
-    history = History(state)
+    history = UndoHistory(state)
     history.change(state.with_skin(mix=state.scene.skin.mix))
     assert not history.can_undo
     for k in range(1000):

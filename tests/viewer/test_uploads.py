@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("rendercanvas", reason="the extra `viewer` is not installed")
 
 from dermis.apps.viewer.browser import uploads
-from dermis.apps.viewer.browser.guard import Guard
+from dermis.apps.viewer.browser.request_filter import RequestFilter
 from dermis.apps.viewer.browser.uploads import Uploads
 
 
@@ -26,7 +26,7 @@ class Server:
         self.got: list[Path] = []
         self.names: list[str] = []
         self.canvas = canvas = SimpleNamespace(ticket="secret", on_file=self._take)
-        self.app = Guard(Uploads(_app, canvas, folder), "")
+        self.app = RequestFilter(Uploads(_app, canvas, folder), "")
 
     def _take(self, path: Path, name: str) -> None:
         self.got.append(path)
@@ -113,10 +113,10 @@ def test_another_site_may_not(server: Server) -> None:
 def test_large_files_are_refused_before_and_while_they_come(
     server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(uploads, "MOST_BYTES", 1 << 20)
+    monkeypatch.setattr(uploads, "MAX_FILE_BYTES", 1 << 20)
     assert server.send("a.obj", b"x", content_length=str(1 << 21)) == (400, server.send("a.obj", *_MUCH)[1])
     assert "at most 1 MB" in server.send("a.obj", *_MUCH)[1]
-    monkeypatch.setattr(uploads, "MOST_BYTES_IN_ALL", 1 << 20)
+    monkeypatch.setattr(uploads, "MAX_TOTAL_BYTES", 1 << 20)
     for status in (200, 400):
         assert server.send("a.obj", bytes(600_000))[0] == status
     assert [path.stat().st_size for path in tmp_path.rglob("*.obj")] == [600_000]
@@ -127,26 +127,26 @@ _MUCH = [bytes(1 << 19)] * 3
 
 def test_nothing_is_left_of_a_file_that_ends_early(server: Server, tmp_path: Path) -> None:
     status, said = server.send("a.obj", b"v 0", whole=False)
-    assert status == 400 and "whole" in said and server.got == [] and not list(tmp_path.rglob("*.obj"))
+    assert status == 400 and "complete" in said and server.got == [] and not list(tmp_path.rglob("*.obj"))
     assert server.send("a.obj", b"v")[0] == 200
 
 
 def test_a_file_that_does_not_go_on_is_given_up(
     server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(uploads, "IDLE_S", 0.05)
+    monkeypatch.setattr(uploads, "IDLE_TIMEOUT_S", 0.05)
 
     async def never() -> Any:
         await asyncio.sleep(60.0)
 
     status, said = server.send("a.obj", b"v 0", whole=False, then=never)
-    assert status == 400 and "nothing came" in said and not list(tmp_path.rglob("*.obj"))
+    assert status == 400 and "got nothing" in said and not list(tmp_path.rglob("*.obj"))
     monkeypatch.undo()
     assert server.send("a.obj", b"v")[0] == 200
 
 
 def test_only_so_many_files_are_taken(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(uploads, "MOST_FILES", 2)
+    monkeypatch.setattr(uploads, "MAX_FILES", 2)
     assert [server.send("a.obj", b"v")[0] for _ in range(3)] == [200, 200, 400]
 
 

@@ -13,7 +13,7 @@ from offscreen_input import ADAPTER, SETTINGS
 
 from dermis.apps.viewer.navigation import orbit
 from dermis.apps.viewer.state import ATLAS, ViewerState
-from dermis.apps.viewer.studio import QUALITY_LEVELS, Studio
+from dermis.apps.viewer.view_renderer import QUALITY_LEVELS, ViewRenderer
 from dermis.apps.viewer.views import VIEWS
 from dermis.frame.renderer import Renderer
 from dermis.images.io import read_image
@@ -24,11 +24,11 @@ LIT = {"irradiance", "diffuse", "combine"}
 
 
 @pytest.fixture(scope="module")
-def studio() -> Studio:
+def view_renderer() -> ViewRenderer:
     """Whose pictures in motion are alike on quick and on busy machines."""
-    studio = Studio(ADAPTER)
-    studio.pace.note = lambda _: None  # type: ignore[method-assign]
-    return studio
+    view_renderer = ViewRenderer(ADAPTER)
+    view_renderer.quality_controller.record_frame_time = lambda _: None  # type: ignore[method-assign]
+    return view_renderer
 
 
 @pytest.fixture(scope="module")
@@ -37,13 +37,13 @@ def fresh() -> Renderer:
     return Renderer(ADAPTER)
 
 
-def image(studio: Studio, state: ViewerState, moving: bool = False) -> Any:
-    return studio.read(studio.image(state, state.scene.camera, SIZE, moving)).astype(int)
+def image(view_renderer: ViewRenderer, state: ViewerState, moving: bool = False) -> Any:
+    return view_renderer.read(view_renderer.render_image(state, state.scene.camera, SIZE, moving)).astype(int)
 
 
-def stages(studio: Studio) -> set[str]:
-    assert studio.rendered is not None and studio.rendered.gpu_ms is not None
-    return set(studio.rendered.gpu_ms)
+def stages(view_renderer: ViewRenderer) -> set[str]:
+    assert view_renderer.rendered is not None and view_renderer.rendered.gpu_ms is not None
+    return set(view_renderer.rendered.gpu_ms)
 
 
 def turned(state: ViewerState, angle: float = 0.5) -> ViewerState:
@@ -73,83 +73,89 @@ CHANGES: dict[str, Callable[[ViewerState], ViewerState]] = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_what_is_kept_never_shows(name: str, studio: Studio, fresh: Renderer, state: ViewerState) -> None:
-    image(studio, state)
-    changed = CHANGES[name](state)
-    expected = fresh.draw(changed.scene, changed.settings.model_copy(update={"size": SIZE}), anew=True)
-    off = np.abs(image(studio, changed) - expected.srgb8().astype(int))
+def test_what_is_kept_never_shows(
+    name: str, view_renderer: ViewRenderer, fresh: Renderer, state: ViewerState
+) -> None:
+    image(view_renderer, state)
+    validated_copy = CHANGES[name](state)
+    expected = fresh.draw(
+        validated_copy.scene, validated_copy.settings.model_copy(update={"size": SIZE}), force=True
+    )
+    off = np.abs(image(view_renderer, validated_copy) - expected.srgb8().astype(int))
     assert off.max() <= (1 if name == "pigments" else 0)  # whose fit begins elsewhere
 
 
-def test_a_camera_does_not_light_the_atlas_again(studio: Studio, state: ViewerState) -> None:
-    first = image(studio, state)
-    second = image(studio, turned(state))
-    assert not LIT & stages(studio) and "shade" in stages(studio)
+def test_a_camera_does_not_light_the_atlas_again(view_renderer: ViewRenderer, state: ViewerState) -> None:
+    first = image(view_renderer, state)
+    second = image(view_renderer, turned(state))
+    assert not LIT & stages(view_renderer) and "shade" in stages(view_renderer)
     assert np.abs(first - second).mean() > 1.0
 
 
-def test_a_light_lights_it_again_and_loads_no_map(studio: Studio, state: ViewerState) -> None:
-    image(studio, state)
-    before = prepared(studio, state)
-    image(studio, brighter(state))
-    assert stages(studio) >= LIT | {"shadows"}
-    assert_same_textures(before, prepared(studio, brighter(state)))
+def test_a_light_lights_it_again_and_loads_no_map(view_renderer: ViewRenderer, state: ViewerState) -> None:
+    image(view_renderer, state)
+    before = prepared(view_renderer, state)
+    image(view_renderer, brighter(state))
+    assert stages(view_renderer) >= LIT | {"shadows"}
+    assert_same_textures(before, prepared(view_renderer, brighter(state)))
 
 
-def test_pigments_fit_again_and_load_nothing(studio: Studio, state: ViewerState) -> None:
+def test_pigments_fit_again_and_load_nothing(view_renderer: ViewRenderer, state: ViewerState) -> None:
     skin = state.with_skin(profile="light")
-    before = prepared(studio, skin.with_pigments(melanin=0.02))
-    after = prepared(studio, skin.with_pigments(melanin=0.021))
+    before = prepared(view_renderer, skin.with_pigments(melanin=0.02))
+    after = prepared(view_renderer, skin.with_pigments(melanin=0.021))
     assert not np.array_equal(before.blurs[0].weight, after.blurs[0].weight)
     assert_same_textures(before, after)
     assert before.layouts[0].translucency.pairs is after.layouts[0].translucency.pairs
 
 
 def test_pigments_that_spread_light_farther_get_their_own_pairs(
-    studio: Studio, fresh: Renderer, state: ViewerState
+    view_renderer: ViewRenderer, fresh: Renderer, state: ViewerState
 ) -> None:
     pale, dark = (
         state.with_skin(profile="light", albedo="profile").with_pigments(melanin=melanin)
         for melanin in (0.01, 0.2)
     )
-    pairs = [prepared(studio, one).layouts[0].translucency.pairs for one in (pale, dark)]
+    pairs = [prepared(view_renderer, one).layouts[0].translucency.pairs for one in (pale, dark)]
     assert pairs[0].cells.radius_mm != pairs[1].cells.radius_mm
-    image(studio, pale)
-    fresh.forget()
+    image(view_renderer, pale)
+    fresh.clear_cache()
     expected = fresh.draw(dark.scene, dark.settings.model_copy(update={"size": SIZE})).srgb8().astype(int)
-    assert np.abs(image(studio, dark) - expected).max() <= 1  # whose fit begins elsewhere
+    assert np.abs(image(view_renderer, dark) - expected).max() <= 1  # whose fit begins elsewhere
 
 
-def prepared(studio: Studio, state: ViewerState) -> Any:
-    return studio.renderer.prepare(state.scene, state.settings.model_copy(update={"size": SIZE}))
+def prepared(view_renderer: ViewRenderer, state: ViewerState) -> Any:
+    return view_renderer.renderer.prepare(state.scene, state.settings.model_copy(update={"size": SIZE}))
 
 
 def assert_same_textures(a: Any, b: Any) -> None:
     """The maps, the mesh and the atlas are the same objects on the device."""
     for name in ("colour_map", "slope_map", "relief_map", "vertex_table", "albedo_table"):
-        assert a.lit[name] is b.lit[name], name
+        assert a.bindings[name] is b.bindings[name], name
     for name in ("atlas", "stretch_map", "reach_map"):
         assert a.layouts[0].atlas.resources[name] is b.layouts[0].atlas.resources[name], name
 
 
 def test_going_back_and_forth_between_two_sizes_lights_each_once(
-    studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+    view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = replace(QUALITY_LEVELS[2], atlas=64)
-    monkeypatch.setattr("dermis.apps.viewer.studio.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
+    monkeypatch.setattr(
+        "dermis.apps.viewer.view_renderer.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small)
+    )
     moving, still = [(turned(state, 0.1 * k), bool(k % 2)) for k in (1, 2)]
     for one, moves in (moving, still):
-        image(studio, one, moves)
+        image(view_renderer, one, moves)
     for one, moves in (moving, still):
-        image(studio, turned(one, 0.3), moves)
-        assert not LIT & stages(studio)
+        image(view_renderer, turned(one, 0.3), moves)
+        assert not LIT & stages(view_renderer)
 
 
-def test_an_unchanged_state_is_not_drawn_again(studio: Studio, state: ViewerState) -> None:
-    image(studio, state)
-    before = studio.rendered
-    image(studio, state)
-    assert studio.rendered is before
+def test_an_unchanged_state_is_not_drawn_again(view_renderer: ViewRenderer, state: ViewerState) -> None:
+    image(view_renderer, state)
+    before = view_renderer.rendered
+    image(view_renderer, state)
+    assert view_renderer.rendered is before
 
 
 def test_the_two_parts_add_up_to_the_picture(fresh: Renderer, state: ViewerState) -> None:
@@ -162,36 +168,42 @@ def test_the_two_parts_add_up_to_the_picture(fresh: Renderer, state: ViewerState
 
 
 @pytest.mark.parametrize("view", [view for view in VIEWS if view not in ("picture", "blur 6", ATLAS)])
-def test_each_view_shows_the_head_and_another_picture(view: str, studio: Studio, state: ViewerState) -> None:
-    picture, found = image(studio, state), image(studio, state.in_view(view))
+def test_each_view_shows_the_head_and_another_picture(
+    view: str, view_renderer: ViewRenderer, state: ViewerState
+) -> None:
+    picture, found = image(view_renderer, state), image(view_renderer, state.with_view(view))
     head = picture.sum(axis=-1) > 0
     assert head.mean() > 0.1
     assert (found[~head] == 0).mean() > 0.99
     assert np.abs(found - picture)[head].mean() > 0.5
 
 
-def test_a_level_of_light_is_what_the_atlas_holds(studio: Studio, state: ViewerState) -> None:
+def test_a_level_of_light_is_what_the_atlas_holds(view_renderer: ViewRenderer, state: ViewerState) -> None:
     """With no blur to tell them apart, a wider blur is a smoother picture."""
-    rough = [np.abs(np.diff(image(studio, state.in_view(f"blur {k}")), axis=1)).sum() for k in (1, 5)]
+    rough = [
+        np.abs(np.diff(image(view_renderer, state.with_view(f"blur {k}")), axis=1)).sum() for k in (1, 5)
+    ]
     assert rough[1] < rough[0]
 
 
-def test_normals_are_those_of_the_ellipsoid(studio: Studio, state: ViewerState) -> None:
-    middle = image(studio, state.in_view("normals"))[48, 48]
+def test_normals_are_those_of_the_ellipsoid(view_renderer: ViewRenderer, state: ViewerState) -> None:
+    middle = image(view_renderer, state.with_view("normals"))[48, 48]
     assert np.abs(middle - (127.5, 127.5, 255.0)).max() < 40.0
 
 
 def test_screenshots_have_any_size_and_the_state_s_own_view(
-    studio: Studio, state: ViewerState, tmp_path: Path
+    view_renderer: ViewRenderer, state: ViewerState, tmp_path: Path
 ) -> None:
-    studio.screenshot(tmp_path / "a.png", state, (50, 40))
-    studio.screenshot(tmp_path / "a.exr", state, (50, 40))
-    studio.screenshot(tmp_path / "n.png", state.in_view("normals"), (50, 40))
+    view_renderer.screenshot(tmp_path / "a.png", state, (50, 40))
+    view_renderer.screenshot(tmp_path / "a.exr", state, (50, 40))
+    view_renderer.screenshot(tmp_path / "n.png", state.with_view("normals"), (50, 40))
     found = [read_image(tmp_path / name) for name in ("a.png", "a.exr", "n.png")]
     assert [one.shape[:2] for one in found] == [(40, 50)] * 3
     assert found[1].dtype == np.float32 and float(np.abs(found[0][..., :3] - found[2]).max()) > 0.0
 
 
-def test_settings_of_the_window_are_those_of_the_pace(studio: Studio, state: ViewerState) -> None:
-    image(studio, state.with_settings(size=(4000, 4000)))
-    assert isinstance(studio.settings, Settings) and studio.settings.size == SIZE
+def test_settings_of_the_window_are_those_of_the_pace(
+    view_renderer: ViewRenderer, state: ViewerState
+) -> None:
+    image(view_renderer, state.with_settings(size=(4000, 4000)))
+    assert isinstance(view_renderer.settings, Settings) and view_renderer.settings.size == SIZE

@@ -179,11 +179,11 @@ def test_the_window_may_change_its_size_or_have_none(driver: InputDriver) -> Non
 def test_a_lost_device_is_opened_again(make_driver: Callable[[], InputDriver]) -> None:
     driver = make_driver()
     before = driver.settled()
-    lost = driver.viewer.session.studio
+    lost = driver.viewer.session.view_renderer
     lost.renderer.device.handle.destroy()
     driver.viewer.session.change(driver.viewer.session.state.with_skin(mix=0.4))
     driver.frame()
-    assert driver.viewer.session.studio is not lost and "lost" in driver.viewer.session.message
+    assert driver.viewer.session.view_renderer is not lost and "lost" in driver.viewer.session.message
     driver.viewer.session.history.undo()
     assert difference(before, driver.settled(), rows=380) == 0.0
     assert np.abs(driver.frame()[30:440, :190].astype(int) - before[30:440, :190]).max() == 0  # not "redo"

@@ -14,7 +14,7 @@ from page_client import PATIENCE_S
 from small_head import write_head
 
 from dermis.apps.viewer import session as viewer_session
-from dermis.apps.viewer.session import Heads
+from dermis.apps.viewer.session import HeadLoader
 from dermis.apps.viewer.state import ViewerState
 from dermis.mesh.head import Head
 
@@ -97,7 +97,7 @@ def test_a_pose_stays_where_the_names_are_the_same(rigged: ViewerState, rigged_f
     for name, kept in ((str(rigged_file), True), (str(rigged_file.with_name("bare.obj")), False)):
         if not kept:
             write_head(rigged_file.with_name("bare.obj"))
-        opening = Heads()
+        opening = HeadLoader()
         opening.open(name)
         end, found = time.monotonic() + PATIENCE_S, None
         while found is None and time.monotonic() < end:

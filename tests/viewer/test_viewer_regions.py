@@ -11,7 +11,7 @@ from PIL import Image
 from dermis.apps.viewer.session import apply_regions
 from dermis.apps.viewer.state import ViewerState
 from dermis.base.errors import DermisError
-from dermis.human.regions.zones import REGIONS
+from dermis.human.regions.region_table import REGIONS
 from dermis.scene.head_table import AUTO
 from dermis.scene.skin import Skin
 
@@ -51,5 +51,5 @@ def test_heads_that_are_there_are_not_made_again(state: ViewerState, table: str)
 def test_heads_without_known_regions_are_refused(state: ViewerState) -> None:
     with pytest.raises(DermisError):
         apply_regions(state, "default")
-    with pytest.raises(DermisError, match="made in memory"):
+    with pytest.raises(DermisError, match="created in memory"):
         apply_regions(ViewerState(state.scene), "default")

@@ -52,10 +52,10 @@ fn displayed_colour(point: Point) -> vec3f {
         return vec3f(0.0);
     }
     if (view_parameters.quantity == STRETCH_VIEW) { // not interpolated: a mean over several charts is meaningless
-        let texel = vec2u(point.place * vec2f(textureDimensions(layer)));
+        let texel = vec2u(point.atlas_uv * vec2f(textureDimensions(layer)));
         return layer_colour(view_parameters.quantity, textureLoad(layer, texel, 0), view_parameters.scale);
     }
-    return layer_colour(view_parameters.quantity, load_bilinear(layer, point.place), view_parameters.scale);
+    return layer_colour(view_parameters.quantity, load_bilinear(layer, point.atlas_uv), view_parameters.scale);
 }
 
 // Surface point of a triangle under a position of the image.
@@ -73,7 +73,7 @@ fn point_under(index: u32, pixel: vec2f, size: vec2f) -> Point {
     let inside = max(w * sign(w.x + w.y + w.z), vec3f(0.0));
     let weights = inside / max(inside.x + inside.y + inside.z, 1e-20);
     var point = interpolate(a, b, c, weights, t.w);
-    point.place = place_of_point(index, weights);
+    point.atlas_uv = atlas_position(index, weights);
     return point;
 }
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.apps.viewer.posing import posed_positions
 from dermis.apps.viewer.state import ViewerState, validated_copy
 from dermis.scene.camera import Camera
-from dermis.scene.frozen_model import FARTHEST_MM
+from dermis.scene.frozen_model import MAX_COORDINATE_MM
 from dermis.scene.lights import DirectionalLight, Light
 from dermis.scene.model import Scene
 
@@ -54,7 +54,7 @@ def dolly(camera: Camera, factor: float) -> Camera:
     offset = np.subtract(camera.position, camera.target)
     old_distance = float(np.linalg.norm(offset))
     requested = old_distance * frame_mm / camera.frame_mm
-    distance = max(min(requested, FARTHEST_MM / 10), min(old_distance, _MIN_DISTANCE_MM))
+    distance = max(min(requested, MAX_COORDINATE_MM / 10), min(old_distance, _MIN_DISTANCE_MM))
     position = np.array(camera.target) + offset * (distance / old_distance)
     return _with_position(camera, position, camera.target, frame_mm=frame_mm)
 
@@ -170,7 +170,7 @@ def _with_position(camera: Camera, position: ArrayLike, target: ArrayLike, **fie
 
 
 def _clamped_tuple(v: ArrayLike) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in np.clip(v, -FARTHEST_MM, FARTHEST_MM))
+    x, y, z = (float(c) for c in np.clip(v, -MAX_COORDINATE_MM, MAX_COORDINATE_MM))
     return x, y, z
 
 
