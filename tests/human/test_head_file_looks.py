@@ -80,7 +80,7 @@ def test_eyes_have_their_pictures_and_a_coat(path: Path, pictures: EyePictures) 
         assert "baseColorFactor" not in material["pbrMetallicRoughness"] and "normalTexture" in material
         coat = material["extensions"]["KHR_materials_clearcoat"]["clearcoatFactor"]
         assert coat * 0.04 == pytest.approx(((1.336 - 1) / (1.336 + 1)) ** 2, abs=5e-4)
-        uv, places = (document.real(found["attributes"][key]) for key in ("TEXCOORD_0", "POSITION"))
+        uv, places = (document.read_floats(found["attributes"][key]) for key in ("TEXCOORD_0", "POSITION"))
         front = places[np.hypot(*(uv - 0.5).T) < 0.21].max(axis=0) - places[
             np.hypot(*(uv - 0.5).T) < 0.21
         ].min(axis=0)
@@ -92,8 +92,8 @@ def test_eyes_have_their_pictures_and_a_coat(path: Path, pictures: EyePictures) 
 def test_hairs_are_closed_tubes_of_the_hairs_width() -> None:
     head = PERSON.head(subdivide=0)
     assert head.strands is not None
-    fibres = FibreTubes.of(head.strands, head.mesh, 100_000, 5)
-    places, normals = fibres.placed(head.mesh.points_mm)
+    fibres = FibreTubes.from_strands(head.strands, head.mesh, 100_000, 5)
+    places, normals = fibres.posed(head.mesh.points_mm)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
     rings = places.reshape(len(head.strands), -1, 3)[:, :3]
     middle = head.strands.places_mm(head.mesh, head.mesh.points_mm)[:, 0]
@@ -103,7 +103,7 @@ def test_hairs_are_closed_tubes_of_the_hairs_width() -> None:
     edges = np.sort(fibres.triangles()[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, count = np.unique(edges, axis=0, return_counts=True)
     assert set(count) == {1, 2} and (count == 1).sum() == 3 * len(head.strands)  # open at the root alone
-    few = FibreTubes.of(head.strands, head.mesh, 100, 5)
+    few = FibreTubes.from_strands(head.strands, head.mesh, 100, 5)
     total = len(head.strands) * head.strands.radius_mm[:100, 0]
     np.testing.assert_allclose(100 * few.strands.radius_mm[:, 0], total, rtol=1e-5)
     own, wide = head.strands, few.strands
@@ -115,7 +115,7 @@ def test_hairs_are_as_light_as_their_pigment() -> None:
     def colour(look: HairLook) -> np.ndarray:
         head = Human(hair=look).head(subdivide=0)
         assert head.strands is not None
-        return np.asarray(FibreTubes.of(head.strands, head.mesh, 5000, 5).colours()[0].mean(axis=(0, 1)))
+        return np.asarray(FibreTubes.from_strands(head.strands, head.mesh, 5000, 5).colours()[0].mean(axis=(0, 1)))
 
     black, brown, blond = (colour(HairLook(eumelanin=e, pheomelanin=0.0)) for e in (8.0, 1.3, 0.3))
     assert black.max() < 0.01 < brown[0] < 0.05 < blond[0] < 0.3
@@ -129,8 +129,8 @@ def test_lashes_go_along_with_a_lid(path: Path) -> None:
         primitive(document, "brows and lashes"),
         document.tree["meshes"][0]["extras"]["targetNames"],
     )
-    moved = document.real(found["targets"][names.index("eyeBlinkLeft")]["POSITION"]) * 1e3
-    rest = document.real(found["attributes"]["POSITION"]) * 1e3
+    moved = document.read_floats(found["targets"][names.index("eyeBlinkLeft")]["POSITION"]) * 1e3
+    rest = document.read_floats(found["attributes"]["POSITION"]) * 1e3
     strands = head.strands
     assert strands is not None
     rig = head.control

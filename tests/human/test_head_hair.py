@@ -134,16 +134,16 @@ def test_it_moves_with_the_head_and_stays_with_the_face() -> None:
 )
 def test_no_hair_is_lost_where_none_is_looked_for(where: density.HairDensity) -> None:
     mesh = Human().head(subdivide=0).mesh
-    both = where, where._replace(near=ALL)
+    both = where, where._replace(candidates=ALL)
     some, every = (density.sample_roots(mesh, one, 60.0, np.random.default_rng(0)) for one in both)
-    assert not where.near.all() and len(some.quad) > 1000
+    assert not where.candidates.all() and len(some.quad) > 1000
     assert np.array_equal(some.place, every.place) and np.array_equal(some.quad, every.quad)
 
 
 @pytest.mark.parametrize("seed", [2, 11, 30])
 def test_hair_lies_as_if_all_skin_counted(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     def every(root_finder: RootFinder, _: bool) -> NDArray[np.int64]:
-        return np.arange(len(root_finder.drawn.positions))
+        return np.arange(len(root_finder.subdivided_mesh.positions))
 
     person = Human.drawn(seed, hair={"beard_mm": 12.0, "style": "short", "length_mm": 45.0})
     some = person.head(hairs=0.1)
@@ -156,7 +156,7 @@ def test_hair_lies_as_if_all_skin_counted(monkeypatch: pytest.MonkeyPatch, seed:
 def test_recession_bares_temples_and_crown() -> None:
     temple, crown = np.array([[33.0, 75.0, -12.0, -50.0]]), np.array([[0.0, 95.0, -122.0, -50.0]])
     middle = np.array([[0.0, 100.0, -50.0, -50.0]])
-    full, thin = density.scalp_density(0.0).amount, density.scalp_density(1.0).amount
+    full, thin = density.scalp_density(0.0).relative, density.scalp_density(1.0).relative
     assert full(temple) > 0.4 > 0.05 > thin(temple)
     assert full(crown) > 0.95 and thin(crown) < 0.3 and thin(middle) > 0.9 * full(middle)
 

@@ -252,6 +252,7 @@ class Human:
     hair: HairLook | None = None
 
     def __post_init__(self) -> None:
+        """Validate the fields."""
         check_fields(self, _RANGES)
         if not self.african + self.asian + self.caucasian > 0:
             refuse("ancestry", "a weight of african, asian or caucasian above 0", "all are 0", "Raise one")
@@ -362,7 +363,12 @@ class Human:
             For other heads.
         """
         if not isinstance(head.maps, PaintedMaps) or head.eyes is None:
-            refuse(head.name, "a head of the parametric human with painted skin", "it is another head", "Load human")
+            refuse(
+                head.name,
+                "a head of the parametric human with painted skin",
+                "it is another head",
+                "Load human",
+            )
         eyes = head.eyes.with_look(self.iris)
         return replace(head, maps=replace(head.maps, look=self.look), eyes=eyes)
 

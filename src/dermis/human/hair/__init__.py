@@ -1,1 +1,1 @@
-"""Hair of people: brows, lashes and head hair grown from the skin as strands."""
+"""Hair of people as strands: brows, lashes, hair of the head and beard."""

@@ -1,4 +1,4 @@
-"""Where hair grows: how much of it at places of the average person, and roots drawn from that."""
+"""Density of hair over the skin of the average person, and roots sampled from it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ _SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
 _HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
 _LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density of the beard rises
 _BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the beard rises
-_HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the ragged hairline [rad/mm]
+_HAIRLINE_WAVES = np.array(
+    [[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]]
+)  # wave vectors of the ragged hairline [rad/mm]
 
 _SCALP_MARGIN_MM = 25.0  # below the hairline, for quads that may have hair
 _HAIR_MARGIN_MM, _BROW_MARGIN_MM = 25.0, 8.0  # around hairy quads, for skin that hair may touch
@@ -33,11 +35,11 @@ _MIN_BEARD = 0.02  # zone amount above which quads may have a beard
 
 
 class HairDensity(NamedTuple):
-    """Where hair grows.
+    """Relative density of hair over the skin.
 
-    amount : share of the density (n,) at places (n, 4): on the average person, and how far inside the lips
-        these are [mm]
-    near : (p,) control points of quads on which any may grow
+    relative : function of points (n, 4) that returns the relative density (n,); columns are the position on
+        the average person and the distance inside the lips [mm]
+    candidates : (p,) mask of control points whose quads may have hair
     """
 
     relative: Callable[[Doubles], Doubles]
@@ -47,10 +49,10 @@ class HairDensity(NamedTuple):
 def sample_roots(
     control_mesh: Mesh, hair_density: HairDensity, per_cm2: float, rng: np.random.Generator
 ) -> Roots:
-    """Roots on the skin, evenly but for chance, quad after quad; none on ears, lips and in the mouth.
+    """Return random, evenly distributed roots, ordered by quad; none on ears, lips and in the mouth.
 
-    plain : the person's mesh of control points
-    per_cm2 : density where the share is 1
+    control_mesh : the person's mesh before subdivision
+    per_cm2 : density where the relative density is 1 [1/cm2]
     """
     quad = _hairy_quads(control_mesh)
     corner_points = corners(control_mesh, quad)
@@ -68,36 +70,39 @@ def sample_roots(
     return Roots(quad.take(which.take(kept)).astype(np.int32), place.take(kept, axis=0).astype(np.float32))
 
 
-def height_above_hairline(places: Doubles, recession: float = 0.0) -> Doubles:
-    """How far (n,) places (n, 3 or more) are above the edge of the hair, on the average person [mm].
+def height_above_hairline(points: Doubles, recession: float = 0.0) -> Doubles:
+    """Return the height (n,) of points (n, 3 or more) of the average person above the hairline [mm].
 
     recession : see `SkinLook`
     """
-    angle = np.degrees(np.arctan2(np.abs(places[:, 0]), places[:, 2] - HEAD_AXIS_Z))
+    angle = np.degrees(np.arctan2(np.abs(points[:, 0]), points[:, 2] - HEAD_AXIS_Z))
     edge = hairline_heights(recession)
-    return np.asarray(places[:, 1] - np.interp(angle, HAIRLINE_STEP_DEGREES * np.arange(len(edge)), edge))
+    return np.asarray(points[:, 1] - np.interp(angle, HAIRLINE_STEP_DEGREES * np.arange(len(edge)), edge))
 
 
 def scalp_density(recession: float) -> HairDensity:
-    """Hair of the head."""
+    """Return the density of the hair of the head.
+
+    recession : see `SkinLook`
+    """
     column = _amount_column("hair")
     receding = zone_table(recession)[:, column] != zone_table()[:, column]
 
-    def relative(places: Doubles) -> Doubles:
-        above = height_above_hairline(places, recession)
+    def relative(points: Doubles) -> Doubles:
+        above = height_above_hairline(points, recession)
         low, high = _HAIRLINE_FADE_MM
         margin = len(_HAIRLINE_WAVES)
         near = np.flatnonzero((above > low - margin) & (above < high + margin))
-        above[near] += sum(np.sin(places[near, :3] @ wave) for wave in _HAIRLINE_WAVES)
-        fraction = smoothstep(low, high, above) * (places[:, 1] > _SCALP_BOTTOM_Y)
-        thinned = _sum_zones("hair", zone_table(recession)[receding], places)
+        above[near] += sum(np.sin(points[near, :3] @ wave) for wave in _HAIRLINE_WAVES)
+        fraction = smoothstep(low, high, above) * (points[:, 1] > _SCALP_BOTTOM_Y)
+        thinned = _sum_zones("hair", zone_table(recession)[receding], points)
         return np.asarray(fraction * np.clip(1.0 + thinned, 0.0, 1.0))
 
     return HairDensity(relative, _scalp_candidates())
 
 
 def beard_density() -> HairDensity:
-    """Hair of the beard."""
+    """Return the density of the beard."""
     return HairDensity(_beard_amount, _beard_candidates())
 
 
@@ -111,29 +116,29 @@ def _beard_candidates() -> NDArray[np.bool_]:
     return _sum_zones("beard", zone_table(), average_points()) > _MIN_BEARD
 
 
-def _beard_amount(places: Doubles) -> Doubles:
-    lip_fade = smoothstep(*_LIP_FADE_MM, -places[:, 3])
-    return np.asarray(smoothstep(*_BEARD_FADE, _sum_zones("beard", zone_table(), places)) * lip_fade)
+def _beard_amount(points: Doubles) -> Doubles:
+    lip_fade = smoothstep(*_LIP_FADE_MM, -points[:, 3])
+    return np.asarray(smoothstep(*_BEARD_FADE, _sum_zones("beard", zone_table(), points)) * lip_fade)
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """From 0 at `low` to 1 at `high`."""
+    """Return the smooth Hermite transition from 0 at `low` to 1 at `high`."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
 def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
-    """(n,) area of quads [cm2]."""
+    """Return the areas (n,) of quads [cm2]."""
     corner_points = control_mesh.points_mm.T.take(corners(control_mesh, quad).T, axis=1)
     a, b, c, d = corner_points.swapaxes(0, 1)
     across = crosses(c - a, d - b)
     return np.asarray(np.sqrt(dots(across, across)) / 200.0)
 
 
-def _sum_zones(name: str, rows: Floats, places: Doubles) -> Doubles:
-    """Sum (n,) of an amount of zones, see zones.csv."""
-    column, found = _amount_column(name), np.zeros(len(places))
-    mirrored = np.abs(places[:, 0]), places[:, 1], places[:, 2]
+def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
+    """Return the sum (n,) of a quantity over Gaussian zones, see zones.csv."""
+    column, found = _amount_column(name), np.zeros(len(points))
+    mirrored = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     for zone in rows[rows[:, column] != 0.0].astype(np.float64):
         distance2 = sum(((mirrored[c] - zone[c]) * zone[4 + c]) ** 2 for c in range(3))
         found += zone[column] * np.exp(-distance2)
@@ -142,15 +147,15 @@ def _sum_zones(name: str, rows: Floats, places: Doubles) -> Doubles:
 
 @cache
 def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
-    """Vertices of the drawn mesh among which are all that hairs of anyone lie beside."""
+    """Return the vertices of the subdivided mesh that hair of any person may touch."""
     from scipy.spatial import cKDTree
 
     mesh = root_finder.mesh
     corner_points = corners(mesh, _hairy_quads(mesh))
     near = np.zeros(len(root_finder.subdivided_mesh.positions), bool)
     hairy = _scalp_candidates() | _beard_candidates() if bearded else _scalp_candidates()
-    places = corner_points[hairy[corner_points].any(axis=1)], corners(mesh, root_finder.brow_grid_roots.quad)
-    for subset, reach in zip(places, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
+    points = corner_points[hairy[corner_points].any(axis=1)], corners(mesh, root_finder.brow_grid_roots.quad)
+    for subset, reach in zip(points, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
         tree = cKDTree(root_finder.points_mm[np.unique(subset)])
         near |= tree.query(root_finder.subdivided_mesh.positions, distance_upper_bound=reach)[0] < reach
     return np.flatnonzero(near)
@@ -162,7 +167,7 @@ def _amount_column(name: str) -> int:
 
 @cache
 def average_points() -> Doubles:
-    """(p, 4) of control points their place on the average person, and how far inside the lips [mm]."""
+    """Return the control points of the average person and their distance inside the lips (p, 4) [mm]."""
     points_mm, distances = average_surface()
     lips = distances[:, BORDER_FIELDS.index("lips")]
     return np.asfortranarray(np.column_stack([points_mm, lips]), np.float64)
@@ -170,7 +175,7 @@ def average_points() -> Doubles:
 
 @cache
 def _hairless_quads() -> Index:
-    """Quads on which no hair grows: ears, lips, the mouth."""
+    """Return the quads without hair: ears, lips and the inside of the mouth."""
     rows = read_rows("dermis.human.regions", "parts")
     return np.concatenate([np.arange(int(row["first"]), int(row["last"]) + 1) for row in rows])
 

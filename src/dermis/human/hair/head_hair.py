@@ -1,4 +1,4 @@
-"""Hair of head and beard: how it lies by style, how it grows, and which strands stand for it."""
+"""Strands of hair and beard: combing by style, growth and random variation."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ _LONG_BEARD_MM = 8.0
 
 
 class GuideShape(NamedTuple):
-    """How hairs lie.
+    """Shape of guide hairs.
 
-    way : (n, 3) unit directions along the skin
+    directions : (n, 3) unit directions along the skin
     length_mm : (n,)
-    rise, last_rise : (n,) angles over the skin of root and tip [rad]
+    rise, last_rise : (n,) angles between the skin and the hair at root and tip [rad]
     """
 
     directions: Doubles
@@ -60,82 +60,82 @@ class GuideShape(NamedTuple):
     last_rise: Doubles
 
 
-def comb_scalp(places: Doubles, normals: Doubles, look: HairLook, recession: float) -> GuideShape:
-    """The hair of the head.
+def comb_scalp(points: Doubles, normals: Doubles, look: HairLook, recession: float) -> GuideShape:
+    """Return the guides of the hair of the head.
 
-    places : (n, 3) on the average person [mm]
+    points : (n, 3) on the average person [mm]
     normals : (n, 3) of the person's skin
     recession : see `SkinLook`
     """
-    growth, top, n = _growth_directions(places, normals), _top_weight(places), len(places)
-    edge = height_above_hairline(places, recession)
+    growth, top, n = _growth_directions(points, normals), _top_weight(points), len(points)
+    edge = height_above_hairline(points, recession)
     if look.style == "cropped":
         length = look.length_mm * (0.55 + 0.45 * smoothstep(-2.0, 22.0, edge)) * (0.85 + 0.15 * top)
         return GuideShape(growth, length, *(np.full(n, rise) for rise in _CROPPED_RISE))
-    high = places[:, 1] + _LEVEL_TILT * (places[:, 2] - HEAD_AXIS_Z)
+    high = points[:, 1] + _LEVEL_TILT * (points[:, 2] - HEAD_AXIS_Z)
     sides = 1.0 - look.fade * (1.0 - smoothstep(-45.0, 62.0, high))
     near = 0.3 + 0.7 * np.maximum(smoothstep(0.0, 35.0, edge), top)
     length = look.length_mm * np.minimum(sides, near)
     rise = (side + more * top for side, more in zip(_SHORT_RISE, _TOP_RISE, strict=True))
-    return GuideShape(_combed_directions(places, normals, growth), length, *rise)
+    return GuideShape(_combed_directions(points, normals, growth), length, *rise)
 
 
-def comb_beard(places: Doubles, normals: Doubles, look: HairLook) -> GuideShape:
-    """The beard, down and a little to the sides; see `comb_scalp`."""
-    n = len(places)
-    aside = 0.4 * np.clip(places[:, 0] / 25.0, -1.0, 1.0)
+def comb_beard(points: Doubles, normals: Doubles, look: HairLook) -> GuideShape:
+    """Return the guides of the beard, which point down and slightly to the sides; see `comb_scalp`."""
+    n = len(points)
+    aside = 0.4 * np.clip(points[:, 0] / 25.0, -1.0, 1.0)
     directions = tangent_directions(np.stack([aside, np.full(n, -1.0), np.zeros(n)], axis=1), normals)
     return GuideShape(directions, np.full(n, look.beard_mm), *(np.full(n, rise) for rise in _BEARD_RISE))
 
 
 def tangent_directions(offsets: Doubles, normals: Doubles) -> Doubles:
-    """Unit vectors: what of ways (n, 3) lies along the skin."""
+    """Return the unit tangential components of vectors (n, 3)."""
     flat = tangent_component(offsets, normals)
     return np.asarray(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9))
 
 
 def rotate_about_normals(offsets: Doubles, normals: Doubles, angle: Doubles) -> Doubles:
-    """Ways along the skin turned about its normals by angles (n,) [rad]."""
+    """Return tangent vectors rotated about the normals by angles (n,) [rad]."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     return np.asarray(c * offsets + s * np.cross(normals, offsets))
 
 
-def _growth_directions(places: Doubles, normals: Doubles) -> Doubles:
-    """As hair grows: away from the whorl, and down at sides and nape."""
-    away = places - _WHORL_CENTRE
+def _growth_directions(points: Doubles, normals: Doubles) -> Doubles:
+    """Return the natural growth directions: away from the whorl, and down at sides and nape."""
+    away = points - _WHORL_CENTRE
     spiral = 1.1 * np.exp(-(away**2).sum(axis=1) / _WHORL_MM**2)
     offsets = rotate_about_normals(tangent_directions(away, normals), normals, spiral)
-    low = 1.2 * smoothstep(40.0, -30.0, places[:, 1])
-    back = 0.35 * smoothstep(-120.0, -60.0, places[:, 2])
-    down = np.stack([np.zeros(len(places)), -low, -low * back], axis=1)
+    low = 1.2 * smoothstep(40.0, -30.0, points[:, 1])
+    back = 0.35 * smoothstep(-120.0, -60.0, points[:, 2])
+    down = np.stack([np.zeros(len(points)), -low, -low * back], axis=1)
     return tangent_directions(offsets + down, normals)
 
 
-def _top_weight(places: Doubles) -> Doubles:
-    """1 on top of the head, 0 at its sides and behind."""
-    return smoothstep(48.0, 86.0, places[:, 1] + _LEVEL_TILT * (places[:, 2] - HEAD_AXIS_Z))
+def _top_weight(points: Doubles) -> Doubles:
+    """Return 1 on top of the head, 0 at its sides and back."""
+    return smoothstep(48.0, 86.0, points[:, 1] + _LEVEL_TILT * (points[:, 2] - HEAD_AXIS_Z))
 
 
-def _combed_directions(places: Doubles, normals: Doubles, growth: Doubles) -> Doubles:
-    """As hair is combed: on top from the parting to the other side, at the sides down and back."""
-    one = np.ones(len(places))
-    top = 2.2 * _top_weight(places) * smoothstep(-135.0, -95.0, places[:, 2])
-    away = np.tanh((places[:, 0] - _PARTING_X) / _PARTING_WIDTH_MM)
+def _combed_directions(points: Doubles, normals: Doubles, growth: Doubles) -> Doubles:
+    """Return combed directions: on top from the parting to the other side, at the sides down and back."""
+    one = np.ones(len(points))
+    top = 2.2 * _top_weight(points) * smoothstep(-135.0, -95.0, points[:, 2])
+    away = np.tanh((points[:, 0] - _PARTING_X) / _PARTING_WIDTH_MM)
     across = np.stack([away, 0.25 * one, 0.55 * one], axis=1)
-    side = 1.2 * (1.0 - _top_weight(places)) * smoothstep(-120.0, -80.0, places[:, 2])
+    side = 1.2 * (1.0 - _top_weight(points)) * smoothstep(-120.0, -80.0, points[:, 2])
     down = np.stack([0.0 * one, -one, -0.55 * one], axis=1)
     return tangent_directions(growth + top[:, None] * across + side[:, None] * down, normals)
 
 
 class HairVariation(NamedTuple):
-    """By how much hairs differ from their guides.
+    """Random variation of hairs around their guides.
 
-    astray : angle to the side [rad]
-    uneven : of lengths, as a share
-    tufts : how much tips are drawn together, 0 to 1
-    frizz : of waves, over the length
+    angle_deviation : standard deviation of the sideways angle [rad]
+    length_deviation : relative standard deviation of the length
+    tuft_strength : attraction of tips to tufts, 0 to 1
+    frizz : amplitude of waves relative to the length
     coil_mm : radius of curls
-    coils : how many turns
+    coils : number of turns
     """
 
     angle_deviation: float
@@ -154,13 +154,13 @@ def grow_hair(
     variation: HairVariation,
     rng: np.random.Generator,
 ) -> tuple[RootFrames, Floats]:
-    """Hairs on the head, and (k, 3, n) ways from their roots to their knots [mm].
+    """Return the root frames of hairs, and the offsets (k, 3, n) of their knots from the roots [mm].
 
-    roots : on quads of the plain mesh, at whose corners the guides of their hairs grow
-    comb : how guides lie, by their places on the average person and the skin's normals, both (g, 3)
+    roots : on quads of the control mesh; guides grow at the corners of these quads
+    comb : function that returns guides from points on the average person and normals of the skin, both (g, 3)
 
-    Hairs come last in all arrays here, so that what is done to one is done to all at once. What must be the
-    same on all machines is so: sines are taken of doubles, and floats are only added and multiplied.
+    In all arrays the hair index comes last, which suits vectorised operations. For results that are equal on
+    all machines, sines are computed in float64, and float32 values are only added and multiplied.
     """
     hair, around = surface.root_frames(roots), corners(surface.control_mesh, roots.quad)
     point, near = compacted(around)
@@ -184,9 +184,10 @@ def grow_hair(
 def _trace_guides(
     skin: SkinSurface, root_mm: Doubles, base_mm: Doubles, normal: Doubles, guide: GuideShape, knots: int
 ) -> Doubles:
-    """(g, k, 3) ways from roots to knots, over the skin [mm].
+    """Return the offsets (g, k, 3) of guide knots from the roots, traced over the skin [mm].
 
-    root_mm, foot, normal : (g, 3) with what `SkinSurface.project` says of them
+    root_mm : (g, 3) control points at which the guides grow
+    base_mm, normal : (g, 3) their projections onto the skin, and the normals there
     """
     root_offset = root_mm - base_mm  # distance of the control points from the smooth surface
     directions, height, step = guide.directions, np.zeros(len(root_mm)), guide.length_mm / (knots - 1)
@@ -201,22 +202,24 @@ def _trace_guides(
 
 
 def _interpolate_guides(weight: Doubles, guide_index: NDArray[np.int64], offsets: Doubles) -> Floats:
-    """(k, 3, n) means of guides' ways.
+    """Return the weighted means (k, 3, n) of offsets of guides.
 
-    share, near : (n, 4) of which guides
+    weight, guide_index : (n, 4)
     """
     from scipy.sparse import csr_array
 
     first = np.arange(0, weight.size + 1, weight.shape[1])
     entries = weight.ravel().astype(np.float32), guide_index.ravel(), first
-    found = csr_array(entries, (len(weight), len(offsets))) @ offsets.reshape(len(offsets), -1).astype(np.float32)
+    found = csr_array(entries, (len(weight), len(offsets))) @ offsets.reshape(len(offsets), -1).astype(
+        np.float32
+    )
     return np.ascontiguousarray(found.T).reshape(*offsets.shape[1:], len(weight))
 
 
 def _vary_directions(
     offsets: Floats, normal: Floats, variation: HairVariation, rng: np.random.Generator
 ) -> Floats:
-    """Turned about the skin's normal, each as a whole, leaning more or less, and longer or shorter."""
+    """Return offsets rotated about the normal, tilted and scaled, at random for each hair."""
     n = offsets.shape[-1]
     angle = variation.angle_deviation * rng.standard_t(4, size=n)
     lean = 1.0 + variation.angle_deviation * rng.normal(size=n)
@@ -232,10 +235,10 @@ def _vary_directions(
 def _form_tufts(
     offsets: Floats, root_mm: Doubles, t: Doubles, strength: float, rng: np.random.Generator
 ) -> None:
-    """Draw tips to those of a few, in tufts."""
-    places = np.ascontiguousarray(root_mm.T)
+    """Pull tips towards one hair of each tuft, in place."""
+    points = np.ascontiguousarray(root_mm.T)
     cell = np.zeros(len(root_mm), np.int64)
-    for coordinate in np.floor(places / _TUFT_MM).astype(np.int64):
+    for coordinate in np.floor(points / _TUFT_MM).astype(np.int64):
         coordinate -= coordinate.min()
         cell *= coordinate.max() + 1
         cell += coordinate
@@ -245,13 +248,16 @@ def _form_tufts(
     pull = (strength * rng.uniform(0.3, 1.0, len(root_mm)) * t**1.3).astype(np.float32)
     difference = offsets.take(leader, axis=-1)
     difference -= offsets
-    difference += (places.take(leader, axis=-1) - places).astype(np.float32)
+    difference += (points.take(leader, axis=-1) - points).astype(np.float32)
     difference *= pull[:, None]
     offsets += difference
 
 
 def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple[Doubles, Floats]]:
-    """Smooth ways whose sum is 0 at roots: how much (k, 1) of each of some (3, n); size : (n,)."""
+    """Yield smooth waves that are 0 at the roots, as factors (k, 1) and amplitudes (3, n).
+
+    size : (n,) amplitude
+    """
     fade = np.minimum(2 * t, 1.0)
     for waves in (0.5, 1.1):
         for shape in (np.sin(2 * np.pi * waves * t), np.cos(2 * np.pi * waves * t) - 1.0):
@@ -260,7 +266,7 @@ def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple
 
 
 def _coils(tips: Floats, t: Doubles, variation: HairVariation, rng: np.random.Generator) -> Floats:
-    """(k, 3, n) turns around the ways to tips (3, n), from the root on."""
+    """Return the offsets (k, 3, n) of helices around the line from the root to the tip (3, n)."""
     n = tips.shape[-1]
     along = np.asarray(tips / np.maximum(np.sqrt(dots(tips, tips)), _EPSILON), np.float32)
     side: Floats = rng.normal(size=tips.shape).astype(np.float32)
@@ -274,7 +280,7 @@ def _coils(tips: Floats, t: Doubles, variation: HairVariation, rng: np.random.Ge
 
 
 def _sine_sequence(angle: Doubles, step: Doubles, knots: int) -> tuple[Doubles, Doubles]:
-    """Cosines and sines (k, n) of angles (n,) that grow by equal steps, of which only the first are taken."""
+    """Return cosines and sines (k, n) of angles (n,) at equal steps, by recurrence."""
     x, y = np.empty((knots, len(angle))), np.empty((knots, len(angle)))
     x[0], y[0], cosine, sine = np.cos(angle), np.sin(angle), np.cos(step), np.sin(step)
     for k in range(1, knots):
@@ -284,7 +290,7 @@ def _sine_sequence(angle: Doubles, step: Doubles, knots: int) -> tuple[Doubles, 
 
 
 def _lift_above_skin(offsets: Floats, normal: Floats, t: Floats) -> Floats:
-    """Lifted where a knot would be in the skin, taken as round as a head."""
+    """Return offsets with knots lifted above the skin, which is approximated by a sphere."""
     height = dots(offsets, normal)
     flat2 = dots(offsets, offsets) - height**2
     min_height = _MIN_HEIGHT_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_RADIUS_MM)
@@ -293,14 +299,14 @@ def _lift_above_skin(offsets: Floats, normal: Floats, t: Floats) -> Floats:
 
 
 def knot_count(look: HairLook) -> int:
-    """Of each hair: few for what is hardly bent."""
+    """Return the number of knots of each hair, fewer for straighter hair."""
     if look.curl > _COIL_CURL:
         return _COILED_KNOTS
     return _CURVED_KNOTS if look.style == "short" or look.beard_mm > _LONG_BEARD_MM else _STRAIGHT_KNOTS
 
 
 def scalp_hair(surface: GrowthSurface, look: HairLook, recession: float) -> list[HairGroup]:
-    """The hair of the head; none for a bald one."""
+    """Return the hair of the head; empty for a bald one."""
     if look.style == "none" or look.density == 0.0:
         return []
     rng = np.random.default_rng((look.seed, 3))
@@ -313,7 +319,7 @@ def scalp_hair(surface: GrowthSurface, look: HairLook, recession: float) -> list
 
 
 def beard_hair(surface: GrowthSurface, look: HairLook) -> list[HairGroup]:
-    """The beard; none for a shaved one."""
+    """Return the beard; empty for a shaved one."""
     if look.beard_mm == 0.0:
         return []
     rng, strands_per_cm2 = np.random.default_rng((look.seed, 4)), surface.hair_fraction * BEARD_PER_CM2
@@ -333,17 +339,19 @@ def _hair_group(
     radius_mm: float,
     rng: np.random.Generator,
 ) -> HairGroup:
-    """Hairs with their width; fewer than there are, and wider.
+    """Return strands with radii and coverage; there are fewer strands than hairs, and they are wider.
 
-    ways : (k, 3, n) from `grow_hair`
-    drawn, true : how many are made and how many there are on a square centimetre
+    offsets : (k, 3, n) from `grow_hair`
+    strands_per_cm2, hairs_per_cm2 : density of strands, and of the hairs that they represent
     """
     hairs_per_strand, (knots, _, n) = hairs_per_cm2 / strands_per_cm2, offsets.shape
     radius = np.tile((hairs_per_strand * radius_mm * rng.uniform(0.8, 1.2, (n, 1))).astype(np.float32), knots)
     radius[:, -1] *= np.float32(_TIP_RADIUS_FACTOR)
     steps = np.diff(offsets, axis=0)
     length = np.sqrt(dots(steps, steps)).sum(axis=0, dtype=np.float64)
-    area = float(np.mean(2.0 * radius.mean(axis=1) * length))  # of one strand from the side; halved below, as hair is inclined
+    area = float(
+        np.mean(2.0 * radius.mean(axis=1) * length)
+    )  # of one strand from the side; halved below, as hair is inclined
     local = np.empty((n, knots, 3), np.float32)
     for c in range(3):
         local[..., c] = dots(offsets, hair.frame_vectors[c]).T

@@ -1,4 +1,4 @@
-"""Eyelashes: rows of hairs along the edges of the lids, which curve away from the eye to a point."""
+"""Eyelashes: rows of tapered hairs along the edges of the lids, curved away from the eye."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ _ALONG = np.array([0.0, 0.15, 0.35, 0.55, 0.75, 0.9, 1.0])
 
 
 class LashRow(NamedTuple):
-    """The lashes of one lid.
+    """Lashes of one lid.
 
-    loop : control points of the left lid's edge, from the nose outwards
-    hairs : how many
-    first, last : between which parts of the edge
-    length : along the edge [mm]
-    rise : angles from straight ahead to upwards, of the root and of the tip [rad]
-    splay : towards the sides, at the inner and at the outer end
+    edge_points : control points of the left lid's edge, from the nose outwards
+    hairs : number of lashes
+    start, end : of the row along the edge, 0 to 1
+    length : along the row [mm]
+    rise : angles from forward to upward, at root and tip [rad]
+    splay : sideways inclination at the inner and the outer end
     radius : of the roots [mm]
     """
 
     edge_points: tuple[int, ...]
     hairs: int
-    first: float
-    last: float
+    start: float
+    end: float
     length: Doubles
     rise: tuple[float, float]
     splay: tuple[float, float]
@@ -38,8 +38,8 @@ class LashRow(NamedTuple):
 UPPER_LASHES = LashRow(
     edge_points=(2625, 2664, 2622, 2619, 2616, 2563, 2562, 2568, 2571, 2574, 2577, 2580),
     hairs=165,
-    first=0.14,
-    last=0.96,
+    start=0.14,
+    end=0.96,
     length=np.array([5.0, 7.0, 8.6, 9.6, 10.0, 9.2, 7.2]),
     rise=(-0.3, 1.15),
     splay=(-0.35, 0.55),
@@ -48,8 +48,8 @@ UPPER_LASHES = LashRow(
 LOWER_LASHES = LashRow(
     edge_points=(2634, 2615, 4280, 2612, 2609, 2606, 2603, 2598, 2595, 2592, 4278),
     hairs=84,
-    first=0.2,
-    last=0.95,
+    start=0.2,
+    end=0.95,
     length=np.array([2.8, 3.4, 4.0, 4.6, 5.2, 5.0, 4.0]),
     rise=(-0.25, -0.85),
     splay=(-0.3, 0.5),
@@ -57,42 +57,44 @@ LOWER_LASHES = LashRow(
 )
 
 
-def sample_positions(lid: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
-    """Along the lid's edge, evenly but for chance, and from the edge onto the skin, each (n,)."""
-    u = (np.arange(lid.hairs) + rng.uniform(-0.3, 1.3, lid.hairs)) / lid.hairs
-    across = 0.04 + 0.12 * rng.integers(0, 3, lid.hairs)
-    return lid.first + (lid.last - lid.first) * np.clip(u, 0, 1), np.asarray(across, np.float64)
+def sample_positions(row: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
+    """Return random positions along the lid's edge and from the edge into the skin, each (n,)."""
+    u = (np.arange(row.hairs) + rng.uniform(-0.3, 1.3, row.hairs)) / row.hairs
+    across = 0.04 + 0.12 * rng.integers(0, 3, row.hairs)
+    return row.start + (row.end - row.start) * np.clip(u, 0, 1), np.asarray(across, np.float64)
 
 
-def sample_shapes(lid: LashRow, u: Doubles, rng: np.random.Generator, before: int) -> Doubles:
-    """(7, n) how far lashes splay, the angles of their first and last piece [rad], their length, the radius
-    of their roots [mm], the number of their clump and how much of the way to its middle their tips are drawn.
+def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clump: int) -> Doubles:
+    """Return random shapes of lashes (7, n).
+
+    The rows are the splay, the angles of the first and the last segment [rad], the length and the radius of
+    the root [mm], the number of the clump, and the attraction of the tip to the clump, 0 to 1.
 
     u : (n,) along the lid's edge, from `sample_positions`
-    before : how many clumps other lids may have
+    first_clump : number of the first clump
     """
-    n, share = len(u), (u - lid.first) / (lid.last - lid.first)
-    splay = np.interp(share, [0, 1], lid.splay) + rng.normal(0, 0.1, n)
-    first = lid.rise[0] + rng.normal(0, 0.12, n)
-    last = lid.rise[1] + rng.normal(0, 0.18, n)
-    length = np.interp(share, _ALONG, lid.length) * rng.uniform(0.7, 1.08, n)
-    clump = np.empty(n)  # of neighbours, as wet lashes stick to each other
-    clump[np.argsort(u)] = before + np.cumsum(rng.random(n) < 0.4)
+    n, fraction = len(u), (u - row.start) / (row.end - row.start)
+    splay = np.interp(fraction, [0, 1], row.splay) + rng.normal(0, 0.1, n)
+    first = row.rise[0] + rng.normal(0, 0.12, n)
+    last = row.rise[1] + rng.normal(0, 0.18, n)
+    length = np.interp(fraction, _ALONG, row.length) * rng.uniform(0.7, 1.08, n)
+    clump = np.empty(n)  # neighbours that stick together
+    clump[np.argsort(u)] = first_clump + np.cumsum(rng.random(n) < 0.4)
     pull = rng.uniform(0.2, 0.7, n)
-    radius = lid.radius * rng.uniform(0.8, 1.15, n)
+    radius = row.radius * rng.uniform(0.8, 1.15, n)
     return np.stack([splay, first, last, length, radius, clump, pull])
 
 
 def grow(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
-    """Knots (n, k, 3) and radii (n, k) of lashes [mm].
+    """Return the knots (n, k, 3) and radii (n, k) of lashes [mm].
 
-    root_mm, eye_mm : (n, 3) on the lids, and middles of their eyes
-    side : (n,) 1 for the left one
-    shape : (7, n) from `sample_shapes`; no clump has lashes of two lids
+    root_mm, eye_mm : (n, 3) on the lids, and centres of their eyes
+    side : (n,) 1 for the left eye
+    shape : (7, n) from `sample_shapes`; each clump belongs to one lid
     """
     splay, first, last, length, radius, clump, pull = shape
     ahead = root_mm - eye_mm
-    ahead = ahead * [0.55, 0.0, 1.0]  # lashes fan out less than the eye is round
+    ahead = ahead * [0.55, 0.0, 1.0]  # lashes fan out less than the normals of the eye
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     up = np.array([0.0, 1.0, 0.0])
     out = np.cross(up, ahead) * side[:, None]
@@ -108,7 +110,7 @@ def grow(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tu
 
 
 def _clump_tips(knots: Doubles, clump: NDArray[np.int64], strength: Doubles, t: Doubles) -> Doubles:
-    """Tips drawn together in clumps."""
+    """Return knots with the tips of each clump pulled towards their mean."""
     count = np.maximum(np.bincount(clump), 1)
     mean = np.stack([np.bincount(clump, knots[:, -1, c]) / count for c in range(3)], axis=-1)
     pull = (mean[clump] - knots[:, -1]) * strength[:, None]

@@ -1,4 +1,4 @@
-"""The look of a person's hair, and looks drawn at random."""
+"""Look of the hair, typical or sampled at random."""
 
 from __future__ import annotations
 
@@ -34,17 +34,40 @@ _DARK_EUMELANIN = 3.0  # eumelanin from which on shaved hair shows as much as it
 class HairLook:
     """Hair of the head, beard, brows and lashes.
 
-    style : "none" for a bald or shaved head, "cropped" for hair of one length that stands up, "short" for
-        hair that is combed to the side and shorter at the sides and the nape
-    length_mm : of the hair of the head where it is longest, 1 to 60 [mm]
-    density : of the hair of the head, 0 to 1; 1 is 200 hairs on a square centimetre [-]
-    curl : from straight, 0, to tightly coiled, 1 [-]
-    fade : how much shorter short hair is at the sides and the nape than on top, 0 to 1 [-]
-    beard_mm : length of the beard, 0 for none, to 30 [mm]
-    bushy : of brows, from 0, sparse and short, to 1, dense and long [-]
-    grey : share of hairs without pigment, 0 to 1 [-]
-    eumelanin, pheomelanin : concentrations from 0 to 10, see `dermis.specular.hair.absorption_per_mm` [-]
-    seed : of what differs from hair to hair, any integer from 0
+    Parameters
+    ----------
+    style : {"none", "cropped", "short"}
+        "none" for a bald or shaved head, "cropped" for hair of equal length that stands up, "short" for hair
+        combed to the side and shorter at the sides and the nape.
+    length_mm : float
+        Length of the hair of the head where it is longest, 1 to 60 [mm].
+    density : float
+        Density of the hair of the head, 0 to 1; 1 is 200 hairs per cm2 [-].
+    curl : float
+        From straight, 0, to tightly coiled, 1 [-].
+    fade : float
+        Reduction of the length of short hair at the sides and the nape, 0 to 1 [-].
+    beard_mm : float
+        Length of the beard, 0 to 30; 0 for none [mm].
+    bushy : float
+        Brows, from sparse and short, 0, to dense and long, 1 [-].
+    grey : float
+        Fraction of hairs without pigment, 0 to 1 [-].
+    eumelanin, pheomelanin : float
+        Concentrations of pigments, 0 to 10, see `dermis.specular.hair.absorption_per_mm` [-].
+    seed : int
+        Seed of the variation between hairs, 0 to 2**32 - 1.
+
+    Raises
+    ------
+    DermisError
+        For an unknown style and for values out of range.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.HairLook(style="short", length_mm=30).beard_mm
+    0.0
     """
 
     style: Style = "none"
@@ -60,13 +83,14 @@ class HairLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        """Validate the fields."""
         if self.style not in STYLES:
             refuse("style", f"one of {', '.join(STYLES)}", f"got {format_value(self.style)}", "Choose one")
         check_fields(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)[1:]})
 
 
 def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: float) -> HairLook:
-    """The hair that goes with a person: by ancestry, age and sex.
+    """Return the typical hair by ancestry, age and sex.
 
     eumelanin, pheomelanin : see `HairLook`
     """
@@ -89,9 +113,9 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
 
 
 def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: HairLook) -> HairLook:
-    """Hair at random around the usual one, by numbers that are always drawn in the same order.
+    """Return random hair around the typical one; random numbers are always drawn in the same order.
 
-    Men crop and shave theirs more often than women, and only they have beards.
+    Men have cropped or shaved hair more often than women, and only men have beards.
     """
     n, style_chance, beard_chance = rng.normal(size=4), rng.random(), rng.random()
     man = demographics.sex > 0.5
@@ -126,12 +150,12 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
 
 
 def sample_recession(rng: np.random.Generator, demographics: Demographics) -> float:
-    """How far the hair of men has gone back at random, more with age."""
+    """Return a random recession of the hair of men, which increases with age."""
     old = (demographics.age - YOUNG) / (OLD - YOUNG)
     man = max(2.0 * demographics.sex - 1.0, 0.0)
     return float(np.clip(man * rng.beta(1.2, 1.8) * (0.15 + 1.1 * old), 0.0, 1.0))
 
 
 def stubble_visibility(hair: HairLook) -> float:
-    """Factor of the shadow of shaved hair by its pigments, 0 to 1."""
+    """Return the factor of the shadow of shaved hair due to its pigments, 0 to 1."""
     return min(1.0, 0.15 + (hair.eumelanin + 0.3 * hair.pheomelanin) * (1.0 - hair.grey) / _DARK_EUMELANIN)

@@ -1,4 +1,4 @@
-"""Where brows and lashes are rooted: places of the mean person's quads, found once for all people."""
+"""Roots of brows and lashes on the quads of the mean person, computed once for all people."""
 
 from __future__ import annotations
 
@@ -17,22 +17,19 @@ from dermis.mesh.strands import Roots, corners
 
 Index = NDArray[np.int64]
 SIDES = 1.0, -1.0
-"""Of x: the left one and the right one."""
+"""Sign of x on the left and on the right side."""
 _QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
 _MIN_WEIGHT = -1e-9  # least share of a corner
 _CELL_MM = 2.0  # of the grid that triangles are listed in
-_GRID_LOW, _GRID_HIGH = (
-    np.array([-70.0, -20.0]),
-    np.array([70.0, 50.0]),
-)  # of places in front, around the brows [mm]
+_GRID_LOW, _GRID_HIGH = np.array([-70.0, -20.0]), np.array([70.0, 50.0])  # around the brows [mm]
 _HALVES = np.array([[0, 1, 2], [2, 3, 0]])
 
 
 class _FrontTriangles(NamedTuple):
-    """Triangles that face the viewer, by cells of a grid over the front plane.
+    """Front-facing triangles, listed by cells of a grid in the front plane.
 
-    listed : (columns, rows, most) in order, -1 for none
-    quad, half : (t,) whose they are, and which corners
+    triangle_lists : (columns, rows, longest list) triangles of each cell, -1 for none
+    quad, half : (t,) quad of each triangle, and which half of it
     corner : (t, 3, 3) [mm]
     """
 
@@ -43,11 +40,12 @@ class _FrontTriangles(NamedTuple):
 
 
 class _LidEdge(NamedTuple):
-    """Edges in a row, with a quad beside each.
+    """Edge of a lid as a polyline, with the adjacent quads.
 
-    run : (m,) how far along the row each begins and the last ends [mm]
-    quad : (m - 1,)
-    frame : (m - 1, 4, 2) places on these: the edge's ends, and what lies beside each
+    lengths_mm : (m,) arc length at each point
+    quad : (m - 1,) adjacent quad of each segment
+    frame : (m - 1, 4, 2) coordinates in the quad of the ends of the segment, and of the corners opposite to
+        them
     """
 
     lengths_mm: Doubles
@@ -56,32 +54,27 @@ class _LidEdge(NamedTuple):
 
 
 class RootFinder:
-    """Roots on a mesh of quads.
+    """Roots on a quad mesh by position in the front plane or along the lids.
 
-    mesh : with control points at points_mm (p, 3)
-    eyes_mm : (2, 3) middles of the left and of the right eye
-    drawn : the mesh as it is drawn, of the same person
+    mesh : mesh with control points at points_mm (p, 3)
+    eyes_mm : (2, 3) centres of the left and the right eye
+    subdivided_mesh : the subdivided mesh of the same person
     """
 
     def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles, subdivided_mesh: Mesh) -> None:
-        self.mesh, self.points_mm, self.subdivided_mesh, self._eyes_mm = (
-            mesh,
-            points_mm,
-            subdivided_mesh,
-            eyes_mm,
-        )
+        self.mesh, self.points_mm, self._eyes_mm = mesh, points_mm, eyes_mm
+        self.subdivided_mesh = subdivided_mesh
         self._lid_edges: dict[tuple[tuple[int, ...], float], _LidEdge] = {}
 
     def front_roots(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
-        """Roots on what faces the viewer at places of the front plane (n,) [mm], and which there are."""
+        """Return roots on front-facing triangles at points (n,) of the front plane [mm], and a hit mask."""
         front = self._front
         cell = np.floor((np.column_stack([x, y]) - _GRID_LOW) / _CELL_MM).astype(np.int64)
-        triangle_lists = front.triangle_lists[
-            tuple(np.clip(cell, 0, np.array(front.triangle_lists.shape[:2]) - 1).T)
-        ]
-        query_index, column = np.nonzero(triangle_lists >= 0)
-        which = triangle_lists[query_index, column]
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = front.corner.take(which, axis=0).transpose(1, 2, 0)
+        last_cell = np.array(front.triangle_lists.shape[:2]) - 1
+        triangles = front.triangle_lists[tuple(np.clip(cell, 0, last_cell).T)]
+        query_index, column = np.nonzero(triangles >= 0)
+        triangle = triangles[query_index, column]
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = front.corner.take(triangle, axis=0).transpose(1, 2, 0)
         px, py = x[query_index], y[query_index]
         det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
         v = ((px - ax) * (cy - ay) - (cx - ax) * (py - ay)) / det
@@ -91,45 +84,44 @@ class RootFinder:
         z = (az + v * (bz - az) + w * (cz - az))[inside]
         foremost = np.full(len(x), -1)
         order = inside[np.argsort(z)]
-        foremost[query_index[order]] = order  # the last one stays: the foremost
+        foremost[query_index[order]] = order  # the last assignment is the foremost triangle
         hit = foremost >= 0
-        which, weights = which[foremost], np.stack([u[foremost], v[foremost], w[foremost]], axis=-1)
-        place = np.einsum("nk,nkc->nc", weights, _QUAD_CORNERS[_HALVES].take(front.half[which], axis=0))
-        quad = np.where(hit, front.quad[which], 0)
+        triangle, weights = triangle[foremost], np.stack([u[foremost], v[foremost], w[foremost]], axis=-1)
+        place = np.einsum("nk,nkc->nc", weights, _QUAD_CORNERS[_HALVES].take(front.half[triangle], axis=0))
+        quad = np.where(hit, front.quad[triangle], 0)
         return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), hit
 
     @cached_property
     def brow_grid_roots(self) -> Roots:
-        """The grids of `BrowSkin`; what faces the viewer is all around a brow."""
+        """Return the roots at the grid points of `BrowSurface`, all of which are front-facing."""
         x, y = grid_points()
         return self.front_roots(np.concatenate([side * x for side in SIDES]), np.tile(y, len(SIDES)))[0]
 
     def lid_edge_roots(self, lid: lashes.LashRow, side: float, u: Doubles, across: Doubles) -> Roots:
-        """Roots along a lid's edge, on the quads beside it that are farther from the eye.
+        """Return roots along a lid's edge, on the adjacent quads that are farther from the eye.
 
-        side : 1 for the left one
-        u : (n,) how far along it, from 0 to 1 by length
-        across : (n,) how far from the edge into the quad, 0 to 1
+        side : 1 for the left eye
+        u : (n,) arc length along the edge, 0 to 1
+        across : (n,) distance from the edge into the quad, 0 to 1
         """
         key = lid.edge_points, side
         if key not in self._lid_edges:
             self._lid_edges[key] = self._lid_edge(np.array(lid.edge_points), side)
         lengths_mm, quad, frame = self._lid_edges[key]
-        at = np.clip(np.searchsorted(lengths_mm, u * lengths_mm[-1], "right") - 1, 0, len(quad) - 1)
-        part = (u * lengths_mm[-1] - lengths_mm[at]) / (lengths_mm[at + 1] - lengths_mm[at])
-        frame = frame[at]
-        low = (1 - part)[:, None] * frame[:, 0] + part[:, None] * frame[:, 1]
-        high = (1 - part)[:, None] * frame[:, 2] + part[:, None] * frame[:, 3]
+        k = np.clip(np.searchsorted(lengths_mm, u * lengths_mm[-1], "right") - 1, 0, len(quad) - 1)
+        t = (u * lengths_mm[-1] - lengths_mm[k]) / (lengths_mm[k + 1] - lengths_mm[k])
+        frame = frame[k]
+        low = (1 - t)[:, None] * frame[:, 0] + t[:, None] * frame[:, 1]
+        high = (1 - t)[:, None] * frame[:, 2] + t[:, None] * frame[:, 3]
         place = (1 - across)[:, None] * low + across[:, None] * high
-        return Roots(quad[at].astype(np.int32), place.astype(np.float32))
+        return Roots(quad[k].astype(np.int32), place.astype(np.float32))
 
     def _lid_edge(self, edge_points: Index, side: float) -> _LidEdge:
-        points, around, away = self.points_mm, self._quad_points, self._eyes_mm[0 if side > 0 else 1]
+        points, around, eye = self.points_mm, self._quad_points, self._eyes_mm[0 if side > 0 else 1]
         edge_points = edge_points if side > 0 else _mirrored_points(points, edge_points)
-        distances = np.linalg.norm(points[around].mean(axis=1) - away, axis=1)
-        lengths_mm = np.concatenate(
-            [[0], np.cumsum(np.linalg.norm(np.diff(points[edge_points], axis=0), axis=1))]
-        )
+        distances = np.linalg.norm(points[around].mean(axis=1) - eye, axis=1)
+        segments_mm = np.linalg.norm(np.diff(points[edge_points], axis=0), axis=1)
+        lengths_mm = np.concatenate([[0], np.cumsum(segments_mm)])
         quads, frames = [], []
         for a, b in pairwise(edge_points.tolist()):
             both = np.flatnonzero((around == a).any(axis=1) & (around == b).any(axis=1))
@@ -141,7 +133,7 @@ class RootFinder:
 
     @cached_property
     def _quad_points(self) -> NDArray[np.int32]:
-        """(q, 4) points of all quads."""
+        """Return the points (q, 4) of all quads."""
         return corners(self.mesh, np.arange(len(self.mesh.quads)))
 
     @cached_property
@@ -155,8 +147,8 @@ class RootFinder:
         seen &= ((high >= _GRID_LOW) & (low <= _GRID_HIGH)).all(axis=1)
         quad, half, corner = quad[seen], half[seen], corner[seen]
         shape = np.ceil((_GRID_HIGH - _GRID_LOW) / _CELL_MM).astype(np.int64)
-        first, last = (np.clip(np.floor((at[seen] - _GRID_LOW) / _CELL_MM).astype(np.int64), 0, shape - 1)
-                       for at in (low, high))  # fmt: skip
+        first, last = (np.clip(np.floor((bound[seen] - _GRID_LOW) / _CELL_MM).astype(np.int64), 0, shape - 1)
+                       for bound in (low, high))  # fmt: skip
         cells: dict[tuple[int, int], list[int]] = {}
         for number, ((x0, y0), (x1, y1)) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
             for x in range(x0, x1 + 1):
@@ -173,14 +165,14 @@ def _bounding_box(corner: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _mirrored_points(points_mm: Doubles, index: Index) -> Index:
-    """Points opposite to some of a symmetric head."""
+    """Return the points on the other side of a symmetric head."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(points_mm).query(points_mm[index] * [-1, 1, 1])[1], np.int64)
 
 
 def eye_centres(mesh: Mesh) -> Doubles:
-    """(2, 3) middles of the left and of the right eye [mm]."""
+    """Return the centres (2, 3) of the left and the right eye [mm]."""
     names = [one.name for one in mesh.materials]
     found = []
     for name in ("left eye", "right eye"):

@@ -1,4 +1,4 @@
-"""Strands grown on a skin: positions and heights over its surface."""
+"""Skin surface on which strands grow, and groups of strands."""
 
 from __future__ import annotations
 
@@ -13,71 +13,61 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, finer_roots, frames
 
-_NEIGHBOURS = 6  # vertices that a place's tangent plane is the mean of
+_NEIGHBOURS = 6  # vertices whose tangent planes are averaged
 
 
 class SkinSurface:
-    """A surface, by its vertices with their normals.
+    """Smooth surface through vertices with normals.
 
-    mesh : as it is drawn
-    which : those of its vertices that are near enough to count; all when left out
+    mesh : the subdivided mesh
+    vertex_index : vertices to use; all by default
     """
 
     def __init__(self, mesh: Mesh, vertex_index: NDArray[np.int64] | None = None) -> None:
-        both = mesh.positions, mesh.normals
-        positions_mm, normals = (
-            one if vertex_index is None else one.take(vertex_index, axis=0) for one in both
-        )
-        self._places, normals = positions_mm.astype(np.float64), normals.astype(np.float64)
-        self._planes = np.column_stack([normals, (self._places * normals).sum(axis=1)])
+        index = slice(None) if vertex_index is None else vertex_index
+        self._positions_mm = mesh.positions[index].astype(np.float64)
+        normals = mesh.normals[index].astype(np.float64)
+        self._planes = np.column_stack([normals, (self._positions_mm * normals).sum(axis=1)])
 
-    def project(self, places_mm: Doubles) -> tuple[Doubles, Doubles]:
-        """Where places (n, 3) are on the skin when put there along its normal, and that normal [mm]."""
-        distance, near = self._tree.query(places_mm, k=_NEIGHBOURS)
+    def project(self, points_mm: Doubles) -> tuple[Doubles, Doubles]:
+        """Return the projections of points (n, 3) onto the skin along its normals, and these normals [mm]."""
+        distance, near = self._tree.query(points_mm, k=_NEIGHBOURS)
         weights = 1.0 / (distance**2 + 0.05)
         weights /= weights.sum(axis=1, keepdims=True)
         plane = np.einsum("nk,nkc->nc", weights, self._planes.take(near, axis=0))
-        height = (places_mm * plane[:, :3]).sum(axis=1) - plane[:, 3]
+        height = (points_mm * plane[:, :3]).sum(axis=1) - plane[:, 3]
         normal = plane[:, :3] / np.sqrt((plane[:, :3] ** 2).sum(axis=1, keepdims=True))
-        return places_mm - height[:, None] * normal, normal
+        return points_mm - height[:, None] * normal, normal
 
     @cached_property
     def _tree(self) -> Any:
         from scipy.spatial import cKDTree
 
-        return cKDTree(self._places, compact_nodes=False, balanced_tree=False)
+        return cKDTree(self._positions_mm, compact_nodes=False, balanced_tree=False)
 
 
 def tangent_component(vectors: Doubles, normals: Doubles) -> Doubles:
-    """What of ways (n, 3) lies along the skin."""
+    """Return the components of vectors (n, 3) tangential to the skin."""
     return np.asarray(vectors - (vectors * normals).sum(axis=1, keepdims=True) * normals)
 
 
 class RootFrames:
-    """Roots on the head as it is drawn.
-
-    places, frame : (n, 3) and (n, 3, 3), from `frames` [mm]
-    """
+    """Roots on the subdivided mesh, with their positions (n, 3) [mm] and coordinate frames (n, 3, 3)."""
 
     def __init__(self, roots: Roots, positions_mm: Doubles, frame: Doubles) -> None:
         self.roots, self.positions_mm, self.frame = roots, positions_mm, frame
 
-    @property
-    def normals(self) -> Doubles:
-        """(n, 3) of the skin."""
-        return np.asarray(self.frame[:, 2])
-
     @cached_property
     def frame_vectors(self) -> Floats:
-        """(3, 3, n) the frames, roots last."""
+        """Return the frames (3, 3, n) with the root index last."""
         return np.ascontiguousarray(self.frame.transpose(1, 2, 0), np.float32)
 
 
 class GrowthSurface:
-    """What hair grows on: the head as it is drawn, and its mesh before it was subdivided.
+    """Surface that hair grows on: the subdivided head and its control mesh.
 
-    skin : of the head, where hairs lie
-    share : of the usual number of hairs that grows, each as much wider
+    skin : surface of the head, over which hairs lie
+    hair_fraction : fraction of the hairs that grow, each wider by the inverse
     """
 
     def __init__(self, head: Head, control_mesh: Mesh, skin: SkinSurface, hair_fraction: float = 1.0) -> None:
@@ -87,11 +77,11 @@ class GrowthSurface:
 
     @property
     def points_mm(self) -> Doubles:
-        """(p, 3) of the drawn mesh, the control points first; numbers lie as `frames` reads them."""
+        """Return the points (p, 3) of the subdivided mesh, control points first, in column-major order."""
         return self._columns.T
 
     def root_frames(self, roots: Roots) -> RootFrames:
-        """Roots on quads of the plain mesh."""
+        """Return the positions and frames of roots on quads of the control mesh."""
         finer = finer_roots(self.control_mesh, roots, self._levels)
         return RootFrames(finer, *frames(self._mesh, finer, self.points_mm))
 
@@ -99,10 +89,10 @@ class GrowthSurface:
 class HairGroup(NamedTuple):
     """Hairs of one kind.
 
-    knots, radius : (n, k, 3) in the frames of the roots, as `Strands` has them, and (n, k) [mm]
-    darker : factor of their pigments
-    bundle : how many hairs each stands for
-    cover : of roots by the hair around them
+    knots, radius : (n, k, 3) in the frames of the roots, see `Strands`, and (n, k) [mm]
+    pigment_factor : factor of the pigments
+    hairs_per_strand : number of hairs that each strand represents
+    cover : coverage of the roots by surrounding hair
     """
 
     roots: Roots

@@ -1,1 +1,1 @@
-"""Parts of the face as classes: which triangles are of which, and distances by which skin is told apart."""
+"""Label classes of the face: classes of triangles and hairs, and border distances of skin."""

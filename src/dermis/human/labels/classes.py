@@ -1,4 +1,4 @@
-"""The classes of the label outputs."""
+"""Classes of the label outputs."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dermis.base.tables import read_rows
 
 
 class LabelClass(NamedTuple):
-    """What a pixel may show.
+    """Class of a pixel.
 
-    number : in the output `label`
-    face_synthetics : its number in the output `label_face_synthetics`
+    number : value in the output `label`
+    face_synthetics : value in the output `label_face_synthetics`
     """
 
     number: int
@@ -23,7 +23,7 @@ class LabelClass(NamedTuple):
 
 @cache
 def label_classes() -> tuple[LabelClass, ...]:
-    """All classes by their numbers, which have no gaps."""
+    """Return all classes, ordered by their consecutive numbers."""
     rows = read_rows(__package__, "classes")
     return tuple(
         LabelClass(int(row["number"]), row["name"], int(row["face_synthetics"]), row["description"])
@@ -33,5 +33,5 @@ def label_classes() -> tuple[LabelClass, ...]:
 
 @cache
 def class_number(name: str) -> int:
-    """Number of a class."""
+    """Return the number of a class."""
     return next(one.number for one in label_classes() if one.name == name)

@@ -1,4 +1,4 @@
-"""Labels of the parametric human's skin: distances from the borders of parts, and classes of hairs."""
+"""Labels of meshes: signed border distances of parts of the face, and classes of hairs."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ HUMAN_FIELDS = (
     "left_brow",
     "neck",
 )
-"""Classes in the order in which they count."""
+"""Label classes of the skin, in order of precedence."""
 SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])
-"""Distance from the middle and height where the lips meet."""
+"""Polyline where the lips meet: distance from the middle and height [mm]."""
 _OUTSIDE_MM = -1.0
-_MIN_BROW_Z = -30.0  # of the front, where no brow is
-_HAIRLINE_MARGIN_MM = -8.0  # above the hairline, from where on hair is of the head and no beard
+_MIN_BROW_Z = -30.0  # of brows
+_HAIRLINE_MARGIN_MM = -8.0  # height above the hairline that separates hair of the head from the beard
 _LEVELS = 2
 SIDES = "right", "left"
 _PART_CLASSES = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "neck"}
@@ -54,28 +54,28 @@ _LOCK = Lock()
 
 @cache
 def label_fields() -> Doubles:
-    """(k, p) `HUMAN_FIELDS` at the control points [mm, positive inside]."""
-    places = average_head().positions_mm.astype(np.float64)
-    told = np.full((len(BORDER_FIELDS), len(places)), -_OUTSIDE_MM)
-    told[:, : len(average_surface()[1])] = average_surface()[1].T
-    lips, mouth, lids = told
-    left = places[:, 0] > 0
-    above = places[:, 1] - np.interp(np.abs(places[:, 0]), *SEAM_MM.T)
+    """Return the signed distances (k, p) of `HUMAN_FIELDS` at the control points, positive inside [mm]."""
+    points = average_head().positions_mm.astype(np.float64)
+    distances = np.full((len(BORDER_FIELDS), len(points)), -_OUTSIDE_MM)
+    distances[:, : len(average_surface()[1])] = average_surface()[1].T
+    lips, mouth, lids = distances
+    left = points[:, 0] > 0
+    above = points[:, 1] - np.interp(np.abs(points[:, 0]), *SEAM_MM.T)
     found = {
         "mouth_interior": -mouth,
         "upper_lip": np.minimum(lips, above),
         "lower_lip": np.minimum(lips, -above),
-        "nose": nose_distance_mm(places),
-        "neck": neck_distance_mm(places),
+        "nose": nose_distance_mm(points),
+        "neck": neck_distance_mm(points),
     }
-    for name, values in (("ear", _ear_field()), ("eye", -lids), ("brow", _brow_field(places))):
+    for name, values in (("ear", _ear_field()), ("eye", -lids), ("brow", _brow_field(points))):
         found[f"left_{name}"] = np.where(left, values, _OUTSIDE_MM)
         found[f"right_{name}"] = np.where(left, _OUTSIDE_MM, values)
     return np.stack([found[name] for name in HUMAN_FIELDS])
 
 
 def dense_fields() -> tuple[Doubles, Doubles]:
-    """(n, 3) places all over the average human's outer skin [mm], and (k, n) the fields there."""
+    """Return points (n, 3) on the average human's outer skin [mm], and the signed distances (k, n) there."""
     head = AVERAGE_HUMAN.head(subdivide=_LEVELS)
     assert head.control.stencils is not None
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
@@ -85,7 +85,7 @@ def dense_fields() -> tuple[Doubles, Doubles]:
 
 
 def hair_classes(head: Head) -> NDArray[np.uint8]:
-    """(n,) class of each of the head's hairs, brows and lashes first; all hair where nobody knows."""
+    """Return the class of each hair (n,), brows and lashes first; "hair" for heads of another topology."""
     both = [part for part in (head.strands, head.hair) if part is not None]
     quads = [part.roots.quad >> (2 * head.levels) for part in both]
     if not quads:
@@ -99,7 +99,7 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
 
 @cache
 def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """(q,) class of fine and of coarse hairs on each of the human's quads."""
+    """Return the classes (q,) of fine and of coarse hairs on each quad of the human."""
     mesh = average_head().mesh
     around = corners(mesh, np.arange(len(mesh.quads)))
     middle = average_head().positions_mm.astype(np.float64)[around].mean(axis=1)
@@ -113,37 +113,37 @@ def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
 
 
 def _ear_field() -> Doubles:
-    """(p,) above 0 where most quads around a control point are of the ears."""
+    """Return a field (p,) that is positive where most quads around a control point belong to an ear."""
     mesh = average_head().mesh
     around = corners(mesh, np.arange(len(mesh.quads)))
     within = np.zeros(len(around))
     within[part_quads()["ears"]] = 1.0
     count = len(average_head().positions_mm)
-    sums, all_of = (
+    ears, quads = (
         np.bincount(around.ravel(), np.repeat(each, 4), count) for each in (within, np.ones(len(around)))
     )
-    return np.asarray(sums / np.maximum(all_of, 1.0) - 0.5)
+    return np.asarray(ears / np.maximum(quads, 1.0) - 0.5)
 
 
-def _brow_field(places: Doubles) -> Doubles:
-    """(p,) how far inside the strip where brows grow, seen from the front [mm]."""
-    x, y = np.abs(places[:, 0]), places[:, 1]
+def _brow_field(points: Doubles) -> Doubles:
+    """Return the signed distance (p,) to the outline of the brows in the front plane [mm]."""
+    x, y = np.abs(points[:, 0]), points[:, 1]
     low, high = (brows.outline(side) for side in (-1.0, 1.0))
     ends = 0.5 * (low + high)
     below, above = (np.interp(x, *side.T) for side in (low, high))
     across = np.minimum(np.minimum(y - below, above - y), np.minimum(x - ends[0, 0], ends[-1, 0] - x))
-    return np.where(places[:, 2] > _MIN_BROW_Z, across, _OUTSIDE_MM)
+    return np.where(points[:, 2] > _MIN_BROW_Z, across, _OUTSIDE_MM)
 
 
 _CACHE: dict[bytes, MeshLabels] = {}
 
 
 class MeshLabels(NamedTuple):
-    """What a mesh shows where.
+    """Label classes of a mesh.
 
     base : (t,) class of each triangle
-    classes : (k,) of the fields: of those that are above 0 at a place, the first one counts, else the base
-    fields : (v, k) at the mesh's vertices, linear between these [mm, positive inside]
+    classes : (k,) classes of the fields; the first field that is positive decides, else the base class
+    fields : (v, k) signed distances at the vertices, interpolated linearly, positive inside [mm]
     """
 
     base: NDArray[np.uint8]
@@ -152,12 +152,11 @@ class MeshLabels(NamedTuple):
 
 
 def mesh_labels(head: Head) -> MeshLabels:
-    """The labelling of a head; of parametric humans the same for all of one layout and level."""
+    """Return the labels of a head; cached for parametric humans, where they depend on layout and level."""
     if not is_human(head):
         return _build_labels(head)
-    key = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest() + bytes(
-        [head.strands is not None]
-    )
+    digest = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest()
+    key = digest + bytes([head.strands is not None])
     with _LOCK:
         if key not in _CACHE:
             while len(_CACHE) >= _CACHE_SIZE:
@@ -167,50 +166,49 @@ def mesh_labels(head: Head) -> MeshLabels:
 
 
 def _build_labels(head: Head) -> MeshLabels:
-    of_material = np.array([class_number(_material_class(one)) for one in head.mesh.materials], np.uint8)
+    material_classes = np.array([class_number(_material_class(one)) for one in head.mesh.materials], np.uint8)
     for material, side in zip(() if head.eyes is None else head.eyes.material, reversed(SIDES), strict=False):
-        of_material[material] = class_number(f"{side}_eye")
+        material_classes[material] = class_number(f"{side}_eye")
     fields = _iris_fields(head.template or head) | _skin_fields(head)
     none = np.zeros((int(head.mesh.point.max()) + 1, 0))
     points = np.stack(list(fields.values()), axis=1) if fields else none
     classes = np.array([class_number(name) for name in fields], np.uint8)
-    return MeshLabels(
-        of_material[head.mesh.material], classes, np.ascontiguousarray(points[head.mesh.point], np.float32)
-    )
+    values = np.ascontiguousarray(points[head.mesh.point], np.float32)
+    return MeshLabels(material_classes[head.mesh.material], classes, values)
 
 
 def _material_class(material: Material) -> str:
-    """Class of what is made of it, were it no eyeball."""
+    """Return the class of a material that is not an eyeball."""
     known = _PART_CLASSES.get(material.part or material.name)
     return known or ("skin" if material.kind == "skin" else "other")
 
 
 def _iris_fields(head: Head) -> dict[str, Doubles]:
-    """How far inside the limbus points of eyeballs are [mm of a usual eye]."""
+    """Return the signed distances of eyeball points to the limbus, positive inside [mm of an average eye]."""
     if head.eyes is None:
         return {}
-    mesh, places = head.mesh, head.mesh.points_mm
+    mesh, points = head.mesh, head.mesh.points_mm
     found = {}
     frames = head.eyes.frames(head.control, head.control.rest)
     for frame, material, side in zip(frames, head.eyes.material, reversed(SIDES), strict=False):
         own = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
-        local = places[own] @ frame[:3, :3].T + frame[:3, 3]
+        local = points[own] @ frame[:3, :3].T + frame[:3, 3]
         inside = np.where(local[:, 2] > 0, LIMBUS_MM - np.hypot(local[:, 0], local[:, 1]), _OUTSIDE_MM)
-        found[f"{side}_iris"] = np.full(len(places), _OUTSIDE_MM)
+        found[f"{side}_iris"] = np.full(len(points), _OUTSIDE_MM)
         found[f"{side}_iris"][own] = inside
     return found
 
 
 def _skin_fields(head: Head) -> dict[str, Doubles]:
-    """How far inside of each part of the face points of the skin are [mm]."""
+    """Return the signed distances of skin points to the borders of the parts of the face [mm]."""
     mesh = head.mesh
     count = int(mesh.point.max()) + 1
     if is_human(head):
         stencils = head.control.stencils
         refined: Callable[[Doubles], Doubles] = stencils.points if stencils else lambda values: values
         fields = dict(zip(HUMAN_FIELDS, refined(label_fields().T.copy()).T, strict=True))
-    elif (places := known_landmarks(head)) is not None:
-        fields = _warped_fields(head, places)
+    elif (landmarks := known_landmarks(head)) is not None:
+        fields = _warped_fields(head, landmarks)
     else:
         return {}
     if head.strands is None:
@@ -221,13 +219,11 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
     return {name: np.where(off, _OUTSIDE_MM, values) for name, values in fields.items()}
 
 
-def _warped_fields(head: Head, places: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:
-    """Those of the point of the average human where landmarks take each point."""
+def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:
+    """Return the fields at the points of the average human that a landmark warp maps to."""
     from scipy.spatial import cKDTree
-
-    from dermis.human.labels.fields import dense_fields
 
     points = head.mesh.points_mm
     average, values = dense_fields()
-    _, near = cKDTree(average).query(warp_to_average(head, places, points))
+    _, near = cKDTree(average).query(warp_to_average(head, landmarks, points))
     return {name: values[k][near] for k, name in enumerate(HUMAN_FIELDS) if not name.endswith("_eye")}

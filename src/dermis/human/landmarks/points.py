@@ -1,4 +1,4 @@
-"""Landmarks as means of points of a head's mesh."""
+"""Landmarks as weighted means of mesh points."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ _EXPECTED = "landmarks in CSV: rows of name,vertex"
 
 @dataclass(frozen=True, eq=False)
 class LandmarkPoints:
-    """Landmarks by the points of a head's mesh.
+    """Landmarks as weighted means of mesh points.
 
     names : in order
-    corner, share : (n, 4) points whose mean each is, and their shares
-    material : (n,) index of what has to be seen there for it to count as seen; -1 for any surface near it
+    point, weight : (n, 4) indices and weights of the points
+    material : (n,) material that must be visible there for the landmark to count as visible; -1 for any
+        surface
     """
 
     names: tuple[str, ...]
-    corner: NDArray[np.int32]
-    share: NDArray[np.float32]
+    point: NDArray[np.int32]
+    weight: NDArray[np.float32]
     material: NDArray[np.int32]
 
 
 def landmark_points(head: Head, name: str) -> LandmarkPoints:
-    """Those of a set, or of a table by vertex.
+    """Return the landmarks of a set or of a table by vertex.
 
-    name : one of `SETS`, or a file of rows name,vertex; vertices are counted from 0 as
-        `Head.positions_mm` lists them
+    name : one of `SETS`, or a file of rows name,vertex; vertices are indices into `Head.positions_mm`
 
     Raises DermisError for a set on a head of another topology, and for tables that cannot be read.
     """
@@ -50,15 +50,15 @@ def landmark_points(head: Head, name: str) -> LandmarkPoints:
         return _table_landmarks(head, name)
     if not is_human(head):
         actual = f"{head.name!r} has a topology of its own"
-        advice = "Write a table of name,vertex for its mesh, and give the name of that file"
+        advice = "Write a CSV table of name,vertex for its mesh, and pass the name of that file"
         refuse(f"landmarks {name}", "a head of the parametric human", actual, advice)
     return _human_landmarks(head, _rows(name))
 
 
 def check_landmarks(name: object) -> str:
-    """The name of a set or of a table's file.
+    """Return the name of a set or of a table's file.
 
-    Raises DermisError for what is neither.
+    Raises DermisError for other names.
     """
     text = str(checked_path(name, "a set of landmarks or its table"))
     if text not in SETS and not text.endswith(".csv"):
@@ -68,7 +68,7 @@ def check_landmarks(name: object) -> str:
 
 
 def read_landmark_table(name: str) -> list[tuple[str, int]]:
-    """Name and vertex of each landmark in a table's file.
+    """Return the name and the vertex of each landmark in a table's file.
 
     Raises DermisError for tables that cannot be read.
     """
@@ -87,23 +87,24 @@ def _rows(name: str) -> Rows:
 
 def _human_landmarks(head: Head, rows: Rows) -> LandmarkPoints:
     quad = np.array([int(row["quad"]) for row in rows], np.int32)
-    place = np.array([[float(row["along"]), float(row["across"])] for row in rows], np.float32)
-    fine = finer_roots(average_head().mesh, Roots(quad, place), head.levels)
-    corner, share = corners(head.mesh, fine.quad), weights(fine.place).astype(np.float32)
+    position = np.array([[float(row["along"]), float(row["across"])] for row in rows], np.float32)
+    fine = finer_roots(average_head().mesh, Roots(quad, position), head.levels)
+    point, weight = corners(head.mesh, fine.quad), weights(fine.place).astype(np.float32)
     material = np.full(len(rows), -1, np.int32)
     for k in np.flatnonzero([float(row["sunk"]) > 0 for row in rows]):
         assert head.eyes is not None
         eye_material = head.mesh.material[head.mesh.quads[fine.quad[k], 0]]
         back = head.eyes.back[head.eyes.material == eye_material][0]
-        sunk, apex = float(rows[k]["sunk"]), corner[k, share[k].argmax()]
-        corner[k], share[k], material[k] = (apex, back, back, back), (1 - sunk, sunk, 0, 0), eye_material
-    return LandmarkPoints(tuple(row["landmark"] for row in rows), corner, share, material)
+        sunk, apex = float(rows[k]["sunk"]), point[k, weight[k].argmax()]
+        point[k], weight[k], material[k] = (apex, back, back, back), (1 - sunk, sunk, 0, 0), eye_material
+    return LandmarkPoints(tuple(row["landmark"] for row in rows), point, weight, material)
 
 
 def _table_landmarks(head: Head, name: str) -> LandmarkPoints:
     found, count = read_landmark_table(name), len(head.positions_mm)
     for landmark, vertex in found:
         checked_integer(f"{Path(name).name}: vertex of {landmark}", vertex, 0, count - 1)
-    corner = np.repeat(np.array([[vertex] for _, vertex in found], np.int32), 4, axis=1)
-    share = np.tile(np.array([1, 0, 0, 0], np.float32), (len(found), 1))
-    return LandmarkPoints(tuple(one for one, _ in found), corner, share, np.full(len(found), -1, np.int32))
+    point = np.repeat(np.array([[vertex] for _, vertex in found], np.int32), 4, axis=1)
+    weight = np.tile(np.array([1, 0, 0, 0], np.float32), (len(found), 1))
+    names = tuple(landmark for landmark, _ in found)
+    return LandmarkPoints(names, point, weight, np.full(len(found), -1, np.int32))

@@ -2,7 +2,7 @@
 
 SETS = {
     "ibug-68": "the 68 of iBUG's 300-W",
-    "face-synthetics-70": "the same and both pupils, as in FaceSynthetics",
+    "face-synthetics-70": "those of ibug-68 and both pupils, as in FaceSynthetics",
     "mediapipe": "142 of MediaPipe's 478: outlines, the middle of the nose, both irises",
 }
-"""The package's tables and what is in them, for heads of the parametric human."""
+"""Sets of landmarks of the parametric human, with descriptions."""

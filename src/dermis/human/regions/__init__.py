@@ -1,1 +1,1 @@
-"""Roughness and strength of the reflection by region of the face."""
+"""Roughness and specular strength by region of the face."""

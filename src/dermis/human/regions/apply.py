@@ -1,4 +1,4 @@
-"""Maps of roughness and strength by region of the face, for heads given or loaded."""
+"""Maps of roughness and specular strength by region of the face."""
 
 from __future__ import annotations
 
@@ -21,29 +21,51 @@ from dermis.mesh.maps import Maps
 Floats = NDArray[np.float32]
 
 SIZE = 1024
-"""Side of the maps in texels; maps of the head that are larger keep their size."""
+"""Minimum side of the maps [texel]; larger maps of the head keep their size."""
 EDGE_MM = 2.5
-"""Borders between regions are blurred: standard deviation [mm]."""
-_DETAIL_MM = 6.0  # what is finer stays in the head's own maps; what is coarser comes from the table
-_MIN_LOCAL_MEAN, _MAX_DETAIL = (
-    0.4,
-    3.0,
-)  # of the mean and of the surroundings: else specks in black would glare
+"""Standard deviation of the blur of borders between regions [mm]."""
+_DETAIL_MM = 6.0  # finer detail is taken from the head's own maps, the rest from the table
+_MIN_LOCAL_MEAN, _MAX_DETAIL = 0.4, 3.0  # relative to the mean of the map, and to its local mean
 _CELL_MM = 2.0
-_MAX_CELLS = 256  # along the longest side
+_MAX_CELLS = 256  # of the longest side
 _TRUNCATE = 3  # standard deviations
-_CACHE_VERSION = 2  # increment when `with_regions` gives other maps for the same head
+_CACHE_VERSION = 2  # increment when `with_regions` returns different maps for the same head
 
 
 def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) -> tuple[Head, float]:
-    """The head with roughness and specular maps by region of the face, and the mean rho_s of its skin [-].
+    """Return a head with roughness and specular maps by region of the face.
 
-    table : what `load_region_table` gives or takes
+    The specular map contains rho_s itself; maps that are scaled to a mean need the returned one. Fine detail
+    of the head's own two maps is kept, as a factor relative to its local mean.
 
-    The specular map holds rho_s itself; to scale maps to a mean, take the one returned. Pores and blotches of
-    the head's own two maps stay, as a factor of their surroundings.
+    Parameters
+    ----------
+    head : Head
+        Head with known regions: the human, a sample, or a head with landmarks or labels in the table.
+    table : RegionTable, str or path
+        Table, its TOML file, or "default" for the package's.
 
-    Raises DermisError when the head's regions are not known, and for invalid tables.
+    Returns
+    -------
+    head : Head
+        The head with the maps.
+    rho_s : float
+        Mean specular strength of the skin [-].
+
+    Raises
+    ------
+    DermisError
+        For heads whose regions are not known, and for invalid tables.
+
+    Examples
+    --------
+    >>> import dermis, numpy
+    >>> from dermis.mesh.maps import Maps
+    >>> from dermis.mesh.primitives import uv_sphere
+    >>> labels = numpy.full((64, 64), 3, numpy.uint8)
+    >>> head = dermis.Head("nose", uv_sphere(90.0, 8, 4), Maps(region=labels))
+    >>> round(dermis.with_regions(head)[1], 2)
+    0.75
     """
     if not isinstance(table, RegionTable):
         table = load_region_table(table)
@@ -64,7 +86,7 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) ->
 def _region_map(
     atlas: Atlas, points: NDArray[np.float64], level: NDArray[np.float64], own_maps: Floats | None
 ) -> Floats:
-    """(h, w) picture of the levels (n,) of the covered texels, times the fine detail of the own map."""
+    """Return a map (h, w) of the values (n,) of covered texels, times the fine detail of an existing map."""
     if own_maps is None:
         return _picture(atlas, level)
     y, x = np.nonzero(atlas.coverage)
@@ -80,7 +102,7 @@ def _region_map(
 
 
 def _picture(atlas: Atlas, values: NDArray[np.float64]) -> Floats:
-    """(SIZE, SIZE) values (n,) of the covered texels; empty ones take the nearest."""
+    """Return the values (n,) of covered texels as a picture; other texels take the nearest value."""
     from scipy.ndimage import distance_transform_edt
 
     picture = np.zeros(atlas.coverage.shape, np.float32)
@@ -99,7 +121,7 @@ def _resized(picture: Floats, shape: tuple[int, int]) -> Floats:
 
 
 def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
-    """Gaussian mean (n, c) of the values around each place, by distance in space: seams do not show.
+    """Return the Gaussian-weighted means (n, c) of values around each point, across seams of the uv layout.
 
     points : (n, 3) [mm]
     values : (n, c)
@@ -126,10 +148,10 @@ def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
 
 @logged_step("finding the regions of the face")
 def with_default_regions(head: Head) -> Head:
-    """The head with the package's table by region, where it knows the regions and no map says the roughness.
+    """Return a head with roughness and strength of the package's region table.
 
-    Strengths are relative to each other: a skin's rho_s is their mean, as of every map. A map of the head's
-    own stays: it knows the person, and the table is an artist's.
+    A head whose regions are unknown or that has a roughness map stays the same, and an existing specular map
+    is kept. The strengths are relative; the skin's rho_s is their mean.
     """
     if head.maps.rough or known_landmarks(head) is None:
         return head
@@ -143,6 +165,6 @@ def with_default_regions(head: Head) -> Head:
 
     try:
         found = cached_arrays(sources, f"regions {_CACHE_VERSION} {SIZE} {head.name}", missing, make)
-    except DermisError:  # of a known name, but another head
+    except DermisError:  # another head with a known name
         return head
     return replace(head, maps=replace(head.maps, **found))

@@ -1,4 +1,4 @@
-"""The average human, on which the regions of the face are told apart: landmarks, skin and regions of it."""
+"""Average human: landmarks, skin and regions of the face."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ from dermis.human.regions.region_table import Doubles, classify_regions
 from dermis.mesh.head import Head
 
 AVERAGE_HUMAN = Human(sex=0.5, age=35.0)
-_LEVELS = 2  # of subdivision: triangles of about a millimetre
-_EYE_LANDMARKS = ("left eye", "right eye")  # landmarks, and materials whose middles these are
+_LEVELS = 2  # levels of subdivision, for triangles of about 1 mm
+_EYE_LANDMARKS = ("left eye", "right eye")  # names of landmarks and of the materials whose centres they are
 _MOUTH_MATERIALS = ("upper teeth", "lower teeth", "tongue")
 
 
 class DenseSkin(NamedTuple):
-    """The outer skin of the average human, densely.
+    """Dense sampling of the average human's outer skin.
 
-    quad : (n,) number of the human's quad at each place
-    tree : of the places, to find the nearest
+    quad_index : (n,) quad of the human at each point
+    tree : spatial index of the points
     """
 
     quad_index: NDArray[np.int64]
     tree: Any
 
     def nearest_quads(self, points: Doubles) -> NDArray[np.int64]:
-        """Number (m,) of the human's quad that is nearest to each point (m, 3) [mm]."""
+        """Return the quad (m,) of the human nearest to each point (m, 3) [mm]."""
         return np.asarray(self.quad_index[self.tree.query(points)[1]])
 
 
 @cache
 def average_head() -> Head:
-    """The average human without subdivision."""
+    """Return the average human without subdivision."""
     return AVERAGE_HUMAN.head(subdivide=0)
 
 
 @cache
 def average_skin() -> DenseSkin:
-    """The skin that can be seen, not the inside of the mouth."""
+    """Return the outer skin, without the inside of the mouth."""
     from scipy.spatial import cKDTree
 
     head = AVERAGE_HUMAN.head(subdivide=_LEVELS)
@@ -56,14 +56,14 @@ def average_skin() -> DenseSkin:
 
 
 def landmark_indices() -> dict[str, int]:
-    """Control point of the human at each landmark that lies on skin."""
+    """Return the control point of each landmark on the skin."""
     return {row["landmark"]: int(row["point"]) for row in read_rows(__package__, "points")}
 
 
 def human_landmarks(head: Head) -> dict[str, Doubles]:
-    """Places (3,) of all landmarks on a head of the parametric human [mm]."""
-    places = head.positions_mm.astype(np.float64)
-    found = {name: places[point] for name, point in landmark_indices().items()}
+    """Return the positions (3,) of all landmarks of a parametric human [mm]."""
+    positions_mm = head.positions_mm.astype(np.float64)
+    found = {name: positions_mm[point] for name, point in landmark_indices().items()}
     mesh = head.mesh
     for name in _EYE_LANDMARKS:
         material = [one.name for one in mesh.materials].index(name)
@@ -73,52 +73,51 @@ def human_landmarks(head: Head) -> dict[str, Doubles]:
 
 
 def is_human(head: Head) -> bool:
-    """Whether the head is one of the parametric human, by its points and what moves them."""
-    expected, rig = average_head().control, head.rig
+    """Return whether a head is a parametric human, by its control points and morph targets."""
+    average, rig = average_head().control, head.rig
     return (
         rig is not None
-        and rig.positions_mm.shape == expected.positions_mm.shape
-        and rig.targets.names == expected.targets.names
+        and rig.positions_mm.shape == average.positions_mm.shape
+        and rig.targets.names == average.targets.names
         and head.mesh.materials == tuple(MATERIALS.values())
     )
 
 
 def control_quads(head: Head, triangle: NDArray[Any]) -> NDArray[np.int64]:
-    """Number (n,) of the human's own quad that triangles (n,) of a head, however fine, are of.
+    """Return the quad of the human (n,) that each triangle (n,) of a subdivided head belongs to.
 
-    head : of the parametric human, in either layout
+    head : parametric human in either layout
     """
-    own = len(average_head().mesh.triangles)
+    control_triangles = len(average_head().mesh.triangles)
     levels = 0
-    while len(head.mesh.triangles) > own * 4**levels:
+    while len(head.mesh.triangles) > control_triangles * 4**levels:
         levels += 1
     return np.asarray(triangle // (2 * 4**levels), np.int64)
 
 
 def average_positions(head: Head) -> Doubles:
-    """Where the corner vertices (v, 3) of a head of the parametric human lie on the average one [mm]."""
-    places = average_head().positions_mm.astype(np.float64)
+    """Return the positions of a parametric human's vertices on the average human (v, 3) [mm]."""
+    points_mm = average_head().positions_mm.astype(np.float64)
     stencils = head.control.stencils
-    return np.asarray((places if stencils is None else stencils.points(places))[head.mesh.point])
+    return np.asarray((points_mm if stencils is None else stencils.points(points_mm))[head.mesh.point])
 
 
-def classify_surface(places: Doubles, quad_index: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """Index into `REGIONS` (n,) of places on or near the average human.
+def classify_surface(points: Doubles, quad_index: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """Return the index into `REGIONS` (n,) of points on or near the average human.
 
-    places : (n, 3) [mm]
-    quad : (n,) number of the human's quad at each
+    points : (n, 3) [mm]
+    quad_index : (n,) nearest quad of the human
     """
-    named, mesh = part_quads(), average_head().mesh
-    mouth = [k for k, one in enumerate(mesh.materials) if one.name in _MOUTH_MATERIALS]
-    within = np.isin(mesh.material[2 * quad_index], mouth)
-    lips = np.isin(quad_index, np.concatenate([named["lips"], named["mouth"]])) | within
-    label = classify_regions(places, lips, np.isin(quad_index, named["ears"]))
-    return label.astype(np.uint8)
+    parts, mesh = part_quads(), average_head().mesh
+    mouth_materials = [k for k, one in enumerate(mesh.materials) if one.name in _MOUTH_MATERIALS]
+    mouth = np.isin(mesh.material[2 * quad_index], mouth_materials)
+    lips = np.isin(quad_index, np.concatenate([parts["lips"], parts["mouth"]])) | mouth
+    return classify_regions(points, lips, np.isin(quad_index, parts["ears"])).astype(np.uint8)
 
 
 @cache
 def part_quads() -> Mapping[str, NDArray[np.int64]]:
-    """Numbers of the human's quads by what they are: lips, ears, the inside of the mouth."""
+    """Return the quads of lips, ears and the inside of the mouth."""
     found: dict[str, list[NDArray[np.int64]]] = {}
     for row in read_rows(__package__, "parts"):
         found.setdefault(row["part"], []).append(np.arange(int(row["first"]), int(row["last"]) + 1))

@@ -97,6 +97,7 @@ class SkinLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        """Validate the fields."""
         check_fields(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)})
 
 

@@ -36,13 +36,13 @@ def _cached_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -
 def mean_colour(look: SkinLook) -> NDArray[np.float64]:
     """Return the colour (3,) of skin with mean pigments, linear Rec. 709 [-]."""
     table = skin_colour_table(look.eumelanin, look.oxygen, DEFAULT_SKIN.epidermis_mm)
-    return np.asarray(table.read(np.array([look.melanin]), np.array([look.blood]))[0])
+    return np.asarray(table.lookup(np.array([look.melanin]), np.array([look.blood]))[0])
 
 
 def face_and_lip_colours(look: SkinLook) -> NDArray[np.float32]:
     """Return the colours (2, n, n, 3) of face and lips, laid out as in `ColourTable`."""
     thick = DEFAULT_SKIN.epidermis_mm, LIP_EPIDERMIS_MM
-    both = [skin_colour_table(look.eumelanin, look.oxygen, mm).skin_colour_table for mm in thick]
+    both = [skin_colour_table(look.eumelanin, look.oxygen, mm).colours for mm in thick]
     return np.stack(both).astype(np.float32)
 
 

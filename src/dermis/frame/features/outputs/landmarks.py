@@ -1,4 +1,4 @@
-"""Landmarks of a frame: where they are in the scene, and whether they are seen."""
+"""Landmark outputs: positions of landmarks in the scene, and whether they are visible."""
 
 from __future__ import annotations
 
@@ -16,43 +16,40 @@ from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landm
 from dermis.mesh.head import Head
 
 LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
-"""Names of each set, and (n, 4) places [mm] with 1 for those that are seen."""
+"""Names of the landmarks of each set, and (n, 4) positions [mm] with 1 for visible ones, 0 for hidden ones."""
 TOLERANCE_MM = 2.0
-"""By which the mesh at the pixels around a landmark may lie before it where it still counts as seen."""
-_ROW = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("material", "u4", 4)])  # as in landmarks.wgsl
-_FOUND = 4  # floats of each: place, and whether it is seen
+"""Depth by which the mesh around a visible landmark may be in front of it."""
+_ROW = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)])  # as in landmarks.wgsl
+_RESULT_FLOATS = 4  # position, and visibility
 
 
 @dataclass(frozen=True, eq=False)
 class LandmarkBuffers:
-    """Landmarks of all requested sets, one after the other.
+    """Landmarks of all requested sets in buffers.
 
-    sets : by their names
-    table, buffer : as landmarks.wgsl reads and writes them
-    count : of all
+    sets : landmarks by the names of the sets
+    table, results : buffers that landmarks.wgsl reads and writes
+    count : number of landmarks of all sets
     """
 
     sets: dict[str, LandmarkPoints]
     table: Buffer
-    buffer: Buffer
+    results: Buffer
     count: int
 
-    def found(self, raw: NDArray[np.uint8]) -> LandmarkPositions:
-        """Return the names of each set, and (n, 4) places [mm] with 1 for those that are seen.
-
-        raw : bytes of the buffer
-        """
-        rows, first, found = raw.view(np.float32).reshape(-1, _FOUND), 0, {}
+    def positions(self, raw: NDArray[np.uint8]) -> LandmarkPositions:
+        """Return the landmarks of each set from the bytes of `results`."""
+        rows, first, positions = raw.view(np.float32).reshape(-1, _RESULT_FLOATS), 0, {}
         for name, points in self.sets.items():
-            found[name] = points.names, rows[first : first + len(points.names)]
+            positions[name] = points.names, rows[first : first + len(points.names)]
             first += len(points.names)
-        return found
+        return positions
 
 
 def checked_landmarks(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of sets and tables, each once.
+    """Return the names of landmark sets and tables without duplicates.
 
-    Raises DermisError for what is neither.
+    Raises DermisError for what is neither a set nor a table.
     """
     if isinstance(names, str) or not isinstance(names, Iterable):
         actual = f"got {format_value(names)}"
@@ -61,22 +58,23 @@ def checked_landmarks(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def make_landmark_buffers(device: Device, head: Head, names: tuple[str, ...]) -> LandmarkBuffers:
-    """Return the landmarks of a head on the device.
+    """Upload the landmarks of a head.
 
     Raises DermisError as `landmark_points` does.
     """
     sets = {name: landmark_points(head, name) for name in names}
     rows = np.zeros(sum(len(points.names) for points in sets.values()), _ROW)
-    for part in ("corner", "share"):
-        rows[part] = np.concatenate([getattr(points, part) for points in sets.values()])
+    rows["corner"] = np.concatenate([points.point for points in sets.values()])
+    rows["weight"] = np.concatenate([points.weight for points in sets.values()])
     rows["material"][:, 0] = np.concatenate([points.material for points in sets.values()]) + 1
     table = device.buffer(rows.view(np.uint32), "STORAGE")
-    return LandmarkBuffers(sets, table, device.storage_buffer(4 * _FOUND * len(rows), "landmarks"), len(rows))
+    results = device.storage_buffer(4 * _RESULT_FLOATS * len(rows), "landmarks")
+    return LandmarkBuffers(sets, table, results, len(rows))
 
 
-def draw_landmarks(graph: Recorder, space: LandmarkBuffers, seen: StageInputs, centres: Texture) -> None:
-    """Declare the pass that finds the landmarks."""
+def draw_landmarks(graph: Recorder, buffers: LandmarkBuffers, inputs: StageInputs, centres: Texture) -> None:
+    """Declare the pass that computes the positions and the visibility of the landmarks."""
     shader = program(graph.device, "outputs/landmarks.wgsl", (("TOLERANCE_MM", TOLERANCE_MM),))
-    bound = seen.bound(shader, centres) | {"landmarks": space.table}
-    bound |= {"points": seen.shape.surface["points"], "found": space.buffer}
-    graph.dispatch("outputs", shader, bound, workgroup_grid(space.count))
+    bindings = inputs.bindings(shader, centres) | {"landmarks": buffers.table}
+    bindings |= {"points": inputs.shape.surface["points"], "results": buffers.results}
+    graph.dispatch("outputs", shader, bindings, workgroup_grid(buffers.count))
