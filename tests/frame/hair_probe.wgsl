@@ -14,5 +14,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let depth = d.w * vec3f(0.5, 1.0, 2.0);
     textureStore(seen, id.xy, vec4f(hair_scattered(d.x, d.y, d.z, depth), 0.0));
     let share = hair_albedo(d.y, depth);
-    textureStore(white, id.xy, vec4f(share.reflected + share.passed + share.inside + share.rest, 0.0));
+    textureStore(white, id.xy, vec4f(share.reflected + share.transmitted + share.internal + share.residual, 0.0));
 }

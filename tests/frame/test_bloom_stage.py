@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 def bloomed(device: Device, picture: Floats, share: float) -> Floats:
     size = picture.shape[1], picture.shape[0]
-    source, glow = make_texture(device, size, "rgba32float"), bloom.make_glow(device, size)
+    source, glow = make_texture(device, size, "rgba32float"), bloom.make_bloom(device, size)
     upload(device, source, picture)
     frame = CommandList(device)
     made = bloom.draw(frame, glow, source, share)
@@ -60,8 +60,8 @@ def test_only_when_asked(renderer: Renderer) -> None:
     scene = scene_of(head_of(plane(30.0)), frontal())
     ran = []
     for share in (0.0, 0.3):
-        drawn = renderer.draw(scene, settings_of(bloom=share, size=(128, 128)), anew=True)
-        ran.append("bloom" in renderer.graph.ran)
+        drawn = renderer.draw(scene, settings_of(bloom=share, size=(128, 128)), force=True)
+        ran.append("bloom" in renderer.graph.executed_stages)
     assert ran == [False, True]
     image = drawn.linear()
     assert 0 < image[64, 34, 0] < 0.2 * image[64, 64, 0]  # beside the plane

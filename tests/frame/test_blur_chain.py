@@ -9,11 +9,11 @@ from test_diffuse_stage import point_of_light
 from tolerances import SPREAD_ENERGY, SPREAD_PEAK
 
 from dermis.atlas.build import build_atlas
-from dermis.frame.features.atlas.textures import Sheet, _coarser
+from dermis.frame.features.atlas.textures import AtlasMip, _coarser
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
-from dermis.frame.features.diffusion.kernels import chain_cost, lead_up
-from dermis.frame.features.diffusion.levels import Blur, halvings_of, make_levels
+from dermis.frame.features.diffusion.kernels import chain_cost, add_intermediate_levels
+from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, make_levels
 from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
@@ -27,35 +27,35 @@ SIX = load_profile("gpu-gems-3").variance_mm2[1:]
 def test_one_gaussian_costs_less_than_six(texels_per_mm: float) -> None:
     """By the texels read; at once it costs two to five times as much."""
     six, at_once = (chain_cost(list(v), texels_per_mm, MOST) for v in (SIX, SIX[-1:]))
-    led, steps = lead_up(SIX[-1:], texels_per_mm, MOST)
+    led, steps = add_intermediate_levels(SIX[-1:], texels_per_mm, MOST)
     assert chain_cost(list(led), texels_per_mm, MOST) < min(six, 0.5 * at_once)
     assert led[-1] == SIX[-1] and steps == tuple(range(1, len(led)))
 
 
 @pytest.mark.parametrize("texels_per_mm", [0.1, 0.75, 1.5, 3.0, 6.0])
 def test_six_gaussians_need_no_steps(texels_per_mm: float) -> None:
-    led, steps = lead_up(SIX, texels_per_mm, MOST)
+    led, steps = add_intermediate_levels(SIX, texels_per_mm, MOST)
     assert np.array_equal(led, SIX) and steps == ()
 
 
 def test_steps_are_told_from_the_profiles_levels() -> None:
-    blur = Blur(np.array([1.0, 2.0, 3.0]), np.zeros((3, 3)), (0, 0, 1, 2), steps=(1, 3))
-    assert blur.own == (0, 2)
+    blur = Blur(np.array([1.0, 2.0, 3.0]), np.zeros((3, 3)), (0, 0, 1, 2), intermediate_levels=(1, 3))
+    assert blur.profile_levels == (0, 2)
 
 
 @pytest.mark.parametrize("texels_per_mm", [1.5, 3.0, 6.0])
 def test_a_wide_gaussian_in_steps_is_that_gaussian(device: Device, texels_per_mm: float) -> None:
     """A point of light, against the analytic peak; the sum is read between coarse texels, as a frame's."""
     atlas = build_atlas(plane(256 / texels_per_mm), 256)
-    coarser = _coarser(device, Sheet(atlas.coverage, atlas.own, atlas.reach, atlas.gutter, atlas.source))
-    textures, wanted = resting(device, atlas, coarser=coarser, usual_per_mm=texels_per_mm), SIX[-1:]
+    coarser = _coarser(device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source))
+    textures, wanted = resting(device, atlas, coarser=coarser, median_texels_per_mm=texels_per_mm), SIX[-1:]
     source, _, r2, area = point_of_light(atlas)
-    led, steps = lead_up(wanted, textures.usual_per_mm, len(textures.coarser))
-    halvings = halvings_of(led, textures.usual_per_mm, len(textures.coarser))
+    led, steps = add_intermediate_levels(wanted, textures.median_texels_per_mm, len(textures.coarser))
+    halvings = choose_halvings(led, textures.median_texels_per_mm, len(textures.coarser))
     assert len(steps) > 0 and max(halvings) > 0
     weight = np.zeros((len(led), 3))
     weight[-1] = 1.0
-    blur = Blur(led, weight, halvings, steps=steps)
+    blur = Blur(led, weight, halvings, intermediate_levels=steps)
     space, into = make_levels(device, 256, (halvings,), FLOATS), make_texture(device, (256, 256), FLOATS)
     upload(device, space.stacks[0], np.dstack([source, np.ones((256, 256))]))
     frame = CommandList(device)

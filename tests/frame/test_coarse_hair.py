@@ -14,7 +14,7 @@ from tolerances import FURNACE_OF_HAIR
 
 from dermis.frame.features.hair import passes as drawing
 from dermis.frame.features.hair import resources as hairs
-from dermis.frame.features.hair.resources import make_space, room_of
+from dermis.frame.features.hair.resources import make_strand_buffers, strand_capacity
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.mesh.head import Head
@@ -55,10 +55,10 @@ def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
     scene = replace(lit(wool(6000, absorption)), lights=(frontal(shadows=True),))
     shown = []
     for share in (1, 4):
-        monkeypatch.setattr(drawing, "drawn_of", lambda made, _, share=share: made.coarse.hairs // share)
-        renderer.forget()
+        monkeypatch.setattr(drawing, "drawn_hair_count", lambda made, _, share=share: made.coarse.hairs // share)
+        renderer.clear_cache()
         shown.append(picture(renderer, scene, size=(48, 48))[..., :3])
-    renderer.forget()
+    renderer.clear_cache()
     bare = picture(renderer, scene, size=(48, 48), strands=False)[..., :3]
     middle = np.s_[18:30, 18:30]
     assert shown[1][middle].mean() == pytest.approx(shown[0][middle].mean(), rel=0.06)
@@ -67,9 +67,9 @@ def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
 
 def test_coarse_hairs_are_drawn_as_wide_as_pixels_are(renderer: Renderer) -> None:
     head, device = wool(20_000, 1.0), renderer.device
-    tables = hairs.make_tables(device, head, make_space(device, room_of(head)))
-    near, far = (hairs.drawn_of(tables, pixel_mm) for pixel_mm in (0.01, 0.5))
-    assert near == 20_000 and hairs._LEAST_DRAWN <= far < 12_000
+    tables = hairs.make_strand_tables(device, head, make_strand_buffers(device, strand_capacity(head)))
+    near, far = (hairs.drawn_hair_count(tables, pixel_mm) for pixel_mm in (0.01, 0.5))
+    assert near == 20_000 and hairs._MIN_DRAWN <= far < 12_000
     assert tables.coarse == (20_000, 5) and tables.fine.hairs == 0
 
 
@@ -97,6 +97,6 @@ def test_hair_shades_hair(renderer: Renderer, absorption: float, low: float, hig
         scene = replace(lit(head), lights=(frontal(shadows=True),))
         made = run_frame(renderer, scene, technique="none", size=(SIZE, SIZE)).resources.hair
         assert made is not None
-        raw = renderer.device.handle.queue.read_buffer(made.tables.drawn)
+        raw = renderer.device.handle.queue.read_buffer(made.tables.projected)
         seen.append(np.frombuffer(raw, np.float32, 5 * 8).reshape(5, 8)[2, 4:7].mean())
     assert low <= seen[1] / seen[0] < high

@@ -17,7 +17,7 @@ from dermis.atlas.build import build_atlas
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
-from dermis.frame.features.diffusion.levels import Blur, halvings_of, make_levels
+from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, make_levels
 from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane, uv_sphere
@@ -33,8 +33,8 @@ def blur(
 ) -> list[Floats]:
     """Levels of 32-bit floats over an (n, n, 3) source, or (n, n, 4) with its coverage."""
     size = len(source)
-    most = len(atlas.sheets(edge.get("edge", "repeated"))) - 1
-    halvings = halvings_of(variances, atlas.usual_per_mm, most)
+    most = len(atlas.mips_for(edge.get("edge", "repeated"))) - 1
+    halvings = choose_halvings(variances, atlas.median_texels_per_mm, most)
     space = make_levels(device, size, (halvings,), FLOATS)
     upload(device, space.stacks[0], np.dstack([source, np.ones((size, size))])[..., :4])
     frame = CommandList(device)
@@ -72,7 +72,7 @@ def test_twin(device: Device, shear: float, edge: str) -> None:
     atlas = random_atlas(64, shear)
     source = np.random.default_rng(2).random((64, 64, 3)).astype(np.float32).astype(float)
     made = blur(device, source, resting(device, atlas), edge=edge)
-    reach = atlas.reach if edge == "repeated" else None
+    reach = atlas.edge_distance if edge == "repeated" else None
     for level, twin in zip(made, twins.levels(source, metric(atlas), reach, BLURRED), strict=True):
         assert np.abs(level - twin).max() < TWIN
 
@@ -169,7 +169,7 @@ def test_the_order_of_the_axes_does_not_matter(device: Device, monkeypatch: pyte
     """Where the stretch is the same everywhere, first along v and then along u is the same blur."""
     atlas = build_atlas(plane(40.0), 64)
     source = np.random.default_rng(9).random((64, 64, 3))
-    resources, along = resting(device, atlas), diffuse._along
+    resources, along = resting(device, atlas), diffuse._axis_program
     first = blur(device, source, resources)
     monkeypatch.setattr(diffuse, "_along", lambda *given: along(*given[:2], 1 - given[2], *given[3:]))
     swapped = blur(device, source, resources)

@@ -6,18 +6,28 @@ import math
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from tolerances import KERNEL_VARIANCE
 
 from dermis.frame.features.diffusion.kernels import (
+    MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT,
     TRUNCATION,
-    WIDEST,
-    kernel,
     kernel_table,
-    taps,
+    tap_count,
 )
 
 VARIANCES = [0.001, 0.02, 0.3, 0.5, 0.999, 1.0, 1.7, 2.3, 4.0, 6.5, 8.99, 9.0]
+
+
+def kernel(variance: float) -> NDArray[np.float64]:
+    """Return the (2 taps + 1,) normalised weights for a variance [step^2], as the shader finds them."""
+    taps = tap_count(variance)
+    row = variance * ROWS_PER_UNIT
+    low, high = kernel_table().astype(np.float64)[[int(row), int(row) + 1], taps]
+    n = np.arange(-taps, taps + 1)
+    weights = (low + (high - low) * (row % 1.0)) ** (n**2)
+    return np.asarray(weights / weights.sum())
 
 
 @pytest.mark.parametrize("variance", VARIANCES)
@@ -31,8 +41,8 @@ def test_sum_and_variance(variance: float) -> None:
 
 @pytest.mark.parametrize("variance", VARIANCES)
 def test_taps_reach_the_truncation(variance: float) -> None:
-    assert taps(variance) == math.ceil(TRUNCATION * math.sqrt(variance))
-    assert len(kernel(variance)) == 2 * taps(variance) + 1
+    assert tap_count(variance) == math.ceil(TRUNCATION * math.sqrt(variance))
+    assert len(kernel(variance)) == 2 * tap_count(variance) + 1
 
 
 def test_no_variance_is_no_blur() -> None:
@@ -48,7 +58,7 @@ def test_a_wide_kernel_is_the_gaussian(variance: float) -> None:
 
 
 def test_table_covers_the_widest_kernel() -> None:
-    """Row `WIDEST * ROWS_PER_UNIT` and the next are read; each column used there holds a ratio in 0..1."""
+    """Row `MAX_TABLE_VARIANCE * ROWS_PER_UNIT` and the next are read; each column used there holds a ratio in 0..1."""
     table = kernel_table()
-    assert table.shape == (WIDEST * ROWS_PER_UNIT + 2, taps(WIDEST) + 1)
+    assert table.shape == (MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2, tap_count(MAX_TABLE_VARIANCE) + 1)
     assert ((table >= 0) & (table <= 1)).all()

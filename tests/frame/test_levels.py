@@ -15,10 +15,10 @@ from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.features.atlas.textures import AtlasTextures, Sheet, _coarser, halved, upload_atlas
+from dermis.frame.features.atlas.textures import AtlasTextures, AtlasMip, _coarser, halve_mip, upload_atlas
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
-from dermis.frame.features.diffusion.levels import Blur, halvings_of, layers_of, make_levels, scale_of
+from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, levels_by_resolution, make_levels, half_precision_scale
 from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
@@ -48,13 +48,13 @@ def test_halvings_are_the_same_from_disk(
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     first, second = upload_atlas(device, atlas), upload_atlas(device, atlas)
     assert len(list(tmp_path.rglob("*.arrays"))) == 1 and len(first.coarser) == len(second.coarser) == 3
-    sheet = Sheet(atlas.coverage, atlas.own, atlas.reach, atlas.gutter, atlas.source)
+    sheet = AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
     for one, other in zip(first.coarser, second.coarser, strict=True):
-        sheet = halved(sheet)
+        sheet = halve_mip(sheet)
         for made in (one, other):
             reach = download(device, made.resources["reach_map"])
             assert np.array_equal(reach & 0x7FFF, sheet.reach)
-            assert np.array_equal(reach[..., 0] >> 15, sheet.covered & ~sheet.own)
+            assert np.array_equal(reach[..., 0] >> 15, sheet.covered & ~sheet.lit)
         gutters = [device.handle.queue.read_buffer(made.gutter).tobytes() for made in (one, other)]
         words = np.concatenate([sheet.source.view(np.uint32), sheet.gutter], axis=1, dtype=np.uint32)
         assert one.sheared == other.sheared and gutters == [words.tobytes()] * 2
@@ -65,14 +65,14 @@ def stripes(atlas: Atlas) -> Floats:
     """Bands of light with hard ends over the sphere."""
     y = atlas.interpolate(SPHERE, SPHERE.positions)[..., 1]
     light = (np.sin(y / 1.5) > 0)[..., None] * np.array([1.0, 0.6, 0.3]) + 0.01
-    return np.dstack([light, np.ones(y.shape)]) * atlas.own[..., None]
+    return np.dstack([light, np.ones(y.shape)]) * atlas.lit[..., None]
 
 
 def combined(
     device: Device, texel: str, textures: AtlasTextures, light: Floats, scale: float = 1.0
 ) -> tuple[Floats, tuple[int, ...]]:
     """The sum of the blurred levels, and how often each was halved."""
-    side, halvings = len(light), halvings_of(BLURRED, textures.usual_per_mm, len(textures.coarser))
+    side, halvings = len(light), choose_halvings(BLURRED, textures.median_texels_per_mm, len(textures.coarser))
     blur = Blur(BLURRED, WEIGHT, halvings, scale)
     space = make_levels(device, side, (halvings,), texel)
     into = make_texture(device, (side, side), FLOATS)
@@ -96,26 +96,26 @@ def test_coarser_levels_show_the_same(
     whole, once = combined(device, FLOATS, replace(textures, coarser=()), stripes)
     made, halvings = combined(device, texel, textures, stripes)
     assert max(once) == 0 and max(halvings) == 2
-    assert error(made, whole, atlas.own) < HALVED
-    assert made[atlas.own].sum() == pytest.approx(whole[atlas.own].sum(), rel=SPREAD_ENERGY)
+    assert error(made, whole, atlas.lit) < HALVED
+    assert made[atlas.lit].sum() == pytest.approx(whole[atlas.lit].sum(), rel=SPREAD_ENERGY)
 
 
 @pytest.mark.parametrize("texel", [FLOATS, HALF])
 def test_constant_light_stays_constant_at_every_resolution(
     device: Device, atlas: Atlas, textures: AtlasTextures, texel: str
 ) -> None:
-    made, _ = combined(device, texel, textures, np.ones((256, 256, 4)) * atlas.own[..., None])
+    made, _ = combined(device, texel, textures, np.ones((256, 256, 4)) * atlas.lit[..., None])
     close = FLAT if texel == FLOATS else HALVES
-    assert np.abs(made[atlas.own] / WEIGHT.sum(axis=0) - 1).max() < close
+    assert np.abs(made[atlas.lit] / WEIGHT.sum(axis=0) - 1).max() < close
 
 
 def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) -> None:
     """Texels of 1 mm: the second level widens by 0.4 mm2, halving alone by 1, which the third makes good."""
     atlas = build_atlas(plane(256.0), 256)
-    coarser = _coarser(device, Sheet(atlas.coverage, atlas.own, atlas.reach, atlas.gutter, atlas.source))
-    textures = resting(device, atlas, coarser=coarser, usual_per_mm=2.0)
+    coarser = _coarser(device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source))
+    textures = resting(device, atlas, coarser=coarser, median_texels_per_mm=2.0)
     variances = np.array([0.5, 0.9, 3.0])
-    halvings = halvings_of(variances, 2.0, len(coarser))
+    halvings = choose_halvings(variances, 2.0, len(coarser))
     space, light = make_levels(device, 256, (halvings,), FLOATS), np.zeros((256, 256, 4))
     light[..., 3], light[128, 128, :3] = 1.0, 1.0
     upload(device, space.stacks[0], light)
@@ -133,9 +133,9 @@ def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) 
 
 def test_levels_are_held_at_their_own_resolution_alone() -> None:
     """And the last finer one before them, halved; of two layouts what either needs."""
-    assert layers_of(((0,),)) == (range(1),)
-    assert layers_of(((0, 0, 0, 1, 1, 2),)) == (range(3), range(2, 5), range(4, 6))
-    assert layers_of(((0, 0, 0, 1, 1, 2), (0, 0, 1, 1, 1, 1))) == (range(3), range(1, 6), range(4, 6))
+    assert levels_by_resolution(((0,),)) == (range(1),)
+    assert levels_by_resolution(((0, 0, 0, 1, 1, 2),)) == (range(3), range(2, 5), range(4, 6))
+    assert levels_by_resolution(((0, 0, 0, 1, 1, 2), (0, 0, 1, 1, 1, 1))) == (range(3), range(1, 6), range(4, 6))
 
 
 @pytest.mark.parametrize("brightest", [1.0, 5e5, 3e-6, 1e9])
@@ -145,23 +145,23 @@ def test_halves_keep_the_light(
     """In amount and in place, however bright it is; were they cut off, each pass would lose a 4000th."""
     light = stripes * [brightest, brightest, brightest, 1.0]
     floats, _ = combined(device, FLOATS, textures, light)
-    halves, _ = combined(device, HALF, textures, light, scale_of(HALF, brightest))
-    assert error(halves, floats, atlas.own) < HALVES
-    assert halves[atlas.own].sum() == pytest.approx(floats[atlas.own].sum(), rel=HALVES / 4)
+    halves, _ = combined(device, HALF, textures, light, half_precision_scale(HALF, brightest))
+    assert error(halves, floats, atlas.lit) < HALVES
+    assert halves[atlas.lit].sum() == pytest.approx(floats[atlas.lit].sum(), rel=HALVES / 4)
 
 
 @pytest.mark.parametrize("brightest", [0.0, 5e-324, 1e-40, 1e-30, 0.3, 3.0, 1e12])
 def test_scales_are_powers_of_two(brightest: float) -> None:
     """Those that a shader's float holds, however little light there is."""
-    scale = scale_of(HALF, brightest)
+    scale = half_precision_scale(HALF, brightest)
     assert np.frexp(scale)[0] == 0.5 and scale * brightest <= 16
     assert scale < np.finfo(np.float32).max and 1 / scale > np.finfo(np.float32).tiny
-    assert scale_of(FLOATS, brightest) == 1.0
+    assert half_precision_scale(FLOATS, brightest) == 1.0
 
 
 @pytest.mark.parametrize(("texels_per_mm", "most"), [(0.5, 3), (3.0, 3), (30.0, 3), (30.0, 1), (1e6, 3)])
 def test_resolution_falls_step_by_step(texels_per_mm: float, most: int) -> None:
-    found = halvings_of(BLURRED, texels_per_mm, most)
+    found = choose_halvings(BLURRED, texels_per_mm, most)
     assert len(found) == len(BLURRED) + 1 and found[:2] == (0, 0)
     assert set(np.diff(found)) <= {0, 1} and max(found) <= most
     assert (max(found) > 0) == (texels_per_mm > 1.0)
@@ -169,15 +169,15 @@ def test_resolution_falls_step_by_step(texels_per_mm: float, most: int) -> None:
 
 def test_a_halved_atlas_is_the_same_surface(device: Device, atlas: Atlas, textures: AtlasTextures) -> None:
     """Stretch of half as many texels, runs of half the length, and gutters that show the same places."""
-    coarse = halved(Sheet(atlas.coverage, atlas.own, atlas.reach, atlas.gutter, atlas.source))
+    coarse = halve_mip(AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source))
     own, made = coarse.own, textures.coarser[0].resources
     metric = download(device, made["stretch_map"]).astype(np.float64)
     assert np.array_equal(metric[..., 0] > 0, coarse.covered)
     y, x = np.nonzero(own)
     ratio = metric[y, x, :2] / atlas.stretch[2 * y, 2 * x].clip(1e-3)
     assert np.median(ratio) == pytest.approx(0.5, 1e-2)
-    assert (2 * coarse.reach[..., 0] <= atlas.reach[::2, ::2, 0].max() + 1).all()
-    assert own[atlas.own[::2, ::2]].all() and len(coarse.gutter) > 50
+    assert (2 * coarse.reach[..., 0] <= atlas.edge_distance[::2, ::2, 0].max() + 1).all()
+    assert own[atlas.lit[::2, ::2]].all() and len(coarse.gutter) > 50
     assert not own[coarse.gutter[:, 1], coarse.gutter[:, 0]].any()
     sources = np.rint(coarse.source).astype(int)
     assert own[sources[:, 1], sources[:, 0]].mean() > 0.98
@@ -185,7 +185,7 @@ def test_a_halved_atlas_is_the_same_surface(device: Device, atlas: Atlas, textur
     assert np.percentile(apart, 98) < 1.5  # texels of the whole atlas, between what shows at the same place
 
 
-def shown_apart(atlas: Atlas, coarse: Sheet) -> Any:
+def shown_apart(atlas: Atlas, coarse: AtlasMip) -> Any:
     """Distance from the source of each halved texel to the mean of those of its four [texel]."""
     source = np.full((256, 256, 2), np.nan)
     source[atlas.gutter[:, 1], atlas.gutter[:, 0]] = atlas.source

@@ -42,7 +42,7 @@ MOST = {
 } | {"dynamic": DEFAULT_LIMITS["max-dynamic-uniform-buffers-per-pipeline-layout"]}
 STORED = re.compile(r"rgba8(unorm|snorm|uint|sint)|rgba16(uint|sint|float)|(r|rg|rgba)32(uint|sint|float)")
 READ_AND_WRITTEN = re.compile(r"r32(uint|sint|float)")
-LARGEST = {"TAKEN": 128, "THREADS": 256}  # that visibility_buffer.py gives
+LARGEST = {"TRIANGLES": 128, "THREADS": 256}  # that visibility_buffer.py gives
 STRIDES = {"": 4, "u32": 4, "f32": 4, "vec2f": 8, "vec3f": 16, "vec4f": 16}
 WHOLE = {"seams": "multi-uv", "bloom": 0.1, "tone": "filmic"}
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, scene_of, settings_of
 from tolerances import HALVES
 
-from dermis.frame.features.post.meter import CLIPPING, KEY, SIDE, STOPPED_DOWN
+from dermis.frame.features.post.meter import CLIPPING, KEY, SIDE, MIN_HIGHLIGHT_FACTOR
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.environment import Environment
@@ -86,7 +86,7 @@ def test_highlights_stop_it_down_by_one_stop_at_most(renderer: Renderer) -> None
         bright = np.sort(points(renderer, scene)[:, 1])[::-1]
         limit = 1.0 / bright[int(CLIPPING * len(bright))]
         assert limit < usual
-        assert found == pytest.approx(max(limit, STOPPED_DOWN * usual), rel=1e-3)
+        assert found == pytest.approx(max(limit, MIN_HIGHLIGHT_FACTOR * usual), rel=1e-3)
 
 
 def test_only_skin_is_metered(renderer: Renderer) -> None:

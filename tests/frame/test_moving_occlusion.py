@@ -18,7 +18,7 @@ from dermis.atlas.build import cached_atlas
 from dermis.frame.features.occlusion import moving as moving_occlusion
 from dermis.frame.features.occlusion.baked import bake_occlusion
 from dermis.frame.features.occlusion.moving import SIDE as MAP_SIDE
-from dermis.frame.features.occlusion.moving import anchors_of, look_around, turn_of
+from dermis.frame.features.occlusion.moving import make_anchors, sky_views, head_rotation
 from dermis.frame.features.visibility.layers import make_layers
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
@@ -52,7 +52,7 @@ def posed(head: Head, points: NDArray[np.floating] | None = None, **given: Any) 
 def open_maps(renderer: Renderer, scene: Scene, **settings: Any) -> list[Floats]:
     """The open share of the sky as the shading reads it, of each layout."""
     layouts = run_frame(renderer, scene, **({"atlas": SIDE} | settings)).layouts
-    return [download(renderer.device, layout.lit["occlusion_map"]).astype(float) for layout in layouts]
+    return [download(renderer.device, layout.bindings["occlusion_map"]).astype(float) for layout in layouts]
 
 
 def on_floor(head: Head) -> tuple[NDArray[np.bool_], Floats]:
@@ -90,7 +90,7 @@ def baked_anew(renderer: Renderer, head: Head, points: Floats, side: int) -> NDA
     anew = replace(head, mesh=moved, rig=None, strands=None, hair=None)
     inputs = renderer.prepare(scene_of(anew), settings_of(atlas=side))
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(anew.mesh, side)
-    return bake_occlusion(renderer.device, anew, atlas, inputs.lit, texels, side)
+    return bake_occlusion(renderer.device, anew, atlas, inputs.bindings, texels, side)
 
 
 def errors(renderer: Renderer, head: Head, scene: Scene, points: Floats, side: int, away: Any) -> Any:
@@ -144,10 +144,10 @@ def test_both_ways_to_depth_maps_agree(
 ) -> None:
     scene = posed(head, hinged(head, 60.0))
     (usual,) = open_maps(renderer, scene)
-    renderer.forget()
+    renderer.clear_cache()
     monkeypatch.setattr(moving_occlusion, "make_layers", partial(make_layers, compute=True))
     (computed,) = open_maps(renderer, scene)
-    renderer.forget()
+    renderer.clear_cache()
     assert np.sqrt(np.mean((computed - usual) ** 2)) < 2 * STILL
 
 
@@ -157,7 +157,7 @@ def test_it_runs_when_the_shape_moves_and_never_else(renderer: Renderer, head: H
 
     def ran(scene: Scene, **changed: Any) -> bool:
         renderer.draw(scene, settings.model_copy(update=changed))
-        return "occlusion" in renderer.graph.ran
+        return "occlusion" in renderer.graph.executed_stages
 
     renderer.draw(posed(head), settings)
     assert ran(scene) and not ran(scene) and not ran(posed(head, first.copy()))
@@ -170,19 +170,19 @@ def test_it_runs_when_the_shape_moves_and_never_else(renderer: Renderer, head: H
 
 def test_a_turn_is_found_from_points_and_bones() -> None:
     human = Human().head(subdivide=0)
-    anchors, rig = anchors_of(human), human.control
-    assert np.abs(turn_of(anchors, rig.rest) - np.eye(3)).max() < 1e-6
+    anchors, rig = make_anchors(human), human.control
+    assert np.abs(head_rotation(anchors, rig.rest) - np.eye(3)).max() < 1e-6
     given = Pose(positions_mm=rig.positions_mm @ TURN.T).motion(rig)
-    assert np.abs(turn_of(anchors, given) - TURN).max() < 1e-5
+    assert np.abs(head_rotation(anchors, given) - TURN).max() < 1e-5
     spine = Pose(bones={"spine": (20.0, 60.0, -10.0)}, weights={"jawOpen": 1.0}).motion(rig)
-    assert np.abs(turn_of(anchors, spine) - TURN).max() < 1e-5
-    neck = turn_of(anchors, Pose(bones={"neck01": (0.0, 50.0, 0.0)}).motion(rig))
+    assert np.abs(head_rotation(anchors, spine) - TURN).max() < 1e-5
+    neck = head_rotation(anchors, Pose(bones={"neck01": (0.0, 50.0, 0.0)}).motion(rig))
     assert 30.0 < np.degrees(np.arccos((np.trace(neck) - 1) / 2)) < 50.0
 
 
 def test_views_hold_the_whole_shape(head: Head) -> None:
     points = np.random.default_rng(3).normal(scale=(80.0, 120.0, 60.0), size=(500, 3))
-    look = look_around(Outline(points), TURN)
+    look = sky_views(Outline(points), TURN)
     whole = np.concatenate([points, np.ones((500, 1))], axis=1)
     column, row, depth = np.einsum("kij,nj->ikn", look.to_map, whole)
     for place in (column, row):
@@ -195,4 +195,4 @@ def test_views_hold_the_whole_shape(head: Head) -> None:
     step = look.steps_mm[:, 0]  # one texel to the right
     assert np.allclose(np.einsum("kj,kj->k", look.to_map[:, 0, :3], step), 1)
     assert np.allclose(np.einsum("kj,kj->k", look.to_map[:, 1, :3], look.steps_mm[:, 1]), -1)
-    assert (np.einsum("kj,kj->k", look.to_map[:, 2, :3], look.towards) > 0).all()
+    assert (np.einsum("kj,kj->k", look.to_map[:, 2, :3], look.to_sky) > 0).all()

@@ -14,7 +14,7 @@ from tolerances import LIT, OCCLUSION
 from twins import surface
 
 from dermis.atlas.build import build_atlas, cached_atlas
-from dermis.frame.features.occlusion.baked import bake_occlusion, whole_map
+from dermis.frame.features.occlusion.baked import bake_occlusion, fill_gaps
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.mesh.geometry import fibonacci_sphere
@@ -32,7 +32,7 @@ def baked(renderer: Renderer, head: Head, side: int = SIDE, **options: Any) -> N
     inputs = renderer.prepare(scene_of(head), settings_of(atlas=side))
     texels = inputs.layouts[0].atlas.resources["atlas"]
     return bake_occlusion(
-        renderer.device, head, build_atlas(head.mesh, side), inputs.lit, texels, side, **options
+        renderer.device, head, build_atlas(head.mesh, side), inputs.bindings, texels, side, **options
     )
 
 
@@ -79,7 +79,7 @@ def test_vertices_follow_the_atlas(renderer: Renderer) -> None:
 def test_the_map_has_no_gaps() -> None:
     rows = np.full((5, 4), np.nan, np.float32)
     rows[1, 1], rows[2, 3], rows[4] = 0.25, 0.75, [0.1, 0.2, 0.3, np.nan]
-    made = whole_map(rows, 4)
+    made = fill_gaps(rows, 4)
     assert made.shape == (6, 4) and np.isfinite(made).all()
     assert made[0, 0] == made[1, 1] == np.float32(0.25) and made[3, 3] == np.float32(0.75)
     assert np.array_equal(made[3], made[4]) and np.allclose(made[5], [0.1, 0.2, 0.3, 1.0])
@@ -124,6 +124,6 @@ def test_baked_once(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None
     head = corner()
     scene = replace(scene_of(head, rho_s=0.0), environment=Environment(name="uniform"))
     first = seen(renderer, scene)
-    renderer.forget()
+    renderer.clear_cache()
     monkeypatch.setattr("dermis.frame.features.occlusion.baked.bake_occlusion", None)
     assert np.array_equal(seen(renderer, scene), first)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from setups import entered_light, frontal, head_of, run_frame, scene_of, settings_of
 
 from dermis.base.errors import DermisError
-from dermis.frame.features.diffusion.mixture import load_shares
-from dermis.frame.inputs import Inputs
+from dermis.frame.features.diffusion.mixture import load_blend_weights
+from dermis.frame.inputs import FrameInputs
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.images.io import write_png
@@ -50,7 +50,7 @@ def lit_scene(**skin: Any) -> Scene:
     return scene_of(head_of(plane(SIZE_MM), colour=0.05 + 0.9 * patches**4), frontal(), **(DIFFUSE | skin))
 
 
-def lights(renderer: Renderer, scene: Scene) -> tuple[Inputs, Floats, Floats]:
+def lights(renderer: Renderer, scene: Scene) -> tuple[FrameInputs, Floats, Floats]:
     """A frame, and the light that enters and that leaves over the plane, (n, n, 3)."""
     inputs = run_frame(renderer, scene, atlas=SIDE)
     leaves = download(renderer.device, inputs.resources.scattered).astype(float)
@@ -94,7 +94,7 @@ def mixed_by(name: Path, *others: str) -> dict[str, Any]:
 def mixed(renderer: Renderer, scene: Scene, name: Path, others: int) -> tuple[Floats, Floats, Floats]:
     """Light that enters, light that leaves with what is lit again in the picture, and the map's shares."""
     inputs, light, made = lights(renderer, scene)
-    shares = load_shares(str(name)).astype(float)
+    shares = load_blend_weights(str(name)).astype(float)
     changes = inputs.view["relit_changes"][:others, :3]
     return light, made + light * (inputs.view["relit"] + shares[..., :others] @ changes), shares
 

@@ -8,7 +8,7 @@ import pytest
 
 from dermis.base.errors import DermisError
 from dermis.frame.features.diffusion.profiles import SkinProfiles
-from dermis.frame.features.translucency.make import shared_width
+from dermis.frame.features.translucency.build import rounded_width
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import fit_profile, load_profile
 from dermis.optics.tissue import Tissue
@@ -21,11 +21,11 @@ def skin(**pigments: float) -> Skin:
 
 def test_pigments_are_fitted_near_what_a_fresh_fit_finds() -> None:
     profiles = SkinProfiles()
-    profiles.of(skin(melanin=0.02))
-    near, fresh = profiles.of(skin(melanin=0.03)), load_profile("light", {"melanin": 0.03})
+    profiles.profile(skin(melanin=0.02))
+    near, fresh = profiles.profile(skin(melanin=0.03)), load_profile("light", {"melanin": 0.03})
     radius = [0.1, 0.5, 2.0]
     assert near.albedo == pytest.approx(fresh.albedo, rel=2e-3)
-    assert near.within(radius) == pytest.approx(fresh.within(radius), rel=5e-3, abs=1e-4)
+    assert near.energy_within(radius) == pytest.approx(fresh.energy_within(radius), rel=5e-3, abs=1e-4)
 
 
 def test_the_first_move_of_a_slider_starts_from_the_profile_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -36,25 +36,25 @@ def test_the_first_move_of_a_slider_starts_from_the_profile_as_it_is(monkeypatch
         return fit_profile(tissue, name, near)
 
     monkeypatch.setattr("dermis.frame.features.diffusion.profiles.fit_profile", fit)
-    plain = profiles.of(Skin(profile="light"))
-    first, fresh = profiles.of(skin(melanin=0.03)), load_profile("light", {"melanin": 0.03})
+    plain = profiles.profile(Skin(profile="light"))
+    first, fresh = profiles.profile(skin(melanin=0.03)), load_profile("light", {"melanin": 0.03})
     assert starts == [plain]
     assert first.albedo == pytest.approx(fresh.albedo, rel=1e-4)
-    profiles.of(Skin(profile="dark", pigments=Pigments(melanin=0.03)))
+    profiles.profile(Skin(profile="dark", pigments=Pigments(melanin=0.03)))
     assert starts[1] is load_profile("dark")
 
 
 def test_the_same_pigments_are_not_fitted_again() -> None:
     profiles = SkinProfiles()
-    first = profiles.of(skin(melanin=0.02))
-    assert profiles.of(skin(melanin=0.02).model_copy(update={"mix": 1.0})) is first
+    first = profiles.profile(skin(melanin=0.02))
+    assert profiles.profile(skin(melanin=0.02).model_copy(update={"mix": 1.0})) is first
 
 
 def test_skins_in_turn_are_fitted_once() -> None:
     """As on both sides of the viewer's divider."""
     profiles = SkinProfiles()
-    first = [profiles.of(skin(melanin=share)) for share in (0.02, 0.05)]
-    again = [profiles.of(skin(melanin=share)) for share in (0.02, 0.05, 0.02)]
+    first = [profiles.profile(skin(melanin=share)) for share in (0.02, 0.05)]
+    again = [profiles.profile(skin(melanin=share)) for share in (0.02, 0.05, 0.02)]
     assert [a is b for a, b in zip(again, [*first, first[0]], strict=True)] == [True] * 3
 
 
@@ -66,19 +66,19 @@ def test_a_file_that_changes_is_read_again_for_another_skin(tmp_path: Path) -> N
 
     written(0.25)
     first, second = (Skin(profile=str(path)) for _ in range(2))
-    found = profiles.of(first)
+    found = profiles.profile(first)
     written(0.125)
-    assert profiles.of(first) is found  # not read for each frame
-    changed = profiles.of(second)
+    assert profiles.profile(first) is found  # not read for each frame
+    changed = profiles.profile(second)
     assert (found.albedo[1], changed.albedo[1]) == (0.25, 0.125)
-    assert profiles.of(Skin(profile=str(path))) is changed
+    assert profiles.profile(Skin(profile=str(path))) is changed
 
 
 def test_a_table_has_no_pigments() -> None:
     with pytest.raises(DermisError, match="gpu-gems-3"):
-        SkinProfiles().of(Skin(pigments=Pigments(melanin=0.1)))
+        SkinProfiles().profile(Skin(pigments=Pigments(melanin=0.1)))
 
 
 def test_widths_that_differ_little_are_one() -> None:
-    assert shared_width(2.0) == shared_width(2.1) == pytest.approx(2.0)
-    assert all(0.84 <= shared_width(w) / w <= 1.19 for w in (0.6, 0.9, 1.3, 2.6, 7.0))
+    assert rounded_width(2.0) == rounded_width(2.1) == pytest.approx(2.0)
+    assert all(0.84 <= rounded_width(w) / w <= 1.19 for w in (0.6, 0.9, 1.3, 2.6, 7.0))

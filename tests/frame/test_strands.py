@@ -16,14 +16,14 @@ from dermis.base.errors import DermisError
 from dermis.frame.features.hair import resources as strand_space
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
-from dermis.specular.hair import attenuations, fibre, scattered
+from dermis.specular.hair import attenuations, fibre, scattering
 
 Floats = NDArray[np.float64]
 FRAME_MM, SIZE = 40.0, 40  # a pixel is a millimetre, at the sheet
@@ -61,11 +61,11 @@ def test_the_lobe_is_its_twin(renderer: Renderer) -> None:
     sines = rng.uniform(-0.98, 0.98, (24, 24, 2))
     drawn = np.dstack([sines, rng.uniform(-np.pi, np.pi, (24, 24)), rng.uniform(0, 2, (24, 24))])
     drawn = drawn.astype(np.float32).astype(float)
-    bound = {"directions": texture_from(renderer.device, drawn, "rgba32float")}
+    bound = {"directions": texture_from_array(renderer.device, drawn, "rgba32float")}
     seen, white = probe(renderer.device, "hair_probe", (24, 24), ["seen", "white"], **bound)
     depth = drawn[..., 3:] * [0.5, 1.0, 2.0]
     twin = np.array(
-        [[scattered(*d[:3], depth[i, j], fibre()) for j, d in enumerate(row)] for i, row in enumerate(drawn)]
+        [[scattering(*d[:3], depth[i, j], fibre()) for j, d in enumerate(row)] for i, row in enumerate(drawn)]
     )
     assert np.abs(seen[..., :3] - twin).max() < LOBE_TWIN * twin.max()
     h = (np.arange(16) + 0.5) / 8 - 1
@@ -110,9 +110,9 @@ def test_without_hairs_nothing_changes(renderer: Renderer) -> None:
     head = tangle(20)
     ran = []
     for scene, strands in ((lit(head), False), (lit(replace(head, strands=None)), True)):
-        renderer.graph.forget()
+        renderer.graph.invalidate()
         made = picture(renderer, scene, strands=strands, technique="texture-space")
-        ran.append((list(renderer.graph.ran), made))
+        ran.append((list(renderer.graph.executed_stages), made))
     assert ran[0][0] == ran[1][0] and "strands" not in ran[0][0]
     assert np.array_equal(ran[0][1], ran[1][1])
 
@@ -205,7 +205,7 @@ def test_hairs_are_drawn_again_only_when_they_change(renderer: Renderer) -> None
     ran = []
     for scene, exposure in ((lit(head), 1.0), (lit(head), 1.0), (lit(head), 2.0), (turned, 2.0)):
         picture(renderer, scene, exposure=exposure)
-        ran.append(set(renderer.graph.ran))
+        ran.append(set(renderer.graph.executed_stages))
     assert ran[1:3] == [set(), {"post"}]
     assert "strands" in ran[3] and not ran[3] & {"shape", "shadows"}
 
@@ -236,9 +236,9 @@ def test_tiles_of_a_workgroup_draw_the_same(
     """As GPUs do it: many chains for each tile, followed side by side."""
     scene, shown = lit(tangle(700, absorption=0.4)), []
     for ways in (1, 64):
-        monkeypatch.setattr(strand_space, "ways_of", lambda device, tiles, ways=ways: ways)
-        renderer.forget()
+        monkeypatch.setattr(strand_space, "chains_per_tile", lambda device, tiles, ways=ways: ways)
+        renderer.clear_cache()
         shown.append(picture(renderer, scene, size=size))
-    renderer.forget()
+    renderer.clear_cache()
     np.testing.assert_allclose(shown[1], shown[0], rtol=1e-5, atol=1e-6)
     assert shown[0][..., :3].std() > 0.02

@@ -28,16 +28,16 @@ from translucency_twins import (
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.atlas.translucency.cells import Cells, divide
+from dermis.atlas.translucency.cells import Cells, divide_into_cells
 from dermis.frame.features.translucency import passes as translucency_weights
-from dermis.frame.features.translucency.make import pairs_from, translucency_from
-from dermis.frame.features.translucency.pair_search.search import cell_tables, search
+from dermis.frame.features.translucency.build import make_buffers, make_pair_buffers, with_profile
+from dermis.frame.features.translucency.pair_search.search import search_pairs
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, Device, download
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
-from dermis.optics.diffusion.models import through_gaussians
+from dermis.optics.diffusion.models import gaussian_transmittance
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight
@@ -83,7 +83,7 @@ def thin(device: Device) -> Thin:
     mesh = wedge(12.0, 1.0, 4.0, cells=2)
     atlas = build_atlas(mesh, 64, "stitched")
     surface = surface_of(device, mesh, atlas)
-    pairs = pairs_on(device, surface, atlas, divide(atlas, SIGMA))
+    pairs = pairs_on(device, surface, atlas, divide_into_cells(atlas, SIGMA))
     found = weighed(device, pairs, surface)
     side = pairs.cells.side
     taken, given = taking(mesh, atlas, side), giving(mesh, atlas, side)
@@ -110,7 +110,7 @@ def thin(device: Device) -> Thin:
 
 def weighed(device: Device, pairs: PairBuffers, surface: dict[str, Any]) -> Translucency:
     """What the blurred levels let pass between pairs, on a surface."""
-    made = translucency_from(device, surface, pairs, BLURRED.variance_mm2, BLURRED.weight)
+    made = with_profile(device, make_buffers(device, surface, pairs), BLURRED.variance_mm2, BLURRED.weight)
     frame = CommandList(device)
     translucency_weights.draw_weights(frame, made)
     frame.submit()
@@ -173,7 +173,7 @@ def test_twin_of_the_distances_along_the_surface(thin: Thin) -> None:
     nowhere = thin.offset == 0x80008000
     low, high = (along(thin.atlas, thin.taken, thin.given, same) for same in (1.6, 0.4))
     low, high = (far[thin.receiver, thin.source] for far in (low, high))
-    texel = 1.0 / thin.atlas.stretch[thin.atlas.own].astype(float).min()
+    texel = 1.0 / thin.atlas.stretch[thin.atlas.lit].astype(float).min()
     near, radius = high < thin.cells.radius_mm - 2 * texel, thin.cells.radius_mm
     assert near.mean() > 0.1 and (~near).mean() > 0.1
     assert not nowhere[near].any()
@@ -200,7 +200,7 @@ def test_twin_of_what_passes(device: Device, thin: Thin) -> None:
 
 def test_the_same_search_finds_the_same(device: Device, thin: Thin) -> None:
     surface = surface_of(device, thin.mesh, thin.atlas)
-    again = pairs_on(device, surface, thin.atlas, divide(thin.atlas, SIGMA))
+    again = pairs_on(device, surface, thin.atlas, divide_into_cells(thin.atlas, SIGMA))
     for name in ("pairs", "sums"):
         assert (read(device, getattr(again, name)) == read(device, getattr(thin.pairs, name))).all()
     weights = read(device, weighed(device, again, surface).weights)
@@ -210,7 +210,7 @@ def test_the_same_search_finds_the_same(device: Device, thin: Thin) -> None:
 def test_a_narrow_profile_has_no_pairs(device: Device) -> None:
     mesh = uv_sphere(100.0, 8)
     atlas = build_atlas(mesh, 64, "stitched")
-    pairs = pairs_on(device, surface_of(device, mesh, atlas), atlas, divide(atlas, 0.01))
+    pairs = pairs_on(device, surface_of(device, mesh, atlas), atlas, divide_into_cells(atlas, 0.01))
     assert pairs.count == 0 and pairs.cells.side == 64
 
 
@@ -219,11 +219,11 @@ def test_a_ball_smaller_than_the_profile_spreads_has_pairs(device: Device, layou
     """Its blurs read nearly all texels, gutters included."""
     mesh = uv_sphere(3.0, 48, 24)
     atlas = build_atlas(mesh, 64, layout)
-    pairs = pairs_on(device, surface_of(device, mesh, atlas), atlas, divide(atlas, SIGMA))
+    pairs = pairs_on(device, surface_of(device, mesh, atlas), atlas, divide_into_cells(atlas, SIGMA))
     source, receiver, _ = read(device, pairs.pairs).reshape(-1, 3).T
     assert len(source) == pairs.count > 1000
     assert source.max() == pairs.sources[1] - 1 and receiver.max() == pairs.receivers[1] - 1
-    cell, first, end = read(device, pairs.sums).reshape(-1, 3).T
+    cell, first, end = read(device, pairs.receiver_ranges).reshape(-1, 3).T
     assert len(np.unique(cell)) == len(cell) and (end - first).sum() == pairs.count
 
 
@@ -233,7 +233,7 @@ def test_cells_are_coarser_where_memory_does_not_hold_the_pairs(
     monkeypatch.setattr(device, "max_storage_bytes", 12 * thin.pairs.count - 1)
     fewer = pairs_on(device, surface_of(device, thin.mesh, thin.atlas), thin.atlas, thin.cells)
     assert 0 < fewer.count < thin.pairs.count
-    assert fewer.cells.spacing_mm == pytest.approx(1.5 * thin.cells.spacing_mm, rel=0.1)
+    assert fewer.cells.cell_mm == pytest.approx(1.5 * thin.cells.cell_mm, rel=0.1)
     assert fewer.cells.radius_mm == thin.cells.radius_mm
 
 
@@ -243,12 +243,12 @@ def test_pairs_follow_a_surface_that_moves(device: Device, thin: Thin) -> None:
     x, y, z = head.positions_mm.T.astype(float)
     moved = np.stack([1.1 * x, y + 0.02 * x * x, 0.8 * z + 0.1 * x], axis=-1).astype(np.float32)
     surface = surface_of(device, thin.mesh, thin.atlas, moved)
-    there = search(device, surface, thin.cells, cell_tables(device, thin.cells))
+    there = search_pairs(device, surface, thin.cells)
     assert there is not None
     totals = []
-    for pairs in (thin.pairs, pairs_from(device, thin.cells, there)):
+    for pairs in (thin.pairs, make_pair_buffers(device, thin.cells, there)):
         share = decoded(read(device, weighed(device, pairs, surface).weights).reshape(-1, 2)[:, 1])
-        cell, first, _ = read(device, pairs.sums).reshape(-1, 3).T
+        cell, first, _ = read(device, pairs.receiver_ranges).reshape(-1, 3).T
         total = np.zeros((thin.cells.side, thin.cells.side, 3))
         order = np.argsort(first)
         total[cell[order] >> 16, cell[order] & 0xFFFF] = np.add.reduceat(share, first[order])
@@ -292,7 +292,7 @@ def test_a_slab_lets_through_what_the_profile_says(renderer: Renderer, thickness
     points, light = front(renderer, wedge(60.0, thickness, thickness))
     inner = light[np.abs(points[:, :2]).max(axis=1) < 14.0]
     assert len(inner) > 100
-    exact = through_gaussians(BLURRED, thickness)
+    exact = gaussian_transmittance(BLURRED, thickness)
     assert np.abs(inner - exact).max() < SLAB_THROUGH * BLURRED.albedo.max()
     if thickness <= 3:
         assert np.abs(inner / exact - 1)[:, 0].max() < 5 * SLAB_THROUGH
@@ -317,7 +317,7 @@ def test_a_wedge_fades_without_a_step(renderer: Renderer) -> None:
     x, row = points[middle, 0][order] + 30.0, light[middle][order]
     half = np.arctan(19.5 / 120.0)
     thickness = (0.5 + x / 60.0 * 19.5) * np.cos(2 * half)
-    exact = np.cos(half) * through_gaussians(BLURRED, thickness)
+    exact = np.cos(half) * gaussian_transmittance(BLURRED, thickness)
     away = (x > 8.0) & (x < 52.0)
     assert np.abs(row - exact)[away].max() < 0.03 * BLURRED.albedo.max()
     bins = np.array([row[(x >= k) & (x < k + 1), 0].mean() for k in range(4, 58)])  # a millimetre each

@@ -13,12 +13,12 @@ from translucency_twins import decoded, pairs_on, share_of, surface_of
 
 from dermis.apps.viewer.views import draw_thickness
 from dermis.atlas.build import build_atlas
-from dermis.atlas.translucency.cells import divide
+from dermis.atlas.translucency.cells import divide_into_cells
 from dermis.frame import programs
-from dermis.frame.features.diffusion.levels import Blur, make_levels
+from dermis.frame.features.diffusion.pyramid import Blur, make_levels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.features.translucency import passes as translucency_weights
-from dermis.frame.features.translucency.make import translucency_from
+from dermis.frame.features.translucency.build import make_buffers, with_profile
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Constants, Device, download, make_texture, upload
@@ -59,14 +59,14 @@ def weighed(device: Device) -> Weighed:
 def weighed_of(device: Device, mesh: Mesh) -> Weighed:
     atlas = build_atlas(mesh, 64, "stitched")
     surface = surface_of(device, mesh, atlas)
-    pairs = pairs_on(device, surface, atlas, divide(atlas, float(np.sqrt(VARIANCE[-1]))))
-    thin = translucency_from(device, surface, pairs, VARIANCE, WEIGHT)
+    pairs = pairs_on(device, surface, atlas, divide_into_cells(atlas, float(np.sqrt(VARIANCE[-1]))))
+    thin = with_profile(device, make_buffers(device, surface, pairs), VARIANCE, WEIGHT)
     frame = CommandList(device)
     translucency_weights.draw_weights(frame, thin)
     frame.submit()
     words = read(device, thin.weights).reshape(-1, 2)[: pairs.count]
     texel = read(device, thin.source_points).reshape(-1, 8)[:, 7]
-    sums = read(device, pairs.sums).reshape(-1, 3)[: pairs.receivers[1]].astype(np.int64).T
+    sums = read(device, pairs.receiver_ranges).reshape(-1, 3)[: pairs.receivers[1]].astype(np.int64).T
     source = words[:, 0].astype(np.int64)
     return Weighed(thin, source, unpacked(texel), decoded(words[:, 1]), *sums)
 
@@ -94,7 +94,7 @@ def summed(
     translucency.draw(frame, space, BLUR, thin, constants)
     frame.submit()
     x, y = weighed.texel[weighed.source].T
-    light = weighed.share * levels[thin.layer, y, x]
+    light = weighed.share * levels[thin.source_level, y, x]
     sums = np.zeros((side, side, 3))
     column, row = unpacked(weighed.cell).T
     for k in range(len(weighed.cell)):
@@ -117,7 +117,7 @@ def test_twin_of_what_comes_through(
     twin, made = summed(device, weighed, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
     assert twin.max() > 0.1
     assert np.abs(made[..., :3] - twin).max() < TWIN * twin.max()
-    assert ((made[..., 3] == 1) == weighed.thin.pairs.cells.surface).all()
+    assert ((made[..., 3] == 1) == weighed.thin.pairs.cells.receiver_mask).all()
 
 
 def test_bright_and_dim_light_are_kept_alike(device: Device, weighed: Weighed) -> None:
@@ -136,7 +136,7 @@ def test_a_head_without_thin_parts_gets_nothing(device: Device) -> None:
     frame.submit()
     light = download(device, ball.thin.light)
     assert (light[..., :3] == 0).all()
-    assert ((light[..., 3] == 1) == ball.thin.pairs.cells.surface).all()
+    assert ((light[..., 3] == 1) == ball.thin.pairs.cells.receiver_mask).all()
     assert light[..., 3].any()
 
 

@@ -13,8 +13,8 @@ from setups import front_camera, frontal, head_of, scene_of, settings_of
 
 from dermis.frame.features.shape import shape
 from dermis.frame.features.visibility import layers as visibility_buffer
-from dermis.frame.features.visibility.layers import Layers, draw_layers, make_layers
-from dermis.frame.projection import parallel_view
+from dermis.frame.features.visibility.layers import ViewLayers, draw_layers, make_layers
+from dermis.frame.projection import parallel_shadow_view
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download
 from dermis.mesh.head import Head
@@ -71,16 +71,16 @@ def truth_of_soup(numbers: bytes) -> Truth:
     return Truth(first, np.where(first > 0, every.argmax(axis=0), 0), sure)
 
 
-def shown(layers: Layers, renderer: Renderer, head: Head, camera: Camera, samples: int) -> Any:
+def shown(layers: ViewLayers, renderer: Renderer, head: Head, camera: Camera, samples: int) -> Any:
     """Layers after a view was drawn into them, and its matrices."""
     settings = settings_of(size=SIZE, samples=samples)
     inputs = renderer.prepare(scene_of(head, frontal(), camera=camera), settings)
     frame = CommandList(renderer.device)
     shape.draw(frame, inputs.resources.shape.shape, inputs.motion)
-    draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
+    draw_layers(frame, "nearest", layers, inputs.camera_views, inputs.resources.head)
     frame.submit()
     made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]
-    return made, inputs.camera.matrices(SIZE)
+    return made, inputs.camera_views.matrices(SIZE)
 
 
 SOUP = soup(600)
@@ -147,7 +147,7 @@ def test_steps_of_depth() -> None:
     at_far, before = np.array([[1, 2, far - 5, 1], [1, 2, far - 5 - little, 1]])
     step = (seen[2] @ before) / (seen[3] @ before) - (seen[2] @ at_far) / (seen[3] @ at_far)
     assert visibility_buffer._depth_range_mm(seen) == pytest.approx(little / step, rel=1e-4)
-    parallel = parallel_view(np.array([0.0, 0.6, -0.8]), BALL.mesh.outline, 64)
+    parallel = parallel_shadow_view(np.array([0.0, 0.6, -0.8]), BALL.mesh.outline, 64)
     assert visibility_buffer._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
 
 

@@ -13,9 +13,8 @@ from dermis.atlas.translucency.cells import Cells
 from dermis.frame.features.atlas.passes import draw_stretch
 from dermis.frame.features.atlas.textures import upload_atlas
 from dermis.frame.features.shape.mesh import upload_geometry
-from dermis.frame.features.shape.shape import rest_shape, shape_tables
-from dermis.frame.features.translucency.make import find_pairs
-from dermis.frame.features.translucency.pair_search.search import cell_tables
+from dermis.frame.features.shape.shape import evaluate_rest_shape, shape_tables
+from dermis.frame.features.translucency.build import find_pairs
 from dermis.frame.features.translucency.resources import PairBuffers
 from dermis.gpu import CommandList, Device
 from dermis.mesh.head import Head
@@ -53,7 +52,7 @@ def surface_of(device: Device, mesh: Mesh, atlas: Atlas, positions_mm: Any = Non
     """What shaders read of a mesh and its atlas, also where its points are elsewhere."""
     head, textures = Head("test", mesh, Maps()), upload_atlas(device, atlas)
     tables = shape_tables(device, head)
-    shape = rest_shape(device, tables, head.positions_mm if positions_mm is None else positions_mm)
+    shape = evaluate_rest_shape(device, tables, head.positions_mm if positions_mm is None else positions_mm)
     held, frame = upload_geometry(device, mesh, atlas, shape), CommandList(device)
     draw_stretch(frame, held, textures)
     frame.submit()
@@ -62,7 +61,7 @@ def surface_of(device: Device, mesh: Mesh, atlas: Atlas, positions_mm: Any = Non
 
 def pairs_on(device: Device, surface: dict[str, Any], atlas: Atlas, cells: Cells) -> PairBuffers:
     """The translucent pairs of a surface."""
-    return find_pairs(device, surface, atlas, cells, cell_tables(device, cells))
+    return find_pairs(device, surface, atlas, cells)
 
 
 def interpolated(mesh: Mesh, atlas: Atlas, x: Index, y: Index, values: NDArray[Any]) -> Floats:
@@ -80,7 +79,7 @@ def unit(vectors: Floats) -> Floats:
 def taking(mesh: Mesh, atlas: Atlas, side: int) -> Points:
     """The middles of the cells that hold texels of their own, or lie beside such, in order."""
     own = np.zeros((side + 2, side + 2), bool)
-    y, x = np.stack(np.nonzero(atlas.own)) * side // atlas.size
+    y, x = np.stack(np.nonzero(atlas.lit)) * side // atlas.size
     for row, column in np.ndindex(3, 3):
         own[y + row, x + column] = True
     middle = ((np.arange(side) + 0.5) * atlas.size / side).astype(np.int64)
@@ -93,13 +92,13 @@ def taking(mesh: Mesh, atlas: Atlas, side: int) -> Points:
 
 def giving(mesh: Mesh, atlas: Atlas, side: int) -> Points:
     """The cells with surface of their own: its middle and area, and the normal at their middle texel."""
-    y, x = np.nonzero(atlas.own)
-    corners = atlas.place[atlas.triangle[y, x]].astype(float) * atlas.size
+    y, x = np.nonzero(atlas.lit)
+    corners = atlas.corner_uv[atlas.triangle[y, x]].astype(float) * atlas.size
     b = atlas.barycentric[y, x] / 65535.0
     place = np.einsum("nk,nkc->nc", np.column_stack([1 - b.sum(axis=1), b]), corners) - 0.5
     inside = np.abs(place - np.stack([x, y], axis=-1)).max(axis=1) < INSIDE
     x, y = x[inside], y[inside]
-    p, q = mesh.positions[mesh.triangles].astype(float), atlas.place.astype(float) * atlas.size
+    p, q = mesh.positions[mesh.triangles].astype(float), atlas.corner_uv.astype(float) * atlas.size
     surface = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
     flat = np.abs(np.linalg.det(np.stack([q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]], axis=1)))
     mm2 = (surface / np.maximum(flat, 1e-9))[atlas.triangle[y, x]]
@@ -149,14 +148,14 @@ def lie(taken: Points, given: Points) -> Lie:
 
 def passes(found: Lie, area: Floats, cells: Cells) -> Floats:
     """(m, n) light that passes at most, over the least that counts; 0 out of reach."""
-    share, v = share_of(found.cosine - TURN, found.inward + TURN), cells.widest_mm**2
+    share, v = share_of(found.cosine - TURN, found.inward + TURN), cells.max_sigma_mm**2
     light = share * area * np.exp(-0.5 * found.square / v) / (LEAST * 2 * np.pi * v)
     return np.where(found.square < cells.radius_mm**2, light, 0.0)
 
 
 def along(atlas: Atlas, taken: Points, given: Points, same: float) -> Floats:
     """(m, n) distance in the map, infinite where no blur leads; places `same` texels apart are one."""
-    corners = atlas.place[np.maximum(atlas.triangle, 0)].astype(float)
+    corners = atlas.corner_uv[np.maximum(atlas.triangle, 0)].astype(float)
     place = np.einsum("yxk,yxkc->yxc", atlas.weights(), corners) * atlas.size - 0.5
     away = np.full((len(taken.texel), len(given.texel)), np.inf)
     rows, columns = np.indices(atlas.triangle.shape)
@@ -165,8 +164,8 @@ def along(atlas: Atlas, taken: Points, given: Points, same: float) -> Floats:
         for ty, tx in zip(rows[y, x], columns[y, x], strict=True):
             du, dv = tx - taken.texel[:, 0], ty - taken.texel[:, 1]
             rx, ry = taken.texel.T
-            up = atlas.reach[ry, rx].astype(int)
-            across = atlas.reach[ty, rx].astype(int)
+            up = atlas.edge_distance[ry, rx].astype(int)
+            across = atlas.edge_distance[ty, rx].astype(int)
             fits = (dv >= -up[:, 2]) & (dv <= up[:, 3]) & (du >= -across[:, 0]) & (du <= across[:, 1])
             far = far_of(atlas, taken, du, dv)
             away[:, j] = np.where(fits, np.minimum(away[:, j], far), away[:, j])
@@ -187,7 +186,7 @@ def passed(found: Lie, far: Floats, area: Floats, cells: Cells, variance: Floats
     far, area : (...,) along the surface [mm], of the source [mm2]
     variance : of the blurred levels, the first smooth one of which the source shows
     """
-    radius, cell = cells.radius_mm, cells.spacing_mm
+    radius, cell = cells.radius_mm, cells.cell_mm
     smooth = np.flatnonzero(variance >= (0.45 * cell) ** 2)
     before = variance[smooth[0]] if len(smooth) else variance[-1]
     far = np.where(far < radius, np.sqrt(far**2 + area / 6.0), np.inf)

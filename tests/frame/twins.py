@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
 from dermis.atlas.atlas import Atlas
-from dermis.frame.features.diffusion.kernels import ROWS_PER_UNIT, SUMMED_TRUNCATION, WIDEST, kernel_table
+from dermis.frame.features.diffusion.kernels import MAX_TABLE_VARIANCE, ROWS_PER_UNIT, SUMMED_TRUNCATION, kernel_table
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
@@ -46,9 +46,9 @@ class Kernel(NamedTuple):
     def of(cls, variance: Floats, step: Floats) -> Kernel:
         """variance : [texel^2]"""
         relative = variance / step**2
-        wide = relative > WIDEST
+        wide = relative > MAX_TABLE_VARIANCE
         taps = np.ceil(np.where(wide, WIDE_TRUNCATION, SUMMED_TRUNCATION) * np.sqrt(relative)).astype(int)
-        narrow = _table_ratio(np.minimum(relative, WIDEST))
+        narrow = _table_ratio(np.minimum(relative, MAX_TABLE_VARIANCE))
         return cls(step.astype(int), taps, np.where(wide, np.exp(-0.5 / np.maximum(relative, 1)), narrow))
 
     def weight(self, n: int) -> Floats:
@@ -152,12 +152,12 @@ def surface_albedo(
 
 def enters(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
     """Share of light from a direction that enters the skin."""
-    return ENERGY["full"].enters(surface_albedo(cosine, m)[0], rho_s)
+    return ENERGY["full"].entering_fraction(surface_albedo(cosine, m)[0], rho_s)
 
 
 def leaves(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
     """What leaves in a direction, of light that would leave evenly."""
-    return ENERGY["full"].leaves(*surface_albedo(cosine, m), rho_s)
+    return ENERGY["full"].exitance_factor(*surface_albedo(cosine, m), rho_s)
 
 
 def beckmann_by_table(cos_h: Floats, m: float) -> Floats:
@@ -204,5 +204,5 @@ def surface(atlas: Atlas, head: Head) -> tuple[Floats, Floats]:
     point = atlas.interpolate(head.mesh, head.mesh.positions)
     normal = atlas.interpolate(head.mesh, head.mesh.normals)
     length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
-    covered = atlas.own[..., None]
+    covered = atlas.lit[..., None]
     return np.where(covered, point, 0.0), np.where(covered, normal / length, 0.0)

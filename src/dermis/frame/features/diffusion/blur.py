@@ -32,7 +32,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
     """Fill level k with level 0 blurred by a Gaussian of variance blur.variance_mm2[k - 1]."""
     variance_mm2, sheets = blur.variance_mm2, atlas.mips_for(blur.edge)
     source: TextureOrView = levels.layer(0)
-    first_deviation = np.sqrt(variance_mm2[0]) * atlas.usual_per_mm  # [texel]
+    first_deviation = np.sqrt(variance_mm2[0]) * atlas.median_texels_per_mm  # [texel]
     full_first = len(variance_mm2) == 1 or first_deviation > MAX_SUMMED_DEVIATION
     for k, members in enumerate(_spread_members(variance_mm2, blur.halvings), start=1):
         source_halvings, halvings = blur.halvings[k - 1 : k + 1]
@@ -82,7 +82,9 @@ def _kernel_texture(device: Device) -> Texture:
     return device.cached("kernels", make)
 
 
-def _spread_members(variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]) -> Iterator[dict[str, float]]:
+def _spread_members(
+    variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]
+) -> Iterator[dict[str, float]]:
     """Yield the members of the shader's struct `Spread` for each blurred level."""
     source_mm2 = previous_resampling = previous_mm2 = 0.0
     for variance, (source_halvings, level_halvings) in zip(variance_mm2, pairwise(halvings), strict=True):

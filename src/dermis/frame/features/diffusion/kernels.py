@@ -44,7 +44,9 @@ def tap_count(variance: float, truncation: float = TRUNCATION) -> int:
 
 @cache
 def kernel_table() -> NDArray[np.float32]:
-    """Return q = w(1) / w(0) of kernels w(n) = q^(n^2); rows by variance [1/64 step^2], columns by taps a side.
+    """Return q = w(1) / w(0) of kernels w(n) = q^(n^2), by variance (rows) and taps on each side (columns).
+
+    Rows are spaced by 1/64 step^2.
 
     A Gaussian that is sampled and truncated loses variance, a narrow one most of it. So q is solved for each
     number of taps such that the kernel has the requested variance.

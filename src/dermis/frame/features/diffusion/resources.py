@@ -23,7 +23,7 @@ class BlurScheme(Protocol):
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
         """Allocate the blur pyramid."""
 
-    def chain(
+    def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
         """Return the split with intermediate levels of weight 0, and their indices."""
@@ -62,7 +62,9 @@ def make(
     if request.blend_weights is not None and blurs:
         names = (f"{request.view_name} other {k}" for k in range(len(request.other_profiles)))
         entering = tuple(memo.get(_make_levels, *args, owner=name) for name in names)
-        mixture = memo.get(_mixture, device, request.blend_weights, entering, len(atlases), owner=request.view_name)
+        mixture = memo.get(
+            _mixture, device, request.blend_weights, entering, len(atlases), owner=request.view_name
+        )
     return Resources(levels, blurs, mixture)
 
 

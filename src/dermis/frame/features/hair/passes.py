@@ -31,7 +31,9 @@ _CLEARING_GROUPS = 256
 _RAYS_APART = 4  # of the rays to an area light one in four is traced: pictures change by 0.0002 at most
 
 
-def draw_shadows(graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting: Bindings) -> None:
+def draw_shadows(
+    graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting: Bindings
+) -> None:
     """Declare the passes that pose the strands and compute the shadows that they cast."""
     graph.repeat(pose_strands, strands.tables, shape)
     if len(shadow_views.clips):
@@ -92,9 +94,7 @@ def draw(
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
     record = _view_record(light, strands, view, coarse)
     shared: Bindings = {"strand_view": record, "projected": tables.projected, "hairs": tables.record}
-    graph.dispatch(
-        "strands", light, {**lighting, **shared, "posed": tables.posed}, workgroup_grid(knots)
-    )
+    graph.dispatch("strands", light, {**lighting, **shared, "posed": tables.posed}, workgroup_grid(knots))
     lists: Bindings = {"chains": picture.chains, "links": picture.links}
     _dispatch(graph, "hair/strands_empty.wgsl", lists, picture.chains.size // 4)
     chains = (("CHAINS", picture.chains_per_tile),)
@@ -134,7 +134,7 @@ def _pixel_mm(view: UniformRecord, tables: StrandTables, height: int) -> float:
 
 
 def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) -> int:
-    """Return the largest number of segments in a tile: all fine ones, and a multiple of the mean of coarse ones.
+    """Estimate the number of segments in a crowded tile: all fine ones, and several times the mean of others.
 
     segments : drawn segments of all strands
     """
@@ -144,7 +144,7 @@ def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) 
 
 
 def rows_per_invocation(device: Device, segments: int) -> int:
-    """Return how many pixels of a column an invocation draws: a power of two, so that few shaders are compiled.
+    """Return how many pixels of a column an invocation draws, a power of two to limit the shader variants.
 
     segments : largest number of segments in a tile
 
@@ -157,8 +157,6 @@ def rows_per_invocation(device: Device, segments: int) -> int:
     return 1 << rows.bit_length() - 1
 
 
-def _dispatch(
-    graph: Recorder, name: str, bindings: Bindings, count: int, constants: Constants = ()
-) -> None:
+def _dispatch(graph: Recorder, name: str, bindings: Bindings, count: int, constants: Constants = ()) -> None:
     """Add a pass with one invocation for each of `count` elements."""
     graph.dispatch("strands", program(graph.device, name, constants), bindings, workgroup_grid(count))

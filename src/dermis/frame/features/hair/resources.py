@@ -27,16 +27,21 @@ HEADER_WORDS = 8
 """Words of a light before the texels of its deep opacity map."""
 _LINKS_PER_KNOT = 4
 _MAX_LINKS = 1 << 22
-_FINE_STEP, _KNOT_STEP = 1 << 12, 1 << 19  # by which capacities are rounded up, so that most people share them
+_FINE_STEP, _KNOT_STEP = (
+    1 << 12,
+    1 << 19,
+)  # to which capacities are rounded up, so that most heads share them
 _SHADOW_CASTERS = 32_000  # coarse strands that cast the shadows of all
 _MIN_DRAWN = 5_000
 _DRAWN_WIDTH = 0.45  # width of the drawn coarse strands [pixel]
 _COVERED_WIDTH = 0.2  # further width per cover: where hair hides hair, fewer strands are enough
 WINDOW_KNOTS = 1 << 12
 """Knots whose bounds a workgroup of strands_window.wgsl computes."""
-_STRAND = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)])  # in strands_pose.wgsl
+_STRAND = np.dtype(
+    [("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)]
+)  # in strands_pose.wgsl
 _COUNTS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
-_HAIRS = np.dtype([*((name, "u4") for name in _COUNTS), ("width_scale", "f4")])  # in strand_knots.wgsl
+_HAIRS = np.dtype([*((name, "u4") for name in _COUNTS), ("width_scale", "f4")])
 
 
 class StrandCounts(NamedTuple):
@@ -123,7 +128,7 @@ def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[in
 
 
 def chains_per_tile(device: Device, tiles: int) -> int:
-    """Return the number of linked lists of a tile; 1 on software adapters and if a buffer cannot hold more."""
+    """Return the number of linked lists per tile: 1 on software adapters and if a buffer cannot hold more."""
     fits = 4 * (1 + _GPU_CHAINS * tiles) <= device.max_storage_bytes
     return _GPU_CHAINS if fits and device.adapter.kind != "CPU" else 1
 

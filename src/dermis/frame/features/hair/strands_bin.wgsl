@@ -33,7 +33,7 @@ fn covers(segment: TiledSegment, tile: vec2f) -> bool {
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let segment = number_of(group, groups, lane);
+    let segment = list_index(group, groups, lane);
     if (segment >= segment_count(strand_view.coarse)) {
         return;
     }

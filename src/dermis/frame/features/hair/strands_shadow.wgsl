@@ -63,7 +63,7 @@ fn splat(light: Light, a: vec4f, b: vec4f, width_scale: f32) {
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= segment_count(hairs.shadow_casters)) {
         return;
     }

@@ -33,7 +33,7 @@ class InterreflectionBuffers:
 
     sample_points : buffer of the points at which patches are lit, and their number
     patch_links, cell_links : buffers of the form factors of patches and of cells, by their names in shaders
-    averaged : whether cells store the mean radiance of the patches that they see; else its sum by form factors
+    averaged : whether cells store the mean radiance of visible patches instead of its sum by form factors
     sample_exitance : exitance of the sample points
     direct_exitance : exitance of the patches without bounces
     uniform_exitance : exitance of the patches in uniform irradiance 1
@@ -103,8 +103,12 @@ def _form_factors(head: Head, atlas: Atlas) -> FormFactors:
 
 def _upload_links(device: Device, form_factors: FormFactors) -> LinkBuffers:
     points = np.stack([form_factors.sample_triangle, form_factors.sample_weights], axis=1)
-    patch_links = _upload_rows(device, form_factors.patch_first, form_factors.patch_target, form_factors.patch_factor)
-    cell_links = _upload_rows(device, form_factors.cell_first, form_factors.cell_target, form_factors.cell_factor)
+    patch_links = _upload_rows(
+        device, form_factors.patch_first, form_factors.patch_target, form_factors.patch_factor
+    )
+    cell_links = _upload_rows(
+        device, form_factors.cell_first, form_factors.cell_target, form_factors.cell_factor
+    )
     own = np.stack([form_factors.nearest_patch, form_factors.confidence.view(np.uint32)], axis=1)
     cell_links["cells"] = device.buffer(own, "STORAGE")
     return (device.buffer(points, "STORAGE"), len(points)), patch_links, cell_links
@@ -118,9 +122,7 @@ def _upload_rows(
     return {"first": device.buffer(first, "STORAGE"), "links": device.buffer(links, "STORAGE")}
 
 
-def _make_buffers(
-    device: Device, uploaded: LinkBuffers, averaged: bool, _: str
-) -> InterreflectionBuffers:
+def _make_buffers(device: Device, uploaded: LinkBuffers, averaged: bool, _: str) -> InterreflectionBuffers:
     sample_points, patch_links, cell_links = uploaded
     count = sample_points[1]
     direct, uniform, *bounced = (
@@ -140,9 +142,7 @@ def _make_buffers(
     )
 
 
-def draw(
-    graph: Recorder, bindings: Bindings, interreflection: Interreflection, constants: Constants
-) -> None:
+def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, constants: Constants) -> None:
     """Compute the light that reaches the skin from other skin.
 
     bindings : resources of the lighting

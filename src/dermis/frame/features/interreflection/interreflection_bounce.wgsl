@@ -13,7 +13,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = number_of(group, groups, lane) / TEAM;
+    let index = list_index(group, groups, lane) / TEAM;
     let is_patch = index < arrayLength(&bounced);
     let sum = gathered(index, is_patch, lane);
     if (is_patch && lane % TEAM == 0u) {

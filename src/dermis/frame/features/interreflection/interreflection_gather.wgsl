@@ -12,7 +12,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = number_of(group, groups, lane) / TEAM;
+    let index = list_index(group, groups, lane) / TEAM;
     let is_cell = index < arrayLength(&from_skin);
     let sum = gathered(index, is_cell, lane);
     if (is_cell && lane % TEAM == 0u) {

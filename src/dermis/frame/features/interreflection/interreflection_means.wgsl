@@ -13,7 +13,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = number_of(group, groups, lane) / TEAM;
+    let index = list_index(group, groups, lane) / TEAM;
     let samples = select(0u, SAMPLES, index < arrayLength(&direct_exitance));
     var direct = vec4f(0.0);
     var uniform_light = vec4f(0.0);

@@ -21,7 +21,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= samples.count) {
         return;
     }
@@ -33,20 +33,20 @@ fn main(
     let b = corner_at(t.y);
     let c = corner_at(t.z);
     var point = interpolate(a, b, c, w, t.w);
-    point.place = place_of_point(triangle, w);
+    point.atlas_uv = atlas_position(triangle, w);
     let surface = surface_at(point, samples.footprint * maps_over_atlas(triangle, a, b, c));
     if (STRIPE_LIGHT) {
         let axes = texel_axes(triangle, a, b, c, 1.0 / samples.footprint);
         area_u = AREA_DEVIATION * axes.u;
         area_v = AREA_DEVIATION * axes.v;
     }
-    let open = open_at(point.place);
-    let lit = light_up(point, surface, point.normal, open);
-    let leaving = samples.albedo * surface.colour * leaves_everywhere(surface.roughness, surface.rho_s);
-    let enters = enters_from_everywhere(surface.roughness, surface.rho_s);
+    let open = open_at(point.atlas_uv);
+    let lit = illuminate(point, surface, point.normal, open);
+    let leaving = samples.albedo * surface.colour * leaves_uniform(surface.roughness, surface.rho_s);
+    let enters = enters_uniform(surface.roughness, surface.rho_s);
     var uniform_light = vec3f(enters * select(1.0, 1.0 - open, environment.occluded != 0u)); // see entering_from_around
     if (HALF_SPACE) {
-        uniform_light *= skin.back_from_everywhere;
+        uniform_light *= skin.uniform_reflectance;
     }
     sample_exitance[2u * index] = vec4f(leaving * lit.entered, 0.0);
     sample_exitance[2u * index + 1u] = vec4f(leaving * uniform_light, enters);

@@ -1,4 +1,4 @@
-"""Ambient occlusion at rest: the visible fraction of the sky at texels and vertices, baked from depth maps."""
+"""Ambient occlusion at rest: the visible fraction of the sky at texels and vertices, from depth maps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ambient occlusion of a moving head: the baked map, corrected by the change of sky visibility at vertices."""
+"""Ambient occlusion of a moving head: the baked map, corrected by the change at the vertices."""
 
 from __future__ import annotations
 
@@ -224,7 +224,11 @@ def _draw_vertices(
 ) -> None:
     """Compute the sky visibility at the vertices for the current shape, or for the rest shape."""
     draw_layers(graph, "occlusion", sky.layers, views.views, sky.occluders.with_vertices_of(head))
-    maps = {"maps": sky.layers.texture, "visibility": sky.visibility}
-    bindings: Bindings = {**head.resources, **maps, "sky": record}
+    bindings: Bindings = {
+        **head.resources,
+        "sky": record,
+        "maps": sky.layers.texture,
+        "visibility": sky.visibility,
+    }
     shader = program(graph.device, _VERTICES, (("RESTING", resting),) if resting else ())
     graph.dispatch("occlusion", shader, bindings, workgroup_grid(sky.vertices))

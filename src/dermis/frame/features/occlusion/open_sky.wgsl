@@ -7,7 +7,7 @@ fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
         return 1.0;
     }
     if ((t.w & MAPPED) != 0u) {
-        return open_at(point.place);
+        return open_at(point.atlas_uv);
     }
     return dot(w, vec3f(open_at_vertex(t.x), open_at_vertex(t.y), open_at_vertex(t.z)));
 }

@@ -1,8 +1,7 @@
 """Outputs of a frame besides its picture, and the readback of both."""
 
-from dermis.frame.features.outputs.labels import label_numbers as shader_constants
+from dermis.frame.features.outputs.labels import shader_constants
 from dermis.frame.features.outputs.resources import Resources, make
-from dermis.frame.features.outputs.stages import draw, hair_labels
-from dermis.frame.features.outputs.stages import output_lists as shader_lists
+from dermis.frame.features.outputs.stages import draw, hair_labels, shader_lists
 
-__all__ = ["Resources", "draw", "hair_labels", "make", "shader_lists", "shader_constants"]
+__all__ = ["Resources", "draw", "hair_labels", "make", "shader_constants", "shader_lists"]

@@ -1,8 +1,8 @@
-// What head and hair cover of each pixel, by all of its samples.
+// Coverage of each pixel by head and hair, over all samples.
 //#include "planes.wgsl"
 
 //#include <alpha_outputs>
-//#each alpha_outputs: override {NAME}_FIRST: u32 = UNASKED;
+//#each alpha_outputs: override {NAME}_FIRST: u32 = NOT_REQUESTED;
 
 @group(0) @binding(50) var exposed: texture_2d<f32>;
 
@@ -16,5 +16,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= size)) {
         return;
     }
-    //#each alpha_outputs: put_{type}({NAME}_FIRST, cell_of(id.xy, size), {name}_output(id.xy));
+    //#each alpha_outputs: write_{type}({NAME}_FIRST, plane_slot(id.xy, size), {name}_output(id.xy));
 }

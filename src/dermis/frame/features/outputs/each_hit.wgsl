@@ -1,4 +1,4 @@
-// The entry of stages that read the mesh at pixel centres: what they put there is their own function put_seen.
+// Entry point of stages that read the mesh at the centres of pixels; the including shader defines write_outputs.
 //#include "surface_hit.wgsl"
 //#include "planes.wgsl"
 
@@ -8,8 +8,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= size)) {
         return;
     }
-    let seen = seen_at(id.xy, size);
-    let there = sees_any(id.xy);
-    let cell = cell_of(id.xy, size);
-    put_seen(seen, there, cell);
+    let hit = hit_at(id.xy, size);
+    let found_hit = is_hit(id.xy);
+    let slot = plane_slot(id.xy, size);
+    write_outputs(hit, found_hit, slot);
 }

@@ -1,34 +1,34 @@
-// Outputs of the mesh: where the centre of each pixel meets it.
+// Outputs of the mesh at the centre of each pixel.
 //#include "each_hit.wgsl"
 
 //#include <geometry_outputs>
-//#each geometry_outputs: override {NAME}_FIRST: u32 = UNASKED;
+//#each geometry_outputs: override {NAME}_FIRST: u32 = NOT_REQUESTED;
 
-fn depth_output(seen: Seen) -> f32 {
-    return dot(seen.point.position - look.rays.eye, look.rays.forward);
+fn depth_output(hit: SurfaceHit) -> f32 {
+    return dot(hit.point.position - camera.rays.eye, camera.rays.forward);
 }
 
-fn position_output(seen: Seen) -> vec3f {
-    return seen.point.position - look.centre;
+fn position_output(hit: SurfaceHit) -> vec3f {
+    return hit.point.position - camera.centre;
 }
 
-fn normal_geometric_output(seen: Seen) -> vec3f {
-    let a = position_of(seen.corners.x);
-    return normalize(cross(position_of(seen.corners.y) - a, position_of(seen.corners.z) - a));
+fn normal_geometric_output(hit: SurfaceHit) -> vec3f {
+    let a = position_of(hit.corners.x);
+    return normalize(cross(position_of(hit.corners.y) - a, position_of(hit.corners.z) - a));
 }
 
-fn uv_output(seen: Seen) -> vec2f {
-    return seen.point.uv;
+fn uv_output(hit: SurfaceHit) -> vec2f {
+    return hit.point.uv;
 }
 
-fn triangle_output(seen: Seen) -> i32 {
-    return i32(seen.triangle);
+fn triangle_output(hit: SurfaceHit) -> i32 {
+    return i32(hit.triangle);
 }
 
-fn barycentric_output(seen: Seen) -> vec3f {
-    return seen.weights;
+fn barycentric_output(hit: SurfaceHit) -> vec3f {
+    return hit.weights;
 }
 
-fn put_seen(seen: Seen, there: bool, cell: Cell) {
-    //#each geometry_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(seen), there)); }}
+fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PlaneSlot) {
+    //#each geometry_outputs: if ({NAME}_FIRST != NOT_REQUESTED) {{ write_{type}({NAME}_FIRST, slot, select({nothing}, {name}_output(hit), found_hit)); }}
 }

@@ -1,4 +1,4 @@
-"""Labels of a frame: the class of the part of the mesh or of the hairs that each pixel shows."""
+"""Label outputs: the class of the mesh part or of the hair in each pixel."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from dermis.frame.features.hair.resources import has_strands
-from dermis.frame.features.outputs.planes import Planes, fill, stage_program
+from dermis.frame.features.outputs.planes import Planes, draw_planes, stage_program
 from dermis.frame.features.outputs.stage_inputs import StageInputs
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Bindings, Buffer, Device, Memo, MutableBindings, Recorder, Texture
 from dermis.human.labels.classes import class_number, label_classes
-from dermis.human.labels.fields import MeshLabels, hair_classes, labelling
+from dermis.human.labels.fields import MeshLabels, hair_classes, mesh_labels
 from dermis.mesh.head import Head
 
 STAGE = "label"
@@ -20,12 +20,12 @@ STAGE = "label"
 
 @dataclass(frozen=True, eq=False)
 class LabelBuffers:
-    """Buffers as label.wgsl and strand_labels.wgsl read them.
+    """Buffers that label.wgsl and strand_labels.wgsl read and write.
 
-    tables : by their names there
-    fields : number of fields
-    hair_classes : class of each hair, None without hair
-    hair_labels : coverage by hairs of each pixel, and their class
+    tables : labels of the mesh by their names in label.wgsl
+    fields : number of distance fields
+    hair_classes : class of each strand, None without hair
+    hair_labels : label of the hair in each pixel
     """
 
     tables: MutableBindings
@@ -34,57 +34,61 @@ class LabelBuffers:
     hair_labels: Buffer
 
     def hair_bindings(self, centres: Texture) -> Bindings | None:
-        """Return what the pass that draws hairs binds to label them too; None without hair."""
+        """Return the resources for labels in the pass that draws hair, None without hair.
+
+        centres : texture of the triangles at the centres of the pixels
+        """
         if self.hair_classes is None:
             return None
         return {"hair_classes": self.hair_classes, "hair_labels": self.hair_labels, "centres": centres}
 
 
 def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> LabelBuffers | None:
-    """Return what the requested labels take, None for none."""
+    """Return the buffers for the requested label outputs, None if none are requested."""
     cached = memo.get
     if not any(name.startswith(STAGE) for name in request.outputs):
         return None
     head, settings = request.head.bare, request.settings
-    found = cached(labelling, head)
-    tables = cached(_tables, device, found)
+    labels = cached(mesh_labels, head)
+    tables = cached(_upload_tables, device, labels)
     if not has_strands(request.head, settings):
-        return LabelBuffers(tables, len(found.classes), None, cached(_words, device, 1, owner="no hair labels"))
+        unused = cached(_word_buffer, device, 1, owner="no hair labels")
+        return LabelBuffers(tables, len(labels.classes), None, unused)
     pixels = settings.size[0] * settings.size[1]
-    space = cached(_words, device, pixels, owner="hair labels")
-    return LabelBuffers(tables, len(found.classes), cached(_hairs, device, head), space)
+    hair_labels = cached(_word_buffer, device, pixels, owner="hair labels")
+    return LabelBuffers(tables, len(labels.classes), cached(_upload_hair_classes, device, head), hair_labels)
 
 
-def label_numbers() -> dict[str, int]:
-    """Return the numbers that the shaders of labels fill in."""
+def shader_constants() -> dict[str, int]:
+    """Return the constants of the shaders of labels by their `//#fill` names."""
     names = "right_brow", "left_brow", "hair", "beard", "lashes"
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}
 
 
 def draw_labels(
-    graph: Recorder, planes: Planes, space: LabelBuffers, seen: StageInputs, centres: Texture
+    graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: StageInputs, centres: Texture
 ) -> None:
     """Declare the pass that labels the pixels."""
-    constants = ("FIELDS", space.fields), ("HAIRS", space.hair_classes is not None)
+    constants = ("FIELDS", buffers.fields), ("HAIRS", buffers.hair_classes is not None)
     shader = stage_program(graph.device, planes, constants)
-    bound = seen.bound(shader, centres) | space.tables | {"hair_labels": space.hair_labels}
-    fill(graph, planes, shader, bound)
+    bindings = inputs.bindings(shader, centres) | buffers.tables | {"hair_labels": buffers.hair_labels}
+    draw_planes(graph, planes, shader, bindings)
 
 
-def _tables(device: Device, found: MeshLabels) -> MutableBindings:
-    """Return the labelling, and the classes of its fields with those of FaceSynthetics by our numbers."""
-    others = [one.face_synthetics for one in label_classes()]
+def _upload_tables(device: Device, labels: MeshLabels) -> MutableBindings:
+    """Upload the labels of a mesh, and the FaceSynthetics class of each class."""
+    face_synthetics = [one.face_synthetics for one in label_classes()]
     arrays = {
-        "label_base": found.base.astype(np.uint32),
-        "label_fields": found.fields if found.fields.size else np.zeros(1, np.float32),
-        "label_classes": np.concatenate([others, found.classes]).astype(np.uint32),
+        "label_base": labels.base.astype(np.uint32),
+        "label_fields": labels.fields if labels.fields.size else np.zeros(1, np.float32),
+        "label_classes": np.concatenate([face_synthetics, labels.classes]).astype(np.uint32),
     }
     return {name: device.buffer(array, "STORAGE") for name, array in arrays.items()}
 
 
-def _hairs(device: Device, head: Head) -> Buffer:
+def _upload_hair_classes(device: Device, head: Head) -> Buffer:
     return device.buffer(hair_classes(head).astype(np.uint32), "STORAGE")
 
 
-def _words(device: Device, count: int) -> Buffer:
+def _word_buffer(device: Device, count: int) -> Buffer:
     return device.storage_buffer(4 * count, "hair labels")

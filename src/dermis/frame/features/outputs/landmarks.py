@@ -16,7 +16,7 @@ from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landm
 from dermis.mesh.head import Head
 
 LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
-"""Names of the landmarks of each set, and (n, 4) positions [mm] with 1 for visible ones, 0 for hidden ones."""
+"""Names of the landmarks of each set, and (n, 4) positions [mm] with 1 for visible landmarks, else 0."""
 TOLERANCE_MM = 2.0
 """Depth by which the mesh around a visible landmark may be in front of it."""
 _ROW = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)])  # as in landmarks.wgsl

@@ -1,49 +1,49 @@
-// Outputs of light: what the centre of each pixel shows, by the parts of the picture's own shading.
+// Outputs of light at the centre of each pixel, by the shading of the picture.
 //#include "shading/shading.wgsl"
 //#include "surface_hit.wgsl"
 //#include "planes.wgsl"
 
 //#include <light_outputs>
-//#each light_outputs: override {NAME}_FIRST: u32 = UNASKED;
+//#each light_outputs: override {NAME}_FIRST: u32 = NOT_REQUESTED;
 
-@group(0) @binding(34) var subsurface: texture_storage_2d_array<rgba32float, write>; // light below, depth; share of it that leaves
+@group(0) @binding(34) var subsurface: texture_storage_2d_array<rgba32float, write>; // light below the skin, depth; fraction of it that leaves
 
-struct Parts {
+struct ShadedPixel {
     shading_point: ShadingPoint,
     lit: Lit,
     shaded: Shaded,
 }
 
-// Of the whole pixel.
-fn parts_at(pixel: vec2u, size: vec2u) -> Parts {
+// Shading with the footprint of the whole pixel.
+fn shade_centre(pixel: vec2u, size: vec2u) -> ShadedPixel {
     let triangle = max(textureLoad(centres, pixel, 0, 0).x, 1u) - 1u;
     let shading_point = shading_point_at(triangle, vec2f(pixel) + 0.5, 1.0, vec2f(size));
     let lit = lit_at(shading_point);
-    return Parts(shading_point, lit, shaded(shading_point, lit));
+    return ShadedPixel(shading_point, lit, shaded(shading_point, lit));
 }
 
-// What lids hold back is in an eye's colour, and here in the light that it gets.
-fn albedo_output(parts: Parts) -> vec3f {
-    return select(shade.total, vec3f(1.0), is_opaque(parts.shading_point.point)) * parts.shading_point.surface.colour / parts.shading_point.lids;
+// The transmittance of the lids is moved from the colour of an eye to its irradiance.
+fn albedo_output(shaded_pixel: ShadedPixel) -> vec3f {
+    return select(shade.total, vec3f(1.0), is_opaque(shaded_pixel.shading_point.point)) * shaded_pixel.shading_point.surface.colour / shaded_pixel.shading_point.lids;
 }
 
-fn irradiance_output(parts: Parts) -> vec3f {
-    return parts.lit.entered * parts.shading_point.lids;
+fn irradiance_output(shaded_pixel: ShadedPixel) -> vec3f {
+    return shaded_pixel.lit.entered * shaded_pixel.shading_point.lids;
 }
 
-// Where light spreads over the picture, what spreads is added when it has.
-fn diffuse_output(parts: Parts) -> vec3f {
-    let one = parts.shaded;
+// Light that is diffused over the picture is added afterwards.
+fn diffuse_output(shaded_pixel: ShadedPixel) -> vec3f {
+    let one = shaded_pixel.shaded;
     return select(one.below * one.leaving, vec3f(0.0), SPLIT) + one.local;
 }
 
-fn specular_output(parts: Parts) -> vec3f {
-    return parts.shaded.reflected;
+fn specular_output(shaded_pixel: ShadedPixel) -> vec3f {
+    return shaded_pixel.shaded.reflected;
 }
 
-// The share that leaves towards the eye, to be multiplied by the light through thin parts.
-fn translucent_output(parts: Parts) -> vec3f {
-    return parts.shaded.leaving;
+// Fraction that leaves towards the eye; the light through thin parts multiplies it afterwards.
+fn translucent_output(shaded_pixel: ShadedPixel) -> vec3f {
+    return shaded_pixel.shaded.leaving;
 }
 
 @compute @workgroup_size(8, 8)
@@ -52,15 +52,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= size)) {
         return;
     }
-    let there = sees_any(id.xy);
-    let cell = cell_of(id.xy, size);
-    var parts: Parts;
-    if (there) {
-        parts = parts_at(id.xy, size);
+    let found_hit = is_hit(id.xy);
+    let slot = plane_slot(id.xy, size);
+    var shaded_pixel: ShadedPixel;
+    if (found_hit) {
+        shaded_pixel = shade_centre(id.xy, size);
     }
     if (SPLIT) {
-        textureStore(subsurface, id.xy, 0, vec4f(parts.shaded.below, parts.shaded.depth));
-        textureStore(subsurface, id.xy, 1, vec4f(parts.shaded.leaving, 0.0));
+        textureStore(subsurface, id.xy, 0, vec4f(shaded_pixel.shaded.below, shaded_pixel.shaded.depth));
+        textureStore(subsurface, id.xy, 1, vec4f(shaded_pixel.shaded.leaving, 0.0));
     }
-    //#each light_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(parts), there)); }}
+    //#each light_outputs: if ({NAME}_FIRST != NOT_REQUESTED) {{ write_{type}({NAME}_FIRST, slot, select({nothing}, {name}_output(shaded_pixel), found_hit)); }}
 }

@@ -1,6 +1,6 @@
-// Pixels of four bytes as rows of three, without gaps, so that fewer bytes are read back and none is copied again.
+// Packs pixels of four bytes to three bytes without gaps, which reduces the readback.
 
-const ROW: u32 = 1024u; // invocations a row
+const ROW: u32 = 1024u; // invocations of a row
 
 @group(0) @binding(0) var bytes: texture_2d<u32>;
 @group(0) @binding(1) var<storage, read_write> packed: array<u32>;

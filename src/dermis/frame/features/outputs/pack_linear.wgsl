@@ -1,8 +1,8 @@
-// Pixels of four floats as rows of three or four, without gaps, so that no more is read back than is wanted.
+// Packs pixels of four floats to three or four floats without gaps, which reduces the readback.
 
 override CHANNELS: u32 = 3u;
 
-const ROW: u32 = 1024u; // invocations a row
+const ROW: u32 = 1024u; // invocations of a row
 
 @group(0) @binding(0) var exposed: texture_2d<f32>;
 @group(0) @binding(1) var<storage, read_write> packed: array<f32>;

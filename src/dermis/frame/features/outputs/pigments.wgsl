@@ -1,34 +1,34 @@
-// Pigments of the skin that the centre of each pixel sees, as shares of the volume.
+// Pigments of the skin at the centre of each pixel, as volume fractions.
 //#include "hit_footprint.wgsl"
 //#include "surface/skin.wgsl"
 //#include "each_hit.wgsl"
 
 //#include <pigments_outputs>
-//#each pigments_outputs: override {NAME}_FIRST: u32 = UNASKED;
+//#each pigments_outputs: override {NAME}_FIRST: u32 = NOT_REQUESTED;
 
 struct Pigments {
-    everywhere: vec2f, // melanin and blood of skin that is alike everywhere
-    painted: u32, // 1 where the map of roughness, as it was painted, has both beside it
+    uniform_pigments: vec2f, // melanin and blood of uniform skin
+    painted: u32, // 1 if the painted map of roughness also holds the pigments
 }
 
 @group(0) @binding(53) var<uniform> pigments: Pigments;
 
-// None in eyes, teeth and tongue.
-fn pigments_of(seen: Seen) -> vec2f {
-    let mip = mip_for(roughness_map, footprint_at(seen));
-    let painted = textureSampleLevel(roughness_map, map_sampler, seen.point.uv, mip).zw;
-    let found = select(pigments.everywhere, painted, pigments.painted != 0u);
-    return select(found, vec2f(0.0), (seen.point.flags & OPAQUE) != 0u);
+// Zero in eyes, teeth and tongue.
+fn pigments_at(hit: SurfaceHit) -> vec2f {
+    let mip = mip_for(roughness_map, footprint_at(hit));
+    let painted = textureSampleLevel(roughness_map, map_sampler, hit.point.uv, mip).zw;
+    let value = select(pigments.uniform_pigments, painted, pigments.painted != 0u);
+    return select(value, vec2f(0.0), (hit.point.flags & OPAQUE) != 0u);
 }
 
-fn melanin_output(seen: Seen) -> f32 {
-    return pigments_of(seen).x;
+fn melanin_output(hit: SurfaceHit) -> f32 {
+    return pigments_at(hit).x;
 }
 
-fn blood_output(seen: Seen) -> f32 {
-    return pigments_of(seen).y;
+fn blood_output(hit: SurfaceHit) -> f32 {
+    return pigments_at(hit).y;
 }
 
-fn put_seen(seen: Seen, there: bool, cell: Cell) {
-    //#each pigments_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(seen), there)); }}
+fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PlaneSlot) {
+    //#each pigments_outputs: if ({NAME}_FIRST != NOT_REQUESTED) {{ write_{type}({NAME}_FIRST, slot, select({nothing}, {name}_output(hit), found_hit)); }}
 }

@@ -1,46 +1,46 @@
-// Where outputs go: one after the other, each as rows of pixels with its channels side by side.
+// Buffer of outputs: one after the other, each as rows of pixels with interleaved channels.
 
-const UNASKED: u32 = 0xffffffffu; // in the place of an output's first channel
+const NOT_REQUESTED: u32 = 0xffffffffu; // first channel of an output that is not requested
 
-// Where a pixel is among all.
-struct Cell {
+// Index of a pixel, and number of all pixels.
+struct PlaneSlot {
     index: u32,
     pixels: u32,
 }
 
 @group(0) @binding(52) var<storage, read_write> planes: array<u32>;
 
-fn cell_of(pixel: vec2u, size: vec2u) -> Cell {
-    return Cell(pixel.y * size.x + pixel.x, size.x * size.y);
+fn plane_slot(pixel: vec2u, size: vec2u) -> PlaneSlot {
+    return PlaneSlot(pixel.y * size.x + pixel.x, size.x * size.y);
 }
 
-// first: channels of the outputs before it
-fn put_u32(first: u32, cell: Cell, value: u32) {
-    planes[first * cell.pixels + cell.index] = value;
+// first: number of channels of the outputs before it
+fn write_u32(first: u32, slot: PlaneSlot, value: u32) {
+    planes[first * slot.pixels + slot.index] = value;
 }
 
-fn put_i32(first: u32, cell: Cell, value: i32) {
-    put_u32(first, cell, bitcast<u32>(value));
+fn write_i32(first: u32, slot: PlaneSlot, value: i32) {
+    write_u32(first, slot, bitcast<u32>(value));
 }
 
-fn put_f32(first: u32, cell: Cell, value: f32) {
-    put_u32(first, cell, bitcast<u32>(value));
+fn write_f32(first: u32, slot: PlaneSlot, value: f32) {
+    write_u32(first, slot, bitcast<u32>(value));
 }
 
-fn put_vec2f(first: u32, cell: Cell, value: vec2f) {
-    let at = first * cell.pixels + 2u * cell.index;
+fn write_vec2f(first: u32, slot: PlaneSlot, value: vec2f) {
+    let at = first * slot.pixels + 2u * slot.index;
     planes[at] = bitcast<u32>(value.x);
     planes[at + 1u] = bitcast<u32>(value.y);
 }
 
-fn put_vec3f(first: u32, cell: Cell, value: vec3f) {
-    let at = first * cell.pixels + 3u * cell.index;
+fn write_vec3f(first: u32, slot: PlaneSlot, value: vec3f) {
+    let at = first * slot.pixels + 3u * slot.index;
     planes[at] = bitcast<u32>(value.x);
     planes[at + 1u] = bitcast<u32>(value.y);
     planes[at + 2u] = bitcast<u32>(value.z);
 }
 
-fn get_vec3f(first: u32, cell: Cell) -> vec3f {
-    let at = first * cell.pixels + 3u * cell.index;
+fn read_vec3f(first: u32, slot: PlaneSlot) -> vec3f {
+    let at = first * slot.pixels + 3u * slot.index;
     return bitcast<vec3f>(vec3u(planes[at], planes[at + 1u], planes[at + 2u]));
 }

@@ -19,14 +19,14 @@ from dermis.scene.outputs import OUTPUTS
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """Space for a frame's outputs.
+    """Resources of the outputs of a frame.
 
-    names : as requested
-    planes : a buffer for each stage that makes some
-    centres : triangles at the pixels' centres; None where the picture's only sample lies there
-    previous : the shape in the scene before, None where nothing reads it
-    light : for outputs of light and of what is below the skin
-    labels, landmarks : None where none are requested
+    names : outputs in the order of the request
+    planes : buffers of the outputs, one for each stage
+    centres : triangles at the centres of the pixels; None if the only sample of the picture is there
+    previous : shape in the previous scene, None if it is not needed
+    light : resources for outputs of light and skin
+    labels, landmarks : buffers of labels and landmarks, None if they are not requested
     """
 
     names: tuple[str, ...]
@@ -39,12 +39,12 @@ class Resources:
 
     @property
     def buffers(self) -> list[Buffer]:
-        """Those that are read back, in order."""
-        last = [self.landmarks.buffer] if self.landmarks else []
-        return [*(planes.buffer for planes in self.planes), *last]
+        """Return the buffers to read back, in order."""
+        landmarks = [self.landmarks.results] if self.landmarks else []
+        return [*(planes.buffer for planes in self.planes), *landmarks]
 
-    def planes_of(self, name: str) -> Planes:
-        """Return those that hold an output."""
+    def planes_with(self, name: str) -> Planes:
+        """Return the planes that contain an output."""
         return next(planes for planes in self.planes if name in planes.channels)
 
 
@@ -53,13 +53,13 @@ def make(
     device: Device,
     request: FrameRequest,
     tables: ShapeTables,
-    thin: Sequence[Translucency | None],
+    translucency: Sequence[Translucency | None],
 ) -> Resources | None:
-    """Return space for the requested outputs, None for none.
+    """Return the resources of the requested outputs, None if none are requested.
 
-    thin : thin parts of each layout
+    translucency : translucency of each layout
 
-    Raises DermisError for more than the device has in one buffer, and for outputs that the scene has not.
+    Raises DermisError if outputs do not fit in one buffer of the device, or the scene does not have them.
     """
     if not request.outputs and not request.landmarks:
         return None
@@ -67,20 +67,20 @@ def make(
     stages: dict[str, list[tuple[str, int]]] = {}
     for name, channels in request.output_channels.items():
         stages.setdefault(OUTPUTS[name].stage, []).append((name, channels))
-    names, bare = request.landmarks, request.head.bare
+    sets, bare = request.landmarks, request.head.bare
     return Resources(
         names=request.outputs,
         planes=tuple(
-            cached(make_planes, device, stage, tuple(of), settings.size, owner=stage)
-            for stage, of in stages.items()
+            cached(make_planes, device, stage, tuple(outputs), settings.size, owner=stage)
+            for stage, outputs in stages.items()
         ),
-        centres=None if settings.samples == 1 else cached(_centres, device, settings.size),
+        centres=None if settings.samples == 1 else cached(_make_centres, device, settings.size),
         previous=cached(make_shape, device, tables, owner="before") if "motion" in stages else None,
-        light=make_light_outputs(memo, device, request, thin),
+        light=make_light_outputs(memo, device, request, translucency),
         labels=make_label_buffers(memo, device, request),
-        landmarks=cached(make_landmark_buffers, device, bare, names) if names else None,
+        landmarks=cached(make_landmark_buffers, device, bare, sets) if sets else None,
     )
 
 
-def _centres(device: Device, size: tuple[int, int]) -> ViewLayers:
+def _make_centres(device: Device, size: tuple[int, int]) -> ViewLayers:
     return make_layers(device, size, 1, triangles=True)

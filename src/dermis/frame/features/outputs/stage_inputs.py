@@ -1,4 +1,4 @@
-"""What the stages of outputs read of a frame."""
+"""Inputs of the stages that compute outputs."""
 
 from __future__ import annotations
 
@@ -12,15 +12,23 @@ from dermis.frame.features.shape.shape import MotionBytes, Shape
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.features.visibility.layers import ViewLayers
 from dermis.frame.projection import Triple, Views
-from dermis.gpu import Bindings, ComputeProgram, Constants, MutableBindings, UniformRecord, Texture, TextureOrView
+from dermis.gpu import (
+    Bindings,
+    ComputeProgram,
+    Constants,
+    MutableBindings,
+    Texture,
+    TextureOrView,
+    UniformRecord,
+)
 
 
 @dataclass(frozen=True, eq=False)
 class PreviousScene:
-    """The scene that motion is counted from.
+    """Previous scene, from which motion vectors are measured.
 
-    motion : what moved the head's shape, None where the shape is the same as now
-    view : record of the shading, with the rays of its camera
+    motion : motion of the head, None if its shape has not changed
+    view : record of the shading with the rays of the previous camera
     """
 
     motion: MotionBytes | None
@@ -28,37 +36,38 @@ class PreviousScene:
 
 
 @dataclass(frozen=True, eq=False)
-class SpreadLight:
-    """Light that a technique spreads over the picture, as the outputs need it.
+class PictureDiffusion:
+    """Diffusion of the light below the skin over the picture, by a technique in screen space.
 
-    layers : texture that the shading keeps it in, to be spread
-    spread : spreads it; returns textures of the light, and of the share of it that leaves towards the eye
+    layers : texture in which the shading stores the light
+    diffuse : diffuses it, and returns textures of the light and of the fraction of it that leaves
     """
 
     layers: Texture
-    spread: Callable[[], tuple[TextureOrView, TextureOrView]]
+    diffuse: Callable[[], tuple[TextureOrView, TextureOrView]]
 
 
 @dataclass(frozen=True, eq=False)
 class StageInputs:
-    """What the stages read of a frame.
+    """Inputs of the stages that compute outputs.
 
-    lit : resources of the shading, of the layout that is looked at
+    lighting : resources of the lighting for the first layout
     view : record of the struct Shade
-    centre_mm : the head's, from which places of a scene are counted
-    constants : of the lights, the surface and the technique
-    scattered : light below the skin by place on the atlas, or the tables of pre-integrated skin
-    camera, head, visibility : how the picture's samples see the head, and the triangles that they see
-    shape : the head's
+    centre_mm : centre of the head, the origin of positions of the scene [mm]
+    constants : pipeline constants of the lights, the surface and the technique
+    scattered : texture of the light below the skin over the atlas, or tables of pre-integrated skin
+    camera, head, visibility : views of the samples of a pixel, the triangles, and the triangle at each sample
+    shape : current shape of the head
     picture : textures of the finished picture
-    hair : whether hair is drawn
-    previous : the scene before, None where nothing reads it
-    thin : thin parts of the layout that is looked at, None without any
-    spread : light that spreads over the picture, None for techniques that spread none
-    through : adds up the light through thin parts in textures of the atlas; returns the one of all layouts
+    has_hair : whether hair is drawn
+    previous : previous scene, None if it is not needed
+    translucency : light through thin parts of the first layout, None without any
+    picture_diffusion : diffusion over the picture, None for techniques without it
+    sum_transmitted : sums the light through thin parts in textures of the atlas, and returns the one that
+        combines all layouts
     """
 
-    lit: Bindings
+    lighting: Bindings
     view: UniformRecord
     centre_mm: Triple
     constants: Constants
@@ -68,16 +77,16 @@ class StageInputs:
     visibility: ViewLayers
     shape: Shape
     picture: Picture
-    hair: bool
+    has_hair: bool
     previous: PreviousScene | None
-    thin: Translucency | None
-    spread: SpreadLight | None
-    through: Callable[[tuple[Texture, ...]], Texture]
+    translucency: Translucency | None
+    picture_diffusion: PictureDiffusion | None
+    sum_transmitted: Callable[[tuple[Texture, ...]], Texture]
 
-    def bound(self, shader: ComputeProgram, centres: Texture) -> MutableBindings:
-        """Return the shading's resources with the record Look of surface_hit.wgsl.
+    def bindings(self, shader: ComputeProgram, centres: Texture) -> MutableBindings:
+        """Return the resources of the lighting with the record OutputCamera of surface_hit.wgsl.
 
-        centres : texture of the triangles at the pixels' centres
+        centres : texture of the triangles at the centres of the pixels
         """
-        look = shader.record("Look", rays=ray_record(shader, self.view), centre=self.centre_mm)
-        return {**self.lit, "look": look, "centres": centres}
+        camera = shader.record("OutputCamera", rays=ray_record(shader, self.view), centre=self.centre_mm)
+        return {**self.lighting, "camera": camera, "centres": centres}

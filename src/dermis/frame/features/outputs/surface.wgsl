@@ -1,24 +1,24 @@
-// Outputs of the surface with its relief, at the centre of each pixel.
+// Outputs of the surface with relief at the centre of each pixel.
 //#include "hit_footprint.wgsl"
 //#include "surface/skin.wgsl"
 //#include "each_hit.wgsl"
 
 //#include <surface_outputs>
-//#each surface_outputs: override {NAME}_FIRST: u32 = UNASKED;
+//#each surface_outputs: override {NAME}_FIRST: u32 = NOT_REQUESTED;
 
-// That of eyes and teeth is the mesh's.
-fn normal_output(seen: Seen) -> vec3f {
-    if ((seen.point.flags & OPAQUE) != 0u) {
-        return seen.point.normal;
+// Normal with relief; eyes and teeth have the normal of the mesh.
+fn normal_output(hit: SurfaceHit) -> vec3f {
+    if ((hit.point.flags & OPAQUE) != 0u) {
+        return hit.point.normal;
     }
-    return surface_at(seen.point, footprint_at(seen)).normal;
+    return surface_at(hit.point, footprint_at(hit)).normal;
 }
 
-fn normal_camera_output(seen: Seen) -> vec3f {
-    let n = normal_output(seen);
-    return vec3f(dot(n, normalize(look.rays.right)), -dot(n, normalize(look.rays.up)), dot(n, look.rays.forward));
+fn normal_camera_output(hit: SurfaceHit) -> vec3f {
+    let n = normal_output(hit);
+    return vec3f(dot(n, normalize(camera.rays.right)), -dot(n, normalize(camera.rays.up)), dot(n, camera.rays.forward));
 }
 
-fn put_seen(seen: Seen, there: bool, cell: Cell) {
-    //#each surface_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(seen), there)); }}
+fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PlaneSlot) {
+    //#each surface_outputs: if ({NAME}_FIRST != NOT_REQUESTED) {{ write_{type}({NAME}_FIRST, slot, select({nothing}, {name}_output(hit), found_hit)); }}
 }

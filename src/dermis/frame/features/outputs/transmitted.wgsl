@@ -1,11 +1,11 @@
-// Light that crossed thin parts: what arrives of it below each pixel's centre, times the share that leaves towards the eye.
+// Multiplies the translucent output, the fraction that leaves towards the eye, by the light through thin parts.
 //#include "bilinear.wgsl"
 //#include "surface_hit.wgsl"
 //#include "planes.wgsl"
 
-override TRANSLUCENT_FIRST: u32 = UNASKED;
+override TRANSLUCENT_FIRST: u32 = NOT_REQUESTED;
 
-@group(0) @binding(53) var through: texture_2d<f32>; // on the atlas
+@group(0) @binding(53) var transmitted: texture_2d<f32>; // light over the atlas
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -13,8 +13,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= size)) {
         return;
     }
-    let cell = cell_of(id.xy, size);
-    let point = seen_at(id.xy, size).point;
-    let light = select(vec3f(0.0), load_bilinear(through, point.place).rgb, (point.flags & MAPPED) != 0u);
-    put_vec3f(TRANSLUCENT_FIRST, cell, get_vec3f(TRANSLUCENT_FIRST, cell) * light);
+    let slot = plane_slot(id.xy, size);
+    let point = hit_at(id.xy, size).point;
+    let light = select(vec3f(0.0), load_bilinear(transmitted, point.atlas_uv).rgb, (point.flags & MAPPED) != 0u);
+    write_vec3f(TRANSLUCENT_FIRST, slot, read_vec3f(TRANSLUCENT_FIRST, slot) * light);
 }

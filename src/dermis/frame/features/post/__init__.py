@@ -1,6 +1,6 @@
-"""From radiance to the picture: exposure meter, background, bloom, tone curve and encoding."""
+"""Post-processing of radiance: exposure meter, background, bloom, tone curve and encoding."""
 
-from dermis.frame.features.post.meter import meter_numbers as shader_constants
+from dermis.frame.features.post.meter import shader_constants
 from dermis.frame.features.post.resources import Resources, draw, make
 
 __all__ = ["Resources", "draw", "make", "shader_constants"]

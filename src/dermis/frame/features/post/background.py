@@ -1,4 +1,4 @@
-"""The background behind the head."""
+"""The pass that adds the background behind the head."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ _KINDS = ("gradient", "environment")  # numbered from 1 as in background.wgsl; 0
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """Space for the picture with what is behind the head.
+    """Textures of the background.
 
-    panorama : the one that is seen there where it is not that of the reflections
+    result : texture of the picture with its background
+    panorama : panorama that is shown, None to show the one of the reflections
     """
 
     result: Texture
@@ -27,29 +28,31 @@ class Backdrop:
 def draw(
     graph: Recorder,
     backdrop: Backdrop,
-    look: tuple[Bindings, UniformRecord],
+    shading: tuple[Bindings, UniformRecord],
     image: Texture,
     meter: Meter | None,
     settings: Settings,
 ) -> Texture:
-    """The picture with what is behind the head, a texture of `backdrop`.
+    """Add the background to a picture, and return `backdrop.result`.
 
-    look : resources and record of the shading
-    meter : None where the exposure is given
+    shading : resources of the lighting, and the record of the shading
+    image : texture of the picture without background
+    meter : exposure meter, None for a fixed exposure
     """
-    (lit, view), into = look, backdrop.result
-    shown, (exposure, metered) = settings.background, exposure_input(graph.device, settings, meter)
+    (lighting, view), background = shading, settings.background
+    exposure, metered = exposure_input(graph.device, settings, meter)
     shader = program(graph.device, "post/background.wgsl")
     record = shader.record(
-        "Behind",
+        "Background",
         rays=ray_record(shader, view),
-        kind=1 + _KINDS.index(shown) if isinstance(shown, str) else 0,
-        colour=(0.0, 0.0, 0.0) if isinstance(shown, str) else shown,
+        kind=1 + _KINDS.index(background) if isinstance(background, str) else 0,
+        colour=(0.0, 0.0, 0.0) if isinstance(background, str) else background,
         exposure=exposure,
         blur=settings.background_blur,
     )
-    bound = {**lit, "behind": record, "image": image, "metered": metered, "result": into}
+    images = {"image": image, "result": backdrop.result}
+    bindings = {**lighting, "background": record, "metered": metered, **images}
     if backdrop.panorama is not None:
-        bound["panorama"] = backdrop.panorama
-    graph.compute("background", shader, bound, into.size[:2])
-    return into
+        bindings["panorama"] = backdrop.panorama
+    graph.compute("background", shader, bindings, backdrop.result.size[:2])
+    return backdrop.result

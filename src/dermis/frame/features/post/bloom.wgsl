@@ -1,4 +1,4 @@
-// One step of the bloom: halves a picture by a binomial filter, or adds a smaller one, enlarged.
+// A step of the bloom: halves a picture by a binomial filter, or adds an enlarged smaller picture.
 //#include "bilinear.wgsl"
 
 override WIDEN: bool = false; // false: halve; true: add the smaller picture
@@ -13,7 +13,7 @@ struct Bloom {
 @group(0) @binding(2) var smaller: texture_2d<f32>;
 @group(0) @binding(3) var result: texture_storage_2d<rgba32float, write>;
 
-// 1 3 3 1 along both axes: a Gaussian of the pyramid [BurtAdelson1983], at the middle of four pixels.
+// Filter 1 3 3 1 along both axes: a Gaussian pyramid [BurtAdelson1983] with samples between four pixels.
 fn halved(at: vec2i) -> vec4f {
     let last = vec2i(textureDimensions(picture)) - 1;
     var sum = vec4f(0.0);

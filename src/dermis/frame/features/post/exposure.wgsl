@@ -1,8 +1,8 @@
-// The factor from radiance to the picture: given, or metered by meter_key.wgsl.
+// Exposure, the factor from radiance to the picture: fixed, or metered by meter_key.wgsl.
 
 @group(0) @binding(41) var<storage, read> metered: array<f32>;
 
-// given: 0 for the meter's
-fn exposure_of(given: f32) -> f32 {
-    return select(given, metered[0], given == 0.0);
+// fixed: 0 for the metered exposure
+fn exposure_of(fixed: f32) -> f32 {
+    return select(fixed, metered[0], fixed == 0.0);
 }

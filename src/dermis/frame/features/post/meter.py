@@ -1,4 +1,4 @@
-"""The exposure meter, an incident one: it goes by the light on the skin, so that dark skin stays dark."""
+"""Incident exposure meter: it measures the irradiance of the skin, so that dark skin stays dark."""
 
 from __future__ import annotations
 
@@ -12,67 +12,66 @@ from dermis.gpu import Bindings, Buffer, Constants, Device, Recorder, Texture, U
 from dermis.scene.settings import Settings
 
 SIDE = 64
-"""Points along each side of the grid over the picture at which the meter looks."""
+"""Metered points along each side of a grid over the picture."""
 KEY = 0.85
-"""What white skin shows in the light that is metered: studio light then keeps an exposure of about 1."""
+"""Value of white skin in the metered light: the exposure of studio light is then about 1."""
 CLIPPING = 0.01
-"""Share of the skin in view that may be brighter than the picture can show."""
-STOPPED_DOWN = 0.5
+"""Fraction of the visible skin that may be brighter than the picture can show."""
+MIN_HIGHLIGHT_FACTOR = 0.5
 """Least factor by which highlights lower the exposure: one stop."""
 
 
-def meter_numbers() -> dict[str, float]:
-    """By the shaders' names."""
-    shares = {"meter_clipping": CLIPPING, "meter_stopped_down": STOPPED_DOWN}
-    return {"meter_side": SIDE, "meter_key": KEY, **shares}
+def shader_constants() -> dict[str, float]:
+    """Return the constants of the meter's shaders by their `//#fill` names."""
+    highlights = {"meter_clipping": CLIPPING, "meter_stopped_down": MIN_HIGHLIGHT_FACTOR}
+    return {"meter_side": SIDE, "meter_key": KEY, **highlights}
 
 
 @dataclass(frozen=True, eq=False)
 class Meter:
-    """Buffers of what is metered at each point, and of the exposure that follows."""
+    """Buffers of the meter: measurements at all points, and the exposure."""
 
     points: Buffer
     exposure: Buffer
 
 
 def make_meter(device: Device) -> Meter:
-    """Space for the meter."""
+    """Allocate the buffers of the meter."""
     return Meter(device.storage_buffer(8 * SIDE * SIDE), device.buffer(np.ones(1, np.float32), "STORAGE"))
 
 
 def draw(
     graph: Recorder,
     meter: Meter,
-    look: tuple[Bindings, UniformRecord, Constants],
+    shading: tuple[Bindings, UniformRecord, Constants],
     visibility: Texture,
     image: Texture,
 ) -> None:
-    """Meter the skin that a picture shows.
+    """Meter the exposure for the visible skin.
 
-    look : resources and record of the shading, and pipeline constants of the lights
-    visibility : texture of the triangles that samples see
-    image : texture of the picture's radiance
+    shading : resources of the lighting, record of the shading, and pipeline constants of the lights
+    visibility : texture of the triangle at each sample
+    image : texture of the radiance of the picture
     """
-    lit, view, constants = look
-    shader, key = (
-        program(graph.device, "post/meter.wgsl", constants),
-        program(graph.device, "post/meter_key.wgsl"),
-    )
-    record = shader.record("Look", rays=ray_record(shader, view), place=view["jitter"][0, :2])
-    bound = {**lit, "look": record, "visibility_buffer": visibility, "image": image, "points": meter.points}
-    graph.compute("meter", shader, bound, (SIDE, SIDE))
+    lighting, view, constants = shading
+    shader = program(graph.device, "post/meter.wgsl", constants)
+    camera = shader.record("MeterCamera", rays=ray_record(shader, view), sample=view["jitter"][0, :2])
+    images = {"visibility_buffer": visibility, "image": image}
+    bindings = {**lighting, **images, "camera": camera, "points": meter.points}
+    graph.compute("meter", shader, bindings, (SIDE, SIDE))
+    key = program(graph.device, "post/meter_key.wgsl")
     graph.dispatch("meter", key, {"points": meter.points, "exposure": meter.exposure}, (1, 1, 1))
 
 
 def exposure_input(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Buffer]:
-    """The exposure for exposure.wgsl, 0 where it is metered, and the buffer that it reads."""
+    """Return the fixed exposure, 0 if it is metered, and the buffer of the metered one, for exposure.wgsl."""
     if settings.exposure == "auto":
         assert meter is not None
         return 0.0, meter.exposure
-    none = device.cached("no meter", lambda: device.buffer(np.ones(1, np.float32), "STORAGE"))
-    return settings.exposure, none
+    unused = device.cached("no meter", lambda: device.buffer(np.ones(1, np.float32), "STORAGE"))
+    return settings.exposure, unused
 
 
 def read_meter(device: Device, meter: Meter) -> float:
-    """The exposure that the last frame was metered for; waits for it."""
+    """Wait for the metered exposure of the last frame, and return it."""
     return float(np.frombuffer(device.handle.queue.read_buffer(meter.exposure), np.float32)[0])

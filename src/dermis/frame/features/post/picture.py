@@ -1,4 +1,4 @@
-"""The picture: exposure, tone curve and encoding."""
+"""The pass from radiance to the picture: exposure, tone curve and encoding."""
 
 from __future__ import annotations
 
@@ -14,9 +14,13 @@ _TONES = ("none", "filmic", "neutral")  # numbered as in tone.wgsl
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Textures of an image: radiance as shaded; exposed, linear; exposed, in sRGB bytes.
+    """Textures of a picture.
 
-    packed : buffers for reading it back, by their number of words
+    radiance : radiance and coverage
+    exposed : linear light after exposure
+    bytes : sRGB bytes
+    size : (width, height) [pixel]
+    packed : buffers for the readback, by their number of words
     """
 
     radiance: Texture
@@ -27,7 +31,7 @@ class Picture:
 
 
 def make_picture(device: Device, size: tuple[int, int]) -> Picture:
-    """Space for an image of size (width, height)."""
+    """Allocate the textures of a picture of size (width, height)."""
     radiance, exposed = (make_texture(device, size, "rgba32float", name="picture") for _ in range(2))
     return Picture(radiance, exposed, make_texture(device, size, "rgba8uint", name="picture"), size)
 
@@ -35,18 +39,18 @@ def make_picture(device: Device, size: tuple[int, int]) -> Picture:
 def draw(
     graph: Recorder, radiance: Texture, picture: Picture, settings: Settings, meter: Meter | None = None
 ) -> None:
-    """Expose, apply the tone curve and encode: fill the picture's linear and byte images.
+    """Apply exposure, tone curve and encoding: fill `picture.exposed` and `picture.bytes`.
 
-    meter : None where the exposure is given
+    meter : exposure meter, None for a fixed exposure
     """
     shader = program(graph.device, "post/post.wgsl")
     exposure, metered = exposure_input(graph.device, settings, meter)
-    record = shader.record("Post", exposure=exposure, **encoding_of(settings))
-    bound: MutableBindings = {"settings": record, "image": radiance, "metered": metered}
-    bound |= {"exposed": picture.exposed, "bytes": picture.bytes}
-    graph.compute("post", shader, bound, picture.size)
+    record = shader.record("Post", exposure=exposure, **encoding_members(settings))
+    bindings: MutableBindings = {"settings": record, "image": radiance, "metered": metered}
+    bindings |= {"exposed": picture.exposed, "bytes": picture.bytes}
+    graph.compute("post", shader, bindings, picture.size)
 
 
-def encoding_of(settings: Settings) -> dict[str, int]:
-    """Members of the shaders' records: tone curve, and whether colours are encoded."""
+def encoding_members(settings: Settings) -> dict[str, int]:
+    """Return members of shader records: the tone curve, and whether colours are sRGB-encoded."""
     return {"tone": _TONES.index(settings.tone), "encoded": int(settings.gamma == "right")}

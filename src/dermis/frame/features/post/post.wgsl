@@ -1,11 +1,11 @@
-// From radiance to the display's bytes: exposure, tone curve and sRGB encoding.
+// Exposure, tone curve and sRGB encoding, from radiance to the bytes of a display.
 //#include "encoding.wgsl"
 //#include "exposure.wgsl"
 
 struct Post {
-    exposure: f32, // 0 for the meter's
+    exposure: f32, // 0 for the metered one
     tone: u32,
-    encoded: u32, // 0 leaves the encoding out, which is wrong
+    encoded: u32, // 0 leaves the sRGB encoding out, which is a fault to compare with
 }
 
 @group(0) @binding(0) var<uniform> settings: Post;
@@ -21,7 +21,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let texel = textureLoad(image, id.xy, 0);
     let linear = texel.rgb * exposure_of(settings.exposure);
     textureStore(exposed, id.xy, vec4f(linear, texel.a));
-    // Integers, because a store to a normalised format may round either way.
-    let levels = levels_of(linear, settings.tone, settings.encoded);
-    textureStore(bytes, id.xy, vec4u(levels, u32(round(255.0 * texel.a))));
+    // Integers, because stores to normalised formats may round up or down.
+    let colour_bytes = display_bytes(linear, settings.tone, settings.encoded);
+    textureStore(bytes, id.xy, vec4u(colour_bytes, u32(round(255.0 * texel.a))));
 }

@@ -18,71 +18,75 @@ from dermis.scene.settings import Settings
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """Space for what makes a picture of radiance.
+    """Resources of post-processing.
 
-    meter : of the exposure, None where it is given
-    backdrop : what is behind the head, None for nothing
-    glow : of the bloom, None without one
+    meter : exposure meter, None for a fixed exposure
+    backdrop : textures of the background, None without background
+    bloom : textures of the bloom, None without bloom
     """
 
     picture: Picture
     meter: Meter | None
     backdrop: Backdrop | None
-    glow: BloomTextures | None
+    bloom: BloomTextures | None
 
 
 def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     """Return the resources of the requested post-processing.
 
-    Raises DermisError for a background that shows an environment where there is none.
+    Raises DermisError for a background that shows the environment of a scene without one.
     """
     settings, cached = request.settings, memo.get
     return Resources(
         picture=cached(make_picture, device, settings.size),
         meter=cached(make_meter, device) if settings.exposure == "auto" else None,
         backdrop=_backdrop(memo, device, request),
-        glow=cached(make_bloom, device, settings.size) if settings.bloom else None,
+        bloom=cached(make_bloom, device, settings.size) if settings.bloom else None,
     )
 
 
 def draw(
     graph: Recorder,
-    made: Resources,
+    resources: Resources,
     settings: Settings,
     radiance: Texture,
-    lit: Bindings,
+    lighting: Bindings,
     view: UniformRecord,
     light_constants: Constants,
     visibility: Texture,
 ) -> None:
     """Declare the passes from radiance to the picture.
 
-    lit, view, light_constants : resources and record of the shading, and pipeline constants of the lights
-    visibility : texture of the triangles that samples see
+    lighting : resources of the lighting
+    view : record of the shading
+    light_constants : pipeline constants of the lights
+    visibility : texture of the triangle at each sample
     """
-    if made.meter:
-        meter.draw(graph, made.meter, (lit, view, light_constants), visibility, radiance)
-    if made.backdrop:
-        radiance = background.draw(graph, made.backdrop, (lit, view), radiance, made.meter, settings)
-    if made.glow:
-        radiance = bloom.draw(graph, made.glow, radiance, settings.bloom)
-    picture.draw(graph, radiance, made.picture, settings, made.meter)
+    if resources.meter:
+        shading = lighting, view, light_constants
+        meter.draw(graph, resources.meter, shading, visibility, radiance)
+    if resources.backdrop:
+        backdrop, exposure = resources.backdrop, resources.meter
+        radiance = background.draw(graph, backdrop, (lighting, view), radiance, exposure, settings)
+    if resources.bloom:
+        radiance = bloom.draw(graph, resources.bloom, radiance, settings.bloom)
+    picture.draw(graph, radiance, resources.picture, settings, resources.meter)
 
 
 def _backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | None:
-    """Return space for what is behind the head, with the sharp panorama where that is shown."""
-    settings, around = request.settings, request.environment
+    """Return the textures of the background, with the unfiltered panorama if that is shown."""
+    settings, environment = request.settings, request.environment
     if settings.background == "none":
         return None
-    result = memo.get(_result, device, settings.size)
+    result = memo.get(_make_result, device, settings.size)
     if settings.background != "environment":
         return Backdrop(result)
-    if around is None:
+    if environment is None:
         advice = "Add one (--env), or choose another"
         refuse("background environment", "an environment", "there is none", advice)
     sharp = settings.background_blur == 0.0
-    return Backdrop(result, memo.get(unfiltered_panorama, device, around.name) if sharp else None)
+    return Backdrop(result, memo.get(unfiltered_panorama, device, environment.name) if sharp else None)
 
 
-def _result(device: Device, size: tuple[int, int]) -> Texture:
+def _make_result(device: Device, size: tuple[int, int]) -> Texture:
     return make_texture(device, size, "rgba32float")

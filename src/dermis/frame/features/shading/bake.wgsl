@@ -19,7 +19,7 @@ struct Baking {
 fn shading_point_from_above(triangle: u32, weights: vec3f) -> ShadingPoint {
     let t = triangle_at(triangle);
     var point = interpolate(corner_at(t.x), corner_at(t.y), corner_at(t.z), weights, t.w);
-    point.place = place_of_point(triangle, weights);
+    point.atlas_uv = atlas_position(triangle, weights);
     point.curvature = dot(weights, vec3f(curvatures[t.x], curvatures[t.y], curvatures[t.z]));
     var surface: Surface;
     if (is_opaque(point)) {
@@ -53,7 +53,7 @@ fn pigments_at(point: Point) -> vec2f {
 }
 
 fn thickness_at(point: Point) -> f32 {
-    let thickness = load_bilinear(thickness_map, point.place);
+    let thickness = load_bilinear(thickness_map, point.atlas_uv);
     return select(0.0, thickness.x / max(thickness.a, 1e-6), (point.flags & MAPPED) != 0u);
 }
 
@@ -69,7 +69,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= baking.count) {
         return;
     }
@@ -88,7 +88,7 @@ fn main(
     let u = length(shading_point.point.dpdu);
     let v = length(shading_point.point.dpdv);
     store_vec3(first + 12u, vec3f(u, v, dot(shading_point.point.dpdu, shading_point.point.dpdv) / max(u * v, 1e-9)));
-    store_vec3(first + 15u, vec3f(surface.roughness, surface.rho_s, 1.0 - enters_from_everywhere(surface.roughness, surface.rho_s)));
+    store_vec3(first + 15u, vec3f(surface.roughness, surface.rho_s, 1.0 - enters_uniform(surface.roughness, surface.rho_s)));
     store_vec3(first + 18u, vec3f(pigments, thickness_at(shading_point.point)));
     baked[first + 21u] = shading_point.point.curvature;
 }

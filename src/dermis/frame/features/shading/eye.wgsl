@@ -50,14 +50,14 @@ fn tears_at(smooth_film: vec3f, lids: Lids) -> vec3f {
 fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f) -> EyeLit {
     let rotation = mat3x3f(eye.to_own[0].xyz, eye.to_own[1].xyz, eye.to_own[2].xyz);
     let d = normalize(rotation * -v);
-    let clear = clear_at(p);
+    let clear = clearness(p);
     let ball = normalize(p - vec3f(0.0, 0.0, eye.middle_mm));
     let cornea = normalize(p - vec3f(0.0, 0.0, CORNEA_AT));
-    let on_iris = on_iris_at(seen_on_iris(p, d));
+    let on_iris = clamped_to_iris(refracted_to_iris(p, d));
     let film = tears_at(normalize(mix(ball, cornea, clear)), lids);
     // the white scatters light around its curvature
-    let below = normalize(mix(ball + vec3f(0.0, 0.0, AROUND), gathered_at(on_iris), clear));
-    let colour = mix(white_colour(eye, p), UNDER_WATER * iris_colour(eye, on_iris), clear) * lid_transmittance(lids);
+    let below = normalize(mix(ball + vec3f(0.0, 0.0, FORWARD), iris_normal(on_iris), clear));
+    let colour = mix(white_colour(eye, p), IRIS_FACTOR * iris_colour(eye, on_iris), clear) * lid_transmittance(lids);
     let back = transpose(rotation); // rotation and uniform scale, so that it transforms normals
     let film_roughness = mix(TEARS, MENISCUS_ROUGHNESS, meniscus_weight(lids));
     return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), SHADOW_SCATTER));

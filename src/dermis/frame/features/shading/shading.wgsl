@@ -82,16 +82,16 @@ fn blend_weights_at(at: vec2i) -> vec2f {
 fn shaded_skin(shading_point: ShadingPoint, lit: Lit, exit_factor: f32) -> Shaded {
     let point = shading_point.point;
     let surface = shading_point.surface;
-    let entering = share_of(surface.colour, skin.mix);
+    let entering = colour_power(surface.colour, skin.mix);
     var below = lit.entered * entering;
     if (PRE_INTEGRATED) {
         below = shade.total * pre_integrated(point, surface, shading_point.footprint, shading_point.open) * entering;
     } else if ((point.flags & MAPPED) != 0u) {
-        let relit = relit_at(point.place);
-        below = relit * below + load_bilinear(scattered, point.place).rgb;
+        let relit = relit_at(point.atlas_uv);
+        below = relit * below + load_bilinear(scattered, point.atlas_uv).rgb;
         if (STRIPE_LIGHT) {
             let side = vec2f(textureDimensions(scattered));
-            below += entering * finer_light(point, surface, shading_point.texel, shade.fine, relit, side);
+            below += entering * light_finer_than_texels(point, surface, shading_point.texel, shade.fine, relit, side);
             below = max(below, vec3f(0.0));
         }
     } else {
@@ -99,11 +99,11 @@ fn shaded_skin(shading_point: ShadingPoint, lit: Lit, exit_factor: f32) -> Shade
     }
     let reflected = shade.light_factors.y * lit.reflected * mix(vec3f(1.0), surface.colour, skin.tint);
     var local = vec3f(0.0);
-    var leaving = shade.light_factors.x * exit_factor * share_of(surface.colour, 1.0 - skin.mix);
+    var leaving = shade.light_factors.x * exit_factor * colour_power(surface.colour, 1.0 - skin.mix);
     if (HALF_SPACE) {
         // Light above the mean has scattered once and is not blurred: at grazing angles it is many times the blurred light, which
         // must not be multiplied by it.
-        let excess = directional_share(lit, shade.total * entering, below);
+        let excess = directional_fraction(lit, shade.total * entering, below);
         local = below * leaving * max(excess, vec3f(0.0));
         leaving *= 1.0 + min(excess, vec3f(0.0));
     }
@@ -130,7 +130,7 @@ fn shading_point_at(triangle: u32, position: vec2f, coverage: f32, size: vec2f) 
     let w = meet(weights, ray_to_position(position, size));
     let inside = within(w); // a sample on an edge may be slightly outside
     var point = interpolate(a, b, c, inside, t.w);
-    point.place = place_of_point(triangle, inside);
+    point.atlas_uv = atlas_position(triangle, inside);
     point.curvature = curvature_at(t, inside);
     let open = open_sky(point, t, inside);
     let v = normalize(shade.eye - point.position);
@@ -192,7 +192,7 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
 
 fn lit_at(shading_point: ShadingPoint) -> Lit {
     // The only call: software adapters run both sides of a branch for all pixels.
-    return light_through(shading_point.point, shading_point.surface, shading_point.film, shading_point.v, shading_point.open);
+    return illuminate_film(shading_point.point, shading_point.surface, shading_point.film, shading_point.v, shading_point.open);
 }
 
 fn shaded(shading_point: ShadingPoint, lit: Lit) -> Shaded {

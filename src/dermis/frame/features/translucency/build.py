@@ -114,7 +114,9 @@ class PairCache:
         if pairs is None:
             while len(self._cache) >= _CACHE_SIZE:
                 self._cache.pop(next(iter(self._cache)))
-            pairs = find_pairs(self._device, self._surface, self._atlas, divide_into_cells(self._atlas, widest_mm))
+            pairs = find_pairs(
+                self._device, self._surface, self._atlas, divide_into_cells(self._atlas, widest_mm)
+            )
         self._cache[widest_mm] = pairs
         return pairs
 

@@ -178,7 +178,7 @@ def draw_weights(graph: Recorder, thin: Translucency) -> None:
 
 
 def choose_source_level(spacing_mm: float, variance_mm2: Floats) -> int:
-    """Return the index of the narrowest blurred level that sources of this spacing sample without aliasing."""
+    """Return the index of the narrowest blurred level that sources sample without aliasing."""
     smooth = np.flatnonzero(variance_mm2 >= (_SMOOTH * spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
@@ -213,7 +213,7 @@ def weight_bindings(
 
 
 def _table(gaussians: int, tables: ThinParts | None, transmittance: Floats | None) -> NDArray[np.float32]:
-    """Return (rows k, 4) transmittance by thickness and Gaussian, with the depth factor in the first alpha."""
+    """Return (rows k, 4) transmittance by thickness and Gaussian; the first alpha is the directionality."""
     if tables is None or transmittance is None:
         return np.zeros((1, 4), np.float32)
     table = np.zeros((THICKNESS_ROWS, gaussians, 4), np.float32)

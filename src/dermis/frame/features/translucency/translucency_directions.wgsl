@@ -28,14 +28,14 @@ fn main(
     let texel = vec2u(source_points[index].texel & 0xffffu, source_points[index].texel >> 16u);
     let packed = packed_at(vec2i(texel));
     var factor = vec3f(1.0); // for uniform light
-    if (packed.look.w != 0u) {
+    if (packed.appearance.w != 0u) {
         let surface = unpack_surface(packed);
         var point = unpack_point(packed);
-        point.place = (vec2f(texel) + 0.5) / vec2f(textureDimensions(surfaces));
+        point.atlas_uv = (vec2f(texel) + 0.5) / vec2f(textureDimensions(surfaces));
         if (OBLIQUE) {
-            bend_here = bend_at(vec2i(texel), packed.place);
+            local_bend = bend_at(vec2i(texel), packed.geometry);
         }
-        let lit = light_up(point, surface, surface.normal, open_at(point.place));
+        let lit = illuminate(point, surface, surface.normal, open_at(point.atlas_uv));
         factor = select(factor, lit.across / max(lit.entered, vec3f(1e-20)), lit.entered > vec3f(0.0));
     }
     direction_factors[index] = pack_light(factor);

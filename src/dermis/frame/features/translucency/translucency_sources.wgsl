@@ -23,7 +23,7 @@ fn with_texel(sum: CellSum, at: vec2u, middle: vec2f) -> CellSum {
     let t = triangle_at(index);
     let w = unpack2x16unorm(texel.y);
     let weights = vec3f(1.0 - w.x - w.y, w);
-    let offset = abs(f32(cells.size) * place_of_point(index, weights) - (vec2f(at) + 0.5));
+    let offset = abs(f32(cells.size) * atlas_position(index, weights) - (vec2f(at) + 0.5));
     let inside = texel.x > 0u && max(offset.x, offset.y) < INSIDE;
     let a = corner_at(t.x);
     let b = corner_at(t.y);
@@ -50,7 +50,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= cells.count) {
         return;
     }

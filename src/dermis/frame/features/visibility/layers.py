@@ -1,7 +1,7 @@
 """Rasterisation of the nearest surface in each pixel of one or more views: its depth or its triangle.
 
-There are two implementations. A compute pass is several times faster than the rasteriser on the GPUs measured;
-software adapters rasterise faster than they compute.
+There are two implementations: a compute pass, which is several times faster on GPUs, and the rasteriser,
+which is faster on software adapters.
 """
 
 from __future__ import annotations
@@ -188,14 +188,16 @@ def _depth_range_mm(clip: Matrix) -> float:
     scale = sum(d * d for d in distance)
     if scale == 0.0:  # parallel rays
         return 1.0 / math.hypot(*depth)
-    slope = sum(a * b for a, b in zip(depth, distance, strict=True)) / scale  # depth = slope + rise / distance
+    slope = (
+        sum(a * b for a, b in zip(depth, distance, strict=True)) / scale
+    )  # depth = slope + rise / distance
     rise = depth_offset - slope * distance_offset
     return rise / (slope * slope) / math.sqrt(scale)
 
 
 @cache
 def _work_split(triangles: int, views: int, samples: int) -> tuple[Constants, int]:
-    """Return the pipeline constants for a number of triangles, tuned on an H200, and the number of workgroups."""
+    """Return the pipeline constants, tuned on an H200, and the number of workgroups."""
     fewest, most = _GROUP_TRIANGLES
     per_group = min(most, max(fewest, 1 << (triangles * views // _GROUPS).bit_length() >> 1))
     many = per_group == most  # many triangles are small ones

@@ -23,6 +23,6 @@ fn ray_weights(t: vec4u, ray: vec3f, eye: vec3f) -> vec3f {
 fn point_on_triangle(index: u32, weights: vec3f) -> Point {
     let t = triangle_at(index);
     var point = interpolate(corner_at(t.x), corner_at(t.y), corner_at(t.z), weights, t.w);
-    point.place = place_of_point(index, weights);
+    point.atlas_uv = atlas_position(index, weights);
     return point;
 }

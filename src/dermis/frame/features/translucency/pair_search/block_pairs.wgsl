@@ -10,7 +10,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     let all = search.blocks * search.blocks;
     let words = (all + 31u) / 32u;
     if (index >= search.count) {

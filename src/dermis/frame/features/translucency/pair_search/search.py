@@ -163,7 +163,7 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
 
 
 def _expand_ranges(first: Index, chosen: Index) -> tuple[Index, Index]:
-    """Return all numbers in ranges first[i] to first[i + 1] for the chosen i, and the position of i in chosen."""
+    """Return all numbers of the chosen ranges first[i] to first[i + 1], and the index in `chosen` of each."""
     count = first[chosen + 1] - first[chosen]
     position = np.repeat(np.arange(len(chosen)), count)
     numbers = np.arange(len(position)) + np.repeat(first[chosen] - list_offsets(count)[:-1], count)
@@ -187,7 +187,7 @@ def draw_points(
 
 
 def upload_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
-    """Upload the ranges that hits.wgsl reads, and return their buffers and the number of words of all hits."""
+    """Upload the ranges that hits.wgsl reads; return the buffers, and the number of words of all hits."""
     word = list_offsets(candidates.end - candidates.first)
     unused = np.zeros(len(candidates.receiver), np.int64)
     ranges = candidates.sources_first, candidates.sources_end

@@ -58,7 +58,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let tile = number_of(group, groups, lane);
+    let tile = list_index(group, groups, lane);
     if (tile >= search.count) {
         return;
     }
