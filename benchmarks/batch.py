@@ -1,7 +1,9 @@
-"""How fast data sets are drawn: -o benchmarks/results/scale_NAME.json
+"""Measure the speed of data set rendering.
 
-On any machine: new people and one person moving, by one worker and by several, and by those of dask. All
-numbers of a file are of one run; ratios among them are what to go by on a machine that others use too.
+    python benchmarks/batch.py -o benchmarks/results/scale_NAME.json
+
+Measures new people and one moving person, with one and several local workers and with dask workers. All
+figures of a file are of one run; on a shared machine only their ratios are reliable.
 """
 
 from __future__ import annotations
@@ -52,10 +54,10 @@ MARKS = 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000
 
 @dataclass(frozen=True)
 class Plan:
-    """What is measured on, and how long.
+    """Extent of the measurements.
 
-    images : of each run, for one worker
-    out : folder on the disk that is meant; a temporary one where None
+    images : number of images of each run, per worker
+    out : folder on the disk to measure; None for a temporary folder
     """
 
     adapter: str = "auto"
@@ -67,7 +69,7 @@ class Plan:
 
 
 def spec_for(plan: Plan, images: int, shards: int, *, moving: bool = False) -> Spec:
-    """The example's people, faces, light and cameras; or one person, moving in one light."""
+    """Return the spec of the example with random people, or of one person moving in one light."""
     tables: JsonObject = tomllib.loads(example_toml())
     tables |= {"count": images, "size": list(plan.size), "shard_size": max(1, images // shards)}
     tables |= {"outputs": list(OUTPUTS), "landmarks": list(LANDMARKS)}
@@ -80,9 +82,9 @@ def spec_for(plan: Plan, images: int, shards: int, *, moving: bool = False) -> S
 
 @dataclass
 class Clock:
-    """When images were there, and how much memory the workers had.
+    """Times at which images were finished, and the memory of the workers.
 
-    resident : bytes of the largest worker after so many images of each, about
+    resident : resident bytes of the largest worker by number of images of each
     """
 
     seen: list[tuple[float, int]] = field(default_factory=list)
@@ -90,7 +92,8 @@ class Clock:
     workers: int = 1
     resident: dict[int, int] = field(default_factory=dict)
 
-    def told(self, progress: Progress) -> None:
+    def record(self, progress: Progress) -> None:
+        """Record the progress of a run."""
         self.seen.append((time.monotonic(), progress.images))
         for mark in MARKS:
             if mark not in self.resident and progress.images >= mark * self.workers:
@@ -100,7 +103,7 @@ class Clock:
             self.memory.append(max((_resident(one.pid) for one in active_children()), default=0))
 
     def rate(self) -> float:
-        """Images/s in between."""
+        """Return the number of images per second between the first and the last image."""
         total = self.seen[-1][1]
         (began, first), *_ = [one for one in self.seen if one[1] >= _FROM * total]
         *_, (ended, last) = [one for one in self.seen if one[1] <= max(_TO * total, first + 1)]
@@ -108,10 +111,10 @@ class Clock:
 
 
 def measured_run(plan: Plan, pool: WorkerPool, spec: Spec, encoders: int, count: int = 1) -> JsonObject:
-    """Images/s of a run, bytes of an image, and memory of a worker at its begin and end [byte]."""
+    """Return images/s, bytes per image, and the memory of a worker at begin and end of a run [byte]."""
     clock, began = Clock(workers=count), time.monotonic()
     with _folder(plan) as out:
-        report = run_batch(RunOptions(spec, out, encoders), pool, on_progress=clock.told)
+        report = run_batch(RunOptions(spec, out, encoders), pool, on_progress=clock.record)
         size = sum(path.stat().st_size for path in out.rglob("shard-*") if path.is_file())
     return {
         "images": report.images,
@@ -124,7 +127,7 @@ def measured_run(plan: Plan, pool: WorkerPool, spec: Spec, encoders: int, count:
 
 
 def workers(plan: Plan, count: int, *, moving: bool = False) -> JsonObject:
-    """Plain processes, so many of them."""
+    """Measure a run with the given number of local workers."""
     slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
     spec = spec_for(plan, plan.images * count, 2 * count, moving=moving)
     found = measured_run(plan, ProcessPool(slots), spec, encoders, count)
@@ -132,7 +135,7 @@ def workers(plan: Plan, count: int, *, moving: bool = False) -> JsonObject:
 
 
 def dask(plan: Plan, count: int) -> JsonObject:
-    """The same work by plain processes and by as many workers of dask, each timed by whole shards."""
+    """Measure the same run with local processes and with dask workers, timed by complete shards."""
     distributed = import_extra("distributed", "the comparison with dask")
     slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
     spec = spec_for(plan, plan.images * count, _SHARDS * count)
@@ -156,24 +159,24 @@ def dask(plan: Plan, count: int) -> JsonObject:
 
 
 def steps(plan: Plan) -> JsonObject:
-    """Milliseconds of each step of an image by itself, in one process: medians."""
+    """Return the median time of each step of an image in one process [ms]."""
     spec = spec_for(plan, min(_MOST_STEPS, plan.images), 1)
     maker, renderer = SceneBuilder(spec), Renderer(plan.adapter, cache_ttl=16)
-    told: dict[str, list[float]] = {}
+
+    def observe(scene: Any, settings: Any) -> Any:
+        return next(renderer.observe([scene], settings, outputs=spec.outputs, landmarks=spec.landmarks))
+
+    times_ms: dict[str, list[float]] = {}
     for number in range(spec.count):
-        parameters = _timed(told, "parameters", lambda: spec.parameters(number))  # noqa: B023
-        scene, settings = _timed(told, "scene", lambda: maker.build(parameters))  # noqa: B023
-
-        def seen(scene: Any = scene, settings: Any = settings) -> Any:
-            return next(renderer.observe([scene], settings, outputs=spec.outputs, landmarks=spec.landmarks))
-
-        observation = _timed(told, "draw_and_read", seen)
-        _timed(told, "encode", lambda: encode_record(number, observation, parameters, spec))  # noqa: B023
-    return {name: median(times[2:]) for name, times in told.items()}  # the first ones fill caches
+        parameters = _timed(times_ms, "parameters", spec.parameters, number)
+        scene, settings = _timed(times_ms, "scene", maker.build, parameters)
+        observation = _timed(times_ms, "draw_and_read", observe, scene, settings)
+        _timed(times_ms, "encode", encode_record, number, observation, parameters, spec)
+    return {name: median(times[2:]) for name, times in times_ms.items()}  # the first ones fill caches
 
 
 def disk(plan: Plan) -> JsonObject:
-    """Bytes/s that a file takes, to the disk itself."""
+    """Return the write speed of the disk [byte/s]."""
     block = os.urandom(1 << 24)
     with _folder(plan) as out:
         began = time.perf_counter()
@@ -184,8 +187,8 @@ def disk(plan: Plan) -> JsonObject:
         return {"bytes_per_s": _DISK_BYTES / (time.perf_counter() - began)}
 
 
-def machine_of(plan: Plan) -> JsonObject:
-    """What all of it is measured on."""
+def machine_description(plan: Plan) -> JsonObject:
+    """Return the description of the machine."""
     adapters = SlotRequest(plan.adapter).adapters()
     return {
         "adapters": [one.name for one in adapters],
@@ -198,15 +201,15 @@ def machine_of(plan: Plan) -> JsonObject:
     }
 
 
-def _timed(told: dict[str, list[float]], name: str, job: Callable[[], Any]) -> Any:
+def _timed(times_ms: dict[str, list[float]], name: str, job: Callable[..., Any], *args: Any) -> Any:
     began = time.perf_counter()
-    found = job()
-    told.setdefault(name, []).append(1e3 * (time.perf_counter() - began))
+    found = job(*args)
+    times_ms.setdefault(name, []).append(1e3 * (time.perf_counter() - began))
     return found
 
 
 def _resident(pid: int | None) -> int:
-    """Bytes of memory that a process holds; 0 where that is not told."""
+    """Return the resident memory of a process [byte]; 0 if unknown."""
     try:
         return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):
@@ -221,7 +224,7 @@ def _folder(plan: Plan) -> Iterator[Path]:
 
 @contextmanager
 def _environment(values: Mapping[str, str]) -> Iterator[None]:
-    """Variables that processes started meanwhile see."""
+    """Set environment variables for processes started inside the block."""
     before = {name: os.environ.get(name) for name in values}
     os.environ.update(values)
     try:
@@ -255,37 +258,37 @@ def main(
     Parameters
     ----------
     output:
-        JSON to write.
+        JSON file to write.
     adapter:
-        As of `dermis batch`.
+        Adapter as for `dermis batch`.
     size:
-        Of the images.
+        Width and height of the images, WIDTHxHEIGHT [pixel].
     atlas:
-        Texels along its side.
+        Side of the atlas [texel].
     images:
-        For each worker of each run; more give steadier numbers.
+        Number of images per worker of each run; more give steadier figures.
     workers:
-        How many of them, in all, one run after the other.
+        Numbers of workers, one run for each, separated by commas.
     encoders:
-        Of each worker [by the number of cores].
+        Number of encoders per worker. [default: by the number of cores]
     parts:
-        Names of steps, new, moving, dask and disk, separated by commas.
+        Names of parts to measure, separated by commas: steps, new, moving, dask and disk.
     disk:
-        Folder on the disk that is meant [the system's temporary one].
+        Folder on the disk to measure. [default: the temporary folder of the system]
     """
     target = check_output(output, (".json",), "Choose such a name")
     plan = Plan(adapter, parse_size(size), atlas, images, encoders, disk)
     counts = [int(one) for one in workers.split(",")]
-    told = measure(plan, counts, parts.split(","), lambda told: write_results(target, told, _DIGITS))
-    print_lines(*table(told))
+    figures = measure(plan, counts, parts.split(","), lambda figures: write_results(target, figures, _DIGITS))
+    print_lines(*table(figures))
     return 0
 
 
 def measure(
     plan: Plan, counts: list[int], parts: list[str], keep: Callable[[JsonObject], None]
 ) -> JsonObject:
-    """All figures; `keep` gets those known so far after each part."""
-    told: JsonObject = {"machine": machine_of(plan), **_about()}
+    """Return all figures; call `keep` with those known so far after each part."""
+    figures: JsonObject = {"machine": machine_description(plan), **_about()}
     jobs: dict[str, Callable[[], Any]] = {
         "steps": lambda: steps(plan),
         "new": lambda: [workers(plan, count) for count in counts],
@@ -297,30 +300,30 @@ def measure(
         if part not in jobs:
             raise DermisError(f"--parts: expected some of {', '.join(PARTS)}, but got {part!r}. Correct it.")
         note(part)
-        told[part] = jobs[part]()
-        keep(told)
-    return told
+        figures[part] = jobs[part]()
+        keep(figures)
+    return figures
 
 
-def table(told: JsonObject) -> list[str]:
-    """Lines for people."""
-    machine = told["machine"]
+def table(figures: JsonObject) -> list[str]:
+    """Return the figures as lines of text."""
+    machine = figures["machine"]
     lines = [
         f"{', '.join(machine['adapters'])}, {machine['cores']} cores, "
-        f"{machine['size'][0]}x{machine['size'][1]}, atlas {machine['atlas']}, load before {told['load']}"
+        f"{machine['size'][0]}x{machine['size'][1]}, atlas {machine['atlas']}, load before {figures['load']}"
     ]
     for name in ("new", "moving"):
-        runs = told.get(name, [])
+        runs = figures.get(name, [])
         for one in runs:
             ratio = one["images_per_s"] / runs[0]["images_per_s"]
             who = f"{one['workers']:3} workers on {one['adapters']} adapters, {one['encoders']} encoders each"
             rate = f"{one['images_per_s']:9.3g} images/s, {ratio:.2f} x the first"
             lines.append(f"{name:8}{who}{rate}, {one['bytes_per_image'] / 1e3:.0f} kB an image")
-    if dask := told.get("dask"):
+    if dask := figures.get("dask"):
         lines.append(f"dask    {dask['workers']:3} workers: {dask['dask_over_plain']:.3f} x plain processes")
-    if steps := told.get("steps"):
+    if steps := figures.get("steps"):
         lines.append("alone   " + ", ".join(f"{name} {ms:.3g} ms" for name, ms in steps.items()))
-    if disk := told.get("disk"):
+    if disk := figures.get("disk"):
         lines.append(f"disk    {disk['bytes_per_s'] / 1e6:.0f} MB/s")
     return lines
 

@@ -1,6 +1,6 @@
-"""Writes docs/scale.md from what `batch.py` has measured.
+"""Write docs/scale.md from the results of `batch.py`.
 
-Each results/scale_*.json is a machine.
+Each file results/scale_*.json describes one machine.
 """
 
 from __future__ import annotations
@@ -30,56 +30,56 @@ def main() -> None:
 
 
 def page(machines: Sequence[JsonObject]) -> str:
-    """The page's text."""
+    """Return the text of the page."""
     return "\n".join([_HEAD, *map(_machine, machines)])
 
 
-def _machine(told: JsonObject) -> str:
-    machine, versions = told["machine"], told["versions"]
+def _machine(figures: JsonObject) -> str:
+    machine, versions = figures["machine"], figures["versions"]
     width, height = machine["size"]
     parts = [
         f"## {', '.join(machine['adapters'])}, {machine['cores']} cores\n",
         f"{width} x {height}, atlas {machine['atlas']}; with each picture {', '.join(machine['outputs'])}, "
-        f"landmarks and parameters.\n{told['date'][:10]}, dermis {versions['dermis']}, "
-        f"wgpu {versions['wgpu']}; load average before: {told['load']}.{_noted(told)}\n",
+        f"landmarks and parameters.\n{figures['date'][:10]}, dermis {versions['dermis']}, "
+        f"wgpu {versions['wgpu']}; load average before: {figures['load']}.{_remarks(figures)}\n",
         "### Measured\n",
-        _rates(told),
+        _rates(figures),
     ]
-    if steps := told.get("steps"):
+    if steps := figures.get("steps"):
         rows = [(name.replace("_", " "), f"{ms:.3g}") for name, ms in steps.items()]
         parts += ["### An image by itself\n", _table(("step", "ms"), rows)]
-    parts += [f"### On paper: {IMAGES:,} images of new people\n", _table(("", ""), paper(told))]
+    parts += [f"### On paper: {IMAGES:,} images of new people\n", _table(("", ""), paper(figures))]
     return "\n".join(parts)
 
 
-def _noted(told: JsonObject) -> str:
-    """What is to be said of the machine's figures besides, after a sentence."""
-    return f" {told['note']}" if "note" in told else ""
+def _remarks(figures: JsonObject) -> str:
+    """Return remarks on the figures of a machine, to be appended to a sentence."""
+    return f" {figures['note']}" if "note" in figures else ""
 
 
-def _memory(told: JsonObject) -> str:
-    """How much a worker holds after so many images, where that was read."""
+def _memory(figures: JsonObject) -> str:
+    """Return the text about the memory of a worker by number of images, if it was measured."""
     rows = [
         (_KINDS[name], one["workers"], mark, f"{size / 1e6:.0f}")
         for name in _KINDS
-        for one in told.get(name, [])
+        for one in figures.get(name, [])
         for mark, size in one.get("resident_bytes", {}).items()
     ]
     heads = "what", "workers", "images of each, about", "memory of the largest [MB]"
     return f"\n{_table(heads, rows)}" if rows else ""
 
 
-def _rates(told: JsonObject) -> str:
+def _rates(figures: JsonObject) -> str:
     rows = []
     for name, words in _KINDS.items():
-        runs = told.get(name, [])
+        runs = figures.get(name, [])
         for one in runs:
             memory = " to ".join(f"{size / 1e6:.0f}" for size in one["worker_bytes"]) or "unknown"
             ratio = one["images_per_s"] / runs[0]["images_per_s"]
             who = one["workers"], one["adapters"], one["encoders"]
             rows.append((words, *who, f"{one['images_per_s']:.3g}", f"{ratio:.2f}", memory))
-    text = _table(_HEADS, rows) + _memory(told)
-    if dask := told.get("dask"):
+    text = _table(_HEADS, rows) + _memory(figures)
+    if dask := figures.get("dask"):
         ratio = dask["dask_over_plain"]
         text += (
             f"\n{dask['workers']} workers of dask draw {ratio:.3f} times what as many plain processes do.\n"
@@ -87,11 +87,11 @@ def _rates(told: JsonObject) -> str:
     return text
 
 
-def paper(told: JsonObject) -> list[tuple[str, str]]:
-    """What so many images take where the fastest measured run goes on like that."""
-    best = max(told["new"], key=lambda one: float(one["images_per_s"]))
+def paper(figures: JsonObject) -> list[tuple[str, str]]:
+    """Return the extrapolated times of larger data sets at the rate of the fastest run."""
+    best = max(figures["new"], key=lambda one: float(one["images_per_s"]))
     rate, size = best["images_per_s"], best["bytes_per_image"]
-    hours, limits = IMAGES / rate / 3600, ceilings(told, best)
+    hours, limits = IMAGES / rate / 3600, ceilings(figures, best)
     rows = [
         ("images/s", f"{rate:.3g}"),
         ("hours of this machine", f"{hours:,.0f}"),
@@ -100,21 +100,21 @@ def paper(told: JsonObject) -> list[tuple[str, str]]:
         ("files", f"{IMAGES // _SHARD:,} shards of {_SHARD * size / 1e6:,.0f} MB"),
         *((f"at most, by {name}", f"{limit:,.3g} images/s") for name, limit in limits.items()),
     ]
-    if "steps" in told and "disk" in told:
+    if "steps" in figures and "disk" in figures:
         rows.append(("what is reached first", min(limits, key=lambda name: limits[name])))
     return rows
 
 
-def ceilings(told: JsonObject, run: JsonObject) -> dict[str, float]:
-    """Images/s that each part could do if the others took no time, of those that were measured."""
+def ceilings(figures: JsonObject, run: JsonObject) -> dict[str, float]:
+    """Return the images/s that each measured step alone would permit."""
     found, encoders = {}, run["workers"] * run["encoders"]
-    if steps := told.get("steps"):
+    if steps := figures.get("steps"):
         drawing = steps["parameters"] + steps["scene"] + steps["draw_and_read"]
         drawing += 0.0 if encoders else steps["encode"]
         found["the workers' own time"] = 1e3 * run["workers"] / drawing
         if encoders:
             found["encoding"] = 1e3 * encoders / steps["encode"]
-    if disk := told.get("disk"):
+    if disk := figures.get("disk"):
         found["the disk"] = disk["bytes_per_s"] / run["bytes_per_image"]
     return found
 

@@ -1,9 +1,9 @@
-"""Data sets by Cycles and by us on one CPU, in one run: seconds for an image of a new person, and its noise.
+"""Compare data sets by Cycles and by dermis on one CPU: seconds per image of a new person, and its noise.
 
-Needs DERMIS_BLENDER_PYTHON, a Python with bpy. Cycles renders people that `dermis head` wrote, with light
-below their skin, depth, normals and the number of the material, as those who make data sets with Blender do;
-ours come from `dermis batch`, with hair, brows and lashes, which the files for Cycles lack, and with labels
-and landmarks. Ten minutes on two idle cores.
+Needs DERMIS_BLENDER_PYTHON, a Python interpreter with bpy. Cycles renders people written by `dermis head`,
+with subsurface scattering, depth, normals and material indices. `dermis batch` renders people with hair,
+brows and lashes, which the files for Cycles lack, and with labels and landmarks. Takes ten minutes on two
+idle cores.
 """
 
 from __future__ import annotations
@@ -51,15 +51,15 @@ def main(
     Parameters
     ----------
     people:
-        That Cycles renders.
+        Number of people that Cycles renders.
     images:
-        That dermis batch draws, each of a new person.
+        Number of images of `dermis batch`, each of a new person.
     side:
-        Of pictures [pixel].
+        Side of the pictures [pixel].
     samples:
-        Paths through each pixel, with commas; each with and without denoising.
+        Paths per pixel, separated by commas; each with and without denoising.
     output:
-        Raw figures.
+        JSON file with the raw figures.
     """
     python = blender_python(None)
     settings = [
@@ -84,7 +84,7 @@ def main(
 
 
 def table(report: JsonObject) -> str:
-    """The rows as Markdown."""
+    """Return the rows as a Markdown table."""
     head = "| renderer | setting | s an image, by the clock | of all cores | noise |\n|---|---|---|---|---|"
     return "\n".join([head, *map(_line, report["rows"])])
 
@@ -98,7 +98,7 @@ def _line(row: JsonObject) -> str:
 def _cycles(
     python: Path, folder: Path, people: int, side: int, settings: list[JsonObject]
 ) -> list[JsonObject]:
-    """A row for each setting, reading a person and building its scene included."""
+    """Return a row per setting of Cycles, including the time to load a person and build the scene."""
     for seed in range(people):
         _run([*_DERMIS, "head", "--seed", str(seed), "--size", "1024", "-o", str(folder / f"{seed}.glb")])
     plan = {"size": [side, side], "settings": settings}
@@ -116,7 +116,7 @@ def _cycles(
 
 
 def _ours(folder: Path, images: int, side: int, adapter: str) -> JsonObject:
-    """A row: what a run takes with its start, less what one of a single image takes."""
+    """Return the row of dermis: the time of a run, minus that of a run with one image."""
     spec = folder / "spec.toml"
     spec.write_text(_run([*_DERMIS, "batch", "--example"]), encoding="utf-8")
     spent = [_batch(spec, folder / f"of-{count}", count, side, adapter) for count in (1, 1, 1 + images)]
@@ -125,7 +125,7 @@ def _ours(folder: Path, images: int, side: int, adapter: str) -> JsonObject:
 
 
 def _batch(spec: Path, out: Path, count: int, side: int, adapter: str) -> tuple[float, float]:
-    """Seconds on the clock and of all cores for a data set of so many images."""
+    """Return wall time and CPU time of rendering a data set [s]."""
     began, worked = time.perf_counter(), _cores_s()
     size = ["--size", f"{side}x{side}", "--count", str(count), "--adapter", adapter]
     _run([*_DERMIS, "batch", str(spec), "-o", str(out), *size, "--json"])
@@ -143,7 +143,7 @@ def _row(renderer: str, setting: str, clock: float, cores: float, noise: float) 
 
 
 def _cores_s() -> float:
-    """Of all processes that were started and have ended."""
+    """Return the CPU time of all child processes that have ended [s]."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
@@ -152,9 +152,9 @@ _DERMIS = (sys.executable, "-m", "dermis")
 
 
 def _run(command: list[str]) -> str:
-    """What a command prints.
+    """Return the output of a command.
 
-    Raises DermisError when it fails.
+    Raises DermisError if it fails.
     """
     ran = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_S, check=False)
     if ran.returncode != 0:

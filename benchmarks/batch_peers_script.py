@@ -1,8 +1,8 @@
-"""Renders people with Cycles as for a data set. Blender's Python runs it: batch_peers_script.py FOLDER.
+"""Render people with Cycles as for a data set. Run by Blender's Python: batch_peers_script.py FOLDER.
 
-FOLDER holds plan.json (size, settings) and people as .glb. For each person the scene is made anew, with light
-from three sides and a camera before the face; each setting renders it twice with different seeds, with depth,
-normals and the number of the material. It leaves done.json with times, and the noise between the two.
+FOLDER contains plan.json (size, settings) and people as .glb. The scene of each person has three lights and a
+camera in front of the face; each setting renders it twice with different seeds, with depth, normals and
+material indices. The script writes done.json with times and the noise between the two renderings.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ _MIDDLE_M = 0.02  # of the face, below the middle between the eyes
 
 
 def main(folder: Path) -> None:
+    """Render all people with all settings and write done.json."""
     plan = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
     measured = [measure(folder, person, plan) for person in sorted(folder.glob("*.glb"))]
     done = {"version": bpy.app.version_string, "people": measured}
@@ -34,6 +35,7 @@ def main(folder: Path) -> None:
 
 
 def measure(folder: Path, person: Path, plan: dict[str, Any]) -> dict[str, Any]:
+    """Return the times of a person, and times and noise of each setting."""
     began, worked = time.perf_counter(), time.process_time()
     make_scene(person, plan["size"])
     made = time.perf_counter() - began, time.process_time() - worked
@@ -48,6 +50,7 @@ def measure(folder: Path, person: Path, plan: dict[str, Any]) -> dict[str, Any]:
 
 
 def make_scene(person: Path, size: list[int]) -> None:
+    """Load a person and set up skin, lights and camera."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module="cycles")
     bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
@@ -90,7 +93,7 @@ def set_render(size: list[int]) -> None:
 
 
 def written_as(kind: str) -> None:
-    """Choose what pictures are written as."""
+    """Set the file format of the pictures."""
     settings = bpy.context.scene.render.image_settings
     if hasattr(settings, "media_type"):  # since Blender 5.0
         settings.media_type = "MULTI_LAYER_IMAGE" if kind.endswith("MULTILAYER") else "IMAGE"
@@ -98,7 +101,7 @@ def written_as(kind: str) -> None:
 
 
 def render(path: Path, setting: dict[str, Any], seed: int) -> tuple[Any, tuple[float, float]]:
-    """(h, w, 4) linear light, and the seconds on the clock and of all cores together."""
+    """Return the (h, w, 4) linear picture, and the wall time and CPU time [s]."""
     scene = bpy.context.scene
     scene.cycles.samples, scene.cycles.seed = setting["samples"], seed
     scene.cycles.use_denoising = setting["denoised"]
@@ -110,7 +113,7 @@ def render(path: Path, setting: dict[str, Any], seed: int) -> tuple[Any, tuple[f
 
 
 def combined(path: Path) -> Any:
-    """The picture of a multilayer file, by way of Blender's own reader."""
+    """Return the combined pass of a multilayer file, loaded by Blender."""
     settings = bpy.context.scene.render.image_settings
     written_as("OPEN_EXR")
     settings.color_depth, settings.color_mode = "32", "RGBA"

@@ -1,4 +1,7 @@
-"""Times skins of few Gaussians, in steps and at once: python benchmarks/few_gaussians.py -o result.json"""
+"""Time skins of few Gaussians with and without intermediate blurs.
+
+python benchmarks/few_gaussians.py -o result.json
+"""
 
 from __future__ import annotations
 
@@ -31,9 +34,9 @@ _COUNTS = (1, 2, 3, 4, 6)
 
 
 class AtOnce(TextureSpace):
-    """Each Gaussian from the one before, with none between."""
+    """Technique that blurs each Gaussian from the previous one, without intermediate levels."""
 
-    chain = AtlasTechnique.chain
+    add_intermediate_levels = AtlasTechnique.add_intermediate_levels
 
 
 def main(
@@ -43,18 +46,18 @@ def main(
     adapter: str = "auto",
     atlas: int = 0,
 ) -> int:
-    """Measure and print, and write the figures where a file is named.
+    """Measure, print, and write the figures if a file is named.
 
     Parameters
     ----------
     output:
-        JSON to write.
+        JSON file to write.
     head:
         A sample or a file.
     adapter:
-        auto (the best), cpu (software), or a part of an adapter's name.
+        auto (the best), cpu (software), or part of an adapter's name.
     atlas:
-        Side in texels; 2048 on GPUs and 1024 in software unless given.
+        Side of the atlas [texel]; 0 for 2048 on GPUs and 1024 on software adapters.
     """
     if output is not None:
         check_output(output, (".json",))
@@ -62,7 +65,7 @@ def main(
     software = renderer.device.adapter.kind == "CPU"
     usual = _ON_CPU if software else _ON_GPU
     usual = replace(usual, atlas=atlas or usual.atlas)
-    effort = CPU_FRAME_COUNTS if software else FrameCounts(warming=60, row=1, timed=15)
+    effort = CPU_FRAME_COUNTS if software else FrameCounts(warmup=60, sequence=1, timed=15)
     rows = [measured(renderer, loaded, replace(usual, gaussians=count), effort) for count in _COUNTS]
     found = {"adapter": renderer.device.adapter.name, "atlas": usual.atlas, "rows": rows}
     if output is not None:
@@ -73,7 +76,7 @@ def main(
 
 
 def measured(renderer: Renderer, head: Head, case: Case, effort: FrameCounts) -> JsonObject:
-    """Device time in steps and at once [ms], and how far the pictures are apart (relative RMSE)."""
+    """Return the device times of both variants [ms], and the relative RMSE of their pictures."""
     row: JsonObject = {"gaussians": case.gaussians}
     pictures = []
     with tempfile.TemporaryDirectory() as folder, TECHNIQUES.including(_AT_ONCE, AtOnce()):

@@ -1,6 +1,8 @@
-"""Times `dermis render` from the shell to the picture: python benchmarks/first_picture.py -o result.json
+"""Time `dermis render` from the shell to the picture.
 
-Each cold run begins with empty caches, the package's and the driver's; warm ones follow it.
+    python benchmarks/first_picture.py -o result.json
+
+Each cold run starts with empty caches of the package and of the driver; warm runs follow it.
 """
 
 from __future__ import annotations
@@ -33,20 +35,20 @@ def main(
     adapter: str = "auto",
     runs: int = 3,
 ) -> int:
-    """Measure and print, and write the figures where a file is named.
+    """Measure, print, and write the figures if a file is named.
 
     Parameters
     ----------
     output:
-        JSON to write.
+        JSON file to write.
     head:
-        A sample (its files under DERMIS_DATA: nothing is downloaded in a timed run) or a file.
+        A sample (under DERMIS_DATA, because a timed run downloads nothing) or a file.
     atlas:
-        Texels along the atlas' side.
+        Sides of the atlas [texel].
     adapter:
-        auto (the best), cpu (software), or a part of an adapter's name.
+        auto (the best), cpu (software), or part of an adapter's name.
     runs:
-        How often with empty caches.
+        Number of runs with empty caches.
     """
     if output is not None:
         check_output(output, (".json",))
@@ -59,7 +61,7 @@ def main(
 
 
 def pictures(head: str, side: int, adapter: str, runs: int) -> dict[str, dict[str, float]]:
-    """Least and median time of the whole process with empty caches, and with full ones [s]."""
+    """Return the least and median time of the process with empty and with filled caches [s]."""
     cold, warm = list[float](), list[float]()
     for _ in range(runs):
         with tempfile.TemporaryDirectory() as folder:
@@ -73,7 +75,7 @@ def pictures(head: str, side: int, adapter: str, runs: int) -> dict[str, dict[st
 
 
 def seconds(head: str, side: int, adapter: str, folder: Path, environment: Mapping[str, str]) -> float:
-    """Time of one process [s]."""
+    """Return the time of one process [s]."""
     command = [sys.executable, "-m", "dermis", "render", head, "-o", str(folder / "picture.png")]
     options = ["--atlas", str(side), "--adapter", adapter]
     started = time.perf_counter()

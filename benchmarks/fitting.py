@@ -1,7 +1,7 @@
-"""How well light and skin of path-traced faces are found.
+"""Measure how accurately the light and skin of path-traced faces are estimated.
 
-Traces what is not kept on disk yet, fits each, and writes the figures after each scene; `unmixing_page.py`
-puts them into docs/fit.md.
+Renders the reference pictures that are not cached yet, fits each, and writes the figures after each scene;
+`unmixing_page.py` writes docs/fit.md from them.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ _FACE_MM = 250.0
 
 @dataclass(frozen=True)
 class Case:
-    """A face whose light and skin are known.
+    """Face with known light and skin.
 
     towards : (3,) unit vector to the sun
-    sun : share of the light on a surface that faces the sun which the sun gives [-]
+    sun : fraction of the irradiance of a surface facing the sun that the sun contributes [-]
     """
 
     number: int
@@ -68,7 +68,7 @@ class Case:
 
 
 def case(number: int) -> Case:
-    """The one of a number: the same each time."""
+    """Return the case of a number, always the same."""
     random = np.random.default_rng((_SEED, number))
     melanin, blood = (float(10.0 ** random.uniform(*span)) for span in (_MELANIN, _BLOOD))
     roughness = float(random.uniform(*_ROUGHNESS))
@@ -92,7 +92,7 @@ def case(number: int) -> Case:
 
 
 def _sky(random: np.random.Generator) -> NDArray[np.float64]:
-    """(h, w) radiance: some everywhere, and three wide lobes."""
+    """Return the (h, w) radiance of a sky: a constant and three wide lobes."""
     towards = directions(_ROWS, 2 * _ROWS)
     radiance = np.full(towards.shape[:2], random.uniform(0.05, 0.2))
     for _ in range(3):
@@ -103,7 +103,7 @@ def _sky(random: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _facing(radiance: NDArray[np.float64], towards: NDArray[np.float64]) -> float:
-    """Irradiance of a surface that faces a direction."""
+    """Return the irradiance of a surface that faces a direction."""
     cosine = np.maximum(directions(_ROWS, 2 * _ROWS) @ towards, 0.0)
     return float((radiance * cosine * solid_angles(_ROWS, 2 * _ROWS)).sum())
 
@@ -118,11 +118,11 @@ def _panorama(number: int, radiance: NDArray[np.float64]) -> Path:
 def photograph(
     renderer: Renderer, one: Case, side: int, samples: int, variant: Variant = "scalar_rgb"
 ) -> PathTraced:
-    """The case by path tracing; the surface reflects as a dielectric of index 1.4.
+    """Return the path-traced picture of a case; the surface is a dielectric of index 1.4.
 
-    A medium that does not refract has one colour under light from everywhere and a darker one where light
-    and eye face it. The painted colours are those that colorimeters find: light at 45 degrees, seen from
-    the front.
+    A medium without refraction has one colour under uniform light and a darker one where light and view
+    directions face it. The painted colours are those measured by a colorimeter: light at 45 degrees, seen
+    from the front.
     """
     paint = person_textures(renderer, one.scene, _PAINT)
     paint = replace(paint, colour=_measured(paint.colour))
@@ -132,7 +132,7 @@ def photograph(
 
 
 def _measured(colour: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Colours under light from everywhere of media that have these at 45 degrees to 0."""
+    """Return the colours under uniform light of media that have the given colours at 45 degrees to 0."""
     albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
     seen = [np.pi * float(reflected_radiance(np.sqrt(0.5), 1.0, float(one))) for one in albedo]
     return np.interp(colour, seen, [diffuse_albedo(float(one)) for one in albedo]).astype(np.float32)
@@ -154,28 +154,28 @@ def main(
     own: int = 3,
     trace_only: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
-    """Trace, fit, and write the figures.
+    """Render, fit, and write the figures.
 
     Parameters
     ----------
     output:
-        JSON with the figures.
+        JSON file with the figures.
     side:
-        Of the pictures [pixel].
+        Side of the pictures [pixel].
     samples:
-        Paths through each pixel.
+        Paths per pixel.
     scenes:
         Number of faces.
     variant:
-        Of Mitsuba, such as cuda_ad_rgb.
+        Variant of Mitsuba, such as cuda_ad_rgb.
     own:
-        Number of scenes that are rendered by ourselves too.
+        Number of scenes that are also rendered by dermis.
     trace_only:
-        Trace the pictures that are not kept on disk yet, and fit none.
+        Render the pictures that are not cached yet, and fit none.
     """
     renderer = Renderer(adapter)
-    told: JsonObject = {"side": side, "samples": samples}
-    told |= {"adapter": renderer.device.adapter.name, "traced": [], "own": []}
+    figures: JsonObject = {"side": side, "samples": samples}
+    figures |= {"adapter": renderer.device.adapter.name, "traced": [], "own": []}
     for number in range(scenes):
         one, began = case(number), time.perf_counter()
         image = photograph(renderer, one, side, samples, variant).image
@@ -184,15 +184,16 @@ def main(
             continue
         if number < own:
             settings = Settings(size=(side, side), atlas=512, strands=False)
-            told["own"].append(fitted(one, renderer.draw(one.scene, settings).linear(), adapter))
-        told["traced"].append(fitted(one, image, adapter))
-        print_lines(str(told["traced"][-1]))
-        write_results(output, told, 4)
+            figures["own"].append(fitted(one, renderer.draw(one.scene, settings).linear(), adapter))
+        figures["traced"].append(fitted(one, image, adapter))
+        print_lines(str(figures["traced"][-1]))
+        write_results(output, figures, 4)
 
 
 def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
-    """What is found of a case, beside what is true; nothing of the true skin is given but its eumelanin, its
-    oxygen and the kind of its surface.
+    """Return the estimates of a case beside the true values.
+
+    The fit knows only the true eumelanin, oxygenation and kind of surface.
     """
     began = time.process_time()
     held = Pigments(eumelanin=one.person.look.eumelanin, oxygen=one.person.look.oxygen)
@@ -209,15 +210,15 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
 
 
 def _against(one: Case, found: FitResult) -> JsonObject:
-    told: JsonObject = {}
+    figures: JsonObject = {}
     for name in ("melanin", "blood", "roughness"):
         true = float(getattr(one, name))
-        told[name] = {"true": true, "found": found.values[name], "relative_sd": found.certainty.sd[name]}
+        figures[name] = {"true": true, "found": found.values[name], "relative_sd": found.certainty.sd[name]}
     way = found.suns[0][0]
-    told["rho_s"] = found.values["rho_s"]
-    told["sun_degrees"] = float(np.degrees(np.arccos(np.clip(way @ one.towards, -1.0, 1.0))))
-    told["sun_share"] = one.sun
-    return told
+    figures["rho_s"] = found.values["rho_s"]
+    figures["sun_degrees"] = float(np.degrees(np.arccos(np.clip(way @ one.towards, -1.0, 1.0))))
+    figures["sun_share"] = one.sun
+    return figures
 
 
 if __name__ == "__main__":

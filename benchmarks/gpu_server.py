@@ -1,7 +1,7 @@
-"""Measures all that docs/performance.md says of a GPU.
+"""Measure all GPU figures of docs/performance.md.
 
 For a server without a screen; it ends within --minutes. Each part is written as soon as it is measured, so
-a run that is cut short loses little. --quick tries all parts at tiny sizes, on any adapter.
+that an interrupted run loses little. --quick runs all parts at tiny sizes on any adapter.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ from dermis.scene.techniques import TECHNIQUES
 LONGEST_S = 150.0
 
 
-def lasted_s(words: list[str], longest_s: float = LONGEST_S) -> float:
-    """How long a program ran, whose notes are passed on.
+def run_time_s(words: list[str], longest_s: float = LONGEST_S) -> float:
+    """Return the run time of a program [s], whose notes are printed.
 
-    Raises DermisError when it failed or took too long, with what it said last.
+    Raises DermisError with its last output if it failed or took too long.
     """
     started, name = time.perf_counter(), " ".join([Path(words[1]).name, words[2]])
     last: deque[str] = deque(["it said nothing"], maxlen=1)
@@ -108,13 +108,13 @@ _VIEWER_S, _LATE_S = 90.0, 20.0  # time limit of the viewer's benchmark, and how
 
 @dataclass(frozen=True)
 class Plan:
-    """What is measured, and how large it is.
+    """Extent of the measurements.
 
     head : sample or file
     usual : frame for lights and options
     cases, film : frames of `dermis bench`
-    effort : for lights and options
-    images, image : number in a sequence, and their settings
+    effort : frame counts for lights and options
+    images, image : number of images in a sequence, and their settings
     viewer : options of `benchmarks/viewer.py`
     """
 
@@ -130,7 +130,7 @@ class Plan:
 
 
 def plan_of(adapter: str, head: str) -> Plan:
-    """The sizes of the documentation's tables."""
+    """Return the plan with the sizes of the documentation."""
     film = PRESETS["film"]
     usual, *others = film.cases()
     largest = [
@@ -146,41 +146,41 @@ def plan_of(adapter: str, head: str) -> Plan:
 
 
 def quick_plan(adapter: str, head: str) -> Plan:
-    """Sizes that any machine renders in a moment."""
+    """Return a plan with sizes that any machine renders quickly."""
     usual = Case((48, 32), atlas=64, gaussians=2, lights=1, samples=1)
     cases = [usual, replace(usual, technique=FRAGMENT_TECHNIQUE, varies="technique")]
-    effort = FrameCounts(warming=0, between=0, timed=1, row=1)
+    effort = FrameCounts(warmup=0, between=0, timed=1, sequence=1)
     image = {"size": (32, 32), "atlas": 64}
     small = ("--size", "240x160", "--atlas", "64", "--frames", "2")
     return Plan(adapter, head, usual, cases, cases[:1], effort, 4, image, small)
 
 
 def bench(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
-    """`dermis bench`: all sizes and the passes of 2007."""
+    """Measure the frames of `dermis bench` at all sizes, and the passes of 2007."""
     return as_json(run_benchmark(plan.cases, plan.head, plan.adapter))
 
 
 def film(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
-    """Frames for film: the usual one, by the fragments of 2007, and with most triangles."""
+    """Measure film frames: the default one, the fragment shaders of 2007, and the most triangles."""
     return as_json(run_benchmark(plan.film, plan.head, plan.adapter))
 
 
 def lights(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
-    """Device time of each stage [ms] under lamps, in a room, and in the sun."""
+    """Return the device time of each stage with lamps, an environment, and the sun [ms]."""
     settings, found = _settings(plan.usual), {}
     for name, (lamps, panorama) in ENVIRONMENTS.items():
         around = Environment(name=panorama) if panorama else None
         scenes = [
             replace(scene, environment=around, lights=scene.lights if lamps else ())
-            for scene in _scenes(plan.usual, head, plan.effort.row)
+            for scene in _scenes(plan.usual, head, plan.effort.sequence)
         ]
         found[name] = _or_reason(partial(_stages, renderer, scenes, settings, plan.effort))
     return found
 
 
 def options(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
-    """Device time of each stage [ms] by technique and remedy."""
-    scenes, found = _scenes(plan.usual, head, plan.effort.row), {}
+    """Return the device time of each stage by technique and option [ms]."""
+    scenes, found = _scenes(plan.usual, head, plan.effort.sequence), {}
     for name, chosen in OPTIONS.items():
         settings = Settings(**(_settings(plan.usual).model_dump() | chosen))
         found[name] = _or_reason(partial(_stages, renderer, scenes, settings, plan.effort))
@@ -188,7 +188,7 @@ def options(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
 
 
 def sequences(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
-    """Images per second, each with its own camera and lights: as arrays, PNG files and EXR files."""
+    """Return images per second with different cameras and lights: as arrays, PNG files and EXR files."""
     scenes = _scenes(replace(plan.usual, lights=1), head, plan.images)
 
     def bytes_of() -> Iterable[NDArray[np.generic]]:
@@ -199,43 +199,43 @@ def sequences(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
 
     ways = {"bytes": (bytes_of, ""), "floats": (floats_of, ""), "png": (bytes_of, ".png")}
     ways["exr"] = floats_of, ".exr"
-    for _ in renderer.render_many(scenes[: plan.effort.row], **plan.image):
+    for _ in renderer.render_many(scenes[: plan.effort.sequence], **plan.image):
         pass
-    rates = {name: plan.images / _drained(images(), suffix) for name, (images, suffix) in ways.items()}
+    rates = {name: plan.images / _consume_s(images(), suffix) for name, (images, suffix) in ways.items()}
     return {"images": plan.images, **plan.image, "threads": os.cpu_count(), "per_second": rates}
 
 
 def lobes(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
-    """An evaluation of each surface lobe [ns]."""
+    """Return the cost per evaluation of each specular lobe [ns]."""
     return {", ".join(names): ns for names, ns in lobe_cost_ns(renderer.device).items()}
 
 
 def start(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
-    """Time of a process that renders one image [s]; the second one finds everything in the disk cache."""
+    """Return the time of a process that renders one image [s]; the second one uses the disk cache."""
     size = "x".join(map(str, plan.image["size"]))
     with tempfile.TemporaryDirectory() as folder:
         image = str(Path(folder) / "image.png")
         words = ["render", plan.head, "--adapter", plan.adapter, "-o", image]
         words += ["--size", size, "--atlas", str(plan.image["atlas"])]
-        return {name: lasted_s([sys.executable, "-m", "dermis", *words]) for name in ("first", "second")}
+        return {name: run_time_s([sys.executable, "-m", "dermis", *words]) for name in ("first", "second")}
 
 
 def viewer(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
-    """`benchmarks/viewer.py` without its long memory test; partial results when it ends early."""
+    """Run `benchmarks/viewer.py` without its long memory test; return partial results if it ends early."""
     with tempfile.TemporaryDirectory() as folder:
-        told = Path(folder) / "viewer.json"
-        words = ["--head", plan.head, "--adapter", plan.adapter, "--output", str(told)]
+        file = Path(folder) / "viewer.json"
+        words = ["--head", plan.head, "--adapter", plan.adapter, "--output", str(file)]
         words += ["--minutes", "0", "--changes", "0", "--seconds", str(_VIEWER_S), *plan.viewer]
         script = str(Path(__file__).with_name("viewer.py"))
         reason = {}
         try:
-            lasted_s([sys.executable, script, *words], _VIEWER_S + _LATE_S)
+            run_time_s([sys.executable, script, *words], _VIEWER_S + _LATE_S)
         except DermisError as fault:
-            if not told.exists():
+            if not file.exists():
                 raise
             note(str(fault))
             reason = {"ended": str(fault)}
-        figures: JsonObject = json.loads(told.read_text(encoding="utf-8"))
+        figures: JsonObject = json.loads(file.read_text(encoding="utf-8"))
         return figures | reason
 
 
@@ -244,7 +244,7 @@ def _settings(case: Case) -> Settings:
 
 
 def _scenes(case: Case, head: Head, count: int) -> list[Scene]:
-    """Moving scenes with a profile named rather than in a file, because they outlive the folder."""
+    """Return moving scenes that name their profile, because they outlive the folder of profile files."""
     with tempfile.TemporaryDirectory() as folder:
         moving = case_scenes(case, head, Path(folder), max(2, count))
     return [replace(scene, skin=scene.skin.model_copy(update={"profile": "gpu-gems-3"})) for scene in moving]
@@ -254,20 +254,20 @@ def _stages(
     renderer: Renderer, scenes: list[Scene], settings: Settings, effort: FrameCounts
 ) -> dict[str, float]:
     moving = cycle(scenes)
-    sequence_ms(renderer, moving, 1 + effort.warming, settings)
+    sequence_ms(renderer, moving, 1 + effort.warmup, settings)
     return stage_ms(renderer, moving, settings, effort)
 
 
 def _or_reason(measured: Callable[[], JsonObject | float]) -> JsonObject | float:
-    """The measurements, or why there are none."""
+    """Return the measurements, or the reason why there are none."""
     try:
         return measured()
     except DermisError as fault:
         return {"left_out": str(fault)}
 
 
-def _drained(images: Iterable[NDArray[np.generic]], suffix: str) -> float:
-    """Time to consume all images, and to write them where there is a suffix [s]."""
+def _consume_s(images: Iterable[NDArray[np.generic]], suffix: str) -> float:
+    """Return the time to consume all images, and to write them if a suffix is given [s]."""
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder, ImageWriter() as writer:
         for number, image in enumerate(images):
@@ -297,41 +297,41 @@ def main(
     Parameters
     ----------
     output:
-        JSON to write.
+        JSON file to write.
     head:
-        auto (the scan lee_perry_smith when it is here, else human), a sample or a file.
+        auto (the scan lee_perry_smith if available, else human), a sample or a file.
     adapter:
-        auto (the best), cpu (software), or a part of an adapter's name.
+        auto (the best), cpu (software), or part of an adapter's name.
     parts:
-        Names of bench, lobes, sequences, lights, options, start, viewer and film, separated by commas.
+        Names of parts, separated by commas: bench, lobes, sequences, lights, options, start, viewer and film.
     minutes:
-        No part is begun that would not end within them.
+        Time limit; parts that would exceed it are not started [min].
     quick:
-        Tiny sizes.
+        Use tiny sizes.
     """
     target = check_output(output, (".json",), "Choose such a name")
     name = ("lee_perry_smith" if is_available("lee_perry_smith") else "human") if head == "auto" else head
     plan = (quick_plan if quick else plan_of)(adapter, name)
-    measure(plan, _chosen(parts), minutes, lambda told: write_results(target, told, _DIGITS))
+    measure(plan, _chosen(parts), minutes, lambda figures: write_results(target, figures, _DIGITS))
 
 
 def measure(plan: Plan, parts: list[str], minutes: float, keep: Callable[[JsonObject], None]) -> JsonObject:
-    """All figures; `keep` gets those known so far after each part."""
+    """Return all figures; call `keep` with those known so far after each part."""
     began = time.perf_counter()
     head, renderer = dermis.load_head(plan.head, subdivide=0), dermis.Renderer(plan.adapter)
-    told = _about(plan, renderer)
+    figures = _about(plan, renderer)
     for part in parts:
         note(part)
         started = time.perf_counter()
         left = 60.0 * minutes - (started - began)
-        told[part] = _measured(part, plan, head, renderer, left)
-        told["seconds"][part] = time.perf_counter() - started
-        keep(told)
-    return told
+        figures[part] = _measured(part, plan, head, renderer, left)
+        figures["seconds"][part] = time.perf_counter() - started
+        keep(figures)
+    return figures
 
 
 def _measured(part: str, plan: Plan, head: Head, renderer: Renderer, left: float) -> JsonObject:
-    """A part's figures, or why there are none."""
+    """Return the figures of a part, or the reason why there are none."""
     if left < _NEEDED_S.get(part, 20):
         return {"left_out": f"{left:.0f} s were left"}
     try:

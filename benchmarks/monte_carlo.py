@@ -1,4 +1,4 @@
-"""Photons per second of the Monte Carlo, for half-spaces, a slab and skin of three layers: medians.
+"""Measure the photons per second of the Monte Carlo simulation for half-spaces, a slab and layered skin.
 
 python benchmarks/monte_carlo.py --photons 1000000 --repeats 5
 """
@@ -31,7 +31,7 @@ MEDIA = {
 
 
 def measure(layers: list[ScatteringLayer], photons: int, repeats: int) -> float:
-    """Median of photons per second, once the walk is compiled."""
+    """Return the median of the photons per second, after compilation."""
     rates = []
     for seed in range(repeats):
         started = time.perf_counter()
@@ -41,7 +41,7 @@ def measure(layers: list[ScatteringLayer], photons: int, repeats: int) -> float:
 
 
 def table(report: dict[str, float]) -> str:
-    """The report as Markdown."""
+    """Return the report as a Markdown table."""
     rows = [f"| {medium} | {rate / 1e6:.2f} |" for medium, rate in report.items()]
     return "\n".join(["| medium | million photons a second |", "|---|---|", *rows])
 

@@ -1,6 +1,8 @@
-"""Measures heads that move: python benchmarks/motion.py -o result.json
+"""Measure frames of moving heads.
 
-Ratios are of one run: a frame in which light, skin and camera are new, and one with a new shape too.
+    python benchmarks/motion.py -o result.json
+
+Compares, in one run, frames with new light, skin and camera to frames that also have a new shape.
 """
 
 from __future__ import annotations
@@ -46,20 +48,20 @@ def main(
     frames: int = 0,
     interreflection: bool = True,
 ) -> int:
-    """Measure and print, and write the figures where a file is named.
+    """Measure, print, and write the figures if a file is named.
 
     Parameters
     ----------
     output:
-        JSON to write.
+        JSON file to write.
     head:
         A sample or a file.
     adapter:
-        auto (the best), cpu (software), or a part of an adapter's name.
+        auto (the best), cpu (software), or part of an adapter's name.
     frames:
-        Of motion for the memory; 5000 for the table of docs/performance.md.
+        Number of frames of the memory test; 5000 for the table of docs/performance.md.
     interreflection:
-        Whether light passes from skin to skin in the frames that are timed.
+        Whether timed frames include interreflection.
     """
     if output is not None:
         check_output(output, (".json",))
@@ -85,20 +87,20 @@ def main(
 def moving(
     renderer: Renderer, case: Case, settings: Settings, head: Head, folder: Path, effort: FrameCounts
 ) -> JsonObject:
-    """Frames that each have another skin, other lights and another camera; at rest, and with a new shape."""
+    """Measure frames with changing skin, lights and camera, in the rest pose and with a new shape."""
     found = JsonObject()
     scenes = {
         "still": case_scenes(case, head, folder, _MOMENTS),
         "moving": case_scenes(replace(case, targets=_TARGETS), head, folder, _MOMENTS),
     }
-    endless = {name: anew(several) for name, several in scenes.items()}
+    endless = {name: with_new_skins(several) for name, several in scenes.items()}
     for each in endless.values():
-        sequence_ms(renderer, each, max(2, effort.warming), settings)
+        sequence_ms(renderer, each, max(2, effort.warmup), settings)
     times: dict[str, list[float]] = {name: [] for name in endless}
     for _ in range(3):  # in turn, so that a busy machine slows both down
         for name, each in endless.items():
             sequence_ms(renderer, each, 2, settings)  # another head: its tables
-            times[name].append(sequence_ms(renderer, each, effort.row, settings) / effort.row)
+            times[name].append(sequence_ms(renderer, each, effort.sequence, settings) / effort.sequence)
     for name, each in endless.items():
         sequence_ms(renderer, each, 2, settings)
         found[name] = {"frame_ms": min(times[name]), "device_ms": stage_ms(renderer, each, settings, effort)}
@@ -107,17 +109,17 @@ def moving(
     return found | {"moving_over_still": ratio}
 
 
-def anew(scenes: list[Scene]) -> Iterator[Scene]:
-    """The scenes again and again, each time with a skin that was never seen before."""
+def with_new_skins(scenes: list[Scene]) -> Iterator[Scene]:
+    """Yield the scenes repeatedly, each time with a skin that has not been used before."""
     for number, scene in zip(count(), cycle(scenes), strict=False):
         skin = scene.skin.model_copy(update={"roughness": 0.2 + 0.3 * ((0.618 * number) % 1.0)})
         yield replace(scene, skin=skin)
 
 
 def python_ms(renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: FrameCounts) -> float:
-    """Median of Python's time for a frame while the device is idle [ms]."""
+    """Return the median time that Python takes for a frame while the device is idle [ms]."""
     found = []
-    for _ in range(max(effort.row, 3)):
+    for _ in range(max(effort.sequence, 3)):
         scene = next(scenes)
         renderer.device.wait()
         started = time.perf_counter()
@@ -127,7 +129,7 @@ def python_ms(renderer: Renderer, scenes: Iterator[Scene], settings: Settings, e
 
 
 def people(renderer: Renderer, case: Case, head: Head) -> list[float]:
-    """Time to the first frame of other people of the same topology, one after the other [ms]."""
+    """Return the times to the first frame of other people with the same topology [ms]."""
     settings, found = case_settings(case), []
     renderer.draw(Scene(head), settings)
     for number in range(_PEOPLE):
@@ -142,13 +144,13 @@ def people(renderer: Renderer, case: Case, head: Head) -> list[float]:
 
 
 def resident_mb() -> float:
-    """Memory of this process that is in use [MB]."""
+    """Return the resident memory of this process [MB]."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4096 / 1e6
 
 
 def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int) -> JsonObject:
-    """Memory of the process and of the device over frames of a motion that never repeats [MB]."""
+    """Return the memory of process and device over the frames of a motion without repetition [MB]."""
     scene, settings = case_scenes(case, head, folder, 1)[0], case_settings(case)
     moving, taken = with_test_rig(head, case.targets), list[tuple[int, float, float]]()
     for number in range(frames):

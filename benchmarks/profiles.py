@@ -1,4 +1,4 @@
-"""Median time from tissue to six shared Gaussians, on one core."""
+"""Measure the median time from tissue to six shared Gaussians, on one core."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REPEATS = 15
 
 
 def median_ms(work: Callable[[], object]) -> float:
-    """Of repeated runs, after one that loads what is loaded once [ms]."""
+    """Return the median time of repeated runs, after a warm-up run [ms]."""
     work()
     times = []
     for _ in range(REPEATS):
@@ -32,7 +32,7 @@ def median_ms(work: Callable[[], object]) -> float:
 
 
 def neighbour(tissue: dermis.Tissue) -> dermis.Tissue:
-    """The tissue with a tenth more absorption, as after a slider has moved."""
+    """Return the tissue with 10 % more absorption, as after the move of a slider."""
     layers = tuple(replace(layer, sigma_a=1.1 * layer.sigma_a) for layer in tissue.medium.layers)
     return replace(tissue, medium=replace(tissue.medium, layers=layers))
 

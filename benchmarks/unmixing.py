@@ -1,7 +1,7 @@
-"""How well melanin and blood of skin are found.
+"""Measure how accurately melanin and blood of skin are estimated.
 
-Colours of known skins go in, computed by layered diffusion without the table that unmixing reads, or counted
-by Monte Carlo; `unmixing_page.py` writes docs/fit.md from what comes out.
+The input colours of known skins are computed by layered diffusion, without the table that unmixing uses, or
+by Monte Carlo; `unmixing_page.py` writes docs/fit.md from the results.
 """
 
 from __future__ import annotations
@@ -59,45 +59,45 @@ def main(
     Parameters
     ----------
     output:
-        JSON with the figures.
+        JSON file with the figures.
     speed_only:
-        Print the times alone, and write nothing.
+        Print only the times, and write nothing.
     supplied_folder:
-        Folder with spectral_srgb_diffusion.csv, colours by another program; measure this alone.
+        Folder with spectral_srgb_diffusion.csv, colours by another program; measure only these.
     """
-    told = json.loads(output.read_text("utf-8")) if output.exists() else {}
+    results = json.loads(output.read_text("utf-8")) if output.exists() else {}
     if supplied_folder:
-        write_results(output, told | {"supplied": supplied(supplied_folder)}, 4)
+        write_results(output, results | {"supplied": supplied(supplied_folder)}, 4)
         return 0
     device = open_device(adapter)
     speed = {"adapter": device.adapter.name} | {str(side): speed_ms(device, side) for side in SIDES}
     if speed_only:
         print_lines(json.dumps(speed))
         return 0
-    told |= {"skins": SKINS, "noise": NOISE, "photons": _PHOTONS}
-    told["known"] = {str(mm): known(replace(DEFAULT_SKIN, epidermis_mm=mm)) for mm in THICK_MM}
-    told["mistaken"] = mistaken()
-    told["counted"] = counted()
-    told["shading"] = shading(adapter)
-    told["speed"] = speed
-    write_results(output, told, 4)
+    results |= {"skins": SKINS, "noise": NOISE, "photons": _PHOTONS}
+    results["known"] = {str(mm): known(replace(DEFAULT_SKIN, epidermis_mm=mm)) for mm in THICK_MM}
+    results["mistaken"] = model_error_cases()
+    results["counted"] = counted()
+    results["shading"] = shading(adapter)
+    results["speed"] = speed
+    write_results(output, results, 4)
     return 0
 
 
 def skins(seed: int = SEED) -> tuple[Floats, Floats]:
-    """Random melanin and blood, even in their logarithms."""
+    """Return random melanin and blood fractions, uniform in their logarithms."""
     random = np.random.default_rng(seed)
     return 10.0 ** random.uniform(*_MELANIN, SKINS), 10.0 ** random.uniform(*_BLOOD, SKINS)
 
 
 def colour_of(skin: SkinParameters) -> Floats:
-    """(3,) diffuse reflectance of a skin by layered diffusion at each wavelength, linear Rec. 709."""
+    """Return the (3,) linear Rec. 709 reflectance of a skin by layered diffusion at each wavelength [-]."""
     total = diffusion_profile(spectral_medium("dj2006", skin), "layered", "layer").total
     return np.asarray((1.0 - normal_reflectance(1.4)) * total @ rgb_weights(WAVELENGTHS_NM).T)
 
 
 def known(skin: SkinParameters) -> list[JsonObject]:
-    """Errors on skins of the model itself, by bands of melanin, without noise and with it."""
+    """Return the errors on skins of the model itself, by bands of melanin, with and without noise."""
     m, b = skins()
     colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
     model = skin_model(skin)
@@ -130,15 +130,15 @@ def known(skin: SkinParameters) -> list[JsonObject]:
 
 
 def bound(model: SkinModel, m: Floats, b: Floats, colours: Floats) -> Floats:
-    """Relative Cramér-Rao bound of blood where nothing is believed of it, for noise alone."""
+    """Return the relative Cramér-Rao bound of blood without a prior, for noise alone."""
     found = np.stack([np.sqrt(m), np.sqrt(b), np.full(len(m), model.usual)], axis=-1)
     slopes = model.read(found)[1][:, :, :2]
     weighed = np.einsum("tci,tc,tcj->tij", slopes, weights_of(colours, NOISE), slopes)
     return np.asarray(2.0 * np.sqrt(np.linalg.inv(weighed)[:, 1, 1] / b))
 
 
-def mistaken() -> JsonObject:
-    """What melanin and blood come out as when the skin is not quite the one that was believed."""
+def model_error_cases() -> JsonObject:
+    """Return the estimates of melanin and blood if the skin differs from the assumed model."""
     cases: dict[str, dict[str, float]] = {
         "oxygen 0.6 for 0.75": {"oxygen": 0.6},
         "eumelanin 0.5 for 0.7": {"eumelanin": 0.5},
@@ -147,12 +147,12 @@ def mistaken() -> JsonObject:
     m, b = skins(SEED + 1)
     usual = (m > 0.005) & (m < 0.2) & (b > 0.003) & (b < 0.05)
     m, b = m[usual], b[usual]
-    told = {}
+    results = {}
     for name, other in cases.items():
         skin = replace(DEFAULT_SKIN, **other)
         colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
-        told[name] = {third: _off(third, colours, m, b) for third in ("none", "oxygen")}
-    return told
+        results[name] = {third: _off(third, colours, m, b) for third in ("none", "oxygen")}
+    return results
 
 
 def _off(third: Third, colours: Floats, m: Floats, b: Floats) -> dict[str, float]:
@@ -163,15 +163,15 @@ def _off(third: Third, colours: Floats, m: Floats, b: Floats) -> dict[str, float
 
 
 def counted() -> list[JsonObject]:
-    """Skins whose colour was counted photon by photon: what diffusion itself is off by is in it."""
-    told = []
+    """Return the errors on skins whose colours are Monte Carlo results, including the error of diffusion."""
+    results = []
     for m, b in _COUNTED:
         pigments = {"melanin": m, "blood": b}
         tissue = load_tissue("spectral", pigments=pigments)
         colour = monte_carlo_profile(tissue.medium, tissue.rgb, _PHOTONS, seed=SEED).total[None]
         found = solve(skin_model(), colour, NOISE)
         own = skin_model().colours(np.array([m]), np.array([b]))
-        told.append(
+        results.append(
             {
                 "melanin": m,
                 "blood": b,
@@ -181,11 +181,11 @@ def counted() -> list[JsonObject]:
                 "delta_e_forward": float(delta_e_2000(own, colour)[0]),
             }
         )
-    return told
+    return results
 
 
 def supplied(folder: Path) -> list[JsonObject]:
-    """Skins whose colour another program computed, by bands of melanin: medians."""
+    """Return the median errors on skins whose colours another program computed, by bands of melanin."""
     table = np.genfromtxt(
         folder / "spectral_srgb_diffusion.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
     )
@@ -194,11 +194,11 @@ def supplied(folder: Path) -> list[JsonObject]:
     model = skin_model(replace(DEFAULT_SKIN, eumelanin=1.0, epidermis_mm=0.06))
     found, forward = solve(model, colours, NOISE), delta_e_2000(model.colours(m, b), colours)
     left = delta_e_2000(colours / found.residual, colours)
-    told = []
+    results = []
     for low, high in pairwise(BANDS):
         one = (low < m) & (m <= high) & (b > 0.0)
         if one.any():
-            told.append(
+            results.append(
                 {
                     "melanin": [low, high],
                     "skins": int(one.sum()),
@@ -208,11 +208,11 @@ def supplied(folder: Path) -> list[JsonObject]:
                     "blood_error": float(np.median(np.abs(found.blood[one] / b[one] - 1.0))),
                 }
             )
-    return told
+    return results
 
 
 def shading(adapter: str) -> JsonObject:
-    """A made-up map under light that is not even: what is taken out, and what melanin and blood gain."""
+    """Return the results on a synthetic map under uneven light: removed shading and remaining errors."""
     random = np.random.default_rng(SEED)
     fields = [gaussian_filter(random.standard_normal((_SIDE, _SIDE)), s, mode="wrap") for s in (3, 4, 40)]
     m, b, light = (one / one.std() for one in fields)
@@ -220,20 +220,20 @@ def shading(adapter: str) -> JsonObject:
     colours = skin_model().colours(m.ravel(), b.ravel()).reshape(_SIDE, _SIDE, 3) * light[..., None]
     colours *= 1.0 + NOISE * random.standard_normal(colours.shape)
     colours = np.clip(colours, 0.0, 1.0)
-    told: JsonObject = {"light": float(np.log(light).std())}
+    results: JsonObject = {"light": float(np.log(light).std())}
     for name, taken in (("kept", False), ("divided", True)):
         found = unmix(colours, shading=taken, adapter=adapter)
-        told[name] = {
+        results[name] = {
             "melanin": float(np.median(np.abs(found.melanin / m - 1.0))),
             "blood": float(np.median(np.abs(found.blood / b - 1.0))),
         }
         if found.shading is not None:
-            told["left"] = float((np.log(light) - np.log(found.shading)).std())
-    return told
+            results["left"] = float((np.log(light) - np.log(found.shading)).std())
+    return results
 
 
 def speed_ms(device: Device, side: int) -> float:
-    """Least of five passes over a square picture: the device's clock, or software's processor time [ms]."""
+    """Return the least device or CPU time of five passes over a square picture [ms]."""
     random = np.random.default_rng(SEED)
     m, b = gaussian_filter(random.standard_normal((2, 256, 256)), (0, 2, 2))
     share = np.stack([0.05 * np.exp(2 * m), 0.01 * np.exp(2 * b)]).reshape(2, -1)

@@ -1,4 +1,4 @@
-"""Writes docs/fit.md from what `unmixing.py`, `widths.py` and `fitting.py` measured."""
+"""Write docs/fit.md from the results of `unmixing.py`, `widths.py` and `fitting.py`."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ def main() -> None:
 
 
 def figures() -> tuple[JsonObject, JsonObject]:
-    """What was measured of unmixing, and of widths."""
-    told, widths = (json.loads(path.read_text("utf-8")) for path in (RESULTS, WIDTHS))
-    return told, widths
+    """Return the figures of unmixing and of widths."""
+    results, widths = (json.loads(path.read_text("utf-8")) for path in (RESULTS, WIDTHS))
+    return results, widths
 
 
-def page(told: JsonObject, widths: JsonObject) -> str:
-    """The page's text."""
+def page(results: JsonObject, widths: JsonObject) -> str:
+    """Return the text of the page."""
     text = TEXT.read_text("utf-8")
-    tables = {"known": _known(told), "mistaken": _mistaken(told), "counted": _counted(told)}
+    tables = {"known": _known(results), "mistaken": _mistaken(results), "counted": _counted(results)}
     tables["fitting"] = _fitting(json.loads(FITTED.read_text("utf-8")))
     tables |= {
-        "shading": _shading(told["shading"]),
-        "speed": _speed(*(told[name] for name in ("speed", "speed_gpu") if name in told)),
+        "shading": _shading(results["shading"]),
+        "speed": _speed(*(results[name] for name in ("speed", "speed_gpu") if name in results)),
     }
-    tables |= {"supplied": _supplied(told["supplied"]), "borders": _borders(widths), "grid": _grid(widths)}
+    tables |= {"supplied": _supplied(results["supplied"]), "borders": _borders(widths), "grid": _grid(widths)}
     for name, table in tables.items():
         text = text.replace(f"<!-- {name} -->", table)
     return text
 
 
-def _known(told: JsonObject) -> str:
+def _known(results: JsonObject) -> str:
     heads = (
         "epidermis [mm]",
         "melanin",
@@ -62,7 +62,7 @@ def _known(told: JsonObject) -> str:
         "RMS over what the map states",
     )
     rows = []
-    for mm, bands in told["known"].items():
+    for mm, bands in results["known"].items():
         for one in bands:
             low, high = one["melanin"]
             plain = f"{_percent(one['plain_melanin'])}, {_percent(one['plain_blood'])}, {one['delta_e']:.3f}"
@@ -72,18 +72,18 @@ def _known(told: JsonObject) -> str:
     return _table(heads, rows)
 
 
-def _mistaken(told: JsonObject) -> str:
+def _mistaken(results: JsonObject) -> str:
     heads = "the skin is", "oxygen", "melanin found over true", "blood found over true", "CIEDE2000 left"
     words = {"none": "held", "oxygen": "found too"}
     rows = [
         (name, words[third], f"{one['melanin']:.2f}", f"{one['blood']:.2f}", f"{one['delta_e']:.2f}")
-        for name, both in told["mistaken"].items()
+        for name, both in results["mistaken"].items()
         for third, one in both.items()
     ]
     return _table(heads, rows)
 
 
-def _counted(told: JsonObject) -> str:
+def _counted(results: JsonObject) -> str:
     heads = "melanin", "found", "blood", "found", "CIEDE2000 left", "of the true skin's colour by diffusion"
     rows = [
         (
@@ -94,23 +94,22 @@ def _counted(told: JsonObject) -> str:
             f"{one['delta_e']:.2f}",
             f"{one['delta_e_forward']:.2f}",
         )
-        for one in told["counted"]
+        for one in results["counted"]
     ]
     return _table(heads, rows)
 
 
-def _shading(told: JsonObject) -> str:
+def _shading(results: JsonObject) -> str:
     rows = [
-        (words, _percent(told[key]["melanin"]), _percent(told[key]["blood"]))
+        (words, _percent(results[key]["melanin"]), _percent(results[key]["blood"]))
         for key, words in (("kept", "left in the colours"), ("divided", "found and divided by"))
     ]
-    light = (
-        f"The light varies by {_percent(told['light'])}; {_percent(told['left'])} of it is left afterwards.\n"
-    )
+    varies, left = _percent(results["light"]), _percent(results["left"])
+    light = f"The light varies by {varies}; {left} of it is left afterwards.\n"
     return _table(("light", "melanin off by (median)", "blood"), rows) + "\n" + light
 
 
-def _supplied(told: Sequence[JsonObject]) -> str:
+def _supplied(results: Sequence[JsonObject]) -> str:
     heads = "melanin", "skins", "CIEDE2000 of the colour", "left when found", "melanin off by", "blood"
     rows = [
         (
@@ -121,59 +120,59 @@ def _supplied(told: Sequence[JsonObject]) -> str:
             _percent(one["melanin_error"]),
             _percent(one["blood_error"]),
         )
-        for one in told
+        for one in results
     ]
     return _table(heads, rows)
 
 
-def _borders(told: JsonObject) -> str:
+def _borders(results: JsonObject) -> str:
     heads = "media", "weights of", "mean error", "worst", "light in all", "white skin's light"
     rows = [
         (name, rule, *(_percent(one[key]) for key in ("rms", "worst", "energy", "white")))
-        for name, pair in told["pairs"].items()
+        for name, pair in results["pairs"].items()
         for rule, one in pair["rules"].items()
     ]
     return _table(heads, rows)
 
 
-def _grid(told: JsonObject) -> str:
+def _grid(results: JsonObject) -> str:
     words = {"one_profile": "one profile, at the middle", "mixed": "three, mixed by the map"}
-    rows = [(words[key], *map(_percent, told["grid"][key])) for key in words]
+    rows = [(words[key], *map(_percent, results["grid"][key])) for key in words]
     return _table(("", "red", "green", "blue"), rows)
 
 
 def _speed(*machines: JsonObject) -> str:
     rows = [
-        (f"{side} x {side}", *(f"{told[side]:.3g}" for told in machines))
+        (f"{side} x {side}", *(f"{results[side]:.3g}" for results in machines))
         for side in machines[0]
         if side != "adapter"
     ]
-    return _table(("texels", *(f"{told['adapter']} [ms]" for told in machines)), rows)
+    return _table(("texels", *(f"{results['adapter']} [ms]" for results in machines)), rows)
 
 
-def _fitting(told: JsonObject) -> str:
+def _fitting(results: JsonObject) -> str:
     heads = "pictures", "number", "median error", "90 %", "worst", "bias (median)"
     rows = [
         row
         for key, words in (("own", "our own frames"), ("traced", "path-traced"))
-        for row in _errors(told[key], f"{len(told[key])} {words}")
+        for row in _errors(results[key], f"{len(results[key])} {words}")
     ]
-    seconds = statistics.median(one["seconds"] for one in told["traced"])
-    busy = statistics.median(one["processor_seconds"] for one in told["traced"])
-    size = f"{told['side']} x {told['side']} pixels, {told['samples']} paths a pixel"
-    took = f"{told['adapter']}: {seconds:.3g} s for a fit in the median, {busy:.3g} s of processor time"
-    return _table(heads, rows) + f"\n{size}, fitted at 128 across. {took}.\n\n{_stated(told['traced'])}"
+    seconds = statistics.median(one["seconds"] for one in results["traced"])
+    busy = statistics.median(one["processor_seconds"] for one in results["traced"])
+    size = f"{results['side']} x {results['side']} pixels, {results['samples']} paths a pixel"
+    took = f"{results['adapter']}: {seconds:.3g} s for a fit in the median, {busy:.3g} s of processor time"
+    return _table(heads, rows) + f"\n{size}, fitted at 128 across. {took}.\n\n{_stated(results['traced'])}"
 
 
 def _errors(cases: Sequence[JsonObject], words: str) -> list[tuple[str, ...]]:
-    """Rows of the errors of each number."""
+    """Return the table rows with the errors of each estimated number."""
     rows = []
     for name in ("melanin", "blood", "roughness", "rho_s"):
         pairs = [(one["rho_s"], _TRUE_STRENGTH) if name == "rho_s" else _pair(one[name]) for one in cases]
         shares = name in ("melanin", "blood")
         off = [a / b - 1.0 if shares else a - b for a, b in pairs]
-        told = _percent if shares else _thousandths
-        rows.append((words, name, *_spread([abs(x) for x in off], told), told(statistics.median(off))))
+        results = _percent if shares else _thousandths
+        rows.append((words, name, *_spread([abs(x) for x in off], results), results(statistics.median(off))))
     turns = [one["sun_degrees"] for one in cases]
     return [*rows, (words, "direction of the sun", *_spread(turns, lambda x: f"{x:.1f} degrees"), "")]
 
@@ -183,7 +182,7 @@ def _pair(one: JsonObject) -> tuple[float, float]:
 
 
 def _stated(cases: Sequence[JsonObject]) -> str:
-    """How far off pigments are over the deviations that the fits state."""
+    """Return the errors of the pigments relative to the standard deviations stated by the fits."""
     words = []
     for name in ("melanin", "blood"):
         over = [math.log(a / b) / one[name]["relative_sd"] for one in cases for a, b in [_pair(one[name])]]
@@ -197,10 +196,10 @@ def _thousandths(value: float) -> str:
     return f"{value:.3f}"
 
 
-def _spread(values: Sequence[float], told: Callable[[float], str]) -> tuple[str, str, str]:
+def _spread(values: Sequence[float], results: Callable[[float], str]) -> tuple[str, str, str]:
     ordered = sorted(values)
     most = ordered[math.ceil(0.9 * len(ordered)) - 1]
-    return told(statistics.median(ordered)), told(most), told(ordered[-1])
+    return results(statistics.median(ordered)), results(most), results(ordered[-1])
 
 
 def _percent(share: float) -> str:

@@ -1,9 +1,9 @@
-"""The viewer's speed, delay and memory.
+"""Measure frame rate, latency and memory of the viewer.
 
-No screen is needed: an offscreen canvas takes the place of the window, and a client that speaks as the page
-does that of the browser. About a quarter of an hour, most of it for memory; --minutes 0.5 --changes 50 is a
-quick look, --minutes 0 --changes 0 --seconds 90 leaves the memory out and measures the rest in so long. The
-figures are written as they come: what ends early leaves those known so far, and why there are no more.
+No screen is needed: an offscreen canvas replaces the window, and a client with the protocol of the page
+replaces the browser. Takes about a quarter of an hour, most of it for memory; --minutes 0.5 --changes 50 is a
+quick check, --minutes 0 --changes 0 --seconds 90 skips memory and measures the rest within 90 seconds.
+Figures are written as they are measured, with the reason if a section ends early.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from viewer_input import Clock, Plan, offscreen, slider_position, speeds
-from viewer_memory import delays, endured
-from viewer_page import through_the_page
+from viewer_memory import delays, memory_samples
+from viewer_page import page_figures
 
 from dermis.apps.validation.pages import JsonObject
 from dermis.base.atomic_write import atomic_file, check_output
@@ -34,7 +34,7 @@ _SECTIONS = ("speed", "delay", "page", "memory")
 
 
 def tables(found: JsonObject) -> str:
-    """All of it that there is."""
+    """Return all available figures as Markdown tables."""
     parts = [_title(found), _speed(found), _delay(found)]
     if "samples" in found.get("memory", {}):
         parts.append(_memory(found["memory"]))
@@ -45,7 +45,7 @@ def tables(found: JsonObject) -> str:
 
 
 def _figures(found: JsonObject, section: str) -> JsonObject:
-    """A section's, without the reason why it ended."""
+    """Return the figures of a section, without the reason why it ended."""
     return {name: one for name, one in found.get(section, {}).items() if name != "ended"}
 
 
@@ -136,24 +136,23 @@ def main(
     head:
         The built-in human, a sample, or a mesh file.
     adapter:
-        auto (the best), cpu (software), or a part of an adapter's name.
+        auto (the best), cpu (software), or part of an adapter's name.
     size:
-        WIDTHxHEIGHT of the picture [640x480 on a software adapter, 1920x1080 on a GPU].
+        Size of the picture, WIDTHxHEIGHT. [default: 640x480 on a software adapter, 1920x1080 on a GPU]
     atlas:
-        Side of the irradiance map [512, 2048].
+        Side of the atlas [texel]. [default: 512, 2048]
     samples:
-        Samples of a pixel [1, 4].
+        Samples per pixel. [default: 1, 4]
     frames:
-        Of each kind of motion [16, 300].
+        Number of frames of each kind of motion. [default: 16, 300]
     minutes, changes:
-        What the memory is watched over, at least, on software adapters with half the sides; 0 for both
-        leaves it out.
+        Least duration and number of changes of the memory test; 0 for both skips it.
     seconds:
-        What all but the memory may take, about [as long as it takes].
+        Approximate time limit for everything but the memory test [s]. [default: none]
     browser:
-        Whether the page is measured too.
+        Measure the page too.
     output:
-        Where the figures go.
+        JSON file with the raw figures.
     """
     check_output(output, (".json",))
     clock = Clock(seconds)
@@ -167,56 +166,58 @@ def main(
         samples or (1 if software else 4),
         frames or (16 if software else 300),
     )
-    found = Found(_about(device, plan), output, clock)
+    found = Results(_about(device, plan), output, clock)
     del device
     driver = offscreen(plan)
-    found.take("speed", partial(speeds, driver, plan))
-    found.take("delay", partial(delays, driver, plan))
+    found.record("speed", partial(speeds, driver, plan))
+    found.record("delay", partial(delays, driver, plan))
     if browser:
-        found.take("page", partial(through_the_page, plan, slider_position(driver, "melanin")))
+        found.record("page", partial(page_figures, plan, slider_position(driver, "melanin")))
     del driver
     if minutes or changes:
         watched = _halved(plan) if software else plan  # a thousand changes in ten minutes
-        found.take("memory", lambda _: endured(offscreen(watched), watched, minutes, changes).items())
-    found.told["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    found.keep()
-    print_lines(tables(found.told))
+        found.record(
+            "memory", lambda _: memory_samples(offscreen(watched), watched, minutes, changes).items()
+        )
+    found.all_figures["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    found.write()
+    print_lines(tables(found.all_figures))
     return 1 if found.ended else 0
 
 
-class Found:
-    """Figures as they come; each is written at once.
+class Results:
+    """Figures measured so far; each is written immediately.
 
-    told : all so far
+    all_figures : figures of all sections
     ended : sections that ended early; the reason is among their figures
     """
 
-    def __init__(self, told: JsonObject, output: Path, clock: Clock) -> None:
-        self.told, self.ended = told, list[str]()
+    def __init__(self, all_figures: JsonObject, output: Path, clock: Clock) -> None:
+        self.all_figures, self.ended = all_figures, list[str]()
         self._output, self._clock = output, clock
 
-    def take(self, section: str, measured: Callable[[Clock], Iterable[tuple[str, Any]]]) -> None:
-        """The figures of a section; a fault ends it and leaves what came before."""
-        figures = self.told[section] = JsonObject()
-        self._say(section)
+    def record(self, section: str, measured: Callable[[Clock], Iterable[tuple[str, Any]]]) -> None:
+        """Record the figures of a section; an error ends it but keeps the earlier figures."""
+        figures = self.all_figures[section] = JsonObject()
+        self._log(section)
         try:
             for name, figure in measured(self._clock.share(_SHARES.get(section, 1.0))):
                 figures[name] = figure
-                self._say(f"{section}, {name}")
-                self.keep()
+                self._log(f"{section}, {name}")
+                self.write()
         except Exception as fault:  # whatever ends one section leaves the others
             figures["ended"] = f"{type(fault).__name__}: {fault}"
             self.ended.append(section)
-            self._say(f"{section} ended: {figures['ended']}")
-            self.keep()
+            self._log(f"{section} ended: {figures['ended']}")
+            self.write()
 
-    def keep(self) -> None:
-        """Write all."""
+    def write(self) -> None:
+        """Write all figures."""
         with atomic_file(self._output) as whole:
-            whole.write_text(json.dumps(self.told, indent=1) + "\n", encoding="utf-8")
+            whole.write_text(json.dumps(self.all_figures, indent=1) + "\n", encoding="utf-8")
 
-    def _say(self, what: str) -> None:
-        note(f"{self._clock.gone_s:6.1f} s  {what}")
+    def _log(self, what: str) -> None:
+        note(f"{self._clock.elapsed_s:6.1f} s  {what}")
 
 
 def _halved(plan: Plan) -> Plan:
@@ -225,7 +226,7 @@ def _halved(plan: Plan) -> Plan:
 
 
 def _about(device: Device, plan: Plan) -> JsonObject:
-    """What was measured on what."""
+    """Return the description of adapter and settings."""
     return {
         "adapter": device.adapter.name,
         "kind": device.adapter.kind,

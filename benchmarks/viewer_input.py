@@ -1,4 +1,4 @@
-"""Frame rates of motion in a viewer without a window."""
+"""Measure frame rates of motion in a viewer without a window."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from dermis.scene.settings import Settings
 
 
 class Clock:
-    """Time that is left, from now on.
+    """Remaining time of a measurement.
 
-    seconds : in all; None for as long as it takes
+    seconds : time limit; None for no limit
     """
 
     def __init__(self, seconds: float | None = None) -> None:
@@ -34,23 +34,23 @@ class Clock:
         self._end = self._began + (math.inf if seconds is None else seconds)
 
     @property
-    def gone_s(self) -> float:
-        """Since the beginning."""
+    def elapsed_s(self) -> float:
+        """Return the time since the start [s]."""
         return time.perf_counter() - self._began
 
     @property
-    def left_s(self) -> float:
-        """Until the end, at least 0."""
+    def remaining_s(self) -> float:
+        """Return the remaining time, at least 0 [s]."""
         return max(0.0, self._end - time.perf_counter())
 
     @property
     def over(self) -> bool:
-        """Whether nothing is left."""
-        return self.left_s <= 0.0
+        """Return whether no time is left."""
+        return self.remaining_s <= 0.0
 
     def share(self, part: float) -> Clock:
-        """A part of what is left."""
-        return Clock(part * self.left_s)
+        """Return a clock with a fraction of the remaining time."""
+        return Clock(part * self.remaining_s)
 
 
 Change = Callable[[ViewerState, int], ViewerState]
@@ -64,10 +64,10 @@ FEWEST = 3  # that a median is made of, however little time is left
 
 @dataclass(frozen=True)
 class Plan:
-    """What is drawn, and on which adapter.
+    """Settings of the frames and the adapter.
 
-    size : of the picture [pixel]
-    frames : of each kind of motion
+    size : size of the picture [pixel]
+    frames : number of frames of each kind of motion
     """
 
     head: str
@@ -80,25 +80,25 @@ class Plan:
 
 @dataclass(frozen=True)
 class Motion:
-    """One thing that moves from frame to frame.
+    """One kind of change from frame to frame.
 
-    start : the state in which it begins
+    start : initial state
     """
 
     start: Callable[[ViewerState], ViewerState]
     change: Change
 
 
-class Steady(QualityController):
-    """The same quality for every frame: what the settings ask for."""
+class ConstantQuality(QualityController):
+    """Quality controller with constant quality: that of the settings."""
 
-    def settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
-        """The wanted ones at the window's size."""
+    def limited_settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
+        """Return the settings at the size of the window."""
         return validated_copy(wanted, size=size)
 
 
 class InputDriver:
-    """A viewer on an offscreen canvas, without its panel."""
+    """Viewer on an offscreen canvas, without its panel."""
 
     def __init__(self, viewer: Viewer, canvas: Any) -> None:
         self.viewer, self.canvas, self.first = viewer, canvas, viewer.session.state
@@ -113,9 +113,9 @@ class InputDriver:
             raise
 
     def frame(self) -> NDArray[np.generic]:
-        """The next picture, after what has happened since the last one.
+        """Return the next picture.
 
-        Raises what went wrong, for the canvas would show its last picture for ever.
+        Raises the error of the frame, because the canvas would return its last picture forever.
         """
         self.canvas._process_events()
         picture = np.asarray(self.canvas.draw())
@@ -126,7 +126,7 @@ class InputDriver:
     def rest(self) -> None:
         """Draw until nothing moves.
 
-        Raises RuntimeError when that takes too long.
+        Raises RuntimeError if that takes too long.
         """
         clock = Clock(_REST_S)
         while not self.viewer.is_still:
@@ -135,17 +135,17 @@ class InputDriver:
             self.frame()
 
     def go_on(self, state: ViewerState) -> None:
-        """Go to another state within one gesture, so that the undo history does not grow."""
+        """Change to another state within one gesture, so that the undo history does not grow."""
         self.viewer.session.change(state, "benchmark")
 
     def event(self, kind: str, x: float, y: float, **fields: Any) -> None:
-        """Of a pointer with its left button down."""
+        """Send an event of a pointer with its left button pressed."""
         given = {"button": 1, "buttons": (1,), "modifiers": ()} | fields
         self.canvas.submit_event({"event_type": kind, "x": x, "y": y, **given})
 
 
 def offscreen(plan: Plan) -> InputDriver:
-    """A viewer that draws every frame at the plan's quality."""
+    """Return a viewer that draws every frame at the quality of the plan."""
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
     settings = Settings(atlas=plan.atlas, samples=plan.samples, shadow_size=plan.atlas)
@@ -153,14 +153,14 @@ def offscreen(plan: Plan) -> InputDriver:
     state = ViewerState(Scene(load_head(plan.head, subdivide=0)), settings, {"name": plan.head})
     viewer = Viewer(state, canvas, plan.adapter)
     viewer.panel.is_visible = False
-    viewer.session.view_renderer.quality_controller = Steady(
+    viewer.session.view_renderer.quality_controller = ConstantQuality(
         viewer.session.view_renderer.quality_controller.software
     )
     return InputDriver(viewer, canvas)
 
 
 def slider_position(driver: InputDriver, name: str) -> tuple[float, float] | None:
-    """Position of a pigment's slider in the window, None when it would have to be scrolled to."""
+    """Return the position of a pigment slider in the window; None if it must be scrolled into view."""
     driver.viewer.panel.is_visible = True
     driver.go_on(driver.first.with_skin(profile=PIGMENTED))
     for _ in range(FEWEST):
@@ -170,15 +170,15 @@ def slider_position(driver: InputDriver, name: str) -> tuple[float, float] | Non
     return place if place[1] < driver.canvas.get_logical_size()[1] else None
 
 
-def _unmapped(state: ViewerState) -> ViewerState:
-    """With a roughness that is one number, for its slider to move."""
+def _with_constant_roughness(state: ViewerState) -> ViewerState:
+    """Return the state with a constant roughness, so that its slider has an effect."""
     head = state.scene.head
     head = replace(head, maps=replace(head.maps, roughness=None))
     return replace(state, scene=replace(state.scene, head=head))
 
 
 def _with_targets(state: ViewerState) -> ViewerState:
-    """With as many morph targets as faces have, and bones."""
+    """Return the state with as many morph targets as faces have, and with bones."""
     return replace(state, scene=replace(state.scene, head=with_test_rig(state.scene.head, _TARGETS)))
 
 
@@ -193,7 +193,9 @@ def _same(state: ViewerState) -> ViewerState:
 MOTIONS: dict[str, Motion] = {
     "camera": Motion(_same, lambda state, k: state.with_camera(orbit(state.scene.camera, STEP, 0.0))),
     "light": Motion(_same, lambda state, k: drag_light(state, 0, STEP, 0.0)),
-    "roughness": Motion(_unmapped, lambda state, k: state.with_skin(roughness=0.2 + 0.3 * _to_and_fro(k))),
+    "roughness": Motion(
+        _with_constant_roughness, lambda state, k: state.with_skin(roughness=0.2 + 0.3 * _to_and_fro(k))
+    ),
     "melanin": Motion(
         lambda state: state.with_skin(profile=PIGMENTED).with_pigments(melanin=0.05),
         lambda state, k: state.with_pigments(melanin=0.05 + 0.01 * _to_and_fro(k)),
@@ -204,7 +206,7 @@ MOTIONS: dict[str, Motion] = {
 
 
 def speeds(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, JsonObject]]:
-    """Of each kind of motion, one after the other."""
+    """Yield the frame rate of each kind of motion."""
     for done, (name, motion) in enumerate(MOTIONS.items()):
         yield name, _speed(driver, motion, plan.frames, clock.share(1.0 / (len(MOTIONS) - done)))
 
@@ -236,7 +238,7 @@ def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> Js
 
 
 def counted(most: int, clock: Clock) -> Iterator[int]:
-    """0, 1, 2 and so on as long as there is time."""
+    """Yield 0, 1, 2 and so on while time is left."""
     for k in range(most):
         if k >= FEWEST and clock.over:
             return
@@ -244,12 +246,12 @@ def counted(most: int, clock: Clock) -> Iterator[int]:
 
 
 def processor_s() -> float:
-    """Of this process so far, user and system [s]."""
+    """Return the CPU time of this process so far, user and system [s]."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     return used.ru_utime + used.ru_stime
 
 
 def spread(seconds: Sequence[float]) -> dict[str, float]:
-    """Median and 95th percentile [ms], and of how many."""
+    """Return median and 95th percentile [ms], and the number of values."""
     middle, late = np.percentile(seconds, (50, 95))
     return {"median_ms": 1e3 * float(middle), "late_ms": 1e3 * float(late), "count": len(seconds)}

@@ -1,4 +1,4 @@
-"""The viewer's memory while everything in it is changed again and again."""
+"""Measure latency, and memory of the viewer while everything in it changes."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _PIXELS = 6.0  # of a drag between two frames
 
 
 def delays(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, dict[str, float]]]:
-    """From a pointer's move to the picture that shows it [ms]: in a drag, then out of rest.
+    """Yield the latency from a pointer move to the picture that shows it [ms]: during a drag, then at rest.
 
-    A camera takes some tenths of a second to come to rest, however quick the frames are.
+    The camera takes some tenths of a second to come to rest, independent of the frame rate.
     """
     driver.go_on(driver.first)
     x, y = (0.5 * side for side in plan.size)
@@ -44,7 +44,7 @@ def delays(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str,
 
 
 def _frame_s(driver: InputDriver) -> float:
-    """The quickest of some frames of a camera that turns [s]."""
+    """Return the least time of a frame with a turning camera [s]."""
     times = []
     for _ in range(FEWEST):
         began = time.perf_counter()
@@ -55,7 +55,7 @@ def _frame_s(driver: InputDriver) -> float:
 
 
 def _delay(driver: InputDriver, x: float, y: float) -> float:
-    """Of a move after which the camera has come to rest [s]."""
+    """Return the latency of a move when the camera is at rest [s]."""
     driver.rest()
     before, began = driver.frame(), time.perf_counter()
     driver.event("pointer_move", x, y)
@@ -67,7 +67,7 @@ def _delay(driver: InputDriver, x: float, y: float) -> float:
 
 
 def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> float:
-    """Of a move that comes while a frame is drawn [s]."""
+    """Return the latency of a move that occurs while a frame is drawn [s]."""
     actual: list[float] = []
 
     def move() -> None:
@@ -131,8 +131,8 @@ KINDS: dict[str, Kind] = {
 """Changes of a state; what cannot be rendered together leaves the last picture, as it does for a user."""
 
 
-def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> JsonObject:
-    """The memory over at least so many minutes and changes; each change is drawn."""
+def memory_samples(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> JsonObject:
+    """Return the memory over at least the given minutes and changes; each change is drawn."""
     chance, session = random.Random(11), driver.viewer.session
     done, taken = 0, list[dict[str, float]]()
     counts = dict.fromkeys((*KINDS, *_ACTIONS), 0)
@@ -151,8 +151,8 @@ def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> Js
         counts[kind] += 1
         done += 1
     taken.append(_sample(time.perf_counter() - begun, done))
-    told = {"plan": plan.__dict__, "minutes": taken[-1]["s"] / 60.0, "changes": done, "kinds": counts}
-    return told | {"samples": taken} | growth(taken)
+    result = {"plan": plan.__dict__, "minutes": taken[-1]["s"] / 60.0, "changes": done, "kinds": counts}
+    return result | {"samples": taken} | growth(taken)
 
 
 def _sample(seconds: float, changes: int) -> dict[str, float]:
@@ -185,7 +185,7 @@ def _change(driver: InputDriver, kind: str, chance: random.Random, plan: Plan) -
 
 
 def growth(taken: Sequence[dict[str, float]]) -> JsonObject:
-    """Slopes of the second half of the samples [MB per 1000 changes]."""
+    """Return the slopes of the second half of the samples [MB per 1000 changes]."""
     late = taken[len(taken) // 2 :]
     x = [one["changes"] / 1e3 for one in late]
     names = ("resident_mb", "device_mb")

@@ -1,4 +1,4 @@
-"""`dermis view --browser` as a page sees it: frames a second, and how late a move is seen."""
+"""Measure `dermis view --browser` as a page sees it: frame rate and latency."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _START_S = 120.0
 
 @contextmanager
 def served(plan: Plan, clock: Clock) -> Iterator[tuple[str, int]]:
-    """The address of `dermis view --browser`, and its process."""
+    """Yield the URL of `dermis view --browser` and its process."""
     size = "x".join(map(str, plan.size))
     words = ["view", plan.head, "--browser", "--port", "0", "--size", size, "--atlas", str(plan.atlas)]
     words += ["--profile", PIGMENTED, "--samples", str(plan.samples), "--adapter", plan.adapter]
@@ -39,7 +39,7 @@ def served(plan: Plan, clock: Clock) -> Iterator[tuple[str, int]]:
     ):
         try:
             assert server.stdout is not None
-            yield _address(server.stdout, min(_START_S, clock.left_s)), server.pid
+            yield _address(server.stdout, min(_START_S, clock.remaining_s)), server.pid
         except Exception as fault:
             raise RuntimeError(
                 f"{fault or type(fault).__name__}; dermis view: {_last_words(said)}"
@@ -48,11 +48,11 @@ def served(plan: Plan, clock: Clock) -> Iterator[tuple[str, int]]:
             _ended(server)
 
 
-def _address(told: IO[str], patience_s: float) -> str:
-    """The page's, which is all that the server tells."""
+def _address(output: IO[str], patience_s: float) -> str:
+    """Return the URL of the page, which is the only output of the server."""
     with selectors.DefaultSelector() as waiting:
-        waiting.register(told, selectors.EVENT_READ)
-        words = told.readline().split() if waiting.select(patience_s) else []
+        waiting.register(output, selectors.EVENT_READ)
+        words = output.readline().split() if waiting.select(patience_s) else []
     if not words:
         raise RuntimeError("it tells no address")
     return words[0]
@@ -84,9 +84,9 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True)
 class Picture:
-    """A frame as it came.
+    """Received frame.
 
-    at : when its last byte was here [s]
+    at : time when its last byte was received [s]
     """
 
     kind: str
@@ -95,12 +95,12 @@ class Picture:
 
     @property
     def name(self) -> bytes:
-        """What tells it from other pictures."""
+        """Return a hash that distinguishes pictures."""
         return hashlib.sha256(self.data).digest()
 
 
 class Page:
-    """A client that asks, moves and confirms as rendercanvas' page does."""
+    """Client with the protocol of the page of rendercanvas."""
 
     def __init__(self, url: str, size: tuple[int, int], clock: Clock) -> None:
         self._socket = _connected(url.replace("http", "ws", 1), clock)
@@ -111,36 +111,36 @@ class Page:
         self.send("key_down", key="Tab", modifiers=[])  # hides it
 
     def send(self, kind: str, **fields: Any) -> None:
-        """An event."""
+        """Send an event."""
         self._socket.send(json.dumps({"type": kind, "timestamp": time.time()} | fields))
 
     def pointer(self, kind: str, x: float, y: float, *modifiers: str) -> None:
-        """Of a pointer with its left button down."""
+        """Send an event of a pointer with its left button pressed."""
         state = {"button": 1, "buttons": [1], "modifiers": list(modifiers), "ntouches": 0, "touches": {}}
         self.send(kind, x=x, y=y, **state)
 
     def next_picture(self, timeout_s: float) -> Picture | None:
-        """The next frame, confirmed; None when none comes in time."""
+        """Return the next frame after confirming it; None after the timeout."""
         until = time.perf_counter() + timeout_s
         while (left := until - time.perf_counter()) > 0.0:
             try:
                 message = self._socket.recv(timeout=left)
             except TimeoutError:
                 return None
-            told = json.loads(message)
-            if told["type"] == "failure":
-                raise RuntimeError(told["text"])
-            if told["type"] == "framebufferdata":
+            header = json.loads(message)
+            if header["type"] == "failure":
+                raise RuntimeError(header["text"])
+            if header["type"] == "framebufferdata":
                 data = self._socket.recv(timeout=_PATIENCE_S)
                 assert isinstance(data, bytes)
-                found = Picture(told["mimetype"], data, time.perf_counter())
-                self.send("_framefeedback", index=told["index"], timestamp=told["timestamp"])
+                found = Picture(header["mimetype"], data, time.perf_counter())
+                self.send("_framefeedback", index=header["index"], timestamp=header["timestamp"])
                 self._last = found
                 return found
         return None
 
     def settle(self) -> Picture:
-        """The picture when none follows for a while, which is the lossless one."""
+        """Return the final, lossless picture, after which none follows for a while."""
         first = time.perf_counter()
         while time.perf_counter() - first < self.patience_s:
             if self.next_picture(_QUIET_S) is None and self._last and self._last.kind == "image/png":
@@ -150,41 +150,41 @@ class Page:
 
     @property
     def shown(self) -> bytes:
-        """The name of the last picture, none before the first."""
+        """Return the hash of the last picture, empty before the first."""
         return self._last.name if self._last else b""
 
     @property
     def patience_s(self) -> float:
-        """How long anything is waited for."""
-        return min(_PATIENCE_S, self.clock.left_s)
+        """Return the maximum waiting time [s]."""
+        return min(_PATIENCE_S, self.clock.remaining_s)
 
     def close(self) -> None:
-        """Leave."""
+        """Close the connection."""
         self._socket.close()
 
 
 def _connected(url: str, clock: Clock) -> Any:
-    """A socket, which the caller closes."""
+    """Return an open socket, which the caller closes."""
     from websockets.sync.client import connect
 
     while True:
         try:
-            return connect(url, max_size=None, open_timeout=min(_PATIENCE_S, clock.left_s)).__enter__()
+            return connect(url, max_size=None, open_timeout=min(_PATIENCE_S, clock.remaining_s)).__enter__()
         except ConnectionRefusedError:
             if clock.over:
                 raise
             time.sleep(0.1)
 
 
-def through_the_page(plan: Plan, slider: Place | None, clock: Clock) -> Iterator[tuple[str, Any]]:
-    """Motion and delay with all that lies between a page and the picture, at the viewer's own pace.
+def page_figures(plan: Plan, slider: Place | None, clock: Clock) -> Iterator[tuple[str, Any]]:
+    """Yield frame rates and latencies including everything between page and picture.
 
-    slider : where melanin is moved in the panel, if it can be seen
+    slider : position of the melanin slider in the panel, if it is visible
     """
     with served(plan, clock) as (url, pid):
         page = Page(url, plan.size, clock)
         still = page.settle()
-        yield "start_s", clock.gone_s
+        yield "start_s", clock.elapsed_s
         begun = resident_mb(pid)
         middle = 0.5 * plan.size[0], 0.5 * plan.size[1]
         yield "camera", _motion(page, middle)
@@ -198,12 +198,12 @@ def through_the_page(plan: Plan, slider: Place | None, clock: Clock) -> Iterator
 
 
 def _motion(page: Page, place: Place, *modifiers: str) -> dict[str, float]:
-    """A drag to and fro for some seconds, of few that are left a part; repeated frames do not count.
+    """Return the frame rate of a drag back and forth; repeated frames do not count.
 
-    The time runs from the second picture: the first may be the one at rest as JPEG, and what moves may take
-    long at first.
+    The time runs from the second picture, because the first may still be the picture at rest.
     """
-    watched_s, patience_s = min(_WATCHED_S, 0.13 * page.clock.left_s), min(_FIRST_S, 0.3 * page.clock.left_s)
+    remaining_s = page.clock.remaining_s
+    watched_s, patience_s = min(_WATCHED_S, 0.13 * remaining_s), min(_FIRST_S, 0.3 * remaining_s)
     moves, began = count(), time.perf_counter()
     page.pointer("pointer_down", *place, *modifiers)
     first = next(islice(_dragged(page, place, modifiers, moves, patience_s), 1, None), None)
@@ -226,7 +226,7 @@ def _motion(page: Page, place: Place, *modifiers: str) -> dict[str, float]:
 def _dragged(
     page: Page, place: Place, modifiers: Sequence[str], moves: Iterator[int], seconds: float
 ) -> Iterator[Picture]:
-    """Pictures, each unlike the one before, while a pointer moves to and fro."""
+    """Yield distinct pictures while a pointer moves back and forth."""
     x, y = place
     began = time.perf_counter()
     due_s, known = 0.0, page.shown
@@ -241,9 +241,9 @@ def _dragged(
 
 
 def _slide(page: Page, place: Place) -> dict[str, float]:
-    """A slider of the panel to and fro.
+    """Return the frame rate while a slider of the panel moves back and forth.
 
-    Raises RuntimeError when the skin stays as it was.
+    Raises RuntimeError if the skin does not change.
     """
     page.send("key_down", key="Tab", modifiers=[])
     page.send("pointer_move", x=place[0], y=place[1], button=0, buttons=[], modifiers=[])
@@ -264,11 +264,11 @@ def _pixels(picture: Picture) -> NDArray[np.uint8]:
 
 
 def _delays(page: Page, place: Place) -> list[float]:
-    """From a move out of rest to the first picture that is another [s]; fewer when little time is left."""
+    """Return latencies from a move at rest to the first different picture [s]; fewer if time is short."""
     x, y = place
     page.pointer("pointer_down", x, y)
     found, one_s = list[float](), 0.0
-    while len(found) < _REPEATS and (not found or page.clock.left_s > 2.0 * one_s):
+    while len(found) < _REPEATS and (not found or page.clock.remaining_s > 2.0 * one_s):
         first = time.perf_counter()
         seen = {page.settle().name}
         began = time.perf_counter()
@@ -284,7 +284,7 @@ def _delays(page: Page, place: Place) -> list[float]:
 
 
 def _encoding(still: Picture) -> dict[str, float]:
-    """What it takes to make bytes of a picture [ms]."""
+    """Return the time to encode a picture [ms]."""
     array, times = _pixels(still), {}
     for name, lossless in (("jpeg_ms", False), ("png_ms", True)):
         runs = []
@@ -297,6 +297,6 @@ def _encoding(still: Picture) -> dict[str, float]:
 
 
 def resident_mb(pid: int | str = "self") -> float:
-    """Memory of a process that is in use [MB]."""
+    """Return the resident memory of a process [MB]."""
     pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     return pages * 4096 / 1e6

@@ -1,7 +1,7 @@
-"""How far a page's pictures are from `dermis render`.
+"""Measure the difference between the pictures of an exported page and of `dermis render`.
 
-Headless Chromium on its software adapter draws the page in both forms; its linear pictures are held against
-those of a renderer whose maps are the ones that the page decodes, and these against the maps as they were.
+Headless Chromium on its software adapter renders the page in both forms. Its linear pictures are compared
+with those of a renderer that uses the decoded maps of the page, and these with those of the original maps.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from page_html import FLAGS, SOFTWARE, STATE
+from web_page import FLAGS, SOFTWARE, STATE
 
 import dermis
 from dermis.apps.export.targets.web.build import PageRequest, build_content
@@ -46,27 +46,27 @@ def main(head: str, adapter: str = "auto") -> None:
     scene = dermis.Scene(dermis.load_head(head))
     scene = replace(scene, head=with_reduced_maps(scene.head, MAP))
     settings = dermis.Settings(atlas=ATLAS)
-    print_lines("| head | form | size | difference | what maps and hairs lose |", "|---|---|---|---|---|")
+    print_lines("| head | form | size | difference | loss by maps and hairs |", "|---|---|---|---|---|")
     for form, side in SHOWN:
         settings_for = settings.model_copy(update={"size": (side, side)})
         given = capture_renderer(form, adapter).draw(scene, settings_for).linear()
-        wanted = list[NDArray[np.float32]]()
+        references = list[NDArray[np.float32]]()
         made = build_content(
             PageRequest(scene, (), settings, {form: (side,)}, adapter),
-            lambda renderer, *_, settings_for=settings_for: wanted.append(
+            lambda renderer, *_, settings_for=settings_for, references=references: references.append(
                 renderer.draw(scene, settings_for).linear()
-            ),  # noqa: B023
+            ),
         )
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "head.html"
             file.write_text(page_html(made, (), head, ""), encoding="utf-8")
             found = drawn(file, side)
-        off, lost = distance(found, wanted[0]), distance(wanted[0], given)
+        off, lost = distance(found, references[0]), distance(references[0], given)
         print_lines(f"| {head} | {form} | {side} x {side} | {off:.2%} | {lost:.2%} |")
 
 
 def drawn(file: Path, side: int) -> NDArray[np.float32]:
-    """(h, w, 3) linear, what a browser draws of a page."""
+    """Return the (h, w, 3) linear picture that a browser renders of a page."""
     with chromium_page(side, [*FLAGS, *SOFTWARE]) as page:
         page.goto(file.as_uri())
         page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=120_000)
@@ -75,7 +75,7 @@ def drawn(file: Path, side: int) -> NDArray[np.float32]:
 
 
 def distance(found: NDArray[np.float32], wanted: NDArray[np.float32]) -> float:
-    """Relative RMSE."""
+    """Return the relative RMSE."""
     return float(np.sqrt(((found - wanted) ** 2).mean() / (wanted**2).mean()))
 
 

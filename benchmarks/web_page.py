@@ -1,4 +1,4 @@
-"""Times of an exported page in headless Chromium, or its memory over minutes."""
+"""Measure frame times, or memory over minutes, of an exported page in headless Chromium."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STILL = "async () => { dermis.state.yaw += 0.02; dermis.rest(); await dermis.idl
 
 
 def processor_s() -> float:
-    """Processor time of all of the browser's processes [s]."""
+    """Return the CPU time of all processes of the browser [s]."""
     ticks = 0
     for folder in Path("/proc").iterdir():
         try:
@@ -40,7 +40,7 @@ def processor_s() -> float:
 
 
 def timed(page: Page, script: str, count: int) -> tuple[float, float]:
-    """Seconds by the clock and of the processor for each of some calls."""
+    """Return wall time and CPU time per call [s]."""
     began, used = time.perf_counter(), processor_s()
     for _ in range(count):
         page.evaluate(script)
@@ -48,7 +48,7 @@ def timed(page: Page, script: str, count: int) -> tuple[float, float]:
 
 
 def resident_mb() -> float:
-    """Memory of all of the browser's processes, each with its part of what they share [MB]."""
+    """Return the memory of all processes of the browser, with proportional parts of shared memory [MB]."""
     total = 0
     for folder in Path("/proc").iterdir():
         try:
@@ -61,19 +61,19 @@ def resident_mb() -> float:
 
 
 def turned(page: Page, minutes: float) -> None:
-    """Turn the head for so long, and tell what is held each minute."""
-    began, frames, told = time.monotonic(), 0, 0
-    while told <= minutes:
+    """Turn the head for some minutes, and print the memory each minute."""
+    began, frames, minute = time.monotonic(), 0, 0
+    while minute <= minutes:
         page.evaluate(MOVE)
         frames += 1
-        if time.monotonic() - began >= 60 * told:
+        if time.monotonic() - began >= 60 * minute:
             page.evaluate("window.gc && gc()")
             heap = page.evaluate("performance.memory.usedJSHeapSize") / 1e6
             sys.stdout.write(
-                f"{told} min, {frames} frames: heap {heap:.1f} MB, browser {resident_mb():.0f} MB\n"
+                f"{minute} min, {frames} frames: heap {heap:.1f} MB, browser {resident_mb():.0f} MB\n"
             )
             sys.stdout.flush()
-            told += 1
+            minute += 1
 
 
 def main(
@@ -89,15 +89,15 @@ def main(
     Parameters
     ----------
     file:
-        The exported page.
+        Exported page.
     side:
-        Of the viewport [pixel].
+        Side of the viewport [pixel].
     form:
-        Of the frame [chosen by the page].
+        Form of the frame. [default: chosen by the page]
     gpu:
-        Use the GPU of the machine, where Chromium can.
+        Use the GPU of the machine if Chromium can.
     minutes:
-        Turn the head for so long instead, and print the memory of page and browser each minute.
+        Turn the head for this time instead, and print the memory of page and browser each minute [min].
     """
     with chromium_page(side, FLAGS + (HARDWARE if gpu else SOFTWARE)) as page:
         began, used = time.perf_counter(), processor_s()

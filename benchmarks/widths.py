@@ -1,7 +1,7 @@
-"""Errors of mixed profiles at the border of two media.
+"""Measure the errors of mixed profiles at the border of two media.
 
-Monte Carlo through two half-spaces side by side is the truth; `unmixing_page.py` puts the figures into
-docs/fit.md. With --cost it prints the milliseconds of frames with one, two and three profiles.
+Monte Carlo through two adjacent half-spaces is the reference; `unmixing_page.py` writes the figures to
+docs/fit.md. With --cost it prints the times of frames with one, two and three profiles.
 """
 
 from __future__ import annotations
@@ -55,22 +55,22 @@ def main(
     Parameters
     ----------
     output:
-        JSON with the figures.
+        JSON file with the figures.
     cost_only:
-        Print milliseconds of frames, and write nothing.
+        Print only the times of frames, and write nothing.
     atlas:
-        Texels along the side of the atlas of those frames.
+        Side of the atlas of those frames [texel].
     """
     if cost_only:
         print_lines(json.dumps(cost(adapter, atlas)))
         return 0
-    told = {"pairs": {name: border(*pair) for name, pair in PAIRS.items()}, "grid": grid(adapter)}
-    write_results(output, told | {"photons": PHOTONS}, 3)
+    results = {"pairs": {name: border(*pair) for name, pair in PAIRS.items()}, "grid": grid(adapter)}
+    write_results(output, results | {"photons": PHOTONS}, 3)
     return 0
 
 
 def border(sigma_a: tuple[float, float], sigma_s: tuple[float, float]) -> JsonObject:
-    """Errors of each rule at the border of two media: root mean square over the true maximum, and energy."""
+    """Return the errors of each rule at the border of two media: RMS over the true maximum, and energy."""
     edges = np.linspace(-HALF_MM, HALF_MM, STRIPS + 1)
     a, s = np.array(sigma_a), np.array(sigma_s)
     true = strip_transfer(a, s, edges, PHOTONS, SEED)
@@ -80,16 +80,16 @@ def border(sigma_a: tuple[float, float], sigma_s: tuple[float, float]) -> JsonOb
     apart = np.abs(np.subtract.outer(np.arange(STRIPS), np.arange(STRIPS)))
     white = [one[apart] / total for one, total in zip(alone, colour, strict=True)]
     tint = np.sqrt(np.where(right, colour[1], colour[0]))
-    told = {}
+    results = {}
     for name, kernel in rules(white, right).items():
         off = [errors(light, kernel, tint, true) for light in patterns(edges)]
         rms, energy, kept = np.abs(np.array(off)).T
-        told[name] = {"rms": rms.mean(), "worst": rms.max(), "energy": energy.max(), "white": kept.max()}
-    return {"albedo": colour, "rules": told}
+        results[name] = {"rms": rms.mean(), "worst": rms.max(), "energy": energy.max(), "white": kept.max()}
+    return {"albedo": colour, "rules": results}
 
 
 def along(matrix: Floats) -> Floats:
-    """(n,) light by the distance in strips, of one medium."""
+    """Return the (n,) light of one medium by distance in strips."""
     found = np.zeros(STRIPS)
     for k in range(STRIPS):
         pairs = [matrix[i, j] for i in range(STRIPS)[_JUDGED] for j in (i - k, i + k) if 0 <= j < STRIPS]
@@ -98,7 +98,7 @@ def along(matrix: Floats) -> Floats:
 
 
 def rules(white: list[Floats], right: NDArray[np.bool_]) -> dict[str, Floats]:
-    """White kernels from row to column."""
+    """Return the white kernels of each mixing rule, from row to column."""
     leaves = np.where(right[None], white[1], white[0])
     enters = np.where(right[:, None], white[1], white[0])
     return {
@@ -111,7 +111,7 @@ def rules(white: list[Floats], right: NDArray[np.bool_]) -> dict[str, Floats]:
 
 
 def patterns(edges: Floats) -> Iterator[Floats]:
-    """Light over the strips: even, with an edge near the border, and lines of 0.5 mm."""
+    """Yield illumination patterns of the strips: uniform, an edge near the border, and lines of 0.5 mm."""
     x = 0.5 * (edges[:-1] + edges[1:])
     yield np.ones(STRIPS)
     for edge in (-1.0, 0.0, 1.0):
@@ -122,7 +122,7 @@ def patterns(edges: Floats) -> Iterator[Floats]:
 
 
 def errors(light: Floats, kernel: Floats, tint: Floats, true: Floats) -> tuple[float, float, float]:
-    """Root mean square over the maximum, light in all, and what the kernel alone makes of white's."""
+    """Return RMS error over the maximum, error of the total, and RMS error of the white kernel alone."""
     made, wanted = tint * ((light * tint) @ kernel), light @ true
     off = np.sqrt(((made - wanted)[_JUDGED] ** 2).mean()) / wanted[_JUDGED].max()
     energy = made[_CENTRAL].sum() / wanted[_CENTRAL].sum() - 1.0
@@ -131,17 +131,17 @@ def errors(light: Floats, kernel: Floats, tint: Floats, true: Floats) -> tuple[f
 
 
 def grid(adapter: str) -> JsonObject:
-    """What three profiles leave of the widths of skins with 1 to 15 % of melanin and 0.2 to 6 % of blood."""
+    """Return the width errors that remain with three profiles, over a grid of melanin and blood."""
     m, b = np.meshgrid(np.geomspace(0.01, 0.15, 64), np.geomspace(0.002, 0.06, 64))
     colours = skin_model().colours(m.ravel(), b.ravel()).reshape(64, 64, 3)
     return widths_of(unmix(colours, adapter=adapter)).summary()
 
 
 def cost(adapter: str, atlas: int) -> JsonObject:
-    """Median milliseconds of a human's frames by how many profiles its skin has, lit anew each time."""
+    """Return the median frame times of the human by number of profiles, relit each time [ms]."""
     renderer, head = Renderer(adapter), dermis.load_head("human")
     settings = dermis.Settings(size=(1920, 1080), atlas=atlas)
-    told: JsonObject = {"adapter": renderer.device.adapter.name, "atlas": atlas}
+    results: JsonObject = {"adapter": renderer.device.adapter.name, "atlas": atlas}
     with TemporaryDirectory() as folder:
         mask = Path(folder) / "mask.png"
         write_png(mask, np.random.default_rng(SEED).integers(0, 127, (64, 64, 3)).astype(np.uint8))
@@ -149,12 +149,12 @@ def cost(adapter: str, atlas: int) -> JsonObject:
         for others in ((), ("skin2",), ("skin2", "dj3")):
             skin = one.replace(profile_map=str(mask), other_profiles=others) if others else one
             took = [_frame_ms(renderer, dermis.Scene(head, skin=skin), settings, k) for k in range(_FRAMES)]
-            told[f"profiles {1 + len(others)}"] = float(np.median(took[2:]))
-    return told
+            results[f"profiles {1 + len(others)}"] = float(np.median(took[2:]))
+    return results
 
 
 def _frame_ms(renderer: Renderer, scene: dermis.Scene, settings: dermis.Settings, number: int) -> float:
-    """By the device's clock where it has one; of light that no frame before had."""
+    """Return the time of a frame with new light, by the clock of the device if it has one [ms]."""
     bright = 3.0 + 0.01 * number
     lamp = dermis.PointLight(position=(-300, 300, 700), irradiance=(bright, bright, bright))
     drawn = renderer.draw(replace(scene, lights=(lamp,)), settings, timed="whole")

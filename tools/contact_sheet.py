@@ -1,4 +1,4 @@
-"""Every rig and environment on several heads, exposed as `dermis render` does, on one sheet to look at."""
+"""Render every rig and environment on several heads as one contact sheet."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TURNS = (0.0, 90.0, 180.0, -90.0)
 
 
 def heads() -> dict[str, Head]:
-    """The package's own with light and with dark skin, and sample heads that lie on the disk."""
+    """Return the human with light and with dark skin, and the sample heads that are available on disk."""
     own = {"usual": load_head(HUMAN)}
     own["light"] = Human(african=0.0, asian=0.0, caucasian=1.0).head()
     own["dark"] = Human(african=1.0, asian=0.0, caucasian=0.0).head()
@@ -31,8 +31,8 @@ def heads() -> dict[str, Head]:
     return own | {name: load_head(name, subdivide=1) for name in samples}
 
 
-def lit() -> Iterator[dict[str, object]]:
-    """Each rig alone, each environment turned, and a rig in each environment."""
+def lighting_options() -> Iterator[dict[str, object]]:
+    """Yield lighting options: each rig alone, each environment rotated, and a rig in each environment."""
     for rig in light_presets():
         if rig != NO_LIGHTS:
             yield {"lights": load_lights(rig)}
@@ -45,19 +45,19 @@ def lit() -> Iterator[dict[str, object]]:
 
 
 def main(output: Path, *, side: int = 160, camera: str = "portrait", adapter: str = "auto") -> None:
-    """Draw the sheet: a row for each light, a column for each head.
+    """Render the sheet with one row per light and one column per head.
 
     Parameters
     ----------
     output:
-        PNG file.
+        PNG file to write.
     side:
-        Of each picture [pixel].
+        Side of each picture [pixel].
     """
     settings = Settings(size=(side, side), atlas=512, shadow_size=1024, **PHOTOGRAPHIC_SETTINGS)
     renderer, columns = Renderer(adapter), []
     for head in heads().values():
-        scenes = [Scene(head, camera=preset(camera, head), **light) for light in lit()]  # type: ignore[arg-type]
+        scenes = [Scene(head, camera=preset(camera, head), **light) for light in lighting_options()]  # type: ignore[arg-type]
         columns.append(np.concatenate([renderer.draw(scene, settings).srgb8() for scene in scenes]))
     write_png(output, np.concatenate(columns, axis=1))
 

@@ -1,7 +1,7 @@
-"""Walks as Cycles takes them through a half-space: writes `apps/export/targets/blender/cycles_walk.csv`.
+"""Simulate the random walk of Cycles in a half-space and write `cycles_walk.csv` of the Blender export.
 
-Takes a minute for 4 million photons. None is absorbed: one that leaves after n scatterings counts albedo^n at
-each albedo, so that all columns come from the same walks, smooth in the albedo.
+Takes a minute for 4 million photons. Photons are never absorbed: one that leaves after n scattering events
+counts with albedo^n for each albedo, so that all columns use the same walks and are smooth in the albedo.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ entry,root,radius,within
 
 @compiled
 def _entering(skin: bool, rng: RandomState) -> tuple[float, float, float]:
-    """Where a walk begins, z downwards."""
+    """Return the initial direction of a walk, with z downwards."""
     if not skin:
         return 0.0, 0.0, 1.0
     facing = math.sqrt(uniform(rng))  # cosine of facets of roughness 1, and of diffuse light alike
@@ -53,7 +53,7 @@ def _entering(skin: bool, rng: RandomState) -> tuple[float, float, float]:
 
 @compiled
 def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomState, found: Floats) -> None:
-    """Add to `found` (albedos, radii + 1) the weights of photons that leave, by their ring.
+    """Add the weights of photons that leave to their ring in `found` (albedos, radii + 1).
 
     powers : (albedos, MOST) albedo^n
     """
@@ -72,7 +72,7 @@ def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomS
 
 
 def main(photons: int = 4_000_000) -> None:
-    """Walk for each way to enter and write the table."""
+    """Simulate both entry distributions and write the table."""
     albedo = 1.0 - np.array(ROOTS) ** 2
     powers = albedo[:, None] ** np.arange(MOST)
     lines = []

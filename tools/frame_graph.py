@@ -1,4 +1,4 @@
-"""Writes a frame's graph down, in docs/frame_graph.md."""
+"""Write the graph of a frame to docs/frame_graph.md."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SETTINGS, TARGETS = dermis.Settings(size=(1920, 1080), atlas=2048), 52
 
 
 def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Settings]]:
-    """What the marks are for."""
+    """Return the changed scene and settings of each mark in the table."""
     key, *others = scene.lights
     moved = key.model_copy(update={"position": tuple(c + 20.0 for c in key.position)})  # type: ignore[union-attr]
     rough = scene.skin.model_copy(update={"roughness": 0.4})
@@ -33,15 +33,15 @@ def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Setting
     }
 
 
-def listed(renderer: dermis.Renderer, scene: dermis.Scene) -> Listing:
-    """A frame of which everything runs."""
+def full_listing(renderer: dermis.Renderer, scene: dermis.Scene) -> Listing:
+    """Return the listing of a frame in which all passes run."""
     renderer.graph.listing = listing = Listing()
     renderer.draw(scene, SETTINGS, force=True)
     return listing
 
 
 def stage_rows(listing: Listing, ms: dict[str, float], marks: dict[str, set[str]]) -> Iterable[str]:
-    """A row of the table for each stage."""
+    """Yield the table row of each stage."""
     for stage in dict.fromkeys(one.stage for one in listing.passes):
         own = [one for one in listing.passes if one.stage == stage]
         shaders = ", ".join(f"`{name}`" for name in dict.fromkeys(one.shader for one in own))
@@ -51,20 +51,20 @@ def stage_rows(listing: Listing, ms: dict[str, float], marks: dict[str, set[str]
 
 
 def pass_row(one: ListedPass) -> str:
-    """A row of the table of passes."""
+    """Return the table row of a pass."""
     bound = ", ".join(f"{name} {value}" for name, value in one.bindings.items() if value != "sampler")
     groups = " x ".join(map(str, one.groups))
     return f"| {'recorded' if one.recorded else ''} | {one.stage} | {one.shader} | {groups} | {bound} |"
 
 
 def main(adapter: str = "auto", page: Path = PAGE) -> None:
-    """Draw and write."""
+    """Render the frames and write the page."""
     renderer = dermis.Renderer(adapter)
     name = "lee_perry_smith" if is_available("lee_perry_smith") else "human"
     scene = dermis.Scene(with_test_rig(dermis.load_head(name, subdivide=0), TARGETS))
     renderer.draw(scene, SETTINGS)
     ms = renderer.draw_warm(scene, SETTINGS).gpu_ms or {}
-    listing, marks = listed(renderer, scene), dict[str, set[str]]()
+    listing, marks = full_listing(renderer, scene), dict[str, set[str]]()
     for change, frame in changes(scene).items():
         renderer.draw(scene, SETTINGS)
         renderer.draw(*frame)

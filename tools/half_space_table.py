@@ -1,8 +1,8 @@
-"""Makes src/dermis/optics/data/half_space.csv: profiles of homogeneous half-spaces by Monte Carlo.
+"""Compute profiles of homogeneous half-spaces by Monte Carlo for src/dermis/optics/data/half_space.csv.
 
-Takes some minutes. Scattering is isotropic and lengths are in mean free
-paths, so that a profile depends on the albedo alone, the surface and how light enters. Photons are never
-absorbed: one that leaves after n scatterings counts albedo^n, for all albedos at once.
+Takes some minutes. Scattering is isotropic and lengths are in mean free paths, so a profile depends only on
+the albedo, the surface and the incident directions. Photons are never absorbed: one that leaves after n
+scattering events counts with albedo^n for all albedos at once.
 """
 
 from __future__ import annotations
@@ -42,12 +42,13 @@ HEAD = """\
 
 
 def main(photons: int = PHOTONS) -> None:
-    """Trace all and write the table."""
+    """Trace all photons and write the table."""
     lines = [HEAD + ",".join(["kind", "albedo", "total", *(f"{edge:.5g}" for edge in EDGES[1:])])]
     for kind, (eta, diffuse) in KINDS.items():
         dark = ABSORBED >= DARK
-        bright_left = traced(eta, diffuse, ABSORBED[~dark], photons, EVENTS)
-        left = np.hstack([bright_left, traced(eta, diffuse, ABSORBED[dark], MORE * photons, FEW_EVENTS)])
+        bright_left = trace_photons(eta, diffuse, ABSORBED[~dark], photons, EVENTS)
+        dark_left = trace_photons(eta, diffuse, ABSORBED[dark], MORE * photons, FEW_EVENTS)
+        left = np.hstack([bright_left, dark_left])
         total, within = left.sum(axis=0), np.cumsum(left[:-1], axis=0)
         for i, absorbed in enumerate(ABSORBED):
             shares = ",".join(f"{share:.5f}" for share in within[:, i] / total[i])
@@ -56,8 +57,8 @@ def main(photons: int = PHOTONS) -> None:
         trial.write_text("\n".join([*lines, ""]), encoding="utf-8")
 
 
-def traced(eta: float, diffuse: bool, absorbed: Floats, photons: int, events: int) -> Floats:
-    """Light that leaves through each ring and beyond the last (k, m) for each albedo, of what enters [-]."""
+def trace_photons(eta: float, diffuse: bool, absorbed: Floats, photons: int, events: int) -> Floats:
+    """Return the (k, m) light that leaves through each ring and beyond the last, for each albedo [-]."""
 
     def batch(seeds: np.random.SeedSequence) -> Floats:
         left = np.zeros((len(EDGES), len(absorbed)))

@@ -1,6 +1,6 @@
-"""Makes src/dermis/human/data/human.npz: MakeHuman's parametric human as a bust with a layout of its own.
+"""Make src/dermis/human/data/human.npz: MakeHuman's parametric human as a bust with its own uv layout.
 
-FOLDER holds the published human.npz (CC0).
+FOLDER contains the published human.npz (CC0).
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ ACROSS = 4  # quads of the cap from front to back
 
 
 def main(folder: Path) -> None:
-    """Make the file."""
+    """Build the bust and write the file."""
     with np.load(folder / "human.npz") as found:
         data = {name: found[name] for name in found}
     mean = MM * data["positions_dm"].astype(np.float64) + person(data, MEAN)
-    data = without(data, "eyelashes")
-    quads, kept, mix = cut(data, mean)
+    data = without_groups(data, "eyelashes")
+    quads, kept, mix = clip_to_bust(data, mean)
     shape = capped(quads, data["quad_group"][kept].astype(np.int64), mix, mean)
     published, uv = data["quads_uv"][kept].astype(np.int64), data["uv"].astype(np.float64)
     own, corner = human_layout(shape.places(mean), shape.quads, published, uv, shape.group)
@@ -65,10 +65,10 @@ def main(folder: Path) -> None:
 
 
 class Shape(NamedTuple):
-    """A mesh whose points are mixtures of published ones.
+    """Mesh whose points are linear combinations of the published points.
 
-    quads, group : (q, 4) and (q,), the last group is that of caps
-    mix : (n, p) sparse
+    quads, group : (q, 4) points and (q,) groups of the quads; the last group is that of the caps
+    mix : (n, p) sparse weights of the published points
     """
 
     quads: Index
@@ -76,18 +76,18 @@ class Shape(NamedTuple):
     mix: Any
 
     def places(self, published: Doubles) -> Doubles:
-        """(n, 3) where its points are, given the published ones [mm]."""
+        """Return the (n, 3) positions of the points for given published positions [mm]."""
         return np.asarray(self.mix @ published)
 
 
 def displacements(data: Arrays, index: int) -> tuple[Index, Doubles]:
-    """Points that a target moves, and by how much [mm]."""
+    """Return the points that a target moves and their displacements [mm]."""
     part = slice(*data["target_offset"][index : index + 2])
     return data["target_vertex"][part].astype(np.int64), DELTA_UNIT_MM * data["target_delta_um10"][part]
 
 
 def person(data: Arrays, weights: dict[str, float]) -> Doubles:
-    """(p, 3) what targets add to the base [mm]."""
+    """Return the (p, 3) displacements of the base mesh by weighted targets [mm]."""
     names, added = list(map(str, data["target_names"])), np.zeros(data["positions_dm"].shape)
     for name, weight in weights.items():
         point, delta = displacements(data, names.index(name))
@@ -95,18 +95,18 @@ def person(data: Arrays, weights: dict[str, float]) -> Doubles:
     return added
 
 
-def beyond(places: Doubles) -> Doubles:
-    """How far places (n, 3) of the mean person lie outside of the bust (n,), negative inside [mm].
+def edge_distance_mm(places: Doubles) -> Doubles:
+    """Return the (n,) signed distances of positions (n, 3) from the edge of the bust, negative inside [mm].
 
-    A sculptor's cut: level above the breasts, and rising outwards through the shoulders.
+    The cut is level above the breasts and rises outwards through the shoulders.
     """
     x, y = np.abs(places[:, 0]), places[:, 1]
     below, beside = 385.0 - y, 0.93 * (x - 118.0) - 0.37 * (y - 385.0)
     return np.asarray(CORNER_MM * np.logaddexp(below / CORNER_MM, beside / CORNER_MM))
 
 
-def without(data: Arrays, kind: str) -> Arrays:
-    """The same without the groups of a kind."""
+def without_groups(data: Arrays, kind: str) -> Arrays:
+    """Return the data without the groups of one kind."""
     names = list(map(str, data["group_names"]))
     stays = [index for index, name in enumerate(names) if kind not in name]
     kept = np.isin(data["quad_group"], stays)
@@ -115,13 +115,13 @@ def without(data: Arrays, kind: str) -> Arrays:
     return data | named | {name: data[name][kept] for name in ("quads", "quads_uv")}
 
 
-def cut(data: Arrays, places: Doubles) -> tuple[Index, NDArray[np.bool_], Any]:
-    """Quads of the bust's points, which of the file's they are, and the points as mixtures of the file's.
+def clip_to_bust(data: Arrays, places: Doubles) -> tuple[Index, NDArray[np.bool_], Any]:
+    """Return the quads of the bust, the mask of the kept quads, and the mixing weights of the points.
 
-    Points beyond the edge come back onto it along the shortest way into the bust.
+    Points outside the edge are moved to it along the shortest path into the bust.
     """
     quads, group = data["quads"].astype(np.int64), data["quad_group"].astype(np.int64)
-    away = beyond(places)
+    away = edge_distance_mm(places)
     inside = away <= 0
     kept = inside[quads].any(axis=1) | (group > 0)
     quads = quads[kept]
@@ -144,17 +144,17 @@ def cut(data: Arrays, places: Doubles) -> tuple[Index, NDArray[np.bool_], Any]:
 
 
 def crossing(outer: Doubles, inner: Doubles) -> float:
-    """Where on the way from one place to another the bust's edge is, from 0 to 1."""
+    """Return the fraction of a line between two positions at which it crosses the edge of the bust."""
     low, high = 0.0, 1.0
     for _ in range(40):
         middle = 0.5 * (low + high)
-        inside = beyond((outer + middle * (inner - outer))[None])[0] <= 0
+        inside = edge_distance_mm((outer + middle * (inner - outer))[None])[0] <= 0
         low, high = (low, middle) if inside else (middle, high)
     return high
 
 
 def capped(quads: Index, group: Index, mix: Any, places: Doubles) -> Shape:
-    """The bust closed where it was cut: a ribbon from its front to its back."""
+    """Return the bust with its opening closed by a strip of quads from front to back."""
     loop = border(quads[group == 0])
     where = mix[loop] @ places
     top = int(np.argmax(np.where(where[:, 0] > 0, where[:, 1], -np.inf)))  # where front and back part
@@ -180,7 +180,7 @@ def capped(quads: Index, group: Index, mix: Any, places: Doubles) -> Shape:
 
 
 def relaxed(mix: Any, loop: Index) -> Any:
-    """The mixture with the points of a loop drawn towards their neighbours there, which takes spikes away."""
+    """Return the mixing weights with the points of a loop moved towards their neighbours, without spikes."""
     n = len(loop)
     around: Any = (0.5 * eye_array(n) + 0.25 * (eye_array(n, k=1) + eye_array(n, k=-1))).tolil()
     around[0, n - 1] = around[n - 1, 0] = 0.25
@@ -194,7 +194,7 @@ def relaxed(mix: Any, loop: Index) -> Any:
 
 
 def border(quads: Index) -> Index:
-    """The one loop of points that has the mesh on its left side as it runs."""
+    """Return the only border loop, with the mesh on its left side."""
     sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
     there = set(map(tuple, sides.tolist()))
     after = {a: b for a, b in there if (b, a) not in there}
@@ -208,7 +208,7 @@ def border(quads: Index) -> Index:
 
 
 def bust(data: Arrays, shape: Shape) -> Arrays:
-    """The bust's arrays, all but its layout. Joints are points too, after those of the mesh."""
+    """Return the arrays of the bust without its uv layout; joints follow the points of the mesh."""
     joints, published = data["joint_vertices"].astype(np.int64), len(data["positions_dm"])
     rows = np.repeat(np.arange(len(joints)), joints.shape[1])
     means = coo_array(
@@ -244,8 +244,8 @@ def bust(data: Arrays, shape: Shape) -> Arrays:
 
 
 def influences(data: Arrays, mix: Any) -> tuple[Index, Doubles]:
-    """(n, 4) bones of BONES and their weights."""
-    standing = np.array([stands_for(str(name)) for name in data["bone_names"]])
+    """Return the (n, 4) bone indices and weights of each point."""
+    standing = np.array([bone_index(str(name)) for name in data["bone_names"]])
     table = np.zeros((len(data["positions_dm"]), len(BONES)))
     np.add.at(table, (data["weight_vertex"].astype(int), standing[data["weight_bone"]]), data["weight"])
     table = np.asarray(mix @ table)
@@ -255,8 +255,8 @@ def influences(data: Arrays, mix: Any) -> tuple[Index, Doubles]:
     return order, weight / weight.sum(axis=1, keepdims=True)
 
 
-def stands_for(name: str) -> int:
-    """Number of the bone that moves what a published one does."""
+def bone_index(name: str) -> int:
+    """Return the index of the bone that replaces a published bone."""
     for index, kinds in enumerate(BONES.values()):
         if kinds and name.startswith(kinds):
             return index

@@ -1,4 +1,4 @@
-"""Makes src/dermis/human/data/detail.png: a tile of skin with pores, and one with its finest furrows."""
+"""Make src/dermis/human/data/detail.png: tiles of skin with pores and with fine furrows."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SOFT = 0.6
 
 
 def main() -> None:
-    """Make the file."""
+    """Build the tiles and write the file."""
     rng = np.random.default_rng(0)
     across = (np.arange(TILE_SIDE) + 0.5) * TILE_LENGTH_MM / TILE_SIDE
     places = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def scattered(count: int, rng: np.random.Generator, spread: float = 0.85) -> Doubles:
-    """(count², 2) places, one in each cell of a grid over the tile [mm]."""
+    """Return (count², 2) jittered positions, one in each cell of a grid over the tile [mm]."""
     cell = np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=-1).reshape(-1, 2)
     return np.asarray(
         (cell + 0.5 + spread * (rng.random(cell.shape) - 0.5)) * TILE_LENGTH_MM / count % TILE_LENGTH_MM
@@ -53,7 +53,7 @@ def scattered(count: int, rng: np.random.Generator, spread: float = 0.85) -> Dou
 
 
 def pores(places: Doubles, rng: np.random.Generator) -> Doubles:
-    """Height (n,) of skin with pores, soft pits that lean all ways [mm]."""
+    """Return the (n,) height of skin with pores, smooth pits of different inclination [mm]."""
     middle = scattered(PORES_A_SIDE, rng)
     share = rng.random(len(middle)) ** 1.3
     radius, depth = (low + share * (high - low) for low, high in (PORE_MM, PORE_DEPTH_MM))
@@ -71,13 +71,13 @@ def pores(places: Doubles, rng: np.random.Generator) -> Doubles:
 
 
 def furrows(places: Doubles, rng: np.random.Generator) -> Doubles:
-    """Height (n,) of skin between a net of furrows and a finer one inside [mm]."""
+    """Return the (n,) height of skin with a coarse and a fine net of furrows [mm]."""
     coarse = net(places, CELLS_A_SIDE, 1.0, rng)
     return np.asarray(coarse + FINE_SHARE * net(places, FINE_CELLS_A_SIDE, 0.55, rng))
 
 
 def net(places: Doubles, count: int, size: float, rng: np.random.Generator) -> Doubles:
-    """Furrows between cells, each cell a soft cushion [mm]."""
+    """Return the (n,) height of a net of furrows between convex cells [mm]."""
     middle = scattered(count, rng, 0.8)
     uneven = 0.5 + rng.random(len(middle))
     distance, near = nearest(places, middle, 2)
@@ -88,14 +88,14 @@ def net(places: Doubles, count: int, size: float, rng: np.random.Generator) -> D
 
 
 def nearest(places: Doubles, middle: Doubles, k: int) -> tuple[Doubles, NDArray[np.intp]]:
-    """(n, k) distances to the nearest of some places on the tile, and which these are."""
+    """Return the (n, k) distances to the nearest positions on the tile, and their indices."""
     box: Any = TILE_LENGTH_MM
     distance, which = cKDTree(middle, boxsize=box).query(places, k=k)
     return np.asarray(distance), np.asarray(which)
 
 
 def wrapped(off: Doubles) -> Doubles:
-    """Differences of places on the tile, the shortest way over its edges [mm]."""
+    """Return differences of positions on the periodic tile, by the shortest path [mm]."""
     return np.asarray((off + TILE_LENGTH_MM / 2) % TILE_LENGTH_MM - TILE_LENGTH_MM / 2)
 
 

@@ -1,6 +1,6 @@
-"""Makes src/dermis/human/data/average.npz: the average person, and how far skin is from lips and lids.
+"""Make src/dermis/human/data/average.npz: the average person, and distances of skin from lips and lids.
 
-FOLDER holds the published human.npz and its masks (CC0).
+FOLDER contains the published human.npz and its masks (CC0).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ROOT_MM = 1.5
 
 
 def main(folder: Path) -> None:
-    """Make the file."""
+    """Compute the fields and write the file."""
     head = AVERAGE.head(layout="hm08", subdivide=LEVEL)
     assert head.rig is not None and head.rig.stencils is not None
     stencils = head.rig.stencils
@@ -61,32 +61,32 @@ def main(folder: Path) -> None:
     matrix = csr_array((weight, point, first), shape=(len(first) - 1, len(head.positions_mm)))
     fields = fit(matrix, mesh.point[skin].astype(np.int64), values[skin])
     fields = fields[: mesh_point_count()]  # without eyeballs
-    np.savez_compressed(OUT, places=hundredths(places), fields=hundredths(fields))
+    np.savez_compressed(OUT, places=in_hundredths_mm(places), fields=in_hundredths_mm(fields))
     sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
 
 
-def hundredths(values_mm: NDArray[np.floating]) -> NDArray[np.int32]:
-    """The same in units of the published displacements; the breast is too far down for 16 bits."""
+def in_hundredths_mm(values_mm: NDArray[np.floating]) -> NDArray[np.int32]:
+    """Return values in the units of the published displacements; the breast exceeds the range of 16 bits."""
     return np.asarray(np.rint(values_mm / DELTA_UNIT_MM), np.int32)
 
 
 def skin_vertices(mesh: Mesh) -> Index:
-    """Vertices of the skin."""
+    """Return the vertices of the skin."""
     kinds = np.array([material.kind == "skin" for material in mesh.materials])
     return np.unique(mesh.triangles[kinds[mesh.material]])
 
 
 def mask(folder: Path, name: str, uv: NDArray[np.float32]) -> Doubles:
-    """(v,) a published mask at the vertices, 0 to 1."""
+    """Return the (v,) values of a published mask at the vertices, 0 to 1."""
     picture = np.asarray(Image.open(folder / "masks" / f"mpfb_{name}.jpg").convert("L"), np.float64) / 255
     place = uv[:, ::-1].T * np.array(picture.shape)[:, None] - 0.5
     return np.asarray(map_coordinates(picture, place, order=1, mode="nearest"))
 
 
 def signed(mesh: Mesh, skin: Index, share: Doubles, ignored: NDArray[np.bool_] | None = None) -> Doubles:
-    """(v,) distance from where a share of the skin passes one half, positive inside [mm].
+    """Return the (v,) signed distance from the contour where a fraction is one half, positive inside [mm].
 
-    ignored : vertices whose edges are no border
+    ignored : mask of vertices whose edges are not part of the contour
     """
     held = np.zeros(len(share), bool)
     held[skin] = True
@@ -102,12 +102,12 @@ def signed(mesh: Mesh, skin: Index, share: Doubles, ignored: NDArray[np.bool_] |
 
 
 def away(mesh: Mesh, places: Doubles) -> Doubles:
-    """(v,) distance from the nearest of some places [mm]."""
+    """Return the (v,) distance of each vertex from the nearest position [mm]."""
     return np.asarray(cKDTree(places).query(mesh.positions)[0])
 
 
 def lash_roots(folder: Path, mesh: Mesh, skin: Index) -> Doubles:
-    """(n, 3) where the published strips of lashes touch the lids, with points between [mm]."""
+    """Return (n, 3) points where the published lash strips touch the lids, with points in between [mm]."""
     with np.load(folder / "human.npz") as found:
         data: Arrays = {name: found[name] for name in found}
     names = list(map(str, data["group_names"]))
@@ -124,7 +124,7 @@ def lash_roots(folder: Path, mesh: Mesh, skin: Index) -> Doubles:
 
 
 def published(data: Arrays) -> Doubles:
-    """(p, 3) the published points of the average person, from the middle between the eyes [mm]."""
+    """Return the (p, 3) published points of the average person, relative to the midpoint of the eyes [mm]."""
     names = list(map(str, data["target_names"]))
     places = MM * data["positions_dm"].astype(np.float64)
     for name, weight in AVERAGE.weights().items():
@@ -136,9 +136,9 @@ def published(data: Arrays) -> Doubles:
 
 
 def fit(matrix: csr_array, point: Index, values: Doubles) -> Doubles:
-    """(p, k) values of control points whose smooth surface has those of the vertices (v, k).
+    """Return (p, k) control point values whose smooth surface interpolates the vertex values (v, k).
 
-    point : (v,) row of the matrix of each vertex
+    point : (v,) matrix row of each vertex
     """
     rows = matrix[point]
     near = np.asarray(rows.T @ values) / np.maximum(np.asarray(rows.sum(axis=0)).reshape(-1, 1), 1e-9)

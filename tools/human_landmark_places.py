@@ -1,4 +1,4 @@
-"""Places all over the average human, and the curves of its left side along which landmarks lie."""
+"""Candidate positions all over the average human, and the curves of its left side that carry landmarks."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _JAW_MM = np.array([[69.5, 0, -57], [68.6, -15, -56], [67, -30, -53], [65.2, -42
 
 
 class Surface:
-    """The dense surface.
+    """Dense surface of the average human.
 
-    quad, place : (n,) and (n, 2) of each candidate
-    at_mm : (n, 3) on the average human
+    quad, place : (n,) quad of each candidate and (n, 2) position in it
+    at_mm : (n, 3) positions on the average human [mm]
     """
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class Surface:
         return np.asarray(np.einsum("nk,nkc->nc", self._share, values[self._corner]))
 
     def _fields(self) -> Doubles:
-        """(p, 3) `BORDER_FIELDS` at the points of the fine mesh."""
+        """Return the (p, 3) fields `BORDER_FIELDS` at the points of the fine mesh."""
         told = average_surface()[1].astype(np.float64)
         control = np.zeros((len(self.head.control.positions_mm), len(BORDER_FIELDS)))
         control[: len(told)] = told
@@ -64,36 +64,36 @@ class Surface:
 
     @cached_property
     def skin(self) -> NDArray[np.bool_]:
-        """(n,) whether a candidate is of skin."""
+        """Return the (n,) mask of candidates on skin."""
         mesh = average_head().mesh
         return np.asarray(mesh.material[mesh.quads[self.quad, 0]] == 0)
 
     @cached_property
     def face(self) -> NDArray[np.bool_]:
-        """(n,) skin outside of mouth and ears."""
+        """Return the (n,) mask of candidates on skin outside mouth and ears."""
         return self.skin & ~np.isin(self.quad, np.concatenate([part_quads()["mouth"], part_quads()["ears"]]))
 
     def nearest(self, wanted: Doubles, among: NDArray[np.bool_] | None = None) -> int:
-        """Number of the candidate nearest to a place (3,) [mm]."""
+        """Return the index of the candidate nearest to a position (3,) [mm]."""
         those = np.flatnonzero(self.face if among is None else among)
         return int(those[np.linalg.norm(self.at_mm[those] - wanted, axis=1).argmin()])
 
     def frontmost(self, x: float, y: float) -> int:
-        """Number of the candidate that is seen at a place of the front plane [mm]."""
+        """Return the index of the candidate that is visible from the front at x, y [mm]."""
         off = np.hypot(self.at_mm[:, 0] - x, self.at_mm[:, 1] - y)
         near = np.flatnonzero(self.face & (off < _NEAR_MM))
         first = near[self.at_mm[near, 2] > self.at_mm[near, 2].max() - _NEAR_MM]
         return int(first[off[first].argmin()])
 
     def opposite(self, candidate: int) -> int:
-        """Number of the candidate on the other side."""
+        """Return the index of the mirrored candidate."""
         mirrored = self.at_mm[candidate] * [-1, 1, 1]
         alike = self.skin if self.skin[candidate] else ~self.skin
         same = alike & (np.abs(self.mouth - self.mouth[candidate]) < 1.0)
         return self.nearest(mirrored, same)
 
     def lid(self, upper: bool) -> Doubles:
-        """(r, 3) the edge of the lid that borders on the eye, from the inner to the outer corner [mm]."""
+        """Return the (r, 3) edge of a lid at the eye, from the inner to the outer corner [mm]."""
         rows = lid_rings()[0][_UPPER if upper else _LOWER[::-1]]
         edge, crest = (self.points_mm[rows[:, column]] for column in (_EDGE, _CREST))
         told = average_surface()[1][:, BORDER_FIELDS.index("lids")].astype(np.float64)
@@ -102,11 +102,11 @@ class Surface:
         return np.asarray((1 - part) * edge + part * crest)
 
     def on_lid(self, place: Doubles) -> int:
-        """Number of the candidate where lids border on the eye, nearest to a place (3,) [mm]."""
+        """Return the index of the candidate on the edge of the lids nearest to a position (3,) [mm]."""
         return self.nearest(place, self.skin & (np.abs(self.lids) < 0.12) & (self.at_mm[:, 0] > 0))
 
     def lip_border(self, upper: bool) -> Doubles:
-        """(n, 3) the outer border of a lip, from its corner to the middle [mm]."""
+        """Return the (n, 3) outer border of a lip, from its corner to the centre [mm]."""
         seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
         side = (self.at_mm[:, 1] > seam + 0.4) if upper else (self.at_mm[:, 1] < seam - 0.4)
         those = self.face & side & (np.abs(self.lips) < 0.3) & (np.abs(self.at_mm[:, 0] - 10.5) < 11.0)
@@ -118,12 +118,12 @@ class Surface:
         return np.concatenate([self.at_mm[[self.mouth_corner()]], path])
 
     def mouth_corner(self) -> int:
-        """Where the lips meet at the left end."""
+        """Return the index of the candidate at the left corner of the mouth."""
         x, y = _CORNER_MM, float(_SEAM_MM[-1, 1])
         return self.frontmost(x, y)
 
     def inner_lip(self, upper: bool) -> Doubles:
-        """(n, 3) the lower edge of the upper lip or the upper one of the lower, from the corner inwards."""
+        """Return the (n, 3) inner edge of the upper or lower lip, from the corner inwards [mm]."""
         seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
         above = self.at_mm[:, 1] - seam
         side = (above > 0) & (above < 3) if upper else (above < 0) & (above > -3)
@@ -137,28 +137,31 @@ class Surface:
         return np.concatenate([self.at_mm[[self.mouth_corner()]], np.stack(rows)])
 
     def on_inner_lip(self, place: Doubles, upper: bool) -> int:
-        """Number of the candidate on a lip nearest to a place of its inner edge."""
+        """Return the index of the candidate on a lip nearest to a position on its inner edge."""
         seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
         side = (self.at_mm[:, 1] > seam) == upper
         return self.nearest(place, self.skin & side & (self.mouth > 15))
 
     def jaw(self) -> Doubles:
-        """(n, 3) the outline of the face, from the height of the eyes to the chin."""
+        """Return the (n, 3) outline of the face, from the height of the eyes to the chin [mm]."""
         return _JAW_MM
 
     def midline(self, y: float) -> int:
-        """Number of the candidate in the middle at a height."""
+        """Return the index of the candidate on the midline at a height [mm]."""
         middle = self.face & (np.abs(self.at_mm[:, 0]) < 0.05) & (self.at_mm[:, 2] > 0)
         those = np.flatnonzero(middle)
         return int(those[np.abs(self.at_mm[those, 1] - y).argmin()])
 
     def brow(self, across: float) -> Doubles:
-        """(n, 3) along the brow from its inner end; across : from its lower edge, -1, to its upper one, 1."""
-        x, y = brows.strip(across).T
+        """Return (n, 3) points along the brow from its inner end [mm].
+
+        across : position across the brow, from its lower edge, -1, to its upper edge, 1
+        """
+        x, y = brows.outline(across).T
         return self.at_mm[[self.frontmost(*each) for each in zip(x, y, strict=True)]]
 
     def apex(self, name: str) -> int:
-        """Number of the candidate at the cornea's apex of an eye."""
+        """Return the index of the candidate at the corneal apex of an eye."""
         mesh = average_head().mesh
         material = mesh.material[mesh.quads[self.quad, 0]] == list(MATERIALS.values()).index(
             next(one for one in MATERIALS.values() if one.name == name)
@@ -168,6 +171,6 @@ class Surface:
 
 
 def arcs(path: Doubles, shares: Doubles) -> Doubles:
-    """(n, 3) places at shares (n,) of a path's length."""
+    """Return (n, 3) points at fractions (n,) of the length of a path."""
     run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     return np.stack([np.interp(shares * run[-1], run, column) for column in path.T], axis=-1)

@@ -1,4 +1,4 @@
-"""Landmarks of published sets, from the curves and extremes of the average human's face."""
+"""Landmarks of published sets, from curves and extreme points of the average human's face."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _OVAL_MM = (69.0, -15.0, 54.0)  # half of its breadth, where it is broadest, whe
 
 
 def ibug(surface: Surface) -> Named:
-    """The 68, by their numbers from 0."""
+    """Return the 68 landmarks of iBUG, numbered from 0."""
     left = _half(surface)
     both = {name: (left[name], surface.opposite(left[name])) for name in left}
     order = [
@@ -42,13 +42,13 @@ def ibug(surface: Surface) -> Named:
 
 
 def face_synthetics(surface: Surface) -> Named:
-    """The 68 and the pupils."""
+    """Return the 68 landmarks and the pupils."""
     left, right = (surface.apex(name) for name in ("left eye", "right eye"))
     return ibug(surface) | {"68": (right, PUPIL), "69": (left, PUPIL)}
 
 
 def _half(surface: Surface) -> dict[str, int]:
-    """Candidates of the left side and of the middle."""
+    """Return the candidates of the left side and of the midline by name."""
     found = {f"jaw {k}": surface.nearest(p) for k, p in enumerate(arcs(surface.jaw(), np.arange(9) / 8))}
     found["jaw 8"] = surface.midline(float(surface.jaw()[-1, 1]))
     found |= {f"brow {k}": surface.nearest(p) for k, p in enumerate(_brow(surface, 0.0, 5))}
@@ -84,7 +84,7 @@ def _brow(surface: Surface, across: float, count: int) -> Doubles:
 
 
 def mediapipe(surface: Surface) -> Named:
-    """Outlines of the face, brows, eyes and lips, the middle of the nose and the irises."""
+    """Return the landmarks of face outline, brows, eyes, lips, nose ridge and irises."""
     left = {**_oval(surface), **_eye(surface), **_brows(surface), **_mouth(surface), **_nose(surface)}
     found = {name: (candidate, 0.0) for name, (candidate, _) in left.items()}
     found |= {other: (surface.opposite(candidate), 0.0) for candidate, other in left.values() if other}

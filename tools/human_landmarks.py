@@ -1,4 +1,4 @@
-"""Makes src/dermis/human/landmarks/*.csv: where landmarks lie on the quads of the parametric human."""
+"""Make src/dermis/human/landmarks/*.csv: positions of landmarks on the quads of the parametric human."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SETS = {
 
 
 def main() -> None:
-    """Make the tables."""
+    """Compute the landmarks and write the tables."""
     surface = Surface()
     for name, (made, what) in SETS.items():
         rows = [row(surface, landmark, place) for landmark, place in made(surface).items()]
@@ -44,7 +44,10 @@ def main() -> None:
 
 
 def row(surface: Surface, landmark: str, place: tuple[int, float]) -> str:
-    """A line of the table; place : number of a candidate, and how far it is sunk."""
+    """Return a row of the table.
+
+    place : index of a candidate and its depth below the surface
+    """
     candidate, sunk = place
     along, across = surface.place[candidate]
     return f"{landmark},{surface.quad[candidate]},{along:g},{across:g},{sunk:.3g}\n"

@@ -1,4 +1,4 @@
-"""The uv layout of the human bust: the published cuts, laid flat anew with most room for the face."""
+"""uv layout of the human bust: the published cuts, flattened again with the most texels for the face."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ what is no skin."""
 def human_layout(
     places: Doubles, quads: Index, published: Index, uv: Doubles, group: Index
 ) -> tuple[Doubles, Index]:
-    """uv (m, 2), v down, and the corners (q, 4) of the quads among these.
+    """Return the (m, 2) uv, v down, and the (q, 4) uv corners of the quads.
 
     places : (n, 3) points of the mean person [mm]
-    quads : (q, 4) points, the caps last
-    published : (k, 4) corners of all but the caps in the published layout
-    uv : (v, 2) that layout, v up
-    group : (q,) what each quad belongs to, 0 is the skin
+    quads : (q, 4) points, caps last
+    published : (k, 4) corners of all quads but the caps in the published layout
+    uv : (v, 2) published layout, v up
+    group : (q,) group of each quad, 0 for skin
     """
-    published, uv = _parted(places, quads[: len(published)], published, uv)
+    published, uv = _with_seams(places, quads[: len(published)], published, uv)
     corner = np.concatenate([published, len(uv) + _strip(quads[len(published) :])])
     flat = np.zeros((int(corner.max()) + 1, 2))
     island = _islands(corner)
@@ -44,7 +44,7 @@ def human_layout(
         own = np.flatnonzero(island[corner[:, 0]] == k)
         pieces.append(own)
         points = np.unique(corner[own])
-        flat[points] = _laid(places, quads[own], corner[own], uv, int(group[own[0]]))[points]
+        flat[points] = _flattened(places, quads[own], corner[own], uv, int(group[own[0]]))[points]
     outlines = [flat[border_edges(halves(corner[own]))[0]] for own in pieces]
     scale, offset = pack_charts(outlines, PADDING)
     for own, move in zip(pieces, offset, strict=True):
@@ -54,8 +54,8 @@ def human_layout(
     return flat[used] * [1, -1] + [0, 1], again.reshape(-1, 4)
 
 
-def _laid(places: Doubles, quads: Index, corner: Index, uv: Doubles, group: int) -> Doubles:
-    """Places (v, 2) of one island's corners in the plane, y up, in mm times density."""
+def _flattened(places: Doubles, quads: Index, corner: Index, uv: Doubles, group: int) -> Doubles:
+    """Return the (v, 2) flattened corners of one island, y up [mm times density]."""
     made = np.zeros((int(corner.max()) + 1, 2))
     used, local = np.unique(corner, return_inverse=True)
     triangles = halves(local.reshape(-1, 4))
@@ -77,8 +77,8 @@ def _laid(places: Doubles, quads: Index, corner: Index, uv: Doubles, group: int)
     return made
 
 
-def _parted(places: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[Index, Doubles]:
-    """The published corners with a seam over the crown and behind the ears, and uv with its far side."""
+def _with_seams(places: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[Index, Doubles]:
+    """Return the published corners with an additional seam over crown and behind the ears, and their uv."""
     island, middle = _islands(corner)[corner[:, 0]], places[quads].mean(axis=1)
     head = np.flatnonzero(island == island[middle[:, 1].argmax()])
     behind = middle[head, 2] < _CROWN_Z + _CROWN_SLOPE * (middle[head, 1] - _EAR_Y)
@@ -90,13 +90,13 @@ def _parted(places: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[
 
 
 def rise(values: Doubles, low: float, high: float) -> Doubles:
-    """From 0 at `low` to 1 at `high` with level ends; downwards when `low` is the greater."""
+    """Return a smooth step from 0 at `low` to 1 at `high`; decreasing if `low` is greater."""
     t: Doubles = np.clip((values - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
 
 
 def _head_density(middle: Doubles) -> Doubles:
-    """Texels per mm (f,) of triangles of the head at places (f, 3) [mm]."""
+    """Return the (f,) texels per mm of the head's triangles with centres (f, 3) [mm]."""
     x, y, z = np.abs(middle[:, 0]), middle[:, 1], middle[:, 2]
     front = rise(z, -10, 100) * rise(y, 850, 790) * rise(y, 600, 650)
     density = SCALP + (FACE - SCALP) * front
@@ -105,7 +105,7 @@ def _head_density(middle: Doubles) -> Doubles:
 
 
 def _filled(triangles: Index, points: Doubles) -> tuple[Index, Doubles]:
-    """The sheet with a fan in each hole, and its points with the middles of these."""
+    """Return the sheet with each hole filled by a fan of triangles, and its points with their centres."""
     sides, _ = border_edges(triangles)
     _, loop = connected_components(
         coo_array((np.ones(len(sides)), sides.T), shape=(len(points),) * 2), directed=False
@@ -123,7 +123,7 @@ def _filled(triangles: Index, points: Doubles) -> tuple[Index, Doubles]:
 
 
 def _upright(flat: Doubles, points: Doubles) -> Doubles:
-    """Turned so that up in space is up."""
+    """Return the flattened points rotated so that up in space is up."""
     z = (flat - flat.mean(axis=0)) @ [1, 1j]
     slope = (np.conj(z) * (points[:, 1] - points[:, 1].mean())).sum()
     z = z * slope / abs(slope) * 1j
@@ -131,7 +131,7 @@ def _upright(flat: Doubles, points: Doubles) -> Doubles:
 
 
 def _unrolled(points: Doubles) -> Doubles:
-    """A ribbon's points by their depth, and by the way along it."""
+    """Return the points of a strip by their depth and their distance along the strip."""
     order = np.argsort(np.arctan2(points[:, 0], points[:, 1].max() + 1 - points[:, 1]), kind="stable")
     along = np.zeros(len(points))
     along[order] = np.r_[0, np.cumsum(np.linalg.norm(np.diff(points[order][:, :2], axis=0), axis=1))]
@@ -139,7 +139,7 @@ def _unrolled(points: Doubles) -> Doubles:
 
 
 def _strip(caps: Index) -> Index:
-    """Corners of the caps, numbered by their points."""
+    """Return the corners of the caps, numbered by their points."""
     return np.unique(caps, return_inverse=True)[1].reshape(-1, 4) if len(caps) else caps
 
 

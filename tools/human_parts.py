@@ -1,6 +1,6 @@
-"""Makes src/dermis/human/regions/parts.csv: quads of lips, ears and mouth, by the published masks.
+"""Make src/dermis/human/regions/parts.csv: quads of lips, ears and mouth from the published masks.
 
-FOLDER holds the published masks (CC0).
+FOLDER contains the published masks (CC0).
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ part,first,last
 
 
 def main(folder: Path) -> None:
-    """Make the table."""
+    """Find the quads and write the table."""
     rows = [f"{part},{a},{b}\n" for part, quads in parts(folder).items() for a, b in runs(quads)]
     OUT.write_text(HEADER + "".join(rows), encoding="utf-8")
     sys.stdout.write(f"{OUT}  {len(rows)} runs\n")
 
 
 def parts(folder: Path) -> dict[str, NDArray[np.int64]]:
-    """Numbers of the quads of each part."""
+    """Return the quad indices of each part."""
     with np.load(HUMAN / "data" / "human.npz") as found:
         data: dict[str, NDArray[Any]] = {name: found[name] for name in found}
     u, v = data["uv1"][data["quads_uv1"].astype(int)].mean(axis=1).T
@@ -50,7 +50,7 @@ def parts(folder: Path) -> dict[str, NDArray[np.int64]]:
 
 
 def runs(numbers: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """First and last of each run of consecutive numbers."""
+    """Return the first and last of each run of consecutive numbers."""
     parted = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
     return [(int(run[0]), int(run[-1])) for run in parted]
 

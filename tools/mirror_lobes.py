@@ -1,6 +1,6 @@
-"""Makes src/dermis/environment/data/mirrors.csv: surface lobes as round ones about the plane of view.
+"""Make src/dermis/environment/data/mirrors.csv: specular lobes as sums of isotropic ones.
 
-Takes two or three minutes. `dermis.environment.isotropic_fits` says how they are found.
+Takes two or three minutes. The method is described in `dermis.environment.isotropic_fits`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ HEAD = """\
 
 
 def main() -> None:
-    """Fit all and write the table."""
+    """Fit all lobes and write the table."""
     columns = [
         f"{name}_{k}" for k in range(LOBE_COUNT) for name in ("angle", "beside", "roughness", "weight")
     ]

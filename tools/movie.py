@@ -1,6 +1,6 @@
-"""A movie of the parametric human: it smiles, speaks a few visemes, blinks and turns under studio light.
+"""Render a movie of the parametric human that smiles, speaks, blinks and turns under studio light.
 
-Writes the motion beside the movie, as a CSV like those of Live Link Face. Needs DERMIS_DATA with
+The motion is written beside the movie as a CSV in the format of Live Link Face. Needs DERMIS_DATA with
 heads/makehuman.
 """
 
@@ -63,11 +63,11 @@ def main(output: Path, side: int = SIDE, fps: str = FPS) -> None:
     Parameters
     ----------
     output:
-        Movie, such as NAME.mp4.
+        Movie to write, such as NAME.mp4.
     side:
-        Of the pictures [pixel].
+        Side of the pictures [pixel].
     fps:
-        Pictures a second, as 30 or 30000/1001.
+        Frame rate, such as 30 or 30000/1001 [1/s].
     """
     rate = parse_frame_rate(fps)
     take = output.with_suffix(".csv")
@@ -84,13 +84,13 @@ def main(output: Path, side: int = SIDE, fps: str = FPS) -> None:
 
 
 def scenes(head: Head, clip: dermis.Clip, times: Sequence[float]) -> Iterator[dermis.Scene]:
-    """The head at each time [s]."""
+    """Yield the scene with the head at each time [s]."""
     for seconds in times:
         yield dermis.Scene(head, pose=clip.pose_at(seconds))
 
 
 def capture() -> str:
-    """The text of the CSV."""
+    """Return the text of the CSV."""
     columns = {
         f"{name}{side}": keys
         for name, keys in MOTION.items()
@@ -105,7 +105,7 @@ def capture() -> str:
 
 
 def value_at(keys: Keys, seconds: float) -> float:
-    """A curve through keys that rests at each."""
+    """Return the value at a time of a curve through keys, with zero slope at each key."""
     if seconds <= keys[0][0] or seconds >= keys[-1][0]:
         return keys[0][1] if seconds <= keys[0][0] else keys[-1][1]
     index = next(k for k, (at, _) in enumerate(keys) if at > seconds)

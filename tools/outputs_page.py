@@ -1,4 +1,4 @@
-"""Writes the table of outputs into docs/outputs.md from their registry."""
+"""Write the table of outputs in docs/outputs.md from their registry."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def main() -> None:
 
 
 def page(text: str) -> str:
-    """The page's text with the table of now."""
+    """Return the text of the page with the current table."""
     before, _, rest = text.partition(_BEGIN)
     return f"{before}{_BEGIN}{table()}{_END}{rest.partition(_END)[2]}"
 
 
 def table() -> str:
-    """A row for each output."""
+    """Return the table with one row per output."""
     columns = "name", "what", "unit", "numbers", "channels in OpenEXR", "PNG", "where nothing is seen"
     rows = [columns, ["---"] * len(columns), *map(_cells, OUTPUTS.values())]
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)

@@ -1,4 +1,4 @@
-"""Draws gallery pictures and puts them, as WebP, where the documentation shows them."""
+"""Render gallery pictures and store them as WebP for the documentation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WIDEST = 1600
 
 
 def main(*names: str) -> None:
-    """Draw every picture, or those that are named."""
+    """Render all pictures, or those that are named."""
     studio = Studio("lee_perry_smith")
     for script in find_scripts(names):
         picture = Image.fromarray(sheet(script.draw(studio), script.columns))

@@ -1,4 +1,4 @@
-"""Pictures of the viewer for the documentation: its window on a virtual screen and its page in Chromium."""
+"""Make the pictures of the viewer for the documentation: window on a virtual screen, page in Chromium."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ CHROMIUM = "chromium", "chromium-browser", "google-chrome"
 
 
 def main(head: str = "lee_perry_smith") -> None:
-    """Make both."""
+    """Make both pictures."""
     for name, take in (("viewer-window", window), ("viewer-browser", page)):
         take(head).save(FOLDER / f"{name}.webp", quality=88, method=6)
 
 
 def window(head: str) -> Image.Image:
-    """The window as a screen shows it."""
+    """Return a screenshot of the window."""
     with screen() as display:
         environment = os.environ | {"DISPLAY": display}
         environment.pop("WAYLAND_DISPLAY", None)
         light = ["--env", "royal_esplanade", "--profile", "light"]
         words = ["view", head, "--size", f"{SIZE[0]}x{SIZE[1]}", *light, *SCENE]
-        with ended(subprocess.Popen([sys.executable, "-m", "dermis", *words], env=environment)):
-            return still(lambda: ImageGrab.grab(xdisplay=display).convert("RGB"))
+        with running(subprocess.Popen([sys.executable, "-m", "dermis", *words], env=environment)):
+            return wait_until_still(lambda: ImageGrab.grab(xdisplay=display).convert("RGB"))
 
 
 def page(head: str) -> Image.Image:
-    """The page, with the light before it is spread on the right of the divider."""
+    """Return a screenshot of the page, with the light before scattering right of the divider."""
     from playwright.sync_api import sync_playwright
 
     words = ["view", head, "--browser", "--port", "0", "--size", f"{SIZE[0]}x{SIZE[1]}", *SCENE]
     command = [sys.executable, "-m", "dermis", *words]
     with (
-        ended(subprocess.Popen(command, stdout=subprocess.PIPE, text=True)) as server,
+        running(subprocess.Popen(command, stdout=subprocess.PIPE, text=True)) as server,
         sync_playwright() as play,
     ):
         assert server.stdout is not None
@@ -65,31 +65,31 @@ def page(head: str) -> Image.Image:
         def shown() -> Image.Image:
             return Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
 
-        still(shown)
+        wait_until_still(shown)
         for place in (COMPARE, FREEZE, VIEW_LIST, IRRADIANCE):
             tab.mouse.click(*place)
-            still(shown, ANSWERED_S)
+            wait_until_still(shown, ANSWERED_S)
         tab.mouse.move(SIZE[0] - 5, 5)
-        taken = still(shown)
+        taken = wait_until_still(shown)
         browser.close()
     return taken
 
 
 @contextmanager
 def screen() -> Iterator[str]:
-    """A screen in memory; gives its name."""
+    """Yield the name of a virtual screen in memory."""
     read, write = os.pipe()
     size = f"{SIZE[0]}x{SIZE[1]}x24"
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", size, "-nolisten", "tcp", "-noreset"]
-    with ended(subprocess.Popen(command, pass_fds=(write,), stderr=subprocess.DEVNULL)):
+    with running(subprocess.Popen(command, pass_fds=(write,), stderr=subprocess.DEVNULL)):
         os.close(write)
         with os.fdopen(read) as numbers:
             yield f":{numbers.readline().strip()}"
 
 
 @contextmanager
-def ended(process: subprocess.Popen[Any]) -> Iterator[subprocess.Popen[Any]]:
-    """A process that does not outlive the block."""
+def running(process: subprocess.Popen[Any]) -> Iterator[subprocess.Popen[Any]]:
+    """Yield a process that is ended with the block."""
     try:
         yield process
     finally:
@@ -97,8 +97,8 @@ def ended(process: subprocess.Popen[Any]) -> Iterator[subprocess.Popen[Any]]:
         process.wait(20)
 
 
-def still(take: Callable[[], Image.Image], quiet_s: float = REFINED_S) -> Image.Image:
-    """The first picture with something on it that does not change any more."""
+def wait_until_still(take: Callable[[], Image.Image], quiet_s: float = REFINED_S) -> Image.Image:
+    """Return the first non-empty picture that does not change any more."""
     end = time.monotonic() + PATIENCE_S
     last, since = take(), time.monotonic()
     while time.monotonic() < end:

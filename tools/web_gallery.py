@@ -1,4 +1,4 @@
-"""Writes four heads as pages and a page that leads to them."""
+"""Write four heads as web pages and an index page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STYLE = (
 
 
 def main(folder: Path) -> None:
-    """Write them."""
+    """Write the pages."""
     folder.mkdir(parents=True, exist_ok=True)
     shown = []
     for name, title in HEADS.items():

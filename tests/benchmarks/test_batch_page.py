@@ -59,7 +59,7 @@ def test_memory_is_told_by_images() -> None:
 
     clock = Clock(workers=2)
     for images in range(1, 50):
-        clock.told(Progress(images, 50))
+        clock.record(Progress(images, 50))
     assert list(clock.resident) == [10, 20]
     run = told()["new"][1] | {"resident_bytes": {"10": 5 * 10**8, "20": 6 * 10**8}}
     text = page([told(new=[run])])

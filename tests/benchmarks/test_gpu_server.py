@@ -77,12 +77,12 @@ def test_what_fails_and_what_would_be_late_is_told(
 def test_a_program_that_fails_is_told_with_its_last_words(
     server: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from gpu_server import lasted_s
+    from gpu_server import run_time_s
 
     with pytest.raises(DermisError, match="nobody"):
-        lasted_s([sys.executable, "-m", "dermis", "head", "nobody"])
+        run_time_s([sys.executable, "-m", "dermis", "head", "nobody"])
     assert "nobody" in capsys.readouterr().err
-    assert lasted_s([sys.executable, "-c", "pass"]) > 0.0
+    assert run_time_s([sys.executable, "-c", "pass"]) > 0.0
 
 
 def test_a_program_that_hangs_ends_with_all_that_it_started(
@@ -103,7 +103,7 @@ def test_a_program_that_hangs_ends_with_all_that_it_started(
     monkeypatch.setattr(gpu_server, "note", lambda line: heard.set())
     words = ["/bin/sh", "-c", f"sleep 600 & echo $! > {other}; echo still at it >&2; wait"]
     with pytest.raises(DermisError, match=r"-c sleep .*within 5 s.*Last words: still at it"):
-        gpu_server.lasted_s(words, 5.0)
+        gpu_server.run_time_s(words, 5.0)
     process, patient_until = int(other.read_text(encoding="utf-8")), time.monotonic() + 120.0
     while _runs(process):  # for a moment: it closes what it wrote to before it is gone
         assert time.monotonic() < patient_until
@@ -128,7 +128,7 @@ def test_a_viewer_that_is_stopped_leaves_what_it_has(
         Path(asked["--output"]).write_text('{"speed": {"camera": {"frames_per_s": 50.0}}}', encoding="utf-8")
         raise DermisError("viewer.py: too late. Last words: page")
 
-    monkeypatch.setattr(server, "lasted_s", stopped)
+    monkeypatch.setattr(server, "run_time_s", stopped)
     told = run("viewer")["viewer"]
     assert told["speed"]["camera"]["frames_per_s"] == 50.0 and "Last words: page" in told["ended"]
 

@@ -103,33 +103,36 @@ def test_a_picture_that_never_rests_ends_the_wait(driver: Any, monkeypatch: pyte
 
 
 def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: Path) -> None:
-    from viewer import Found, tables
+    from viewer import Results, tables
     from viewer_input import Clock
 
     def broken(clock: Any) -> Any:
-        assert clock.left_s <= 10.0
+        assert clock.remaining_s <= 10.0
         one = {"frames_per_s": 50.0, "frame_ms": 20.0, "late_frame_ms": 25.0, "longest_frame_ms": 90.0}
         yield "camera", one | {"processor_ms": 10.0, "stages": ["post"]}
         raise RuntimeError("the page does not come to rest")
 
     plan = {"head": "human", "size": (240, 160), "atlas": 64, "samples": 1}
-    found = Found(
+    found = Results(
         {"plan": plan, "adapter": "none", "date": "2026-01-01"}, tmp_path / "told.json", Clock(10.0)
     )
-    found.take("speed", broken)
+    found.record("speed", broken)
     written = json.loads((tmp_path / "told.json").read_text(encoding="utf-8"))
     assert written["speed"]["camera"]["frame_ms"] == 20.0
     assert "RuntimeError: the page does not come to rest" in written["speed"]["ended"]
-    told = tables(written)
-    assert "| camera | 50.0 | 20.0 | 25.0, 90.0 | 10.0 | post |" in told and "speed ended early" in told
+    all_figures = tables(written)
+    assert (
+        "| camera | 50.0 | 20.0 | 25.0, 90.0 | 10.0 | post |" in all_figures
+        and "speed ended early" in all_figures
+    )
 
 
 def test_a_server_that_has_nothing_to_show_is_told_with_its_reason(plan: Any) -> None:
     from viewer_input import Clock
-    from viewer_page import through_the_page
+    from viewer_page import page_figures
 
     with pytest.raises(RuntimeError, match="no such head"):
-        dict(through_the_page(replace(plan, head="no such head"), None, Clock(60.0)))
+        dict(page_figures(replace(plan, head="no such head"), None, Clock(60.0)))
 
 
 def test_all_kinds_of_change_are_drawn_and_the_memory_is_watched(
@@ -139,7 +142,7 @@ def test_all_kinds_of_change_are_drawn_and_the_memory_is_watched(
 
     some = {name: viewer_memory.KINDS[name] for name in ("orbit", "light", "mix", "view")}
     monkeypatch.setattr(viewer_memory, "KINDS", some)
-    found = viewer_memory.endured(driver, plan, minutes=0.0, changes=3)
+    found = viewer_memory.memory_samples(driver, plan, minutes=0.0, changes=3)
     assert found["changes"] == 3 == sum(found["kinds"].values())
     assert set(some) < set(found["kinds"])
     assert found["samples"][0]["changes"] == 0 and found["samples"][-1]["changes"] == 3
@@ -152,7 +155,8 @@ def test_each_kind_of_change_makes_another_state(driver: Any) -> None:
     from dermis.apps.viewer.state import states_equal
 
     for kind in KINDS.values():
-        assert any(not states_equal(kind(driver.first, random.Random(seed)), driver.first) for seed in range(6))
+        changed = [kind(driver.first, random.Random(seed)) for seed in range(6)]
+        assert any(not states_equal(state, driver.first) for state in changed)
 
 
 def test_growth_is_that_of_the_second_half() -> None:
