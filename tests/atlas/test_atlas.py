@@ -180,7 +180,7 @@ def test_a_collapsed_chart_is_left_out() -> None:
     alone = build_atlas(patches((0.1, 0.1, 0.6)), 64)
     atlas = build_atlas(with_it, 64)
     assert atlas.mapped.tolist() == [True] * 8 + [False] * 8
-    for name in ("triangle", "barycentric", "stretch", "reach"):
+    for name in ("triangle", "barycentric", "stretch", "edge_distance"):
         assert np.array_equal(getattr(atlas, name), getattr(alone, name)), name
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.stitched.pack import Span, lay_shapes
+from dermis.atlas.stitched.pack import Span, place_shapes
 
 N = 24
 Flags = NDArray[np.bool_]
@@ -35,7 +35,7 @@ def shapes(count: int) -> list[Flags]:
 
 def test_each_shape_has_the_first_place_where_nothing_is() -> None:
     masks = shapes(14)
-    corners = lay_shapes([spans_of(mask) for mask in masks], N)
+    corners = place_shapes([spans_of(mask) for mask in masks], N)
     assert corners is not None
     taken = np.zeros((N, N), np.bool_)
     for mask, corner in zip(masks, corners, strict=True):
@@ -53,6 +53,6 @@ def test_each_shape_has_the_first_place_where_nothing_is() -> None:
 
 def test_what_has_no_room_is_not_laid() -> None:
     square = spans_of(np.ones((N // 2, N // 2), np.bool_))
-    assert lay_shapes([square] * 4, N) == [(0, 0), (N // 2, 0), (0, N // 2), (N // 2, N // 2)]
-    assert lay_shapes([*[square] * 4, [(0, 0, 0)]], N) is None
-    assert lay_shapes([[(0, 0, N)]], N) is None
+    assert place_shapes([square] * 4, N) == [(0, 0), (N // 2, 0), (0, N // 2), (N // 2, N // 2)]
+    assert place_shapes([*[square] * 4, [(0, 0, 0)]], N) is None
+    assert place_shapes([[(0, 0, N)]], N) is None

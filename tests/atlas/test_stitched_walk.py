@@ -8,9 +8,9 @@ from cut_meshes import cut_cone, cut_cylinder, cut_sphere
 from numpy.typing import NDArray
 
 from dermis.atlas.stitched.build import find_pieces
+from dermis.atlas.stitched.geodesics import trace_geodesics
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps, find_conflicts
-from dermis.atlas.stitched.surface import FlatSurface, survey
-from dermis.atlas.stitched.walk import walk
+from dermis.atlas.stitched.surface import FlatSurface, flat_surface
 from dermis.mesh.mesh import Mesh, build_mesh
 
 Floats = NDArray[np.float64]
@@ -23,9 +23,9 @@ def go(
     surface: FlatSurface, triangle: NDArray[np.int32], start: Floats, target: Floats
 ) -> tuple[Floats, Floats]:
     """Where walks end in space, and whether the surface went on so far."""
-    ends = walk(surface.adjacency, triangle, start, target)
+    ends = trace_geodesics(surface.adjacency, triangle, start, target)
     weights = np.column_stack((1 - ends.weights.sum(axis=1), ends.weights))
-    return np.einsum("nk,nkc->nc", weights, surface.corners[ends.triangle]), ends.whole
+    return np.einsum("nk,nkc->nc", weights, surface.corners[ends.triangle]), ends.complete
 
 
 def around(points: Floats) -> Floats:
@@ -40,7 +40,8 @@ def around(points: Floats) -> Floats:
 def random_walks(surface: FlatSurface, length: float) -> tuple[NDArray[np.int32], Floats, Floats]:
     rng = np.random.default_rng(5)
     triangle = rng.integers(0, len(surface.uv), 2000).astype(np.int32)
-    start = np.einsum("nk,nkc->nc", rng.dirichlet(np.ones(3), 2000), surface.adjacency.flat[triangle])
+    corners = surface.adjacency.planar_corners[triangle]
+    start = np.einsum("nk,nkc->nc", rng.dirichlet(np.ones(3), 2000), corners)
     angle = rng.uniform(0, 2 * np.pi, 2000)
     return triangle, start, start + length * np.column_stack((np.cos(angle), np.sin(angle)))
 
@@ -56,15 +57,15 @@ def prism(flipped: bool) -> Mesh:
 @pytest.mark.parametrize("flipped", [False, True])
 @pytest.mark.parametrize("length", [1.0, 20.0, 150.0])
 def test_on_a_prism_walks_are_straight_lines_on_it_unrolled(length: float, flipped: bool) -> None:
-    surface = survey(prism(flipped))
+    surface = flat_surface(prism(flipped))
     triangle, start, target = random_walks(surface, length)
-    ends, whole = go(surface, triangle, start, target)
+    ends, complete = go(surface, triangle, start, target)
     begins = np.einsum("nk,nkc->nc", _weights(surface, triangle, start), surface.corners[triangle])
     along = _step(surface, triangle, target - start)
     expected = around(begins) + along
     inside = np.abs(expected[:, 1]) < HEIGHT / 2 - 0.05
     beyond = np.abs(expected[:, 1]) > HEIGHT / 2 + 0.05
-    assert whole[inside].all() and not whole[beyond].any()
+    assert complete[inside].all() and not complete[beyond].any()
     off = around(ends) - expected
     off[:, 0] = (off[:, 0] + FACETS * WIDTH / 2) % (FACETS * WIDTH) - FACETS * WIDTH / 2
     # a walk starts a thousandth of the way to the triangle's middle, and so leaves at another angle
@@ -74,7 +75,7 @@ def test_on_a_prism_walks_are_straight_lines_on_it_unrolled(length: float, flipp
 
 
 def _weights(surface: FlatSurface, triangle: NDArray[np.int32], place: Floats) -> Floats:
-    p = surface.adjacency.flat[triangle]
+    p = surface.adjacency.planar_corners[triangle]
     matrix = np.concatenate((p.transpose(0, 2, 1), np.ones((len(p), 1, 3))), axis=1)
     right = np.column_stack((place, np.ones(len(p))))[..., None]
     return np.asarray(np.linalg.solve(matrix, right)[..., 0])
@@ -96,20 +97,20 @@ def _step(surface: FlatSurface, triangle: NDArray[np.int32], step: Floats) -> Fl
 
 def test_a_round_walk_on_a_sphere_comes_home() -> None:
     """Great circles close; facets make them miss by a little."""
-    surface = survey(cut_sphere(20.0, 32))
+    surface = flat_surface(cut_sphere(20.0, 32))
     triangle, start, target = random_walks(surface, 2 * np.pi * 20.0)
-    ends, whole = go(surface, triangle, start, target)
+    ends, complete = go(surface, triangle, start, target)
     begins = np.einsum("nk,nkc->nc", _weights(surface, triangle, start), surface.corners[triangle])
-    assert whole.all()
+    assert complete.all()
     assert np.percentile(np.linalg.norm(ends - begins, axis=1), 90) < 0.05 * 2 * np.pi * 20.0
 
 
 def test_an_overlap_is_cut_until_its_sides_have_room() -> None:
     """The unrolled cone's sides meet at the apex: both would need the same texels."""
-    surface = survey(cut_cone(40.0, 50.0))
+    surface = flat_surface(cut_cone(40.0, 50.0))
     piece, _ = find_pieces(surface)
     assert piece.max() == 0
-    whole = find_conflicts(surface, piece >= 0, np.flatnonzero(piece == 0), 8.0).length_mm
+    complete = find_conflicts(surface, piece >= 0, np.flatnonzero(piece == 0), 8.0).length_mm
     cut = cut_overlaps(surface, piece, 8.0)
     assert 1 <= cut.max() <= 3
     assert np.array_equal(cut >= 0, piece >= 0)
@@ -117,13 +118,13 @@ def test_an_overlap_is_cut_until_its_sides_have_room() -> None:
         find_conflicts(surface, cut >= 0, np.flatnonzero(cut == k), 8.0).length_mm
         for k in range(int(cut.max()) + 1)
     )
-    assert whole > 8.0
-    assert left < 0.5 * whole
+    assert complete > 8.0
+    assert left < 0.5 * complete
 
 
 @pytest.mark.parametrize("mesh", [cut_cylinder(RADIUS, HEIGHT, 6), cut_sphere(30.0, 12)])
 def test_nothing_is_cut_without_need(mesh: Mesh) -> None:
-    surface = survey(mesh)
+    surface = flat_surface(mesh)
     piece, _ = find_pieces(surface)
     cut = cut_overlaps(surface, piece, 8.0)
     assert cut.max() == piece.max()

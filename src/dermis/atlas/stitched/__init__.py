@@ -1,1 +1,1 @@
-"""The stitched layout of the atlas: charts apart, with gutters that show the surface across their seams."""
+"""Stitched uv layouts: charts with gutters that continue the surface across seams."""

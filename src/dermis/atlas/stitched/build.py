@@ -1,4 +1,4 @@
-"""The stitched atlas, step by step: pieces, cuts, packing, gutters."""
+"""Construction of the stitched atlas: pieces, cuts, packing and gutters."""
 
 from __future__ import annotations
 
@@ -20,37 +20,40 @@ from dermis.atlas.stitched.surface import Doubles, FlatSurface, Index, flat_surf
 from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.mesh.mesh import Mesh
 
-_COLLAPSED = 0.05  # of the mesh's mean density: what has less holds nothing that could be blurred
-_SPECK_MM2 = 1.0  # mirrored parts under this stay with the chart around them
-_EVEN = (0.5, 1.4)  # of the mean density: charts that have more or less are moved halfway towards it
-_WIDEST = 1 / 8  # of the map's side, for gutters
+_MIN_DENSITY = 0.05  # of a piece, relative to the mesh's mean; what has less is too small to be blurred
+_SPECK_MM2 = 1.0  # smaller mirrored parts stay in the chart around them
+_DENSITY_RANGE = (0.5, 1.4)  # relative to the mean; the density of charts outside is moved towards it
+_MAX_GUTTER = 1 / 8  # width of gutters as a fraction of the map's side
 
 
 def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
-    """Piece of each triangle (f,), -1 without a place, and scale (f,) of its uv that evens out density."""
+    """Return the piece of each triangle (f,), -1 for none, and uv scales (f,) that even out density.
+
+    A piece is a chart or a mirrored part of one.
+    """
     mirrored = (surface.area_uv < 0).astype(np.int64)
     neighbour = surface.uv_neighbour
     chart = connected_pieces(np.zeros(len(mirrored), np.int64), neighbour)
     piece = connected_pieces(2 * chart + mirrored, neighbour)
-    piece = _with_specks(surface, chart, piece)
+    piece = _merge_specks(surface, chart, piece)
     piece = np.where(surface.valid, piece, -1)
-    density, mean = _density(surface, piece)
-    piece[density < _COLLAPSED * mean] = -1
-    density, mean = _density(surface, piece)
-    low, high = (limit * mean for limit in _EVEN)
-    wanted = np.where(density < low, np.sqrt(low * density), density)
-    wanted = np.where(density > high, np.sqrt(high * density), wanted)
-    return renumbered(piece), np.where(piece >= 0, wanted / np.maximum(density, 1e-12), 1.0)
+    density, mean = _uv_density(surface, piece)
+    piece[density < _MIN_DENSITY * mean] = -1
+    density, mean = _uv_density(surface, piece)
+    low, high = (limit * mean for limit in _DENSITY_RANGE)
+    target = np.where(density < low, np.sqrt(low * density), density)
+    target = np.where(density > high, np.sqrt(high * density), target)
+    return renumbered(piece), np.where(piece >= 0, target / np.maximum(density, 1e-12), 1.0)
 
 
 def renumbered(piece: Index) -> Index:
-    """The same pieces (f,), counted from 0; -1 stays."""
-    numbers, again = np.unique(piece, return_inverse=True)
-    return np.asarray(again.reshape(-1) - np.count_nonzero(numbers < 0), dtype=np.int64)
+    """Return pieces (f,) renumbered from 0 without gaps; -1 is kept."""
+    numbers, index = np.unique(piece, return_inverse=True)
+    return np.asarray(index.reshape(-1) - np.count_nonzero(numbers < 0), dtype=np.int64)
 
 
-def _with_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
-    """Pieces with the small ones given to the largest of their chart."""
+def _merge_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
+    """Return pieces with small ones merged into the largest of their chart."""
     area = np.bincount(piece, surface.area_mm2 * surface.valid)
     order = np.argsort(area[piece], kind="stable")
     largest = np.zeros(int(chart.max()) + 1, np.int64)
@@ -58,61 +61,65 @@ def _with_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
     return np.where(area[piece] < _SPECK_MM2, largest[chart], piece)
 
 
-def _density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
-    """Side of each triangle's piece in uv over that in space (f,) [1/mm], and of all together."""
-    inside, number = piece >= 0, np.maximum(piece, 0)
-    uv = np.bincount(number, np.abs(surface.area_uv) * inside)
-    mm2 = np.bincount(number, surface.area_mm2 * inside)
+def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
+    """Return the length in uv per mm on the surface for each triangle's piece (f,), and its mean."""
+    inside, index = piece >= 0, np.maximum(piece, 0)
+    uv = np.bincount(index, np.abs(surface.area_uv) * inside)
+    mm2 = np.bincount(index, surface.area_mm2 * inside)
     mean = float(np.sqrt(uv.sum() / max(mm2.sum(), 1e-12)))
-    return np.where(inside, np.sqrt(uv / np.maximum(mm2, 1e-12))[number], mean), mean
+    return np.where(inside, np.sqrt(uv / np.maximum(mm2, 1e-12))[index], mean), mean
 
 
 def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
-    """The atlas in which every chart has room of its own, and a gutter that shows what lies across its seams.
+    """Build the atlas in which charts are apart, with gutters that show the surface across their seams.
 
-    None when there are too many charts for the texels.
+    Returns None if there are too many charts for the texels.
 
-    reach_mm : width of the gutters
+    gutter_mm : width of the gutters [mm]
     """
     surface = flat_surface(mesh)
     piece, scale = find_pieces(surface)
     piece = cut_overlaps(surface, piece, gutter_mm)
-    width = GutterWidth(gutter_mm, _WIDEST * size)
+    width = GutterWidth(gutter_mm, _MAX_GUTTER * size)
     packing = pack_pieces(surface, piece, scale, size, width)
     if packing is None:
         return None
-    # where a piece overlaps itself only one layer has light: gutters must not read the other
+    # where a piece overlaps itself, gutters must read only the layer that has texels
     piece = np.where(hidden_triangles(surface, piece, packing, size), -1, piece)
     own = np.flatnonzero(piece >= 0)
-    made = compute_coverage(surface, piece, own, find_border(surface, piece, own), packing, width, (size, size))
-    return _atlas(surface, packing, made, piece >= 0)
+    coverage = compute_coverage(
+        surface, piece, own, find_border(surface, piece, own), packing, width, (size, size)
+    )
+    return _atlas(surface, packing, coverage, piece >= 0)
 
 
-def _atlas(surface: FlatSurface, packing: Packing, made: Coverage, mapped: NDArray[np.bool_]) -> Atlas:
-    size = len(made.triangle)
-    metric = texel_metric(surface, packing, made)
-    reach = edge_distances(surface, packing, made)
-    y, x = np.nonzero(made.gutter)
-    second = made.weights[y, x].astype(np.float64)
-    weights = np.column_stack((1 - second.sum(axis=1), second))
-    source = np.einsum("nk,nka->na", weights, packing.corners[made.triangle[y, x]])
-    place = np.where(mapped[:, None, None], (packing.corners + 0.5) / size, 0.0)
-    # the rims of pieces show what lies across a seam, but are stretched as their own side of it
-    outer = (made.rooted >= 0) & ((made.rooted != made.triangle) | made.gutter)
-    row, column = np.nonzero(outer)
+def _atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, mapped: NDArray[np.bool_]) -> Atlas:
+    size = len(coverage.triangle)
+    metric = texel_metric(surface, packing, coverage)
+    distances = edge_distances(surface, packing, coverage)
+    y, x = np.nonzero(coverage.gutter)
+    bc = coverage.weights[y, x].astype(np.float64)
+    weights = np.column_stack((1 - bc.sum(axis=1), bc))
+    source = np.einsum("nk,nka->na", weights, packing.corners[coverage.triangle[y, x]])
+    corner_uv = np.where(mapped[:, None, None], (packing.corners + 0.5) / size, 0.0)
+    # the rim of a piece shows the surface across a seam, but with the stretch of its own side
+    outside = (coverage.anchor_triangle >= 0) & (
+        (coverage.anchor_triangle != coverage.triangle) | coverage.gutter
+    )
+    row, column = np.nonzero(outside)
     shear = np.clip(metric[..., 2], -MAX_SHEAR, MAX_SHEAR)
     return Atlas(
-        triangle=made.triangle,
-        barycentric=np.floor(made.weights * 65535.0).astype(np.uint16),
+        triangle=coverage.triangle,
+        barycentric=np.floor(coverage.weights * 65535.0).astype(np.uint16),
         stretch=np.minimum(metric[..., :2], 6e4).astype(np.float16),
         shear=shear.astype(np.float16),
-        reach=reach,
-        place=place.astype(np.float32),
+        edge_distance=distances,
+        corner_uv=corner_uv.astype(np.float32),
         gutter=np.column_stack((x, y)).astype(np.uint16),
         source=source.astype(np.float32),
-        beyond=np.column_stack((column, row)).astype(np.uint16),
-        root=made.rooted[row, column],
-        root_weight=np.floor(made.roots[row, column] * 65535.0).astype(np.uint16),
+        outside=np.column_stack((column, row)).astype(np.uint16),
+        border_triangle=coverage.anchor_triangle[row, column],
+        border_weights=np.floor(coverage.anchor_weights[row, column] * 65535.0).astype(np.uint16),
         texels_per_uv=packing.texels_per_uv.astype(np.float32),
         mapped=mapped,
     )

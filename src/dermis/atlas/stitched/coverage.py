@@ -1,4 +1,4 @@
-"""The surface that each texel of pieces and gutters shows, with its stretch and unbroken runs."""
+"""Surface points at the texels of pieces and gutters, with their stretch and the distance to chart edges."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from dermis.atlas.stitched.texels import (
     AnchoredTexels,
     anchors_diverge,
     centre_weights,
-    gap_mm,
-    run_lengths,
+    gap_limit_mm,
     mostly_hidden,
     rasterise_owners,
+    run_lengths,
     unconnected_pairs,
 )
 
@@ -25,19 +25,22 @@ Singles = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Coverage:
-    """Texels of a grid and the surface they show.
+    """Surface points that the texels of a grid show.
 
-    triangle, weights : (h, w), (h, w, 2) -1 where nothing is; weights of the second and third corner
-    rooted, roots : the same at the nearest place on the texel's own piece: itself, or on the border
-    piece : (h, w) piece, -1 where nothing is
-    gutter : (h, w) texels that show what others compute
-    away_mm : (h, w) distance from the piece
+    The anchor of a texel is the nearest point of its own piece: in the piece itself, or on its border for
+    gutters.
+
+    triangle, weights : (h, w) triangle, -1 for none, and (h, w, 2) weights of its second and third corner
+    anchor_triangle, anchor_weights : the same for the anchor
+    piece : (h, w) piece, -1 for none
+    gutter : (h, w) texels that copy others
+    distance_mm : (h, w) distance from the piece
     """
 
     triangle: NDArray[np.int32]
     weights: NDArray[np.float32]
-    rooted: NDArray[np.int32]
-    roots: NDArray[np.float32]
+    anchor_triangle: NDArray[np.int32]
+    anchor_weights: NDArray[np.float32]
     piece: NDArray[np.int32]
     gutter: Flags
     distance_mm: NDArray[np.float32]
@@ -52,123 +55,143 @@ def compute_coverage(
     width: GutterWidth,
     shape: tuple[int, int],
 ) -> Coverage:
-    """The texels of pieces that are placed apart from each other.
+    """Compute the coverage of packed pieces and their gutters.
 
-    piece, own : (f,) and numbers of triangles, as for `find_border`
+    piece, own, border : pieces (f,), triangles to cover, and their border, see `find_border`
     """
-    owner = rasterise_owners(packing.corners, _drawn(surface, piece, own), shape)
+    owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, own), shape)
     weights = centre_weights(packing.corners, owner)
-    made = Coverage(
+    coverage = Coverage(
         owner,
         weights,
-        rooted=owner.copy(),
-        roots=weights.copy(),
+        anchor_triangle=owner.copy(),
+        anchor_weights=weights.copy(),
         piece=np.empty(shape, np.int32),
         gutter=np.zeros(shape, np.bool_),
         distance_mm=np.zeros(shape, np.float32),
     )
-    _add_gutters(made, piece, trace_gutter(surface, border, packing, width, owner))
-    made.piece[:] = np.where(made.rooted >= 0, piece[np.maximum(made.rooted, 0)], -1)
-    return made
+    _add_gutters(coverage, piece, trace_gutter(surface, border, packing, width, owner))
+    coverage.piece[:] = np.where(
+        coverage.anchor_triangle >= 0, piece[np.maximum(coverage.anchor_triangle, 0)], -1
+    )
+    return coverage
 
 
-def _add_gutters(made: Coverage, piece: Index, found: GutterTexels) -> None:
-    """Write rims and gutters into a cover of pieces alone."""
-    y, x = found.y, found.x
-    made.rooted[y, x], made.roots[y, x], made.distance_mm[y, x] = found.root, found.root_weights, found.distance_mm
-    made.triangle[y, x], made.weights[y, x] = found.triangle, found.weights
-    made.gutter[y, x] = ~found.rim
-    ended = np.zeros(made.gutter.shape, np.bool_)
-    ended[y, x] = ~found.complete
-    astray = ~found.complete & ~found.rim
-    made.triangle[y[astray], x[astray]] = -1
-    _repeat_edge(made, piece, ended, y[astray], x[astray])
-    # gutters end where the atlas does not hold their light
-    gone = made.gutter & ((made.triangle < 0) | (piece[np.maximum(made.triangle, 0)] < 0))
-    for grid in (made.triangle, made.rooted):
-        grid[gone] = -1
-    made.gutter[gone] = False
+def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None:
+    """Add rims and gutters to a coverage of pieces only."""
+    y, x = texels.y, texels.x
+    coverage.anchor_triangle[y, x], coverage.anchor_weights[y, x], coverage.distance_mm[y, x] = (
+        texels.anchor_triangle,
+        texels.anchor_weights,
+        texels.distance_mm,
+    )
+    coverage.triangle[y, x], coverage.weights[y, x] = texels.triangle, texels.weights
+    coverage.gutter[y, x] = ~texels.rim
+    ended = np.zeros(coverage.gutter.shape, np.bool_)
+    ended[y, x] = ~texels.complete
+    incomplete = ~texels.complete & ~texels.rim
+    coverage.triangle[y[incomplete], x[incomplete]] = -1
+    _repeat_edge(coverage, piece, ended, y[incomplete], x[incomplete])
+    # gutters end where the surface has no texels in the atlas
+    unlit = coverage.gutter & ((coverage.triangle < 0) | (piece[np.maximum(coverage.triangle, 0)] < 0))
+    for grid in (coverage.triangle, coverage.anchor_triangle):
+        grid[unlit] = -1
+    coverage.gutter[unlit] = False
 
 
 def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Flags:
-    """Triangles (f,) most of whose texels others of their piece own."""
+    """Return the mask (f,) of triangles whose texels belong mostly to other triangles of their piece."""
     own = np.flatnonzero(piece >= 0)
-    owner = rasterise_owners(packing.corners, _drawn(surface, piece, own), (size, size))
+    owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, own), (size, size))
     return mostly_hidden(packing.corners, own, owner)
 
 
-def _drawn(surface: FlatSurface, piece: Index, own: Index) -> Index:
-    """Triangles that are mirrored within their piece first, so that others win."""
+def _drawing_order(surface: FlatSurface, piece: Index, own: Index) -> Index:
+    """Return the triangles with those first that are mirrored within their piece, and so overwritten."""
     return own[np.argsort(~_mirrored(surface, piece[own], own), kind="stable")]
 
 
 def _mirrored(surface: FlatSurface, piece: Index, own: Index) -> Flags:
-    """Which of the triangles `own` face the other way than most of their piece."""
-    complete = np.bincount(piece, surface.area_uv[own])
-    return np.asarray(np.sign(complete)[piece] != np.sign(surface.area_uv[own]))
+    """Return the mask of triangles `own` that are mirrored relative to most of their piece."""
+    total = np.bincount(piece, surface.area_uv[own])
+    return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[own]))
 
 
-def _repeat_edge(made: Coverage, piece: Index, ended: Flags, y: Index, x: Index) -> None:
-    """Gutter texels just beyond the end of the surface repeat their neighbours.
+def _repeat_edge(coverage: Coverage, piece: Index, ended: Flags, y: Index, x: Index) -> None:
+    """Copy neighbouring texels to gutter texels just beyond the end of the surface.
 
     A blur along the edge then reads the same from a gutter as from the rim of a piece.
 
-    ended : (h, w) texels that the surface does not reach
-    y, x : (n,) such texels in gutters
+    ended : (h, w) texels beyond the end of the surface
+    y, x : (n,) those of them that are in gutters
     """
     last = np.array(ended.shape) - 1
     from_y, from_x = y.copy(), x.copy()
     for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0)):
-        beside_y, beside_x = np.clip(y + dy, 0, last[0]), np.clip(x + dx, 0, last[1])
-        root = made.rooted[beside_y, beside_x]
-        same = (root >= 0) & ~ended[beside_y, beside_x] & (piece[root] == piece[made.rooted[y, x]])
-        from_y, from_x = np.where(same, beside_y, from_y), np.where(same, beside_x, from_x)
-    made.triangle[y, x], made.weights[y, x] = made.triangle[from_y, from_x], made.weights[from_y, from_x]
+        next_y, next_x = np.clip(y + dy, 0, last[0]), np.clip(x + dx, 0, last[1])
+        anchor = coverage.anchor_triangle[next_y, next_x]
+        same = (
+            (anchor >= 0) & ~ended[next_y, next_x] & (piece[anchor] == piece[coverage.anchor_triangle[y, x]])
+        )
+        from_y, from_x = np.where(same, next_y, from_y), np.where(same, next_x, from_x)
+    coverage.triangle[y, x], coverage.weights[y, x] = (
+        coverage.triangle[from_y, from_x],
+        coverage.weights[from_y, from_x],
+    )
 
 
-def texel_metric(surface: FlatSurface, packing: Packing, made: Coverage) -> Singles:
-    """(h, w, 3) texels per mm along u and v and the cosine between them; in gutters those at the border."""
-    metric, there = np.zeros((*made.rooted.shape, 3), np.float32), made.rooted >= 0
-    found = interpolate_corners(surface.uv_metric.astype(np.float32), made.rooted[there], made.roots[there])
-    texels_per_uv = packing.texels_per_uv[made.rooted[there]].astype(np.float32)
+def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> Singles:
+    """Return texels per mm along u and v, and the cosine between them (h, w, 3); in gutters of the anchor."""
+    metric, covered = (
+        np.zeros((*coverage.anchor_triangle.shape, 3), np.float32),
+        coverage.anchor_triangle >= 0,
+    )
+    found = interpolate_corners(
+        surface.uv_metric.astype(np.float32),
+        coverage.anchor_triangle[covered],
+        coverage.anchor_weights[covered],
+    )
+    texels_per_uv = packing.texels_per_uv[coverage.anchor_triangle[covered]].astype(np.float32)
     found[:, :2] = texels_per_uv[:, None] / np.maximum(found[:, :2], 1e-3)
-    metric[there] = found
+    metric[covered] = found
     return metric
 
 
-def edge_distances(surface: FlatSurface, packing: Packing, made: Coverage) -> NDArray[np.uint16]:
-    """(h, w, 4) texels to the left, right, up and down of the same piece, while the surface continues.
+def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
+    """Return the texels (h, w, 4) of the same piece to the left, right, up and down, up to the next gap.
 
-    It ends between texels whose points are farther apart than `gap_mm`, and whose roots are farther apart
-    than either texel is from its root.
+    There is a gap between two texels if their points are farther apart than `gap_limit_mm` and their anchors
+    are farther apart than either texel is from its anchor.
     """
-    owner = np.where(made.rooted >= 0, np.where(made.distance_mm > 0, -1, made.rooted), -2)
-    reach = np.empty((*owner.shape, 4), np.uint16)
+    owner = np.where(
+        coverage.anchor_triangle >= 0, np.where(coverage.distance_mm > 0, -1, coverage.anchor_triangle), -2
+    )
+    distance = np.empty((*owner.shape, 4), np.uint16)
     for axis in (0, 1):
         joined = np.zeros(owner.shape, np.bool_)
-        here, before = np.moveaxis(joined, 1 - axis, 0)[1:], np.moveaxis(made.piece, 1 - axis, 0)
+        here, before = np.moveaxis(joined, 1 - axis, 0)[1:], np.moveaxis(coverage.piece, 1 - axis, 0)
         here[:] = (before[1:] >= 0) & (before[1:] == before[:-1])
         first, second = unconnected_pairs(surface, owner, axis)
         same = joined.ravel()[second]
-        joined.ravel()[second[same]] = ~_parted(surface, packing, made, first[same], second[same], axis)
-        found = run_lengths(np.moveaxis(joined, 1 - axis, 1))
-        reach[..., 2 * axis], reach[..., 2 * axis + 1] = (np.moveaxis(one, 1, 1 - axis) for one in found)
-    return reach
+        joined.ravel()[second[same]] = ~_has_gap(surface, packing, coverage, first[same], second[same], axis)
+        runs = run_lengths(np.moveaxis(joined, 1 - axis, 1))
+        distance[..., 2 * axis], distance[..., 2 * axis + 1] = (np.moveaxis(one, 1, 1 - axis) for one in runs)
+    return distance
 
 
-def _parted(
-    surface: FlatSurface, packing: Packing, made: Coverage, first: Index, second: Index, axis: int
+def _has_gap(
+    surface: FlatSurface, packing: Packing, coverage: Coverage, first: Index, second: Index, axis: int
 ) -> Flags:
-    """Whether there is a gap between texels, by their flat indices."""
-    one, other = (_rooted(surface, packing, made, texel) for texel in (first, second))
-    triangle, weights = made.triangle.ravel(), made.weights.reshape(-1, 2)
+    """Return whether there is a gap between pairs of texels, given by flat indices."""
+    one, other = (_anchored(surface, packing, coverage, texel) for texel in (first, second))
+    triangle, weights = coverage.triangle.ravel(), coverage.weights.reshape(-1, 2)
     points = [surface.points(triangle[texel], weights[texel]) for texel in (first, second)]
-    apart_mm = np.linalg.norm(points[0] - points[1], axis=1)
-    return np.asarray(anchors_diverge(one, other) & (apart_mm > gap_mm(one, other, axis)))
+    distance_mm = np.linalg.norm(points[0] - points[1], axis=1)
+    return np.asarray(anchors_diverge(one, other) & (distance_mm > gap_limit_mm(one, other, axis)))
 
 
-def _rooted(surface: FlatSurface, packing: Packing, made: Coverage, texel: Index) -> AnchoredTexels:
-    root, weights = made.rooted.ravel()[texel], made.roots.reshape(-1, 2)[texel]
-    texels = np.column_stack(np.divmod(texel, made.rooted.shape[1])[::-1]).astype(np.float64)
-    steps = surface.uv_metric[root, 0, :2] / packing.texels_per_uv[root, None]
-    return AnchoredTexels(texels, interpolate_corners(packing.corners, root, weights), steps)
+def _anchored(surface: FlatSurface, packing: Packing, coverage: Coverage, texel: Index) -> AnchoredTexels:
+    anchor, weights = coverage.anchor_triangle.ravel()[texel], coverage.anchor_weights.reshape(-1, 2)[texel]
+    texels = np.column_stack(np.divmod(texel, coverage.anchor_triangle.shape[1])[::-1]).astype(np.float64)
+    steps = surface.uv_metric[anchor, 0, :2] / packing.texels_per_uv[anchor, None]
+    return AnchoredTexels(texels, interpolate_corners(packing.corners, anchor, weights), steps)

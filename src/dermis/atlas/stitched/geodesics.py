@@ -1,4 +1,4 @@
-"""Straight walks over a surface, from triangle to triangle."""
+"""Geodesics on a triangle mesh: straight lines that are continued across edges by unfolding triangles."""
 
 from __future__ import annotations
 
@@ -15,142 +15,154 @@ Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 START_SHIFT = 1e-3
-"""Of the way to a place inside the triangle: so that a walk from a corner starts inside."""
+"""Fraction by which starts are moved towards an inner point, so that those at a corner are inside."""
 
 INNER_WEIGHTS = 0.3547, 0.3141, 0.3312
-"""Weights of that place: from the very middle, walks meet corners more often."""
+"""Barycentric weights of the inner point: from the centroid, more geodesics would hit corners."""
 
-_MOST_STEPS = 4096
+_MAX_STEPS = 4096
 
 
 class Geodesics(NamedTuple):
-    """Those who still walk; places are complex numbers in the plane of the first triangle, 0 is the start.
+    """Geodesics that have not ended yet.
 
-    number : which walk it is
-    triangle, side : where they are, and the side that they leave it through
-    a, b : its ends
-    way : from the start to the target
-    hand : 1, or -1 in triangles that face the other way than the first
+    Points are complex numbers in the plane of the first triangle, with the start at 0.
+
+    ray : index of each geodesic
+    triangle, side : current triangle, and the side through which it is left
+    a, b : ends of that side
+    direction : from the start to the target
+    orientation : 1, or -1 in triangles that face the other way than the first
     """
 
-    number: Index
+    ray: Index
     triangle: Index
     side: Index
     a: Complex
     b: Complex
-    way: Complex
-    hand: Doubles
+    direction: Complex
+    orientation: Doubles
 
     def select(self, chosen: Flags) -> Geodesics:
-        """Some of them."""
+        """Return the chosen geodesics."""
         return Geodesics._make(part[chosen] for part in self)
 
 
 class GeodesicEnds(NamedTuple):
-    """Where walks (n,) end.
+    """Ends of geodesics (n,).
 
-    triangle : there
-    weights : (n, 2) of its second and third corner
-    whole : whether the target was reached before the surface ended
+    triangle : triangle of the end
+    weights : (n, 2) weights of its second and third corner
+    complete : whether the target was reached before the surface ended
     """
 
     triangle: NDArray[np.int32]
     weights: Doubles
     complete: Flags
 
-    def write(self, who: Geodesics, first: Index, b: Doubles, c: Doubles, complete: bool) -> None:
-        """The end of some walks: weights of the corners after the corner `first` of their triangle."""
-        three = np.column_stack((1.0 - b - c, b, c))
-        places = (np.arange(3) - first[:, None]) % 3
-        self.triangle[who.number] = who.triangle
-        self.weights[who.number] = np.take_along_axis(three, places, axis=1)[:, 1:]
-        self.complete[who.number] = complete
+    def set_ends(self, rays: Geodesics, first: Index, b: Doubles, c: Doubles, complete: bool) -> None:
+        """Set the ends of some geodesics.
+
+        first : corner of the triangle that is weighted 1 - b - c
+        b, c : weights of the two corners after it
+        """
+        weights = np.column_stack((1.0 - b - c, b, c))
+        order = (np.arange(3) - first[:, None]) % 3
+        self.triangle[rays.ray] = rays.triangle
+        self.weights[rays.ray] = np.take_along_axis(weights, order, axis=1)[:, 1:]
+        self.complete[rays.ray] = complete
 
 
-def trace_geodesics(adjacency: Adjacency, triangle: NDArray[np.integer], start: Doubles, target: Doubles) -> GeodesicEnds:
-    """Walk straight from a place in each triangle to a target in its plane, unfolding triangles on the way.
+def trace_geodesics(
+    adjacency: Adjacency, triangle: NDArray[np.integer], start: Doubles, target: Doubles
+) -> GeodesicEnds:
+    """Trace geodesics from a point of each triangle towards a target in its plane.
 
-    triangle : (n,)
-    start : (n, 2) in the triangle or on its border [mm]
+    triangle : (n,) first triangle
+    start : (n, 2) point in the triangle or on its border [mm]
     target : (n, 2) [mm]
     """
     ends = GeodesicEnds(
         np.array(triangle, np.int32), np.full((len(triangle), 2), 1 / 3), np.zeros(len(triangle), bool)
     )
-    who = _begin(adjacency, np.asarray(triangle, np.int64), _complex(start), _complex(target), ends)
-    for _ in range(_MOST_STEPS):
-        if not len(who.number):
+    rays = _leave_first_triangle(
+        adjacency, np.asarray(triangle, np.int64), _complex(start), _complex(target), ends
+    )
+    for _ in range(_MAX_STEPS):
+        if not len(rays.ray):
             break
-        who = _step(adjacency, who, ends)
+        rays = _cross_edge(adjacency, rays, ends)
     return ends
 
 
-def _begin(adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: GeodesicEnds) -> Geodesics:
-    """Those who leave their first triangle, and the ends of the others."""
-    corners = _complex(adjacency.flat[triangle])
+def _leave_first_triangle(
+    adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: GeodesicEnds
+) -> Geodesics:
+    """Return the geodesics that leave their first triangle, and set the ends of the others."""
+    corners = _complex(adjacency.planar_corners[triangle])
     start = start + START_SHIFT * (corners @ np.array(INNER_WEIGHTS) - start)
-    corners, way = corners - start[:, None], target - start
+    corners, direction = corners - start[:, None], target - start
     after = np.roll(corners, -1, axis=1)
-    passes = (_cross(way[:, None], corners) <= 0.0) & (_cross(way[:, None], after) >= 0.0)
-    passes &= _cross(after - corners, way[:, None] - corners) < 0.0
-    rows, side = np.arange(len(triangle)), passes.argmax(axis=1)
-    all_of_them = Geodesics(
-        rows, triangle, side, corners[rows, side], after[rows, side], way, np.ones(len(triangle))
+    leaves_through = (_cross(direction[:, None], corners) <= 0.0) & (_cross(direction[:, None], after) >= 0.0)
+    leaves_through &= _cross(after - corners, direction[:, None] - corners) < 0.0
+    rows, side = np.arange(len(triangle)), leaves_through.argmax(axis=1)
+    rays = Geodesics(
+        rows, triangle, side, corners[rows, side], after[rows, side], direction, np.ones(len(triangle))
     )
-    leaves = np.asarray(passes.any(axis=1))
-    stay, (a, b, c) = all_of_them.select(~leaves), corners[~leaves].T
-    ends.write(stay, np.zeros(len(a), np.int64), *_weights(a, b, c, stay.way), True)
-    return all_of_them.select(leaves)
+    leaves = np.asarray(leaves_through.any(axis=1))
+    inside, (a, b, c) = rays.select(~leaves), corners[~leaves].T
+    ends.set_ends(inside, np.zeros(len(a), np.int64), *_weights(a, b, c, inside.direction), True)
+    return rays.select(leaves)
 
 
-def _step(adjacency: Adjacency, who: Geodesics, ends: GeodesicEnds) -> Geodesics:
-    """Into the next triangle: those who walk on from there, and the ends of the others."""
-    neighbour = adjacency.neighbour[who.triangle, who.side]
+def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
+    """Return the geodesics that leave the next triangle too, and set the ends of the others."""
+    neighbour = adjacency.neighbour[rays.triangle, rays.side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():
-        stopped = who.select(ended)
-        ends.write(stopped, stopped.side, _met(stopped), np.zeros(len(stopped.number)), False)
-        who, neighbour = who.select(~ended), neighbour[~ended]
-    neighbour_side = adjacency.neighbour_side[who.triangle, who.side].astype(np.int64)
-    flipped = adjacency.flipped[who.triangle, who.side]
-    hand = np.where(flipped, -who.hand, who.hand)
-    # where the corners `neighbour_side` and `neighbour_side` + 1 of the next triangle come to lie, and its apex
-    a, b = np.where(flipped, who.a, who.b), np.where(flipped, who.b, who.a)
-    forth, up = adjacency.apex[neighbour, neighbour_side].T
-    apex = a + (forth + 1j * hand * up) * (b - a)
-    # it leaves between the apex and the end on the other side
-    left, a_left = _cross(who.way, apex) > 0.0, _cross(who.way, a) > 0.0
-    by_a = left != a_left
-    side = (neighbour_side + np.where(by_a, 2, 1)) % 3
-    off, p, q = np.where(by_a, b, a), np.where(by_a, apex, b), np.where(by_a, a, apex)
-    inner = _cross(q - p, off - p)
-    arrived = (inner != 0.0) & (_cross(q - p, who.way - p) * inner >= 0.0)
-    who = Geodesics(who.number, neighbour.astype(np.int64), side, p, q, who.way, hand)
-    there = who.select(arrived)
-    found = _weights(a[arrived], b[arrived], apex[arrived], there.way)
-    ends.write(there, neighbour_side[arrived], *found, True)
-    return who.select(~arrived)
+        stopped = rays.select(ended)
+        ends.set_ends(stopped, stopped.side, _exit_fraction(stopped), np.zeros(len(stopped.ray)), False)
+        rays, neighbour = rays.select(~ended), neighbour[~ended]
+    neighbour_side = adjacency.neighbour_side[rays.triangle, rays.side].astype(np.int64)
+    flipped = adjacency.flipped[rays.triangle, rays.side]
+    orientation = np.where(flipped, -rays.orientation, rays.orientation)
+    # positions of the corners at both ends of the shared edge, and of the apex, after unfolding
+    a, b = np.where(flipped, rays.a, rays.b), np.where(flipped, rays.b, rays.a)
+    along, up = adjacency.apex[neighbour, neighbour_side].T
+    apex = a + (along + 1j * orientation * up) * (b - a)
+    # the geodesic leaves through one of the two edges at the apex
+    left, a_left = _cross(rays.direction, apex) > 0.0, _cross(rays.direction, a) > 0.0
+    exits_at_a = left != a_left
+    side = (neighbour_side + np.where(exits_at_a, 2, 1)) % 3
+    opposite, p, q = np.where(exits_at_a, b, a), np.where(exits_at_a, apex, b), np.where(exits_at_a, a, apex)
+    inner = _cross(q - p, opposite - p)
+    arrived = (inner != 0.0) & (_cross(q - p, rays.direction - p) * inner >= 0.0)
+    rays = Geodesics(rays.ray, neighbour.astype(np.int64), side, p, q, rays.direction, orientation)
+    done = rays.select(arrived)
+    weights = _weights(a[arrived], b[arrived], apex[arrived], done.direction)
+    ends.set_ends(done, neighbour_side[arrived], *weights, True)
+    return rays.select(~arrived)
 
 
-def _complex(places: Doubles) -> Complex:
-    """(...) numbers of (..., 2) places."""
-    return np.ascontiguousarray(places, np.float64).view(np.complex128)[..., 0]
+def _complex(points: Doubles) -> Complex:
+    """Return (..., 2) points as (...) complex numbers."""
+    return np.ascontiguousarray(points, np.float64).view(np.complex128)[..., 0]
 
 
 def _cross(a: Complex, b: Complex) -> Doubles:
     return np.asarray(a.real * b.imag - a.imag * b.real)
 
 
-def _met(who: Geodesics) -> Doubles:
-    """How far along the side from a to b the way meets it, 0 to 1."""
-    here, there = _cross(who.way, who.a), _cross(who.way, who.b)
+def _exit_fraction(rays: Geodesics) -> Doubles:
+    """Return the fraction of the side from a to b at which each geodesic leaves it [0..1]."""
+    here, there = _cross(rays.direction, rays.a), _cross(rays.direction, rays.b)
     return np.clip(here / np.where(here == there, np.inf, here - there), 0.0, 1.0)
 
 
-def _weights(a: Complex, b: Complex, c: Complex, at: Complex) -> tuple[Doubles, Doubles]:
-    """Barycentric weights of b and c, none negative."""
+def _weights(a: Complex, b: Complex, c: Complex, point: Complex) -> tuple[Doubles, Doubles]:
+    """Return the barycentric weights of b and c at a point, clipped to the triangle."""
     area = _cross(b - a, c - a)
-    second = np.clip(_cross(at - a, c - a) / area, 0.0, 1.0)
-    third = np.clip(_cross(b - a, at - a) / area, 0.0, 1.0)
+    second = np.clip(_cross(point - a, c - a) / area, 0.0, 1.0)
+    third = np.clip(_cross(b - a, point - a) / area, 0.0, 1.0)
     total = np.maximum(second + third, 1.0)
     return second / total, third / total

@@ -1,4 +1,4 @@
-"""Borders of pieces, the gutters around them, and the surface that continues there."""
+"""Borders of pieces, and the gutters around them that continue the surface."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from dermis.atlas.stitched.geodesics import GeodesicEnds, trace_geodesics
 from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_border_points
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 
-_MOST_STRETCH = 2.0  # largest texels per mm of a border over its piece's mean, for gutter widths
+_MAX_STRETCH = 2.0  # largest texels per mm at a border, relative to its piece's mean, that widens a gutter
 
 
 class Border(NamedTuple):
-    """Sides of triangles at which pieces end.
+    """Sides of triangles at the border of pieces.
 
-    triangle, side : (k,) triangle and which side of it
-    seam : (k,) whether the surface goes on across it
+    triangle, side : (k,) triangle and index of its side
+    seam : (k,) whether the surface continues across it
     """
 
     triangle: Index
@@ -28,46 +28,48 @@ class Border(NamedTuple):
 
 
 class Packing(NamedTuple):
-    """Where triangles lie on a grid.
+    """Positions of triangles on a grid.
 
-    places : (f, 3, 2) corners [texel], whole numbers at texel centres
-    per_uv : (f,) texels in a unit of uv
-    per_mm : (f,) texels in a mm of the surface, the mean over the piece
+    corners : (f, 3, 2) corners [texel], integers at texel centres
+    texels_per_uv : (f,) texels per unit of uv
+    texels_per_mm : (f,) texels per mm on the surface, the mean over the piece
     """
 
-    places: Doubles
+    corners: Doubles
     texels_per_uv: Doubles
-    per_mm: Doubles
+    texels_per_mm: Doubles
 
 
 class GutterWidth(NamedTuple):
-    """How far gutters reach: on the surface [mm], and at most [texel]."""
+    """Width of gutters on the surface [mm], and the largest width on the grid [texel]."""
 
     gutter_mm: float
     max_texels: float
 
 
 def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
-    """Where pieces end.
+    """Return the border of pieces.
 
-    piece : (f,) piece of each triangle, -1 for triangles that have no place
-    own : triangles to examine, all of which have one
+    piece : (f,) piece of each triangle, -1 for none
+    own : triangles of which the border is searched, each in a piece
     """
     neighbour = surface.uv_neighbour[own]
     row, index = np.nonzero((neighbour == own[:, None]) | (piece[own, None] != piece[neighbour]))
     triangle = own[row]
-    beyond = surface.adjacency.neighbour[triangle, index]
-    return Border(triangle, index, (beyond >= 0) & surface.adjacency.passable[beyond])
+    across = surface.adjacency.neighbour[triangle, index]
+    return Border(triangle, index, (across >= 0) & surface.adjacency.passable[across])
 
 
 def border_sides(surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth) -> BorderSides:
-    """The sides of a border as they are placed."""
+    """Return the sides of a border on the grid."""
     triangle, both = border.triangle, (border.side, (border.side + 1) % 3)
     ends = np.stack([packing.corners[triangle, k] for k in both], axis=1)
     steps = np.stack([surface.uv_steps[triangle, k] for k in both], axis=1)
     steps = steps / packing.texels_per_uv[triangle][:, None, None, None]
-    # slivers may be stretched a hundredfold: gutters that wide would waste room
-    max_texels = np.minimum(width.max_texels, _MOST_STRETCH * width.gutter_mm * packing.per_mm[triangle])
+    # slivers may be stretched a hundredfold, where gutters in proportion would waste space
+    max_texels = np.minimum(
+        width.max_texels, _MAX_STRETCH * width.gutter_mm * packing.texels_per_mm[triangle]
+    )
     return BorderSides(ends, steps, np.where(border.seam, width.gutter_mm, 0.0), max_texels)
 
 
@@ -79,7 +81,7 @@ def needed_texels(
     width: GutterWidth,
     shape: tuple[int, int],
 ) -> Flags:
-    """(h, w) texels that pieces, rims and gutters may need."""
+    """Return the mask (h, w) of texels that pieces, rims and gutters may need."""
     found = np.zeros(shape, np.bool_)
     found.ravel()[covered_texels(packing.corners[own], shape)[0]] = True
     found.ravel()[nearest_border_points(border_sides(surface, border, packing, width), found).texel] = True
@@ -87,22 +89,23 @@ def needed_texels(
 
 
 class GutterTexels(NamedTuple):
-    """Texels (n,) outside of pieces that belong to the gutter of one.
+    """Texels (n,) outside pieces that belong to a gutter or rim.
 
     y, x : row and column
-    rim : those that interpolation within the piece reads
-    away_mm : distance from the piece
-    root, root_weights : nearest place on its border: triangle, weights of the second and third corner
-    triangle, weights : the same where a straight walk from there ends
-    whole : whether the surface reaches that far
+    rim : texels that interpolation within the piece reads
+    distance_mm : distance from the piece
+    anchor_triangle, anchor_weights : nearest point on the border: triangle, weights of its second and third
+        corner
+    triangle, weights : end of the geodesic from there to the texel
+    complete : whether the surface extends to that end
     """
 
     y: Index
     x: Index
     rim: Flags
     distance_mm: Doubles
-    root: NDArray[np.int32]
-    root_weights: Doubles
+    anchor_triangle: NDArray[np.int32]
+    anchor_weights: Doubles
     triangle: NDArray[np.int32]
     weights: Doubles
     complete: Flags
@@ -111,44 +114,51 @@ class GutterTexels(NamedTuple):
 def trace_gutter(
     surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: NDArray[np.int32]
 ) -> GutterTexels:
-    """The surface beyond a border, on texels that no piece owns.
+    """Return the gutter texels of a border, with the surface points that they show.
 
-    owner : (h, w) triangles of the pieces, -1 outside
+    owner : (h, w) triangle of each texel of the pieces, -1 outside
     """
     nearest = nearest_border_points(sides := border_sides(surface, border, packing, width), owner >= 0)
     texels = np.column_stack(np.divmod(nearest.texel, owner.shape[1])[::-1])
     ends, weights = trace_from_border(surface, border, sides, nearest, texels)
     y, x = texels.T[::-1]
-    root = border.triangle[nearest.side].astype(np.int32)
-    return GutterTexels(y, x, nearest.rim, nearest.distance_mm, root, weights, *ends)
+    anchor_triangle = border.triangle[nearest.side].astype(np.int32)
+    return GutterTexels(y, x, nearest.rim, nearest.distance_mm, anchor_triangle, weights, *ends)
 
 
 def trace_from_border(
     surface: FlatSurface, border: Border, sides: BorderSides, nearest: NearestPoints, texels: NDArray[Any]
 ) -> tuple[GeodesicEnds, Doubles]:
-    """Where straight walks to texels (n, 2) from the nearest places on a border end, and weights of these."""
-    t, root = nearest.share[:, None], border.triangle[nearest.side]
-    first, rows = border.side[nearest.side], np.arange(len(root))
+    """Trace geodesics from the nearest border points to texels; return their ends and the points' weights.
+
+    texels : (n, 2) x and y
+    """
+    t, anchor_triangle = nearest.fraction[:, None], border.triangle[nearest.side]
+    first, rows = border.side[nearest.side], np.arange(len(anchor_triangle))
     second = (first + 1) % 3
-    start = _between(surface.adjacency.flat[root, first], surface.adjacency.flat[root, second], t)
-    off = texels - border_points(sides, nearest)
-    step = np.einsum("ns,nsa->na", off, border_steps(sides, nearest))
-    corner = np.zeros((len(root), 3))
+    start = _lerp(
+        surface.adjacency.planar_corners[anchor_triangle, first],
+        surface.adjacency.planar_corners[anchor_triangle, second],
+        t,
+    )
+    offset = texels - border_points(sides, nearest)
+    step = np.einsum("ns,nsa->na", offset, border_steps(sides, nearest))
+    corner = np.zeros((len(anchor_triangle), 3))
     corner[rows, first], corner[rows, second] = 1 - t[:, 0], t[:, 0]
-    return trace_geodesics(surface.adjacency, root, start, start + step), corner[:, 1:]
+    return trace_geodesics(surface.adjacency, anchor_triangle, start, start + step), corner[:, 1:]
 
 
 def border_points(sides: BorderSides, nearest: NearestPoints) -> Doubles:
-    """(n, 2) the nearest places [texel]."""
+    """Return the nearest border points (n, 2) [texel]."""
     first, second = np.moveaxis(sides.ends[nearest.side], 1, 0)
-    return _between(first, second, nearest.share[:, None])
+    return _lerp(first, second, nearest.fraction[:, None])
 
 
 def border_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
-    """(n, 2, 2) steps on the surface there, for a texel to the right and for one down [mm]."""
+    """Return the surface vectors (n, 2, 2) at border points of one texel to the right and one down [mm]."""
     first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
-    return _between(first, second, nearest.share[:, None, None])
+    return _lerp(first, second, nearest.fraction[:, None, None])
 
 
-def _between(a: Doubles, b: Doubles, t: Doubles) -> Doubles:
+def _lerp(a: Doubles, b: Doubles, t: Doubles) -> Doubles:
     return np.asarray(a + (b - a) * t)

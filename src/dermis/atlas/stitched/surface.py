@@ -1,4 +1,4 @@
-"""A mesh as the stitched layout sees it: each triangle in its own plane, and what lies across each side."""
+"""Triangles of a mesh flattened one by one, with their neighbours in space and in uv."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ _MIN_LENGTH_MM = 1e-9
 
 
 class Adjacency(NamedTuple):
-    """Adjacency of triangles, for walks over them; sides are 01, 12, 20 of each triangle.
+    """Adjacency of triangles for geodesics; sides are 01, 12 and 20 of each triangle.
 
-    flat : (f, 3, 2) corners of each triangle in its own plane, counter-clockwise from outside [mm]
-    beside : (f, 3) triangle across each side, -1 where there is none
-    entry : (f, 3) that triangle's side of this edge
+    planar_corners : (f, 3, 2) corners in the triangle's own plane, counter-clockwise from outside [mm]
+    neighbour : (f, 3) triangle across each side, -1 for none
+    neighbour_side : (f, 3) side of that triangle at this edge
     flipped : (f, 3) whether that triangle faces the other way
-    apex : (f, 3, 2) the third corner from each side's start, along and left of the side, in its lengths
-    free : (f,) triangles that may be walked on
+    apex : (f, 3, 2) third corner relative to each side, along it and to its left, in lengths of the side
+    passable : (f,) triangles that geodesics may cross
     """
 
-    flat: NDArray[np.float64]
+    planar_corners: NDArray[np.float64]
     neighbour: NDArray[np.int32]
     neighbour_side: NDArray[np.int8]
     flipped: NDArray[np.bool_]
@@ -39,17 +39,18 @@ class Adjacency(NamedTuple):
 
 @dataclass(frozen=True)
 class FlatSurface:
-    """Triangles laid flat, whatever their place in the atlas. Sides are 01, 12, 20 of each triangle.
+    """Triangles of a surface in their own planes; sides are 01, 12 and 20 of each triangle.
 
     corners : (f, 3, 3) positions [mm]
     uv : (f, 3, 2)
-    area_mm2, area_uv : (f,) the latter negative where u and v are mirrored as seen from outside
+    area_mm2, area_uv : (f,) areas, the latter negative where uv is mirrored as seen from outside
     skin : (f,) triangles that light may cross
-    sound : (f,) skin that has an area in space and in uv
-    adjacency : what walks need
-    beside_uv : (f, 3) triangle across each side in uv too, itself where the map is cut
-    along : (f, 3, 2, 2) at each corner the steps for u and for v, in the triangle's plane [mm per unit of uv]
-    lengths : (f, 3, 3) at each corner the length of both steps and the cosine between them
+    valid : (f,) skin triangles with an area in space and in uv
+    adjacency : adjacency for geodesics
+    uv_neighbour : (f, 3) triangle across each side, or itself at a seam of the uv layout
+    uv_steps : (f, 3, 2, 2) surface vectors at each corner per unit of u and of v, in the triangle's plane
+        [mm]
+    uv_metric : (f, 3, 3) lengths of both vectors at each corner, and the cosine between them
     """
 
     corners: Doubles
@@ -64,11 +65,11 @@ class FlatSurface:
     uv_metric: Doubles
 
     def points(self, triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> Doubles:
-        """Points (n, 3) in triangles, by the weights (n, 2) of their second and third corner [mm]."""
+        """Return the points (n, 3) in triangles, by weights (n, 2) of their second and third corner [mm]."""
         return interpolate_corners(self.corners, triangle, weights.astype(np.float64))
 
     def subset(self, own: Index) -> FlatSurface:
-        """Some of its triangles, not to be walked on: their neighbours keep their old numbers."""
+        """Return some triangles, without geodesics: their adjacency keeps the old indices."""
         names = [field.name for field in fields(self) if field.name != "adjacency"]
         return replace(self, **{name: getattr(self, name)[own] for name in names})
 
@@ -76,9 +77,9 @@ class FlatSurface:
 def interpolate_corners(
     corners: NDArray[np.floating], triangle: NDArray[np.integer], weights: NDArray[np.floating]
 ) -> NDArray[Any]:
-    """(n, c) in triangles of what their corners (f, 3, c) have.
+    """Interpolate values (f, 3, c) of triangles' corners at points; return (n, c).
 
-    weights : (n, 2) of the second and third corner
+    weights : (n, 2) weights of the second and third corner
     """
     second, third = weights[:, :1], weights[:, 1:]
     found = (1.0 - second - third) * corners[:, 0][triangle]
@@ -88,7 +89,7 @@ def interpolate_corners(
 
 
 def flat_surface(mesh: Mesh) -> FlatSurface:
-    """The surface of a mesh."""
+    """Return the flattened triangles of a mesh."""
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     uv = mesh.uv[mesh.triangles].astype(np.float64)
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
@@ -115,7 +116,10 @@ def flat_surface(mesh: Mesh) -> FlatSurface:
 
 
 def _planar_corners(corners: Doubles) -> tuple[Doubles, Doubles]:
-    """Corners (f, 3, 2) in the triangle's plane, first at 0 and second to its right; both axes (f, 2, 3)."""
+    """Return the corners (f, 3, 2) in the triangles' planes, and the axes (f, 2, 3) of these.
+
+    The first corner is at 0 and the second to its right.
+    """
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     x = first / np.maximum(np.linalg.norm(first, axis=1, keepdims=True), _MIN_LENGTH_MM)
     up = second - (second * x).sum(axis=1, keepdims=True) * x
@@ -125,7 +129,10 @@ def _planar_corners(corners: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def side_neighbours(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int8], Flags]:
-    """(f, 3) triangle across each side, -1 for none, its side of this edge, and whether it is turned over."""
+    """Return the triangle across each side (f, 3), its side of this edge, and whether it is flipped.
+
+    The triangle is -1 where there is none.
+    """
     points, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.triangles)
     side = np.arange(3 * count)
     other = opposite_sides(points)
@@ -141,7 +148,7 @@ def side_neighbours(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int8], Fl
 
 
 def _apexes(flat: Doubles) -> Doubles:
-    """(f, 3, 2) the third corner as seen from each side: along it and to its left, in lengths of the side."""
+    """Return the third corner (f, 3, 2) along and to the left of each side, in lengths of the side."""
     side = np.roll(flat, -1, axis=1) - flat
     rest = np.roll(flat, -2, axis=1) - flat
     square = np.maximum((side**2).sum(axis=2), _MIN_LENGTH_MM**2)
@@ -153,7 +160,10 @@ def _apexes(flat: Doubles) -> Doubles:
 def _uv_steps(
     mesh: Mesh, flat: Doubles, axes: Doubles, uv: Doubles, area_uv: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """`uv_steps` and `uv_metric` of a `FlatSurface`: at each corner the mean of triangles mirrored alike in uv."""
+    """Return `uv_steps` and `uv_metric` of a `FlatSurface`.
+
+    They are the mean over the triangles of a corner that are mirrored alike in uv.
+    """
     count = len(mesh.positions)
     corner = mesh.triangles + count * (area_uv < 0)[:, None].astype(np.int32)
     positions, uvs, normals = (np.concatenate((a, a)) for a in (mesh.positions, mesh.uv, mesh.normals))
@@ -171,12 +181,12 @@ def _uv_steps(
 
 
 def _uv_orientation(uv_steps: Doubles) -> Doubles:
-    """Positive where v lies to the left of u."""
+    """Return the cross product of the u and v steps, positive where v is to the left of u."""
     return np.asarray(uv_steps[..., 0, 0] * uv_steps[..., 1, 1] - uv_steps[..., 0, 1] * uv_steps[..., 1, 0])
 
 
 def _triangle_steps(flat: Doubles, uv: Doubles) -> Doubles:
-    """(f, 2, 2) steps for u and v of each triangle by itself [mm per unit of uv]."""
+    """Return the steps (f, 2, 2) per unit of u and of v from each triangle alone [mm]."""
     e, d = flat[:, 1:] - flat[:, :1], uv[:, 1:] - uv[:, :1]
     cross = d[:, 0, 0] * d[:, 1, 1] - d[:, 0, 1] * d[:, 1, 0]
     cross = np.where(np.abs(cross) > MIN_UV_CROSS, cross, np.inf)[:, None]

@@ -33,8 +33,8 @@ def planar_triangles(corners: NDArray[np.floating]) -> Complexes:
 def affine_coefficients(shapes: Complexes, positions: Complexes) -> tuple[Complexes, Complexes]:
     """Return a and b (f,) of the maps z -> a z + b conj(z) + c that take `shapes` to `positions`.
 
-    |a| + |b| and |a| - |b| are the map's singular values, the latter negative where it mirrors the triangle; a / |a| is
-    the nearest rotation.
+    |a| + |b| and |a| - |b| are the map's singular values, the latter negative where it mirrors the triangle;
+    a / |a| is the nearest rotation.
 
     shapes, positions : (f, 3) corners of the triangles
     """

@@ -24,7 +24,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let w = unpack2x16unorm(texel.y);
-    let other = load_bilinear(second, place_of_point(texel.x - 1u, vec3f(1.0 - w.x - w.y, w)));
+    let other = load_bilinear(second, atlas_position(texel.x - 1u, vec3f(1.0 - w.x - w.y, w)));
     let own_weight = smoothstep(0.0, FADE_MM, edge_mm(textureLoad(edge_map, id.xy, 0).x, textureLoad(stretch_map, id.xy, 0).xy));
     textureStore(blended, id.xy, vec4f(mix(other.rgb, own.rgb, own_weight), own.a)); // a: packed weights where profiles are mixed
 }

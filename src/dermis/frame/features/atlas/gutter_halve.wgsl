@@ -21,7 +21,7 @@ struct Square {
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= arrayLength(&squares)) {
         return;
     }

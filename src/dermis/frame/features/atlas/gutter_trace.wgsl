@@ -92,7 +92,7 @@ fn vector_to_texel(path: Start, flat: Flat, w: vec3f) -> vec2f {
     let steps = w.x * steps_at(flat, a, own, mirrored) + w.y * steps_at(flat, b, own, mirrored)
         + w.z * steps_at(flat, c, own, mirrored);
     let texel = vec2f(f32(path.texel & 0xffffu), f32(path.texel >> 16u));
-    let off = texel + 0.5 - f32(SIZE) * place_of_point(path.triangle, w);
+    let off = texel + 0.5 - f32(SIZE) * atlas_position(path.triangle, w);
     return steps * off / texels_per_uv(path.triangle);
 }
 
@@ -184,7 +184,7 @@ fn trace(triangle: u32, flat: Flat, s: vec2f, t: vec2f) -> End {
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= arrayLength(&starts)) {
         return;
     }
@@ -198,7 +198,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     var source = vec2f(path.source[0], path.source[1]);
     if (end.triangle != NO_TRIANGLE && (triangle_at(end.triangle).w & MAPPED) != 0u) {
         let weights = vec3f(1.0 - end.weights.x - end.weights.y, end.weights);
-        source = f32(SIZE) * place_of_point(end.triangle, weights) - 0.5;
+        source = f32(SIZE) * atlas_position(end.triangle, weights) - 0.5;
     }
     gutter[index] = GutterTexel(source, vec2u(path.texel & 0xffffu, path.texel >> 16u));
 }

@@ -60,7 +60,9 @@ def _start_words(atlas: Atlas) -> Words:
     x, y = atlas.gutter.T.astype(np.uint32)
     index = root[y, x]
     second, third = atlas.border_weights[index].T.astype(np.uint32)
-    start = np.stack([x | (y << 16), atlas.border_triangle[index].astype(np.uint32), second | (third << 16)], axis=1)
+    start = np.stack(
+        [x | (y << 16), atlas.border_triangle[index].astype(np.uint32), second | (third << 16)], axis=1
+    )
     return np.concatenate([start, np.ascontiguousarray(atlas.source).view(np.uint32)], axis=1)
 
 

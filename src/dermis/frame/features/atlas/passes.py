@@ -5,7 +5,7 @@ from __future__ import annotations
 from dermis.frame.features.atlas.lit import LitAtlas
 from dermis.frame.features.atlas.textures import GUTTER_ENTRY_BYTES, AtlasTextures
 from dermis.frame.features.shape.mesh import HeadGeometry
-from dermis.frame.programs import TILE, workgroup_grid, program
+from dermis.frame.programs import TILE, program, workgroup_grid
 from dermis.frame.seams import FEATHER_MM
 from dermis.gpu import Device, Recorder, Texture, TextureOrView, make_texture
 

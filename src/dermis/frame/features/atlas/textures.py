@@ -30,7 +30,12 @@ SAME_SOURCE_TEXELS = 4.0
 def atlas_constants() -> dict[str, int | float]:
     """Return the constants of shaders that read the atlas, by their `//#fill` names."""
     _, inner_b, inner_c = INNER_WEIGHTS
-    tracing = {"inward": START_SHIFT, "inner_b": inner_b, "inner_c": inner_c, "same_source": SAME_SOURCE_TEXELS}
+    tracing = {
+        "inward": START_SHIFT,
+        "inner_b": inner_b,
+        "inner_c": inner_c,
+        "same_source": SAME_SOURCE_TEXELS,
+    }
     return {"gutter_bit": _GUTTER_BIT, "max_shear": MAX_SHEAR, **tracing}
 
 
@@ -38,15 +43,15 @@ def atlas_constants() -> dict[str, int | float]:
 class AtlasTextures:
     """Textures and buffers of an atlas.
 
-    resources : textures by their names in the shaders: atlas, stretch_map (filled by its pass), reach_map, and
+    resources : textures by their shader names: atlas, stretch_map (filled by its pass), reach_map, and
         edge_map for two layouts and for feathered stretch; coarser resolutions have stretch_map and reach_map
     sheared : whether blurs account for angles between u and v other than right ones
     stretch_constants : pipeline constants of the stretch passes
-    stretch_sources : buffer of gutter texels with the surface points whose stretch they copy, None without any
+    stretch_sources : buffer of gutter texels and the surface points whose stretch they copy, or None
     gutter, gutter_light : buffers of the gutter texels and of their light, None without any
     gutter_texels : (a, 2) gutter texels, x and y
     coarser : the atlas at half, a quarter, ... of the resolution; only of stitched layouts
-    median_texels_per_mm : median density at rest along the axis that is sampled less [texels/mm]
+    median_texels_per_mm : median of the smaller of both densities at rest [texels/mm]
     """
 
     resources: dict[str, Texture]
@@ -69,8 +74,8 @@ def upload_atlas(
 ) -> AtlasTextures:
     """Upload an atlas; its stretch map is filled by the stretch pass.
 
-    stretch : "full" includes the angle between u and v, "axes" assumes right angles, "none" assumes one density
-        for all texels
+    stretch : "full" includes the angle between u and v, "axes" assumes right angles, "none" assumes one
+        density
     """
     texels = pack_surface_points(atlas.triangle, atlas.barycentric)
     own = atlas.lit
@@ -197,9 +202,9 @@ def halve_mip(mip: AtlasMip) -> AtlasMip:
     from scipy.ndimage import binary_dilation
 
     own = _quads(mip.lit)
-    any_own = own.any(axis=0)
+    any_own = own[0] | own[1] | own[2] | own[3]
     counted = np.where(any_own, own, _quads(mip.covered))
-    covered = counted.any(axis=0)
+    covered = counted[0] | counted[1] | counted[2] | counted[3]
     stitched = covered & ~binary_dilation(any_own, np.ones((3, 3), bool))
     return AtlasMip(covered, covered & ~stitched, _reach(mip.reach, counted), *_gutter(mip, stitched))
 
