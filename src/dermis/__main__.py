@@ -1,4 +1,4 @@
-"""`python -m dermis`."""
+"""Command line program: `python -m dermis`."""
 
 from dermis.cli import main
 

@@ -9,7 +9,7 @@ from observed import observed
 from tolerances import HALVES, TWIN
 
 from dermis.frame.observation import Observation
-from dermis.frame.programs import FLOATS, usual_texel
+from dermis.frame.programs import FLOATS, level_format
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 
@@ -22,7 +22,7 @@ def renderer() -> Renderer:
 @pytest.fixture(scope="session")
 def close(device: Device) -> float:
     """How close light is to its twin after the blurs, of its scale."""
-    return TWIN if usual_texel(device) == FLOATS else HALVES
+    return TWIN if level_format(device) == FLOATS else HALVES
 
 
 @pytest.fixture(scope="session")

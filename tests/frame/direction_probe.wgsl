@@ -9,7 +9,7 @@
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let given = textureLoad(cosines, id.xy, 0);
-    textureStore(back, id.xy, vec4f(coming_back(given.x), 0.0));
-    textureStore(beyond, id.xy, vec4f(beyond_mean(given.x, given.y), 0.0));
-    textureStore(around, id.xy, vec4f(beyond_mean_from_everywhere(given.y), 0.0));
+    textureStore(back, id.xy, vec4f(relative_reflectance(given.x), 0.0));
+    textureStore(beyond, id.xy, vec4f(directional_excess(given.x, given.y), 0.0));
+    textureStore(around, id.xy, vec4f(uniform_directional_excess(given.y), 0.0));
 }

@@ -10,6 +10,6 @@
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if (all(id.xy < textureDimensions(places))) {
         let p = textureLoad(places, id.xy, 0).xyz;
-        textureStore(seen, id.xy, vec4f(seen_on_iris(p, textureLoad(ways, id.xy, 0).xyz), UNDER_WATER, 0.0));
+        textureStore(seen, id.xy, vec4f(refracted_to_iris(p, textureLoad(ways, id.xy, 0).xyz), IRIS_FACTOR, 0.0));
     }
 }

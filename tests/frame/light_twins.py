@@ -140,7 +140,7 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
         return np.asarray(1 / ((1 - way) / depth + way / near))
 
     risen, hidden = [], []
-    for index in range(int(light["lines"])):
+    for index in range(int(light["rays"])):
         even = (0.5 + index * np.array([0.7548776662, 0.5698402910])) % 1
         turn = 2 * np.pi * even[1]
         disc = np.sqrt(even[0]) * np.array([np.cos(turn), np.sin(turn)])

@@ -14,6 +14,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let v = textureLoad(views, id.xy, 0);
     var point: Point;
     point.normal = n;
-    let lit = light_up(point, Surface(n, vec3f(1.0), v.w, 1.0), v.xyz, 1.0);
+    let lit = illuminate(point, Surface(n, vec3f(1.0), v.w, 1.0), v.xyz, 1.0);
     textureStore(mirror, id.xy, vec4f(lit.reflected, 0.0));
 }

@@ -19,6 +19,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let up = vec3f(0.0, 0.0, 1.0);
     let slopes = beckmann_by_table(l.z, l.w);
     textureStore(reflected, id.xy, vec4f(fresnel(l.z), slopes, lobe(up, l.xyz, v.xyz, l.w), 0.0));
-    let shares = vec2f(enters(l.z, l.w, v.w), enters_from_everywhere(l.w, v.w));
+    let shares = vec2f(enters(l.z, l.w, v.w), enters_uniform(l.w, v.w));
     textureStore(passed, id.xy, vec4f(shares, leaves(v.z, l.w, v.w), 0.0));
 }

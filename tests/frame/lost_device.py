@@ -70,29 +70,29 @@ def open_noted(adapter: str) -> Device:
 
 
 def loading(renderer: Renderer) -> Any:
-    renderer.forget()
+    renderer.clear_cache()
     with losing(allocation, "upload_maps"):
         return renderer.draw(scene(), DRAWN).linear()
 
 
 def recording(renderer: Renderer) -> Any:
     with losing(CommandList, "run", 3):
-        return renderer.draw(scene(), DRAWN, anew=True).linear()
+        return renderer.draw(scene(), DRAWN, force=True).linear()
 
 
 def between_passes(renderer: Renderer) -> Any:
     with losing(CommandList, "_end_pass", 2):
-        return renderer.draw(scene(), DRAWN, anew=True).linear()
+        return renderer.draw(scene(), DRAWN, force=True).linear()
 
 
 def submitting(renderer: Renderer) -> Any:
     with losing(CommandList, "_flush"):
-        return renderer.draw(scene(), DRAWN, anew=True, timed=False).linear()
+        return renderer.draw(scene(), DRAWN, force=True, timed=False).linear()
 
 
 def waiting(renderer: Renderer) -> Any:
     with losing(Device, "wait"):
-        return renderer.draw(scene(), DRAWN, anew=True).linear()
+        return renderer.draw(scene(), DRAWN, force=True).linear()
 
 
 def reading(renderer: Renderer) -> Any:
@@ -120,7 +120,7 @@ def painting(renderer: Renderer) -> Any:
     person, small = Scene(Human().head()), settings_of(size=(32, 32), atlas=256)
     with losing(paint, "draw"):
         found = renderer.draw(person, small).linear()
-    renderer.forget()
+    renderer.clear_cache()
     assert np.array_equal(renderer.draw(person, small).linear(), found)
     return renderer.draw(scene(), DRAWN).linear()
 

@@ -17,7 +17,7 @@ from dermis.atlas.atlas import Atlas
 from dermis.frame.features.atlas.passes import draw_coarser
 from dermis.frame.features.atlas.textures import AtlasTextures, upload_atlas
 from dermis.frame.frame import draw_frame
-from dermis.frame.inputs import Inputs
+from dermis.frame.inputs import FrameInputs
 from dermis.frame.programs import shader_folders
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, ComputeProgram, Constants, Device, download, make_texture, upload
@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 AnyLight = PointLight | SpotLight | DirectionalLight
 
 
-def entered_light(renderer: Renderer, inputs: Inputs) -> NDArray[np.float64]:
+def entered_light(renderer: Renderer, inputs: FrameInputs) -> NDArray[np.float64]:
     """(n, n, 4) light that has entered the skin, and 1 where there is any; as halves on GPUs."""
     made = download(renderer.device, inputs.resources.diffusion.levels.stacks[0]).astype(float)
     return made / [*(3 * [inputs.blurs[0].scale]), 1.0]
@@ -89,7 +89,7 @@ def resting(device: Device, atlas: Atlas, stretch: str = "full", **more: Any) ->
     return made
 
 
-def run_frame(renderer: Renderer, scene: Scene, **given: Any) -> Inputs:
+def run_frame(renderer: Renderer, scene: Scene, **given: Any) -> FrameInputs:
     """A whole frame; what its passes made can be downloaded from the result."""
     inputs, graph = renderer.prepare(scene, settings_of(**given)), renderer.graph
     graph.begin()

@@ -18,10 +18,10 @@ from dermis.frame.features.irradiance.irradiance import TEXEL_AREA
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.lights import light_records, light_views
 from dermis.frame.lights.rectangle import KIND, facing_irradiance
-from dermis.frame.programs import device_constants, strip_for
+from dermis.frame.programs import device_constants, strip_constants
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.lights import DirectionalLight, Light, RectangleLight, SphereLight, StripeLight
 
@@ -117,7 +117,7 @@ def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
     }[kind]
     inputs = run_frame(renderer, scene_of(FLOOR, light))
     textures = {
-        name: texture_from(renderer.device, np.dstack([values, np.ones((SIZE, SIZE))]), "rgba32float")
+        name: texture_from_array(renderer.device, np.dstack([values, np.ones((SIZE, SIZE))]), "rgba32float")
         for name, values in {"points": points, "normals": np.broadcast_to([0, 0, 1.0], points.shape)}.items()
     }
     towards, arriving = probe(
@@ -126,11 +126,11 @@ def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
         (SIZE, SIZE),
         ["towards", "arriving"],
         inputs.light_constants,
-        **inputs.lit,
+        **inputs.bindings,
         **textures,
         part={"index": part},
     )
-    direction, irradiance = light_twins.part_of(inputs.lit["lights"]["light"][0], points.astype(float), part)
+    direction, irradiance = light_twins.part_of(inputs.bindings["lights"]["light"][0], points.astype(float), part)
     assert np.abs(towards[..., :3] - direction).max() < TWIN
     assert np.abs(arriving[..., :3] - irradiance).max() < TWIN * irradiance.max()
     assert (towards[..., 3] == 1).all()
@@ -163,8 +163,8 @@ def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) ->
     points = np.dstack([x, np.zeros_like(x), np.zeros_like(x), np.ones_like(x)])
     normals = np.broadcast_to(np.float32([0, 0, 1, 0]), points.shape)
     textures = {
-        "points": texture_from(renderer.device, points, "rgba32float"),
-        "normals": texture_from(renderer.device, normals, "rgba32float"),
+        "points": texture_from_array(renderer.device, points, "rgba32float"),
+        "normals": texture_from_array(renderer.device, normals, "rgba32float"),
     }
     seen = []
     records = light_records(shade_program(renderer.device), scene, views)
@@ -176,7 +176,7 @@ def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) ->
             (SIZE, SIZE),
             ["towards", "arriving"],
             inputs.light_constants,
-            **(inputs.lit | {"lights": records}),
+            **(inputs.bindings | {"lights": records}),
             **textures,
             part={"index": 0},
         )
@@ -217,7 +217,7 @@ def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
     normals = light_twins.unit(rng.normal([0, 0, 2], 1, (SIZE, SIZE, 3))).astype(np.float32)
     inputs = run_frame(renderer, scene_of(PLATE, light), shadow_size=512)
     textures = {
-        name: texture_from(renderer.device, np.dstack([values, np.ones((SIZE, SIZE))]), "rgba32float")
+        name: texture_from_array(renderer.device, np.dstack([values, np.ones((SIZE, SIZE))]), "rgba32float")
         for name, values in {"points": points, "normals": normals}.items()
     }
     towards, _ = probe(
@@ -226,12 +226,12 @@ def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
         (SIZE, SIZE),
         ["towards", "arriving"],
         inputs.light_constants,
-        **inputs.lit,
+        **inputs.bindings,
         **textures,
         part={"index": 0},
     )
     depths = download(renderer.device, inputs.resources.shadow_maps.texture).astype(float)
-    record = inputs.lit["lights"]["light"][0]
+    record = inputs.bindings["lights"]["light"][0]
     exact = light_twins.visibility(
         record, depths, points.reshape(-1, 3).astype(float), normals.reshape(-1, 3)
     )
@@ -312,5 +312,5 @@ def test_too_many_parts_are_refused(renderer: Renderer) -> None:
 def test_strips_hold_no_more_samples_than_drivers_go_round_loops(renderer: Renderer, samples: int) -> None:
     """Under three rectangles of 500 mm, with 16 samples, 4 % of a face stayed black where they held 256."""
     usual = dict(device_constants(renderer.device)).get("STRIP", 1)
-    strip = (dict(strip_for(renderer.device, samples)) or {"STRIP": usual})["STRIP"]
+    strip = (dict(strip_constants(renderer.device, samples)) or {"STRIP": usual})["STRIP"]
     assert 1 <= strip <= usual and strip * samples <= 64

@@ -13,7 +13,7 @@ from tolerances import TWIN
 
 from dermis.base.errors import DermisError
 from dermis.environment.panorama import directions
-from dermis.frame.rendered import Rendered
+from dermis.frame.rendered_frame import RenderedFrame
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb8
 from dermis.images.io import write_exr
@@ -26,7 +26,7 @@ CAMERA = front_camera(BALL, frame_mm=120.0)
 SCENE = scene_of(BALL, frontal(), camera=CAMERA)
 
 
-def drawn(renderer: Renderer, scene: Scene = SCENE, **settings: Any) -> Rendered:
+def drawn(renderer: Renderer, scene: Scene = SCENE, **settings: Any) -> RenderedFrame:
     return renderer.draw(scene, settings_of(**({"samples": 4} | settings)))
 
 

@@ -15,7 +15,7 @@ from dermis.atlas.build import build_atlas
 from dermis.frame.features.shape import curvature
 from dermis.frame.features.shape.curvature import make_curvature
 from dermis.frame.features.shape.mesh import upload_geometry
-from dermis.frame.features.shape.shape import rest_shape, shape_tables
+from dermis.frame.features.shape.shape import evaluate_rest_shape, shape_tables
 from dermis.gpu import CommandList, Device
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
@@ -28,7 +28,7 @@ def found(device: Device, mesh: Mesh, positions_mm: NDArray[np.float32] | None =
     """(v,) the curvature of a mesh, or of one that its points were moved to [1/mm]."""
     head = head_of(mesh)
     points = head.positions_mm if positions_mm is None else positions_mm
-    shape = rest_shape(device, shape_tables(device, head), points)
+    shape = evaluate_rest_shape(device, shape_tables(device, head), points)
     made, frame = make_curvature(device, mesh), CommandList(device)
     atlas = build_atlas(mesh, SIDE, "mesh")
     curvature.draw(frame, upload_geometry(device, mesh, atlas, shape), made)

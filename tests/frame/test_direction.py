@@ -14,9 +14,14 @@ from tolerances import TWIN
 
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.optics.directions import ROWS, directions, mean_of_once, refracted
+from dermis.optics.angular_response import (
+    DIRECTION_ROWS,
+    angular_response,
+    mean_single_scattering_kernel,
+    refracted_cosine,
+)
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import write_profile
 from dermis.scene.camera import Camera
@@ -55,11 +60,13 @@ def middle(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
 
 def law(cosine_in: float, cosine_out: float, eta: float, colour: Floats = COLOUR) -> Floats:
     """What leaves in a direction over the same from and to straight above on the mean."""
-    told = directions(colour, eta)
-    rows = np.linspace(0.0, 1.0, ROWS)
-    back = np.array([np.interp(np.sqrt(cosine_in), rows, told.returned[:, c]) for c in range(3)])
+    told = angular_response(colour, eta)
+    rows = np.linspace(0.0, 1.0, DIRECTION_ROWS)
+    back = np.array([np.interp(np.sqrt(cosine_in), rows, told.relative_reflectance[:, c]) for c in range(3)])
     a, b = (np.sqrt(1.0 - (1.0 - c**2) / eta**2) for c in (cosine_in, cosine_out))
-    return np.asarray(back + told.once * (1.0 / (a + b) - mean_of_once(cosine_in, eta)))
+    return np.asarray(
+        back + told.single_scattering * (1.0 / (a + b) - mean_single_scattering_kernel(cosine_in, eta))
+    )
 
 
 @pytest.mark.parametrize("surface", [DRY, {}], ids=["matched", "refracting"])
@@ -71,20 +78,26 @@ def test_law_at_all_directions(renderer: Renderer, surface: Any) -> None:
     turned = scene_of(
         head_of(plane(100.0), colour=np.tile(COLOUR, (8, 8, 1))), direction="half-space", **surface
     )
-    bound = run_frame(renderer, turned, technique="none").lit
-    bound |= {"cosines": texture_from(renderer.device, pairs.astype(np.float32), "rgba32float")}
+    bound = run_frame(renderer, turned, technique="none").bindings
+    bound |= {"cosines": texture_from_array(renderer.device, pairs.astype(np.float32), "rgba32float")}
     back, beyond, around = (
         made[..., :3]
         for made in probe(renderer.device, "direction_probe", (16, 16), ["back", "beyond", "around"], **bound)
     )
-    told = directions(COLOUR, eta)
-    a, b = (np.maximum(refracted(pairs[..., k], eta), 1e-4) for k in (0, 1))
-    rows, place = np.linspace(0.0, 1.0, ROWS), np.sqrt(pairs[..., 0])
-    expected = np.stack([np.interp(place, rows, told.returned[:, c]) for c in range(3)], axis=-1)
+    told = angular_response(COLOUR, eta)
+    a, b = (np.maximum(refracted_cosine(pairs[..., k], eta), 1e-4) for k in (0, 1))
+    rows, place = np.linspace(0.0, 1.0, DIRECTION_ROWS), np.sqrt(pairs[..., 0])
+    expected = np.stack([np.interp(place, rows, told.relative_reflectance[:, c]) for c in range(3)], axis=-1)
     np.testing.assert_allclose(back, expected, rtol=1e-4)
-    expected = told.once * (1.0 / (a + b) - mean_of_once(pairs[..., 0], eta))[..., None]
+    expected = (
+        told.single_scattering
+        * (1.0 / (a + b) - mean_single_scattering_kernel(pairs[..., 0], eta))[..., None]
+    )
     np.testing.assert_allclose(beyond, expected, rtol=1e-2, atol=2e-3)  # floats round cosines near 0
-    expected = told.once * (mean_of_once(pairs[..., 1], eta) - told.mean_once)[..., None]
+    expected = (
+        told.single_scattering
+        * (mean_single_scattering_kernel(pairs[..., 1], eta) - told.mean_kernel)[..., None]
+    )
     np.testing.assert_allclose(around, expected, atol=2e-3)
 
 
@@ -118,7 +131,7 @@ def test_a_colour_map_counts_by_its_mean(renderer: Renderer) -> None:
 @pytest.mark.parametrize("technique", ["none", "texture-space", "pre-integrated"])
 def test_light_from_everywhere(renderer: Renderer, profile: str, technique: str) -> None:
     """A matched half-space under even light sends out what enters it from there."""
-    room, told = Environment(name="uniform"), directions(COLOUR, 1.0)
+    room, told = Environment(name="uniform"), angular_response(COLOUR, 1.0)
     for degrees in (10.0, 80.0):
         scene = scene_of(
             FLAT,
@@ -129,15 +142,18 @@ def test_light_from_everywhere(renderer: Renderer, profile: str, technique: str)
             **DRY,
         )
         made = middle(renderer, replace(scene, lights=(), environment=room), technique=technique)
-        expected = told.from_everywhere + told.once * (
-            mean_of_once(np.cos(np.radians(degrees)), 1.0) - told.mean_once
+        expected = told.relative_diffuse_reflectance + told.single_scattering * (
+            mean_single_scattering_kernel(np.cos(np.radians(degrees)), 1.0) - told.mean_kernel
         )
         np.testing.assert_allclose(made, COLOUR * expected, rtol=2e-3)
 
 
 def test_what_leaves_in_all_directions_together_is_what_came_back(renderer: Renderer, profile: str) -> None:
     angles = np.degrees(np.arccos(np.sqrt((np.arange(12) + 0.5) / 12)))
-    for direction, expected in (("lambertian", 1.0), ("half-space", directions(COLOUR, 1.0).returned[-1])):
+    for direction, expected in (
+        ("lambertian", 1.0),
+        ("half-space", angular_response(COLOUR, 1.0).relative_reflectance[-1]),
+    ):
         seen = [
             middle(
                 renderer,
@@ -211,10 +227,10 @@ def test_light_that_came_from_beside_leaves_all_ways_alike(renderer: Renderer, p
 def test_white_skin_is_not_made_brighter(renderer: Renderer) -> None:
     """Whatever white skin does not take, it returns already."""
     scene = scene_of(FLAT, LIGHT, camera=seen_from(0.0), albedo="profile", direction="half-space", **DRY)
-    bright = directions(np.ones(3), 1.0)
-    np.testing.assert_allclose(bright.returned, 1.0, atol=1e-3)
+    bright = angular_response(np.ones(3), 1.0)
+    np.testing.assert_allclose(bright.relative_reflectance, 1.0, atol=1e-3)
     cosine = 0.6 / float(np.linalg.norm(LIGHT.direction))
-    turned = bright.once * (1.0 / (cosine + 1.0) - mean_of_once(cosine, 1.0))
+    turned = bright.single_scattering * (1.0 / (cosine + 1.0) - mean_single_scattering_kernel(cosine, 1.0))
     made = middle(renderer, scene, technique="none")
     expected = np.multiply(LIGHT.irradiance, cosine) / np.pi * (1.0 + turned)
     np.testing.assert_allclose(made, expected, rtol=2e-3)

@@ -16,12 +16,12 @@ from twins import DEFAULT_COLOUR, surface, surface_albedo
 
 from dermis.atlas.build import cached_atlas
 from dermis.base.errors import DermisError
-from dermis.environment.mirrors import equivalent_mirrors
+from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import directions, solid_angles
 from dermis.environment.prefilter import SMOOTHEST, prefilter
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.images.io import write_exr
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.environment import Environment
@@ -70,7 +70,7 @@ def facing(normal: Floats, seed: int) -> Floats:
 
 def test_functions_are_numpys(renderer: Renderer, room: str) -> None:
     environment = Environment(name=room, rotation_degrees=70.0, exposure=0.6)
-    lit = run_frame(renderer, around(WHITE, environment), occlusion="none").lit
+    lit = run_frame(renderer, around(WHITE, environment), occlusion="none").bindings
     rng = np.random.default_rng(3)
     normal, smooth = hemisphere(1), hemisphere(2)
     normal[0] = twins.unit(normal[0] * [0.01, 0, 0.01] + [0, 1, 0])  # within a texel of the poles
@@ -81,9 +81,9 @@ def test_functions_are_numpys(renderer: Renderer, room: str) -> None:
     open_, albedo = (rng.uniform(0, 1, (SIZE, SIZE)).astype(np.float32).astype(float) for _ in range(2))
     m = rng.uniform(0.06, 1, (SIZE, SIZE)).astype(np.float32).astype(float)
     textures = {
-        "normals": texture_from(renderer.device, np.dstack([normal, open_]), "rgba32float"),
-        "smooth_normals": texture_from(renderer.device, np.dstack([smooth, albedo]), "rgba32float"),
-        "views": texture_from(renderer.device, np.dstack([view, m]), "rgba32float"),
+        "normals": texture_from_array(renderer.device, np.dstack([normal, open_]), "rgba32float"),
+        "smooth_normals": texture_from_array(renderer.device, np.dstack([smooth, albedo]), "rgba32float"),
+        "views": texture_from_array(renderer.device, np.dstack([view, m]), "rgba32float"),
     }
     entering, mirror = probe(
         renderer.device, "environment_probe", (SIZE, SIZE), ["around", "mirror"], **lit, **textures
@@ -139,7 +139,7 @@ def test_a_white_ball_in_a_furnace(renderer: Renderer, rho_s: float, energy: str
     inputs = run_frame(renderer, scene, occlusion="none", size=(64, 64), atlas=128)
     seen = middle(download(renderer.device, inputs.resources.post.picture.exposed).astype(float))
     albedo, mean = surface_albedo(np.linspace(0.0, 1, 200), 0.3)
-    expected = ENERGY[energy].furnace(albedo, mean, rho_s)
+    expected = ENERGY[energy].furnace_radiance(albedo, mean, rho_s)
     assert seen.min() > expected.min() - FURNACE and seen.max() < expected.max() + FURNACE
     if energy == "full" or rho_s == 0.0:
         assert seen.mean() == pytest.approx(1.0, abs=FURNACE)
@@ -169,15 +169,15 @@ def test_an_environment_adds_to_lights(renderer: Renderer, close: float) -> None
     assert np.abs(one + other - sum_).max() < close * sum_.max()
     plain = renderer.prepare(scene_of(head, frontal()), settings_of())
     assert plain.constants == plain.light_constants == ()
-    lit = plain.lit
+    lit = plain.bindings
     assert lit["panorama"].size[:2] == lit["occlusion_map"].size[:2] == (1, 1)
 
 
 @pytest.mark.parametrize("model", ["kelemen", "phong"])
 def test_reflections_follow_the_model_in_use(renderer: Renderer, model: str) -> None:
     scene = around(WHITE, Environment(name="uniform"), specular=model)
-    record = run_frame(renderer, scene, occlusion="none").lit["environment"]
-    table = equivalent_mirrors(model).reshape(-1, 4)
+    record = run_frame(renderer, scene, occlusion="none").bindings["environment"]
+    table = isotropic_lobe_table(model).reshape(-1, 4)
     assert np.abs(record["mirrors"] - table).max() < 1e-6
 
 
@@ -214,7 +214,7 @@ def test_it_is_seen_behind_the_head(renderer: Renderer, room: str, rotation: flo
     image = download(renderer.device, inputs.resources.post.picture.exposed).astype(float)
     y, x = np.mgrid[:48, :48]
     ray = twins.unit(np.dstack([x - 23.5, 23.5 - y, np.full(x.shape, -24.0)]))  # 45 degrees to each side
-    exact = 2 * twins.panorama_at(prefilter(room).layers[1].astype(float), inputs.lit["environment"], ray)
+    exact = 2 * twins.panorama_at(prefilter(room).layers[1].astype(float), inputs.bindings["environment"], ray)
     free = image[..., 3] == 0
     assert free.sum() > 1000
     assert np.abs(image[..., :3] - exact)[free].max() < PANORAMA * exact.max()
@@ -236,12 +236,12 @@ def test_the_poles_are_no_seams(renderer: Renderer, tmp_path: Path) -> None:
     write_exr(tmp_path / "half.exr", radiance.astype(np.float32))
     lit = run_frame(
         renderer, around(WHITE, Environment(name=str(tmp_path / "half.exr"))), occlusion="none"
-    ).lit
+    ).bindings
     angle = np.radians(np.linspace(-3, 3, SIZE * SIZE)).reshape(SIZE, SIZE)
     normal = np.dstack([np.sin(angle), np.cos(angle), 0 * angle, 1 + 0 * angle])
     view = np.dstack([normal[..., :3], np.full((SIZE, SIZE), 0.05)])
     textures = {
-        name: texture_from(renderer.device, values, "rgba32float")
+        name: texture_from_array(renderer.device, values, "rgba32float")
         for name, values in {"normals": normal, "smooth_normals": normal, "views": view}.items()
     }
     _, mirror = probe(

@@ -13,9 +13,9 @@ from small_head import write_head
 import dermis
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
-from dermis.scene.field_errors import bounds_of, number_fields
+from dermis.scene.field_errors import field_bounds, numeric_fields
 from dermis.scene.lights import LIGHTS
-from dermis.scene.plain import Plain
+from dermis.scene.frozen_model import FrozenModel
 
 SMALL: dict[str, Any] = {"size": (24, 24), "atlas": 64, "samples": 1, "shadow_size": 64}
 NEEDED: dict[str, Any] = {"position": (0.0, 0.0, 900.0), "direction": (0.0, 0.0, -1.0)}
@@ -27,13 +27,13 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> dermis.Head:
     return dermis.load_head(write_head(tmp_path_factory.mktemp("head") / "head.obj"))
 
 
-def ends(model: type[Plain], field: str) -> list[Any]:
+def ends(model: type[FrozenModel], field: str) -> list[Any]:
     """The least and the greatest value of a field."""
     info = model.model_fields[field]
     kind = get_args(info.annotation)
-    if bounds_of(info) != (None, None):
-        return list(bounds_of(info))
-    return [(end,) * len(kind) for end in bounds_of(FieldInfo.from_annotation(kind[0]))]
+    if field_bounds(info) != (None, None):
+        return list(field_bounds(info))
+    return [(end,) * len(kind) for end in field_bounds(FieldInfo.from_annotation(kind[0]))]
 
 
 def check(renderer: Renderer, scene: dermis.Scene, **settings: Any) -> None:
@@ -46,7 +46,7 @@ def test_lights(renderer: Renderer, small: dermis.Head, kind: str) -> None:
     model = LIGHTS[kind]
     needed = {name: value for name, value in NEEDED.items() if name in model.model_fields}
     taken = 0
-    for field in number_fields(model):
+    for field in numeric_fields(model):
         for end in ends(model, field):
             try:
                 light = model(**{**needed, "irradiance": (1e6,) * 3, field: end})
@@ -58,7 +58,7 @@ def test_lights(renderer: Renderer, small: dermis.Head, kind: str) -> None:
     assert taken > 3
 
 
-@pytest.mark.parametrize("field", number_fields(dermis.Camera))
+@pytest.mark.parametrize("field", numeric_fields(dermis.Camera))
 def test_cameras(renderer: Renderer, small: dermis.Head, field: str) -> None:
     for end in ends(dermis.Camera, field):
         for position in ((0.0, 0.0, 1100.0), END):
@@ -69,19 +69,19 @@ def test_cameras(renderer: Renderer, small: dermis.Head, field: str) -> None:
 def test_settings_and_surroundings(renderer: Renderer, small: dermis.Head) -> None:
     around = [
         dermis.Environment("uniform", **{field: end})
-        for field in number_fields(dermis.Environment)
+        for field in numeric_fields(dermis.Environment)
         for end in ends(dermis.Environment, field)
     ]
     for one in around:
         for exposure in ("auto", 1e6):
             check(renderer, dermis.Scene(small, environment=one), exposure=exposure, background="environment")
-    for field in set(number_fields(dermis.Settings)) - set(SMALL):
+    for field in set(numeric_fields(dermis.Settings)) - set(SMALL):
         for end in ends(dermis.Settings, field):
             check(renderer, dermis.Scene(small), **{field: end})
 
 
 def test_skins(renderer: Renderer, small: dermis.Head, tmp_path: Path) -> None:
-    for field in number_fields(dermis.Skin):
+    for field in numeric_fields(dermis.Skin):
         for end in ends(dermis.Skin, field):
             check(renderer, dermis.Scene(small, skin=dermis.Skin(**{field: end})))
     for number, rows in enumerate(["1e-12,1e-12,1e-12,1e-12\n1e4,100,100,100", "1e4,1e-12,100,1e-12"]):

@@ -12,7 +12,7 @@ from setups import frontal, head_of, probe, run_frame, scene_of, settings_of
 from dermis import Human
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.mesh.head import Head
@@ -92,9 +92,9 @@ def on_iris(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
 
 def probed(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
     """(n, n, 4) what the shader finds."""
-    lit = run_frame(renderer, scene_of(head_of(plane(50.0)), frontal())).lit
+    lit = run_frame(renderer, scene_of(head_of(plane(50.0)), frontal())).bindings
     bound = {
-        name: texture_from(renderer.device, np.dstack([one, np.ones((SIZE, SIZE))]), "rgba32float")
+        name: texture_from_array(renderer.device, np.dstack([one, np.ones((SIZE, SIZE))]), "rgba32float")
         for name, one in (("places", places), ("ways", ways))
     }
     (seen,) = probe(renderer.device, "eye_probe", (SIZE, SIZE), ["seen"], **lit, **bound)

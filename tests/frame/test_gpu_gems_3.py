@@ -9,7 +9,7 @@ import pytest
 from setups import resting
 
 from dermis.atlas.build import build_atlas
-from dermis.frame.features.diffusion.levels import Blur
+from dermis.frame.features.diffusion.pyramid import Blur
 from dermis.frame.techniques.gpu_gems_3 import TECHNIQUE
 from dermis.gpu import CommandList, Device, download, upload
 from dermis.mesh.primitives import plane
@@ -30,7 +30,7 @@ def levels(device: Device) -> list[np.ndarray]:
     light[SIZE // 2, SIZE // 2, :3] = 1000.0
     upload(device, space.stacks[0], light)
     frame = CommandList(device)
-    TECHNIQUE.fill(frame, space, resting(device, atlas), BLUR)
+    TECHNIQUE.blur_levels(frame, space, resting(device, atlas), BLUR)
     frame.submit()
     return [
         download(device, space.stacks[0], layer=k + 1)[..., 0].astype(float) / 1000.0
@@ -65,7 +65,7 @@ def test_the_clear_colour_takes_no_light_away(device: Device) -> None:
     upload(device, space.stacks[0], np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
     frame = CommandList(device)
     atlas = resting(device, build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE))
-    TECHNIQUE.fill(frame, space, atlas, replace(BLUR, edge="cleared", clear=(0.5, 0.35, 0.3)))
+    TECHNIQUE.blur_levels(frame, space, atlas, replace(BLUR, edge="cleared", clear=(0.5, 0.35, 0.3)))
     frame.submit()
     dark = download(device, space.stacks[0], layer=len(VARIANCES))
     assert np.abs(dark[8:-8, 8:-8, :3]).max() == 0.0 and dark[8:-8, 8:-8, 3].max() == 1.0

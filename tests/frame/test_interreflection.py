@@ -28,7 +28,7 @@ def test_an_integrating_sphere(renderer: Renderer, albedo: float) -> None:
     head = head_of(within, colour=np.full((4, 4, 3), albedo))
     lamp = PointLight(position=place(head, (0, 0, 0)), irradiance=(3.0, 3.0, 3.0), shadows=False)
     scene = scene_of(head, lamp, rho_s=0.0)
-    shown = cached_atlas(within, SIDE).own
+    shown = cached_atlas(within, SIDE).lit
     straight, all_of_it = (
         entered_light(renderer, run_frame(renderer, scene, atlas=SIDE, interreflection=on))[shown][:, :3]
         for on in (False, True)
@@ -56,8 +56,8 @@ def test_a_white_corner_in_a_furnace(renderer: Renderer, direction: str) -> None
 def test_a_new_camera_leaves_it_as_it_is(renderer: Renderer) -> None:
     head = corner()
     run_frame(renderer, scene_of(head, frontal()), atlas=SIDE)
-    assert "interreflection" in renderer.graph.ran
+    assert "interreflection" in renderer.graph.executed_stages
     run_frame(renderer, scene_of(head, frontal(), camera=front_camera(head, frame_mm=150.0)), atlas=SIDE)
-    assert "interreflection" not in renderer.graph.ran
+    assert "interreflection" not in renderer.graph.executed_stages
     run_frame(renderer, scene_of(head, frontal(2.0)), atlas=SIDE)
-    assert "interreflection" in renderer.graph.ran
+    assert "interreflection" in renderer.graph.executed_stages

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from setups import head_of
 
 import dermis
-from dermis.apps.truths.described import check_lens
+from dermis.apps.truths.scene_description import check_camera
 from dermis.apps.viewer.navigation import pick
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
@@ -130,7 +130,7 @@ def test_hairs_are_cropped_too(renderer: Renderer) -> None:
             "K: expected pixels with right .* skew is 9",
         ),
         ({"K": np.diag([1.0, -1.0, 1.0])}, "K: expected fx, fy above 0"),
-        ({"K": np.eye(4)}, r"K: expected numbers of shape \(3, 3\) .*, but shape \(4, 4\) came"),
+        ({"K": np.eye(4)}, r"K: expected numbers of shape \(3, 3\) .*, but got shape \(4, 4\)"),
         ({"K": "camera.yml"}, "K: expected numbers"),
         ({"R": 2 * R}, "R: expected a rotation matrix"),
         ({"R": np.diag([1.0, 1.0, -1.0])}, "R: .*its determinant is -1"),
@@ -145,6 +145,6 @@ def test_what_is_no_camera_is_refused(given: dict, said: str) -> None:
 
 
 def test_other_renderers_say_that_they_lack_it() -> None:
-    check_lens(dermis.Camera((0, 0, 900)), "Mitsuba")
+    check_camera(dermis.Camera((0, 0, 900)), "Mitsuba")
     with pytest.raises(DermisError, match="in the middle and square pixels, for Mitsuba"):
-        check_lens(dermis.Camera.from_opencv(K, R, T, SIZE), "Mitsuba")
+        check_camera(dermis.Camera.from_opencv(K, R, T, SIZE), "Mitsuba")

@@ -170,7 +170,7 @@ def test_resolution_falls_step_by_step(texels_per_mm: float, most: int) -> None:
 def test_a_halved_atlas_is_the_same_surface(device: Device, atlas: Atlas, textures: AtlasTextures) -> None:
     """Stretch of half as many texels, runs of half the length, and gutters that show the same places."""
     coarse = halve_mip(AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source))
-    own, made = coarse.own, textures.coarser[0].resources
+    own, made = coarse.lit, textures.coarser[0].resources
     metric = download(device, made["stretch_map"]).astype(np.float64)
     assert np.array_equal(metric[..., 0] > 0, coarse.covered)
     y, x = np.nonzero(own)

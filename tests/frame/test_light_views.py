@@ -8,7 +8,7 @@ from setups import head_of, place, scene_of
 
 from dermis.base.errors import DermisError
 from dermis.frame.lights import light_views
-from dermis.frame.projection import axes_of
+from dermis.frame.projection import view_axes
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.lights import DirectionalLight, Light, PointLight, SpotLight
 
@@ -53,6 +53,6 @@ def test_one_within_the_head_is_named(inside: tuple[float, ...]) -> None:
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
 def test_up_counts_however_short(length: float) -> None:
     """The least that scenes allow, up to the longest; only one along the view is replaced."""
-    tilted = axes_of((0.0, 0.6, -0.8), (0.0, 0.9 * length, 0.2 * length))
+    tilted = view_axes((0.0, 0.6, -0.8), (0.0, 0.9 * length, 0.2 * length))
     assert np.allclose(tilted, [(1.0, 0.0, 0.0), (0.0, 0.8, 0.6), (0.0, 0.6, -0.8)])
-    assert np.allclose(axes_of((0.0, 1.0, 0.0), (0.0, length, 0.0))[2], (0.0, 1.0, 0.0))
+    assert np.allclose(view_axes((0.0, 1.0, 0.0), (0.0, length, 0.0))[2], (0.0, 1.0, 0.0))

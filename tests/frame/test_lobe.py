@@ -14,7 +14,7 @@ from tolerances import LOBE_TWIN, TABLE_LOBE
 
 from dermis.frame.features.surface import record as surface
 from dermis.frame.renderer import Renderer
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.mesh.primitives import plane
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.skin import Skin
@@ -41,11 +41,11 @@ def directions(seed: int) -> Floats:
 def shader(renderer: Renderer, light: Floats, view: Floats, m: float, rho_s: float, **skin: Any) -> Any:
     """What the lobe's functions give, each (n, n): reflectance, slopes, BRDF; shares that pass."""
     scene = scene_of(head_of(plane(50.0)), frontal(), **skin)
-    lit = run_frame(renderer, scene).lit
+    lit = run_frame(renderer, scene).bindings
     flat = np.ones((SIZE, SIZE, 1))
     textures = {
-        "to_light": texture_from(renderer.device, np.dstack([light, m * flat]), "rgba32float"),
-        "to_eye": texture_from(renderer.device, np.dstack([view, rho_s * flat]), "rgba32float"),
+        "to_light": texture_from_array(renderer.device, np.dstack([light, m * flat]), "rgba32float"),
+        "to_eye": texture_from_array(renderer.device, np.dstack([view, rho_s * flat]), "rgba32float"),
     }
     outputs, chosen = ["reflected", "passed"], surface.surface_constants(Skin(**skin))
     made = probe(renderer.device, "lobe_probe", (SIZE, SIZE), outputs, chosen, **lit, **textures)
@@ -109,9 +109,9 @@ def test_shares_that_pass(renderer: Renderer, model: str, energy: str) -> None:
     law = ENERGY[energy]
     inwards, mean = twins.surface_albedo(light[..., 2], m, model)
     outwards, _ = twins.surface_albedo(view[..., 2], m, model)
-    assert worst(entering, law.enters(inwards, rho_s)) < LOBE_TWIN
-    assert worst(everywhere, law.enters(mean, rho_s)) < LOBE_TWIN
-    assert worst(leaving, law.leaves(outwards, mean, rho_s)) < LOBE_TWIN
+    assert worst(entering, law.entering_fraction(inwards, rho_s)) < LOBE_TWIN
+    assert worst(everywhere, law.entering_fraction(mean, rho_s)) < LOBE_TWIN
+    assert worst(leaving, law.exitance_factor(outwards, mean, rho_s)) < LOBE_TWIN
 
 
 def test_nothing_enters_beyond_all_of_the_light(renderer: Renderer) -> None:
@@ -131,10 +131,14 @@ def test_relief_that_turns_away_from_the_eye_reflects_as_seen_at_its_horizon(ren
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     view, normal = (a.astype(np.float32).astype(float) for a in (view, normal))
     light = DirectionalLight(direction=tuple(-to_light), irradiance=(1, 1, 1), shadows=False)
-    lit = run_frame(renderer, scene_of(head_of(plane(50.0)), light, specular="kelemen-direct")).lit
+    lit = run_frame(renderer, scene_of(head_of(plane(50.0)), light, specular="kelemen-direct")).bindings
     textures = {
-        "normals": texture_from(renderer.device, np.dstack([normal, 0 * normal[..., :1]]), "rgba32float"),
-        "views": texture_from(renderer.device, np.dstack([view, 0 * normal[..., :1] + 0.3]), "rgba32float"),
+        "normals": texture_from_array(
+            renderer.device, np.dstack([normal, 0 * normal[..., :1]]), "rgba32float"
+        ),
+        "views": texture_from_array(
+            renderer.device, np.dstack([view, 0 * normal[..., :1] + 0.3]), "rgba32float"
+        ),
     }
     chosen = surface.surface_constants(Skin(specular="kelemen-direct"))
     (made,) = probe(renderer.device, "lighting_probe", (SIZE, SIZE), ["mirror"], chosen, **lit, **textures)

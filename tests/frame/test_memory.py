@@ -70,7 +70,7 @@ def chosen(kind: str) -> Settings:
 
 @pytest.fixture
 def held(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> Held:
-    renderer.forget()
+    renderer.clear_cache()
     return Held(renderer.device, monkeypatch)
 
 
@@ -78,7 +78,7 @@ def test_a_frame_leaves_nothing_of_the_one_before(renderer: Renderer, held: Held
     """Whatever came before, as much is held as by a renderer without a past."""
     alone = {}
     for kind in KINDS:
-        renderer.forget()
+        renderer.clear_cache()
         renderer.draw(SCENE, chosen(kind))
         alone[kind] = held.bytes()
     for kind in (*KINDS, *reversed(KINDS)):
@@ -93,7 +93,7 @@ def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind:
         pytest.skip("only a software adapter takes main memory, and levels of floats")
     found = {}
     for side in (256, 512):
-        renderer.forget()
+        renderer.clear_cache()
         renderer.draw(SCENE, chosen(kind).model_copy(update={"atlas": side}))
         found[side] = held.bytes()
     levels = 0 if kind == "none" else 5

@@ -10,7 +10,7 @@ from setups import frontal, head_of, probe, run_frame, scene_of
 
 from dermis.atlas.build import cached_atlas
 from dermis.frame.features.shape.mesh import upload_geometry
-from dermis.frame.features.shape.shape import rest_shape, shape_tables
+from dermis.frame.features.shape.shape import evaluate_rest_shape, shape_tables
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere
 
@@ -25,12 +25,12 @@ def test_buffers_hold_what_textures_hold(renderer: Renderer, monkeypatch: pytest
         patch.setattr(renderer.device, "adapter", adapter)
         patch.setattr(renderer.device, "programs", {})  # those of software write textures
         tables = shape_tables(renderer.device, BALL)
-        shape = rest_shape(renderer.device, tables, BALL.positions_mm)
+        shape = evaluate_rest_shape(renderer.device, tables, BALL.positions_mm)
         held = upload_geometry(renderer.device, BALL.mesh, cached_atlas(BALL.mesh, 64), shape)
     # the texture from one, the buffers from the other: what is read is the same
-    both = held.resources | {name: inputs.lit[name] for name in ("triangle_table", "vertex_table")}
+    both = held.resources | {name: inputs.bindings[name] for name in ("triangle_table", "vertex_table")}
     atlas = inputs.layouts[0].atlas.resources["atlas"]
-    bound = inputs.lit | both | {"atlas": atlas, "footprint": {"side": 1 / 64}}
+    bound = inputs.bindings | both | {"atlas": atlas, "footprint": {"side": 1 / 64}}
     outputs = ["relief", "arriving"]
     for one, other in zip(
         probe(renderer.device, "surface_probe", (64, 64), outputs, **bound),

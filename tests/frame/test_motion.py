@@ -14,13 +14,13 @@ from test_shape import anew, bent, words
 from tolerances import FLAT, HARMONIC, POSED
 
 from dermis import Pose
-from dermis.apps.validation.benchmarks.cases import pose_at, rigged
+from dermis.apps.validation.benchmarks.cases import test_pose, with_test_rig
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.features.atlas.passes import draw_stretch
 from dermis.frame.features.atlas.textures import upload_atlas
 from dermis.frame.features.diffusion import blur as diffuse
-from dermis.frame.features.diffusion.levels import Blur, halvings_of, make_levels
+from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, make_levels
 from dermis.frame.features.shape import shape
 from dermis.frame.features.shape.mesh import upload_geometry
 from dermis.frame.features.shape.shape import MotionBytes, make_shape, shape_tables
@@ -49,10 +49,10 @@ def atlas(head: Head) -> Atlas:
 def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light: Floats) -> list[Floats]:
     """The levels of (n, n, 1) light on a head in motion, each at its resolution."""
     made, textures = make_shape(device, shape_tables(device, head)), upload_atlas(device, atlas)
-    most = len(textures.sheets("repeated")) - 1
-    halvings = halvings_of(BLURRED, textures.usual_per_mm, most)
+    most = len(textures.mips_for("repeated")) - 1
+    halvings = choose_halvings(BLURRED, textures.median_texels_per_mm, most)
     space = make_levels(device, SIDE, (halvings,), FLOATS)
-    upload(device, space.stacks[0], np.dstack([light, light, light, atlas.own[..., None]]))
+    upload(device, space.stacks[0], np.dstack([light, light, light, atlas.lit[..., None]]))
     frame = CommandList(device)
     shape.draw(frame, made, motion)
     draw_stretch(frame, upload_geometry(device, head.mesh, atlas, made), textures)
@@ -67,10 +67,10 @@ def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light:
 
 @pytest.mark.parametrize("moment", range(0, 21, 5))
 def test_even_light_stays_even_in_every_pose(device: Device, head: Head, atlas: Atlas, moment: int) -> None:
-    moving = rigged(head, 12)
-    motion = pose_at(moving, moment).motion(moving.control)
+    moving = with_test_rig(head, 12)
+    motion = test_pose(moving, moment).motion(moving.control)
     held = MotionBytes(words(motion.positions_mm), words(40 * motion.weights), words(motion.matrices))
-    light = np.ones((SIDE, SIDE, 1)) * atlas.own[..., None]
+    light = np.ones((SIDE, SIDE, 1)) * atlas.lit[..., None]
     for level in spread(device, moving, atlas, held, light):
         covered = level[..., 0] > 0
         assert covered.any() and np.abs(level[covered] - 1).max() < FLAT
@@ -83,7 +83,7 @@ def test_light_on_a_scaled_ball_widens_as_on_a_ball_of_that_size(
     """Of light in proportion to x a Gaussian of variance v leaves exp(-v / r^2)."""
     light = np.nan_to_num(shown(atlas, head.mesh, own=True))[..., :1] / RADIUS
     levels = spread(device, head, atlas, MotionBytes(words(scale * head.positions_mm)), light)
-    area = atlas.own[..., None] / np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
+    area = atlas.lit[..., None] / np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     for variance, level in zip(BLURRED, levels, strict=True):
         if len(level) == SIDE:  # the others are read between their texels
             left = (area * level * light).sum() / (area * light**2).sum()
@@ -115,31 +115,31 @@ def test_a_posed_head_looks_like_one_loaded_in_that_shape(
 
 
 def test_a_pose_at_rest_is_no_pose(renderer: Renderer, head: Head) -> None:
-    moving = rigged(head, 4)
+    moving = with_test_rig(head, 4)
     assert np.array_equal(picture(renderer, moving, Pose()), picture(renderer, moving))
 
 
 def test_a_pose_runs_the_shape_and_what_follows_and_coming_back_is_exact(
     renderer: Renderer, head: Head
 ) -> None:
-    moving = rigged(head, 4)
-    first = picture(renderer, moving, pose_at(moving, 1))
-    picture(renderer, moving, pose_at(moving, 2))
-    ran = set(renderer.graph.ran)
+    moving = with_test_rig(head, 4)
+    first = picture(renderer, moving, test_pose(moving, 1))
+    picture(renderer, moving, test_pose(moving, 2))
+    ran = set(renderer.graph.executed_stages)
     assert {"shape", "shadows", "stretch", "surface", "irradiance", "visibility", "shade"} <= ran
-    assert np.array_equal(picture(renderer, moving, pose_at(moving, 1)), first)
-    picture(renderer, moving, pose_at(moving, 1))
-    assert renderer.graph.ran == []
+    assert np.array_equal(picture(renderer, moving, test_pose(moving, 1)), first)
+    picture(renderer, moving, test_pose(moving, 1))
+    assert renderer.graph.executed_stages == []
 
 
 def test_people_in_turn_each_keep_their_gutters(head: Head) -> None:
     """Their pairs are kept side by side; what they share on the device is written anew for each."""
-    alone, together = Renderer("cpu"), Renderer("cpu", depth=2)
+    alone, together = Renderer("cpu"), Renderer("cpu", cache_size=2)
     poses = [
         Pose(positions_mm=head.positions_mm * np.array(by, np.float32)) for by in ((1.2, 1, 1), (1, 0.8, 1))
     ]
     expected = [picture(alone, head, pose) for pose in poses]
     for turn in range(4):
         assert np.array_equal(picture(together, head, poses[turn % 2]), expected[turn % 2])
-    assert "gutters" in together.graph.ran
+    assert "gutters" in together.graph.executed_stages
     assert apart(*expected) > POSED

@@ -28,7 +28,7 @@ class Small(Held):
     """A device with little memory, which says so as drivers do."""
 
     def __init__(self, renderer: Renderer, patch: pytest.MonkeyPatch, most: float) -> None:
-        renderer.forget()
+        renderer.clear_cache()
         super().__init__(renderer.device, patch)
         self._most = most
 
@@ -78,7 +78,7 @@ def test_what_is_told_to_fit_does(
 def test_what_others_of_the_process_hold_is_no_room(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(limits, "held_bytes", lambda: 10**9)
+    monkeypatch.setattr(limits, "allocated_bytes", lambda: 10**9)
     settings = settings_of(transmission="none", atlas=512)
     Small(renderer, monkeypatch, 24e6)
     with pytest.raises(DermisError) as caught:
@@ -93,7 +93,7 @@ def test_buffers_over_the_limit_are_told(renderer: Renderer, monkeypatch: pytest
     with pytest.raises(
         DermisError, match=r"expected room for the list, 4\.0 MB, but it takes at most 0\.0 MB"
     ):
-        renderer.device.space(4_000_000, "list")
+        renderer.device.storage_buffer(4_000_000, "list")
 
 
 def test_what_a_driver_says_of_a_texture_is_told(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from strand_setups import hairy
 from dermis.base.errors import DermisError
 from dermis.frame import allocation
 from dermis.frame.limits import frame_bytes
-from dermis.frame.rendered import Rendered
+from dermis.frame.rendered_frame import RenderedFrame
 from dermis.frame.renderer import Renderer
 from dermis.frame.request import FrameRequest
 from dermis.gpu.graph import Listing
@@ -42,7 +42,7 @@ PIXEL = 0.01
 """How near to the centre of its pixel a position projects [pixel]."""
 
 
-def drawn(renderer: Renderer, scene: Scene = SCENE, previous: Scene | None = None, **given: Any) -> Rendered:
+def drawn(renderer: Renderer, scene: Scene = SCENE, previous: Scene | None = None, **given: Any) -> RenderedFrame:
     return renderer.draw(scene, settings_of(**{"size": SIZE} | given), outputs=NAMES, previous=previous)
 
 
@@ -169,7 +169,7 @@ def turned(degrees: float, **parts: Any) -> Scene:
     return SCENE.replace(pose=Pose(positions_mm=places), **parts)
 
 
-def expected_motion(rendered: Rendered, now: Scene, before: Scene) -> tuple[Floats, NDArray[np.bool_]]:
+def expected_motion(rendered: RenderedFrame, now: Scene, before: Scene) -> tuple[Floats, NDArray[np.bool_]]:
     """By the corners of the triangles that are seen, before and now."""
     seen = rendered.output("triangle") >= 0
     corners = BALL.mesh.point[BALL.mesh.triangles[rendered.output("triangle")[seen]]]
@@ -244,7 +244,7 @@ def test_heads_that_follow_another_begin_anew(renderer: Renderer) -> None:
     with pytest.raises(DermisError, match="previous: expected a scene of the same head"):
         drawn(renderer, SCENE, cut)
     for fewer in ([], [None] * 2):
-        with pytest.raises(DermisError, match="previous: expected one for each scene"):
+        with pytest.raises(DermisError, match="previous: expected one scene or None per scene"):
             list(renderer.observe([SCENE], settings_of(), outputs=["motion"], previous=fewer))
 
 
@@ -260,7 +260,7 @@ def test_what_is_not_asked_costs_nothing(renderer: Renderer) -> None:
     assert depth[: len(bare)] == bare == most[: len(bare)] == passes()
     assert all(one.startswith("outputs") for one in (*depth[len(bare) :], *most[len(bare) :]))
     assert 1 < len(depth) - len(bare) < len(most) - len(bare)
-    one_sample = renderer.draw(SCENE, settings_of(size=SIZE), outputs=["depth"]).shown.outputs
+    one_sample = renderer.draw(SCENE, settings_of(size=SIZE), outputs=["depth"]).textures.outputs
     assert one_sample is not None and one_sample.centres is None
 
 
@@ -268,7 +268,7 @@ def test_what_is_known_is_not_made_again(renderer: Renderer) -> None:
     shapes = ["depth", "uv", "normal_geometric", "motion"]
     renderer.draw(SCENE, settings_of(size=SIZE, samples=2), outputs=shapes)
     renderer.draw(SCENE, settings_of(size=SIZE, samples=2), outputs=shapes)
-    assert renderer.graph.ran == []
+    assert renderer.graph.executed_stages == []
 
 
 def test_outputs_count_where_sizes_are_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,17 +15,17 @@ from outside.glow_light import GlowLight
 from setups import frontal, head_of, place, scene_of, settings_of
 from tolerances import FURNACE, TWIN
 
-from dermis.apps.truths.lights import lamp
+from dermis.apps.truths.lights import cycles_lamp
 from dermis.base.errors import DermisError
 from dermis.frame.lights.kind import KINDS
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane
 from dermis.scene.files import load_lights
 from dermis.scene.lights import LIGHTS
-from dermis.scene.plain import choices_of
+from dermis.scene.frozen_model import field_choices
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
-from dermis.scene.sources import sources_of
+from dermis.scene.sources import picture_sources
 from dermis.scene.techniques import TECHNIQUES
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.models import MODELS
@@ -100,15 +100,15 @@ def test_a_light_beside_others(renderer: Renderer, tmp_path: Path) -> None:
 @pytest.mark.usefixtures("glow")
 def test_what_else_knows_the_light(tmp_path: Path) -> None:
     light = from_file(tmp_path)
-    assert "Phong1975" in sources_of(Skin(specular="none"), Settings(), [light])
-    with pytest.raises(DermisError, match=r"light of Cycles: expected one of point, .*'after-glow' came"):
-        lamp(light, 1)
+    assert "Phong1975" in picture_sources(Skin(specular="none"), Settings(), [light])
+    with pytest.raises(DermisError, match=r"light of Cycles: expected one of point, .*got 'after-glow'"):
+        cycles_lamp(light, 1)
 
 
 def test_its_name_is_unknown_without_it(tmp_path: Path) -> None:
-    with pytest.raises(DermisError, match=r"a kind of point, .*'after-glow' came"):
+    with pytest.raises(DermisError, match=r"a kind of point, .*got 'after-glow'"):
         from_file(tmp_path)
-    with pytest.raises(DermisError, match=r"one of two-lobe, kelemen, .*none, but 'blue-chalk' came"):
+    with pytest.raises(DermisError, match=r"one of two-lobe, kelemen, .*none, but got 'blue-chalk'"):
         Skin(specular="blue-chalk")
 
 
@@ -127,8 +127,8 @@ def test_a_lobe(renderer: Renderer) -> None:
 
 @pytest.mark.usefixtures("chalk")
 def test_what_else_knows_the_lobe() -> None:
-    assert choices_of(Skin, "specular")[-2:] == ("blue-chalk", "none")
-    assert "Phong1975" in sources_of(Skin(specular="blue-chalk"), Settings())
+    assert field_choices(Skin, "specular")[-2:] == ("blue-chalk", "none")
+    assert "Phong1975" in picture_sources(Skin(specular="blue-chalk"), Settings())
     assert directional_albedo([0.2, 0.9], 0.3, MODELS["blue-chalk"].lobe) == pytest.approx(ALBEDO, rel=1e-4)
 
 
@@ -141,10 +141,10 @@ def test_a_technique_from_outside(renderer: Renderer) -> None:
         return renderer.draw(scene, settings).linear().astype(float)
 
     with TECHNIQUES.including("dim", TECHNIQUE):
-        assert "dim" in choices_of(Settings, "technique")
-        assert "Borshukov2003" in sources_of(Skin(), Settings(technique="dim"))
+        assert "dim" in field_choices(Settings, "technique")
+        assert "Borshukov2003" in picture_sources(Skin(), Settings(technique="dim"))
         dimmed = below("dim")
-        assert "dim" in renderer.graph.ran
+        assert "dim" in renderer.graph.executed_stages
         middle = (slice(8, -8),) * 2  # away from the map's edges
         assert dimmed[middle] == pytest.approx(LEFT * below("none")[middle], rel=TWIN)
     with pytest.raises(DermisError, match="technique"):

@@ -17,10 +17,10 @@ from dermis.frame.features.surface.painting import paint as given
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
-from dermis.human.skin.face import MOVEMENTS, movements
+from dermis.human.skin.face import MOVEMENTS, movement_weights
 from dermis.human.skin.look import SkinLook
-from dermis.human.skin.painted import PaintedMaps, colours, mean_colour
-from dermis.human.skin.surface import FIELDS, Painting, painting
+from dermis.human.skin.painted import PaintedMaps, skin_colour_table, mean_colour
+from dermis.human.skin.surface import BORDER_FIELDS, PaintedSurface, painted_surface
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
@@ -39,12 +39,12 @@ def head() -> Head:
 
 
 @pytest.fixture(scope="module")
-def surface(head: Head) -> Painting:
-    return painting(head.mesh, head.control.stencils)
+def surface(head: Head) -> PaintedSurface:
+    return painted_surface(head.mesh, head.control.stencils)
 
 
-def painted(device: Device, surface: Painting, look: SkinLook = BARE, side: int = SIDE) -> Maps:
-    return paint.painted_maps(device, surface, look, side)
+def painted(device: Device, surface: PaintedSurface, look: SkinLook = BARE, side: int = SIDE) -> Maps:
+    return paint.paint_arrays(device, surface, look, side)
 
 
 def covered(head: Head, side: int = SIDE) -> NDArray[np.bool_]:
@@ -56,11 +56,11 @@ def covered(head: Head, side: int = SIDE) -> NDArray[np.bool_]:
     return found.reshape(side, side)
 
 
-def fields(head: Head, surface: Painting, name: str, side: int = SIDE) -> Floats:
+def fields(head: Head, surface: PaintedSurface, name: str, side: int = SIDE) -> Floats:
     """(side, side) a distance at the texels on the skin, far outside elsewhere [mm]."""
     kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
     texel, triangle = rasterise(head.mesh, side, np.flatnonzero(kinds))
-    values = surface.vertices[:, 8 + FIELDS.index(name)]
+    values = surface.vertices[:, 8 + BORDER_FIELDS.index(name)]
     found = np.full(side * side, -99.0, np.float32)
     found[texel] = values[head.mesh.triangles[triangle]].mean(axis=1)
     return found.reshape(side, side)
@@ -71,20 +71,20 @@ def grey(maps: Maps) -> Floats:
     return np.asarray(maps.colour.mean(axis=-1))
 
 
-def test_the_same_look_is_the_same_paint_to_the_bit(device: Device, surface: Painting) -> None:
+def test_the_same_look_is_the_same_paint_to_the_bit(device: Device, surface: PaintedSurface) -> None:
     first, second = painted(device, surface), painted(device, surface)
     for role in ("colour", "height", "specular", "roughness"):
         assert np.array_equal(getattr(first, role), getattr(second, role)), role
 
 
-def test_colours_are_those_of_the_pigments(device: Device, surface: Painting, head: Head) -> None:
+def test_colours_are_those_of_the_pigments(device: Device, surface: PaintedSurface, head: Head) -> None:
     """Every colour of bare skin is one that the table has for some melanin and blood; not within lids."""
     maps, on = painted(device, surface), covered(head)
     assert maps.colour is not None
     outside = on & (fields(head, surface, "lips") < -6) & (fields(head, surface, "lids") > 0.5)
     assert outside.sum() > 0.9 * on.sum()
     bare = maps.colour[outside][::37]
-    table = colours(BARE.eumelanin, BARE.oxygen, DEFAULT_SKIN.epidermis_mm)
+    table = skin_colour_table(BARE.eumelanin, BARE.oxygen, DEFAULT_SKIN.epidermis_mm)
     melanin, blood = np.meshgrid(
         BARE.melanin * 2 ** np.linspace(-2, 2, 81), BARE.blood * 2 ** np.linspace(-2, 4, 121)
     )
@@ -93,7 +93,7 @@ def test_colours_are_those_of_the_pigments(device: Device, surface: Painting, he
     assert away.max() < 0.012
 
 
-def test_its_mean_is_that_of_the_look(device: Device, surface: Painting, head: Head) -> None:
+def test_its_mean_is_that_of_the_look(device: Device, surface: PaintedSurface, head: Head) -> None:
     for look in (BARE, replace(BARE, melanin=0.2), replace(BARE, melanin=0.004, blood=0.005)):
         maps = painted(device, surface, look)
         assert maps.colour is not None
@@ -101,7 +101,7 @@ def test_its_mean_is_that_of_the_look(device: Device, surface: Painting, head: H
         np.testing.assert_allclose(mean, mean_colour(look), rtol=0.16)
 
 
-def test_lips_are_redder_than_what_is_around(device: Device, surface: Painting, head: Head) -> None:
+def test_lips_are_redder_than_what_is_around(device: Device, surface: PaintedSurface, head: Head) -> None:
     maps, lips = painted(device, surface), fields(head, surface, "lips")
     mouth = fields(head, surface, "mouth")
     assert maps.colour is not None
@@ -110,13 +110,13 @@ def test_lips_are_redder_than_what_is_around(device: Device, surface: Painting, 
     assert ratio[(lips > 1) & (mouth > 1)].mean() > 1.15 * around
 
 
-def test_no_texel_beside_a_chart_is_black_or_high(device: Device, surface: Painting) -> None:
+def test_no_texel_beside_a_chart_is_black_or_high(device: Device, surface: PaintedSurface) -> None:
     maps = painted(device, surface, SkinLook(age=1.0))
     assert grey(maps).min() > 0.02
     assert maps.height is not None and np.isfinite(maps.height).all() and np.abs(maps.height).max() < 2.0
 
 
-def test_what_is_asked_for_shows(device: Device, surface: Painting, head: Head) -> None:
+def test_what_is_asked_for_shows(device: Device, surface: PaintedSurface, head: Head) -> None:
     on = covered(head)
     plain = painted(device, surface)
 
@@ -129,7 +129,7 @@ def test_what_is_asked_for_shows(device: Device, surface: Painting, head: Head) 
     assert change(seed=1) == pytest.approx(0.0, abs=0.01)
 
 
-def test_age_deepens_folds(device: Device, surface: Painting, head: Head) -> None:
+def test_age_deepens_folds(device: Device, surface: PaintedSurface, head: Head) -> None:
     on = covered(head)
     depths = []
     for age in (0.0, 0.5, 1.0):
@@ -139,7 +139,7 @@ def test_age_deepens_folds(device: Device, surface: Painting, head: Head) -> Non
     assert depths[0] < 0.6 * depths[1] < 0.6 * depths[2]
 
 
-def test_finer_maps_show_the_same_skin(device: Device, surface: Painting, head: Head) -> None:
+def test_finer_maps_show_the_same_skin(device: Device, surface: PaintedSurface, head: Head) -> None:
     coarse, fine = painted(device, surface), painted(device, surface, side=2 * SIDE)
     assert coarse.colour is not None and fine.colour is not None
     halved = fine.colour.reshape(SIDE, 2, SIDE, 2, 3).mean(axis=(1, 3))
@@ -156,10 +156,10 @@ def test_given_maps_stay_and_others_are_painted(device: Device, head: Head) -> N
     assert with_painted_maps(device, other, SIDE) is other
 
 
-def test_the_finest_mesh_is_painted_as_the_coarsest(device: Device, surface: Painting, head: Head) -> None:
+def test_the_finest_mesh_is_painted_as_the_coarsest(device: Device, surface: PaintedSurface, head: Head) -> None:
     """As many triangles as there can be."""
     fine = Human().head(subdivide=3)
-    finest = painting(fine.mesh, fine.control.stencils)
+    finest = painted_surface(fine.mesh, fine.control.stencils)
     assert finest.count == 16 * surface.count
     both = [painted(device, one).colour for one in (surface, finest)]
     assert both[0] is not None and both[1] is not None
@@ -168,7 +168,7 @@ def test_the_finest_mesh_is_painted_as_the_coarsest(device: Device, surface: Pai
 
 
 def test_more_triangles_than_have_numbers_are_refused(
-    device: Device, surface: Painting, monkeypatch: pytest.MonkeyPatch
+    device: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(given, "_MOST_TRIANGLES", surface.count)
     with pytest.raises(DermisError, match="Subdivide less"):
@@ -196,10 +196,10 @@ def test_raised_brows_deepen_the_forehead_and_leave_the_chin(renderer: Renderer,
     for weight in (0.0, 1.0):
         scene = Scene(head, lights=studio(), pose={"browInnerUp": weight, "browOuterUpLeft": weight})
         renderer.draw(scene, chosen)
-        lit = renderer.prepare(scene, chosen).lit
+        lit = renderer.prepare(scene, chosen).bindings
         found.append(download(renderer.device, lit["relief_map"]).astype(np.float32)[..., :2])
     change = np.abs(found[1] - found[0]).max(axis=-1)
-    surface = painting(head.mesh, head.control.stencils)
+    surface = painted_surface(head.mesh, head.control.stencils)
     kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
     texel, triangle = rasterise(head.mesh, 512, np.flatnonzero(kinds))
     y = np.full(512 * 512, np.nan)
@@ -211,15 +211,15 @@ def test_raised_brows_deepen_the_forehead_and_leave_the_chin(renderer: Renderer,
 
 def test_movements_are_those_of_their_targets() -> None:
     names = ("jawOpen", "browInnerUp", "mouthPressLeft")
-    made = dict(zip(MOVEMENTS, movements(names, np.array([0, 1, 0.5], np.float32)), strict=True))
+    made = dict(zip(MOVEMENTS, movement_weights(names, np.array([0, 1, 0.5], np.float32)), strict=True))
     assert made["raised-brows"] == pytest.approx(0.8) and made["pressed"] == pytest.approx(0.25)
-    assert made["smile"] == 0 and movements(names, np.full(3, 9, np.float32)).max() == 1
-    assert not movements((), np.zeros(0, np.float32)).any()
+    assert made["smile"] == 0 and movement_weights(names, np.full(3, 9, np.float32)).max() == 1
+    assert not movement_weights((), np.zeros(0, np.float32)).any()
 
 
 def test_unposed_people_share_the_painted_places() -> None:
     """Places and fields are those of the average person, whoever is painted."""
-    one, other = (painting(h.mesh, h.control.stencils) for h in (Human().head(), Human(age=80, sex=1).head()))
+    one, other = (painted_surface(h.mesh, h.control.stencils) for h in (Human().head(), Human(age=80, sex=1).head()))
     np.testing.assert_allclose(one.vertices[:, 2:5], other.vertices[:, 2:5], atol=1e-4)
     assert np.array_equal(one.triangles, other.triangles)
 

@@ -14,8 +14,8 @@ from setups import AnyLight, entered_light, head_of, place, run_frame, scene_of
 from dermis.atlas.build import cached_atlas
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.optics.directions import ROWS, directions
-from dermis.optics.flesh import aside_mm, medium_of
+from dermis.optics.angular_response import DIRECTION_ROWS, angular_response
+from dermis.optics.equivalent_medium import equivalent_medium, oblique_offset_mm
 from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight, StripeLight
 
@@ -34,7 +34,7 @@ def entered(renderer: Renderer, head: Any, light: AnyLight, **skin: Any) -> Floa
 
 def aside() -> float:
     profile = load_profile("skin1")
-    return aside_mm(medium_of(profile, profile.albedo, 1.0))
+    return oblique_offset_mm(equivalent_medium(profile, profile.albedo, 1.0))
 
 
 def expected(normals: Floats, radius: float) -> Floats:
@@ -43,8 +43,10 @@ def expected(normals: Floats, radius: float) -> Floats:
     turn = aside() / radius * (-np.array(LIGHT.direction) - cosine[..., None] * normals)
     turned = (normals + turn) / np.linalg.norm(normals + turn, axis=-1, keepdims=True)
     cosine = np.maximum(-turned @ np.array(LIGHT.direction), 0.0)
-    told, rows = directions(load_profile("skin1").albedo, 1.0), np.linspace(0.0, 1.0, ROWS)
-    back = np.stack([np.interp(np.sqrt(cosine), rows, told.returned[:, c]) for c in range(3)], axis=-1)
+    told, rows = angular_response(load_profile("skin1").albedo, 1.0), np.linspace(0.0, 1.0, DIRECTION_ROWS)
+    back = np.stack(
+        [np.interp(np.sqrt(cosine), rows, told.relative_reflectance[:, c]) for c in range(3)], axis=-1
+    )
     return np.asarray(np.array(LIGHT.irradiance) * cosine[..., None] * back)
 
 
@@ -52,7 +54,7 @@ def test_a_ball_is_lit_past_its_terminator(renderer: Renderer) -> None:
     made = entered(renderer, head_of(BALL), LIGHT)
     atlas = cached_atlas(BALL, SIZE)
     _, normals = twins.surface(atlas, head_of(BALL))
-    told = atlas.own & (np.hypot(normals[..., 0], normals[..., 2]) > STEEP)
+    told = atlas.lit & (np.hypot(normals[..., 0], normals[..., 2]) > STEEP)
     wanted = expected(normals, RADIUS)
     past = told & (normals[..., 0] < 0.0) & (wanted[..., 1] > 0.05 * wanted.max())
     assert past.sum() > 0.05 * told.sum()  # a good part of what the light does not face
@@ -64,7 +66,7 @@ def test_lambertian_skin_is_dark_there(renderer: Renderer) -> None:
     made = entered(renderer, head_of(BALL), LIGHT, direction="lambertian")
     atlas = cached_atlas(BALL, SIZE)
     _, normals = twins.surface(atlas, head_of(BALL))
-    assert not made[atlas.own & (normals[..., 0] < -0.05)].any()
+    assert not made[atlas.lit & (normals[..., 0] < -0.05)].any()
 
 
 def test_even_light_on_a_plane_stays(renderer: Renderer) -> None:
@@ -74,8 +76,8 @@ def test_even_light_on_a_plane_stays(renderer: Renderer) -> None:
     lit = made[made.any(axis=-1)]
     assert len(lit) > 0.5 * SIZE**2 and np.ptp(lit, axis=0).max() < 1e-5 * lit.max()
     cosine = 0.5 / np.hypot(1.0, 0.5)
-    told, rows = directions(load_profile("skin1").albedo, 1.0), np.linspace(0.0, 1.0, ROWS)
-    back = [np.interp(np.sqrt(cosine), rows, told.returned[:, c]) for c in range(3)]
+    told, rows = angular_response(load_profile("skin1").albedo, 1.0), np.linspace(0.0, 1.0, DIRECTION_ROWS)
+    back = [np.interp(np.sqrt(cosine), rows, told.relative_reflectance[:, c]) for c in range(3)]
     assert lit.mean(axis=0) == pytest.approx(cosine * np.array(back), rel=1e-3)
 
 

@@ -14,12 +14,12 @@ from tolerances import TWIN
 
 from dermis.frame.renderer import Renderer
 from dermis.frame.techniques.pre_integrated import (
-    MOST_CURVED,
-    half_light_sigma,
-    lit_spheres,
-    penumbra_mm,
+    MAX_CURVATURE,
+    half_light_sigma_mm,
+    sphere_table,
+    penumbra_width_mm,
     shadow_edge,
-    spread_cosine,
+    scattered_cosine,
 )
 from dermis.gpu import download
 from dermis.mesh.mesh import build_mesh
@@ -31,9 +31,9 @@ from dermis.scene.lights import DirectionalLight
 
 Floats = NDArray[np.float64]
 PROFILE = load_profile("gpu-gems-3")
-SPHERES = lit_spheres(PROFILE)
+SPHERES = sphere_table(PROFILE)
 COSINES = np.linspace(-1, 1, SPHERES.shape[1])
-CURVATURES = np.linspace(0, MOST_CURVED, len(SPHERES))
+CURVATURES = np.linspace(0, MAX_CURVATURE, len(SPHERES))
 
 
 def on_sphere(cosine: float, radius_mm: float, profile: GaussianSum) -> Floats:
@@ -55,7 +55,7 @@ def test_sphere_by_quadrature(radius_mm: float) -> None:
     for cosine in (-0.6, -0.1, 0.0, 0.05, 0.3, 0.9, 1.0):
         for variance in (0.0064, 0.187, 7.41):
             one = GaussianSum("one", np.array([variance]), np.ones((1, 1)))
-            made = spread_cosine([cosine], radius_mm**2 / variance)[0]
+            made = scattered_cosine([cosine], radius_mm**2 / variance)[0]
             assert made == pytest.approx(on_sphere(cosine, radius_mm, one)[0], abs=2e-4)
 
 
@@ -66,7 +66,7 @@ def test_flat_skin_is_unspread() -> None:
 def test_first_curved_row_follows_from_the_flat_one() -> None:
     """At the terminator it is what a Gaussian sees of a ramp: curvature times sigma / sqrt(2 pi)."""
     one = GaussianSum("one", np.array([1.0]), np.ones((1, 1)))
-    rows = lit_spheres(one)[:4, COSINES == 0.0, 0].ravel()
+    rows = sphere_table(one)[:4, COSINES == 0.0, 0].ravel()
     assert np.allclose(rows, CURVATURES[:4] / np.sqrt(2 * np.pi), rtol=0.01)
 
 
@@ -86,7 +86,7 @@ def test_more_curved_is_softer() -> None:
 @pytest.mark.parametrize("half_width_mm", [0.0, 1.0])
 def test_shadow_edge(half_width_mm: float) -> None:
     """A step that the profile's line blurs, by plain sums; odd about its middle, from none to all."""
-    radius = penumbra_mm(PROFILE)
+    radius = penumbra_width_mm(PROFILE)
     made = shadow_edge(PROFILE, radius, half_width_mm)
     assert made[0].max() < 1e-15 and made[-1].min() == 1
     assert np.allclose(made + made[::-1], 1) and (np.diff(made, axis=0) >= 0).all()
@@ -104,8 +104,8 @@ def test_shadow_edge(half_width_mm: float) -> None:
 
 def test_relief_is_smoothed_by_the_radius_of_half_the_light() -> None:
     one = GaussianSum("one", np.array([0.49]), np.full((1, 3), 0.3))
-    assert np.allclose(half_light_sigma(one), 0.7, rtol=1e-3)
-    red, green, blue = half_light_sigma(PROFILE)
+    assert np.allclose(half_light_sigma_mm(one), 0.7, rtol=1e-3)
+    red, green, blue = half_light_sigma_mm(PROFILE)
     assert red > green > blue
 
 
@@ -120,7 +120,7 @@ BALL = head_of(uv_sphere(RADIUS, 96, 48))
 
 def table(cosines: Floats, curvature: float) -> Floats:
     """(..., 3) between the table's entries, as the shader reads it."""
-    row = curvature / MOST_CURVED * (len(SPHERES) - 1)
+    row = curvature / MAX_CURVATURE * (len(SPHERES) - 1)
     low = int(row)
     entries = SPHERES[low] + (row - low) * (SPHERES[low + 1] - SPHERES[low])
     return np.stack([np.interp(cosines, COSINES, entries[:, k]) for k in range(3)], axis=-1)
@@ -188,7 +188,7 @@ def test_straight_shadow(renderer: Renderer, down: float) -> None:
     seen = x > 6.0  # farther left the plate itself is in the way
     middle = np.interp(0.5, dry[seen, 0] / dry.max(), x[seen])
     assert middle == pytest.approx(10.0, abs=0.15 + 0.4 * down)  # points are lifted off the wall
-    radius = penumbra_mm(PROFILE)
+    radius = penumbra_width_mm(PROFILE)
     edge = shadow_edge(PROFILE, radius, 0.5)
     at = np.clip((x - middle) / radius, -1, 1)
     exact = np.stack([np.interp(at, np.linspace(-1, 1, len(edge)), edge[:, k]) for k in range(3)], axis=-1)

@@ -52,7 +52,7 @@ def test_cameras_and_lights_leave_the_rest(renderer: Renderer, monkeypatch: pyte
     assert len({one.shadow_views.clips.tobytes() for one in found}) == 3
     assert len({one.view.tobytes() for one in found}) == 3
     assert len({one.camera.clips.tobytes() for one in found}) == 3
-    assert len({one.lit["lights"].tobytes() for one in found}) == 3
+    assert len({one.bindings["lights"].tobytes() for one in found}) == 3
     assert len({id(one.resources.diffusion.levels) for one in found}) == 1
 
 
@@ -80,20 +80,20 @@ def test_all_else_is_seen(
 
 def test_what_was_drawn_before_is_let_go_of(renderer: Renderer) -> None:
     """A still scene counts as a round in which nobody asks for anything else."""
-    two = Renderer(renderer.device.adapter.name, depth=2)
+    two = Renderer(renderer.device.adapter.name, cache_size=2)
     settings = settings_of()
     two.prepare(scene(), settings, "left")
-    assert (blurred_levels._make_levels, "left") in two.memo._kept
+    assert (blurred_levels._make_levels, "left") in two.memo._results
     for _ in range(8):
         two.prepare(scene(), settings)
-    assert {of for make, of in two.memo._kept if make is blurred_levels._make_levels} == {""}
+    assert {of for make, of in two.memo._results if make is blurred_levels._make_levels} == {""}
 
 
 def test_frames_that_move_look_as_if_they_were_the_first(renderer: Renderer) -> None:
     settings = settings_of()
     for k in range(3):
         last = renderer.draw(moved(k), settings).linear()
-    renderer.forget()
+    renderer.clear_cache()
     assert np.array_equal(renderer.draw(moved(2), settings).linear(), last)
 
 

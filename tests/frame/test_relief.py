@@ -29,7 +29,7 @@ def relief(renderer: Renderer, head: Head, *, texels: float = 1.0, roughness: fl
         "surface_probe",
         (SIZE, SIZE),
         ["relief", "arriving"],
-        **inputs.lit,
+        **inputs.bindings,
         atlas=inputs.layouts[0].atlas.resources["atlas"],
         footprint={"side": texels / SIZE},
     )

@@ -14,7 +14,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene import Camera, Environment, Scene, Settings, Skin
-from dermis.scene.light_stage import light_stage, stage_weights
+from dermis.scene.light_stage import light_stage, light_stage_weights
 
 BALL = Head("ball", uv_sphere(100.0, 32, 16), Maps())
 SKIN = Skin(profile="gpu-gems-3", albedo="profile", specular="none", energy="none")
@@ -29,7 +29,7 @@ def test_relit_is_rendered(renderer: Renderer, tmp_path: Path, degrees: float) -
     around = Environment(name=str(tmp_path / "sky.exr"), rotation_degrees=degrees)
     camera = Camera(position=(300.0, 100.0, 900.0), frame_mm=160.0, target=(0.0, 20.0, 0.0))
     lights = [light.model_copy(update={"shadows": False}) for light in light_stage(64)]
-    weights = stage_weights(lights, around)
+    weights = light_stage_weights(lights, around)
     relit = sum(
         weight * renderer.draw(Scene(BALL, [light], camera, SKIN), SETTINGS).linear()
         for weight, light in zip(weights, lights, strict=True)

@@ -14,7 +14,7 @@ from setups import bent_plane, front_camera, frontal, head_of, joined, scene_of,
 from dermis.base.errors import DermisError
 from dermis.frame import allocation
 from dermis.frame.renderer import Renderer, render
-from dermis.frame.seams import REMEDIES
+from dermis.frame.seams import SEAM_METHODS
 from dermis.gpu import CommandList, download
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import build_mesh
@@ -107,7 +107,7 @@ CHANGES: dict[str, tuple[Callable[[], Scene], dict[str, Any]]] = {
         f"technique {name}": (scene, {"technique": name})
         for name in ("none", "one-blur", "gpu-gems-3", "screen-space", "pre-integrated")
     },
-    **{f"seams {name}": (lambda: scene(LEANING), {"seams": name}) for name in REMEDIES},
+    **{f"seams {name}": (lambda: scene(LEANING), {"seams": name}) for name in SEAM_METHODS},
     "seam colour": (lambda: scene(LEANING), {"seams": "clear-colour", "seam_colour": (0.1, 0.2, 0.9)}),
     "published on two atlases": (scene, {"technique": "gpu-gems-3", "seams": "multi-uv"}),
     "axes": (lambda: scene(LEANING), {"stretch": "axes"}),
@@ -129,7 +129,7 @@ def other(renderer: Renderer) -> Renderer:
 
 
 def fresh(other: Renderer, what: Scene, **settings: Any) -> Image:
-    other.forget()
+    other.clear_cache()
     return drawn(other, what, **settings)
 
 
@@ -235,7 +235,7 @@ def test_who_asks_for_many_images_may_stop(renderer: Renderer) -> None:
         assert next(images).tobytes() == expected[1]
         images.close()
     renderer.device.wait()
-    assert not renderer.device.fetching
+    assert not renderer.device.pending_readbacks
 
 
 def test_the_image_does_not_depend_on_its_width(renderer: Renderer) -> None:
@@ -274,7 +274,7 @@ def test_exposure_scales_the_image(renderer: Renderer) -> None:
 
 
 def test_what_a_frame_reports(renderer: Renderer) -> None:
-    rendered = renderer.draw(scene(), settings_of(), anew=True)
+    rendered = renderer.draw(scene(), settings_of(), force=True)
     assert rendered.gaussians == 6
     assert rendered.frame_ms > 0 and rendered.setup_ms > 0
     if rendered.gpu_ms is not None:
@@ -293,7 +293,7 @@ def test_one_call_is_enough(renderer: Renderer) -> None:
 def test_more_than_the_memory_is_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     if renderer.device.adapter.kind != "CPU":
         pytest.skip("a GPU's driver tells by itself")
-    renderer.forget()  # for what is there already there is space
+    renderer.clear_cache()  # for what is there already there is space
     monkeypatch.setattr("os.sysconf", lambda name: 100)
     with pytest.raises(DermisError, match="GB"):
         renderer.draw(scene(), settings_of())

@@ -10,15 +10,15 @@ import pytest
 from numpy.typing import NDArray
 from tolerances import FLAT, TWIN
 
-from dermis.frame.techniques.screen_space import draw, kernel_table, make_apart, make_kernel
+from dermis.frame.techniques.screen_space import draw, kernel_table, make_kernel, make_subsurface_layers
 from dermis.gpu import CommandList, Device, download, make_texture, upload
-from dermis.optics.fits.separable import SeparableKernel, preintegrate
+from dermis.optics.fits.separable import SeparableKernel, preintegrated_kernel
 from dermis.optics.profiles import load_profile
 from dermis.scene.camera import Window
 
 Floats = NDArray[np.float64]
 PROFILE = load_profile("gpu-gems-3")
-KERNEL = preintegrate(PROFILE)
+KERNEL = preintegrated_kernel(PROFILE)
 TABLE, REACH = kernel_table(KERNEL)
 TAPS, STEEPEST = 16, 4.0
 
@@ -45,7 +45,7 @@ class View(NamedTuple):
 
 def spread(device: Device, view: View, light: Floats, depth: Floats) -> Floats:
     """(h, w, 3) light after both passes, as it comes out where all of it leaves and nothing lies over it."""
-    apart = make_apart(device, view.size)
+    apart = make_subsurface_layers(device, view.size)
     upload(device, apart.layers, np.dstack([light, depth]), layer=0)
     upload(device, apart.layers, np.ones((*depth.shape, 4)), layer=1)
     over, frame = make_texture(device, view.size, "rgba32float"), CommandList(device)
@@ -268,6 +268,6 @@ def test_rings_of_the_separable_kernel(device: Device) -> None:
     y, x = np.indices((side, side)) - 31
     radius = np.hypot(x, y) * pixel_mm
     found = np.array([made[radius <= r].sum(axis=0) for r in (1.0, 2.0, 3.0, 5.0, 8.0)])
-    exact = profile.within([1.0, 2.0, 3.0, 5.0, 8.0]) / profile.albedo
+    exact = profile.energy_within([1.0, 2.0, 3.0, 5.0, 8.0]) / profile.albedo
     assert np.abs(found - exact).max() < 0.07
     assert np.abs(found - exact)[1:].max() < 0.01  # from 2 mm on

@@ -12,7 +12,7 @@ from tolerances import SEAM
 
 from dermis.atlas.build import cached_atlas
 from dermis.frame.renderer import Renderer
-from dermis.frame.seams import REMEDIES
+from dermis.frame.seams import SEAM_METHODS
 from dermis.gpu import download
 from dermis.scene.lights import DirectionalLight, StripeLight
 from dermis.scene.model import Scene
@@ -43,7 +43,7 @@ def jumps(renderer: Renderer, seams: str) -> Floats:
     """Change of the scattered light from one side of each seam to the other, of the light there."""
     inputs = run_frame(renderer, striped(), atlas=SIZE, seams=seams, transmission="none")
     light = download(renderer.device, inputs.resources.scattered).astype(float)[..., :3]
-    atlas = cached_atlas(BALL, SIZE, REMEDIES[seams].layouts[0])
+    atlas = cached_atlas(BALL, SIZE, SEAM_METHODS[seams].layouts[0])
     one, other = seam_points(BALL)
     a, b = (lit_at(light, atlas, points) for points in (one, other))
     facing = one.on(BALL.normals[BALL.triangles])[:, 2] > 0.4
@@ -56,7 +56,7 @@ def test_stitched_light_has_no_seams(renderer: Renderer) -> None:
     assert stitched.mean() < 0.5 * SEAM and np.percentile(stitched, 95) < SEAM
 
 
-@pytest.mark.parametrize("seams", [name for name in REMEDIES if name != "stitch"])
+@pytest.mark.parametrize("seams", [name for name in SEAM_METHODS if name != "stitch"])
 def test_remedies_leave_seams(renderer: Renderer, seams: str) -> None:
     """What they are for is to look less bad than black beside each chart."""
     assert np.percentile(jumps(renderer, seams), 90) > 3 * SEAM

@@ -221,7 +221,7 @@ def test_software_adapters_get_the_picture_of_gpus(
     scene = scene_of(head_of(uv_sphere(30.0, 24, 12)), sun, LIGHTS["spot"], frontal(), sun)
     own = [one for one in programs.device_constants(renderer.device) if one[0] == "MESH_IN_BUFFERS"]
     made = []
-    for constants in ((), (("PASSES_DARK", 1), ("STRIP", 16))):
+    for constants in ((), (("SKIPS_UNLIT", 1), ("STRIP", 16))):
         monkeypatch.setattr(programs, "device_constants", lambda _, more=constants: (*own, *more))
         monkeypatch.setattr(renderer.device, "programs", {})
         made.append(image(renderer, scene, size=(45, 37), samples=samples, technique=technique))
@@ -237,9 +237,9 @@ def test_a_strip_is_left_at_its_end(renderer: Renderer) -> None:
     resources = inputs.resources
     radiance = resources.post.picture.radiance
     upload(renderer.device, radiance, np.full((256, 16, 4), 7.0, np.float32))
-    frame, look = CommandList(renderer.device), (inputs.lit, inputs.view, inputs.constants)
+    frame, look = CommandList(renderer.device), (inputs.bindings, inputs.view, inputs.constants)
     shade.draw(frame, *look, resources.visibility, resources.scattered, radiance, (16, 128))
     frame.submit()
-    renderer.graph.forget()  # it knows nothing of this
+    renderer.graph.invalidate()  # it knows nothing of this
     made = download(renderer.device, radiance)
     assert not made[:128].any() and (made[128:] == 7.0).all()

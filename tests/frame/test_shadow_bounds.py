@@ -64,7 +64,7 @@ def test_what_is_passed_over_hides_nothing(renderer: Renderer, name: str, shadow
     bounds = inputs.resources.shadow_maps.bounds
     upload(renderer.device, bounds, np.ones((bounds.size[1], bounds.size[0]), np.float32))
     everywhere = light()
-    renderer.graph.forget()  # it knows nothing of this
+    renderer.graph.invalidate()  # it knows nothing of this
     lit = bounded.max(axis=-1)
     assert (lit > 0.5 * lit.max()).any() and (lit[lit > 0] < 0.2 * lit.max()).any()
     assert np.array_equal(bounded, everywhere)

@@ -31,7 +31,7 @@ def seen(renderer: Renderer, head: Head, light: AnyLight, **settings: Any) -> tu
         "surface_probe",
         (size, size),
         ["relief", "arriving"],
-        **inputs.lit,
+        **inputs.bindings,
         atlas=inputs.layouts[0].atlas.resources["atlas"],
         footprint={"side": 1.0 / size},
     )
@@ -149,7 +149,7 @@ def test_a_small_step_keeps_its_shadow(renderer: Renderer, height: float, dark: 
 def stages_of(renderer: Renderer, *lights: AnyLight, **draw: Any) -> bool:
     """Whether a frame under these lights draws shadow maps."""
     renderer.draw(scene_of(PLATE, *lights), settings_of(), **draw)
-    return "shadows" in renderer.graph.ran
+    return "shadows" in renderer.graph.executed_stages
 
 
 def test_only_what_moved_is_drawn_again(renderer: Renderer) -> None:
@@ -162,7 +162,7 @@ def test_only_what_moved_is_drawn_again(renderer: Renderer) -> None:
     assert not stages_of(renderer, SLANTED, frontal())  # the second casts no shadow
     assert stages_of(renderer, SLANTED, frontal(shadows=True))
     assert stages_of(renderer, turned)
-    assert stages_of(renderer, turned, anew=True)
+    assert stages_of(renderer, turned, force=True)
     assert not stages_of(renderer, turned)
 
 

@@ -14,9 +14,9 @@ from tolerances import SHAPE, SHAPE_NORMAL, STRETCHED, WALKED
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.features.atlas import gutters
-from dermis.frame.features.atlas.gutters import make_walks, with_lists
+from dermis.frame.features.atlas.gutters import make_gutter_tracing, with_own_gutters
 from dermis.frame.features.atlas.passes import draw_stretch
-from dermis.frame.features.atlas.textures import Sheet, halved, upload_atlas
+from dermis.frame.features.atlas.textures import AtlasMip, halve_mip, upload_atlas
 from dermis.frame.features.shape import shape
 from dermis.frame.features.shape.mesh import upload_geometry
 from dermis.frame.features.shape.shape import MotionBytes, Shape, make_shape, shape_tables
@@ -167,7 +167,7 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
     """(a, 2) where each texel of the gutters has its light, at each resolution, walked on the device."""
     textures, frame = upload_atlas(device, atlas), CommandList(device)
     made = make_shape(device, shape_tables(device, head))
-    walks, walked = make_walks(device, head.mesh, atlas, textures), with_lists(device, textures)
+    walks, walked = make_gutter_tracing(device, head.mesh, atlas, textures), with_own_gutters(device, textures)
     shape.draw(frame, made, MotionBytes(words(points)))
     gutters.draw(frame, walked, walks, upload_geometry(device, head.mesh, atlas, made))
     frame.submit()
@@ -181,13 +181,13 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
 def test_gutters_continue_where_they_do_at_rest(device: Device, head: Head) -> None:
     """Whatever the size of the head, and however it is turned as a whole."""
     atlas = build_atlas(head.mesh, 256, "stitched")
-    sheet = Sheet(atlas.coverage, atlas.own, atlas.reach, atlas.gutter, atlas.source)
+    sheet = AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
     turn = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
     for points in (head.positions_mm, head.positions_mm @ turn.T):
         fine, coarse, *_ = sources(device, head, atlas, points)
         away = np.linalg.norm(fine - atlas.source, axis=1)
         assert np.percentile(away, 98) < WALKED and np.median(away) < WALKED / 20
-        away = np.linalg.norm(coarse - halved(sheet).source, axis=1)
+        away = np.linalg.norm(coarse - halve_mip(sheet).source, axis=1)
         assert np.percentile(away, 97) < WALKED
 
 

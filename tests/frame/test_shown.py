@@ -29,8 +29,8 @@ SEQUENCES: dict[str, list[dict[str, Any]]] = {
 def keeping() -> Iterator[Renderer]:
     """Keeps two of each thing, and levels in halves, whatever the adapter."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(technique, "usual_texel", lambda _: HALVES)
-        yield Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"), depth=2)
+        patch.setattr(technique, "level_format", lambda _: HALVES)
+        yield Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"), cache_size=2)
 
 
 def scene(frame_mm: float = 70.0) -> Scene:
@@ -45,26 +45,26 @@ def drawn(renderer: Renderer, settings: dict[str, Any], **draw: Any) -> bytes:
 def test_kept_light_never_shows(keeping: Renderer, name: str) -> None:
     anew = []
     for settings in SEQUENCES[name]:
-        keeping.forget()
+        keeping.clear_cache()
         anew.append(drawn(keeping, settings))
-    keeping.forget()
+    keeping.clear_cache()
     kept = [drawn(keeping, settings) for settings in SEQUENCES[name]]
     assert [a == b for a, b in zip(kept, anew, strict=True)] == [True] * len(anew)
-    assert drawn(keeping, SEQUENCES[name][-1], anew=True) == anew[-1]
+    assert drawn(keeping, SEQUENCES[name][-1], force=True) == anew[-1]
 
 
 def test_what_is_there_is_left_as_it_is(keeping: Renderer) -> None:
     """Stages that run in a frame like the last one, after another exposure, camera and light."""
-    keeping.forget()
+    keeping.clear_cache()
     plain, near = scene(), scene(60.0)
     brighter = scene_of(HEAD, frontal(4.0), camera=near.camera)
     frames = ((plain, 1.0), (plain, 1.0), (plain, 2.0), (near, 2.0), (brighter, 2.0))
     ran = []
     for one, exposure in frames:
         keeping.draw(one, settings_of(exposure=exposure))
-        ran.append(set(keeping.graph.ran))
+        ran.append(set(keeping.graph.executed_stages))
     lit = {"irradiance", "diffuse", "translucency", "combine"}
     whole = lit | {"pairs", "shape", "stretch", "surface", "visibility", "shade", "post"}
     assert ran == [whole, set(), {"post"}, {"visibility", "shade", "post"}, lit | {"shade", "post"}]
-    keeping.draw(brighter, settings_of(exposure=2.0), anew=True)
-    assert set(keeping.graph.ran) == whole
+    keeping.draw(brighter, settings_of(exposure=2.0), force=True)
+    assert set(keeping.graph.executed_stages) == whole

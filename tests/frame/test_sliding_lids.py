@@ -15,7 +15,7 @@ from dermis.frame.features.shape.shape import MotionBytes, make_shape, shape_tab
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, Device
-from dermis.human.model import human_head
+from dermis.human.model import build_head
 from dermis.human.skin.surface import lid_rings
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 
 
 def bare(levels: int = 0) -> Head:
-    return subdivide_head(human_head(Human().weights(), Maps(), "own", EyeLook(redness=0.0)), levels)
+    return subdivide_head(build_head(Human().weights(), Maps(), "own", EyeLook(redness=0.0)), levels)
 
 
 def test_the_device_slides_lids_as_the_twin_does(device: Device) -> None:

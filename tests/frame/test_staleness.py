@@ -25,7 +25,7 @@ from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import LIGHTS, PointLight, SpotLight
 from dermis.scene.model import Scene
-from dermis.scene.plain import Plain, choices_of
+from dermis.scene.frozen_model import FrozenModel, field_choices
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 
@@ -34,7 +34,7 @@ LAMP = SpotLight(position=(60.0, 80.0, 300.0))
 LAYER = TissueLayer(absorption_per_mm=(0.03, 0.1, 0.2), scattering_per_mm=(0.8, 1.0, 1.2))
 BASE = Scene(HEAD, lights=(LAMP,), camera=front_camera(HEAD, frame_mm=70.0))
 SETTINGS = settings_of(seams="stitch", shadow_size=128)
-WORDS: dict[tuple[type[Plain], str], Any] = {  # for what is neither a number nor one of some words
+WORDS: dict[tuple[type[FrozenModel], str], Any] = {  # for what is neither a number nor one of some words
     (Skin, "profile"): "dj3",
     (Skin, "profile_map"): "white.png",
     (Skin, "other_profiles"): ("skin1",),
@@ -48,7 +48,7 @@ GIVEN: dict[str, dict[str, Any]] = {  # what kinds of light have no default for
     "directional": {"direction": (0.0, -0.3, -1.0)},
     "stripe": {"direction": (0.0, 0.0, -1.0)},
 }
-BESIDE: dict[tuple[type[Plain], str], dict[str, Any]] = {  # what lets a field matter, or be changed at all
+BESIDE: dict[tuple[type[FrozenModel], str], dict[str, Any]] = {  # what lets a field matter, or be changed at all
     (Skin, "profile_map"): {"profile_map": "half.png", "other_profiles": ("dj3",)},
     (Skin, "other_profiles"): {"profile_map": "half.png", "other_profiles": ("dj3",)},
     (Skin, "pigments"): {"profile": "light"},
@@ -66,11 +66,11 @@ def masks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
-def others(model: type[Plain], name: str, value: Any) -> Iterator[Any]:
+def others(model: type[FrozenModel], name: str, value: Any) -> Iterator[Any]:
     """Values that the field may have instead, the likely ones first."""
     if (model, name) in WORDS:
         yield WORDS[model, name]
-    yield from (word for word in choices_of(model, name) if word != value)
+    yield from (word for word in field_choices(model, name) if word != value)
     if isinstance(value, bool):
         yield not value
     elif isinstance(value, int | float):
@@ -82,7 +82,7 @@ def others(model: type[Plain], name: str, value: Any) -> Iterator[Any]:
         yield tuple(part * 2 for part in value)
 
 
-def changed(values: Plain, name: str) -> Plain:
+def changed(values: FrozenModel, name: str) -> FrozenModel:
     """The same with another value of one field."""
     told = {key: getattr(values, key) for key in type(values).model_fields}
     for other in others(type(values), name, getattr(values, name)):
@@ -95,11 +95,11 @@ def changed(values: Plain, name: str) -> Plain:
     raise AssertionError(f"{type(values).__name__}.{name}: say in WORDS what else it may be")
 
 
-def model_fields(model: type[Plain]) -> list[tuple[type[Plain], str]]:
+def model_fields(model: type[FrozenModel]) -> list[tuple[type[FrozenModel], str]]:
     return [(model, name) for name in model.model_fields if name != "kind"]
 
 
-def base(model: type[Plain], name: str) -> Plain:
+def base(model: type[FrozenModel], name: str) -> FrozenModel:
     return model(**BESIDE.get((model, name), {}))
 
 
@@ -108,7 +108,7 @@ def kept_and_fresh(renderer: Renderer, *frames: tuple[Scene, Settings]) -> tuple
     for scene, settings in frames[:-1]:
         renderer.draw(scene, settings)
     kept = picture(renderer, *frames[-1])
-    renderer.forget()
+    renderer.clear_cache()
     return kept, picture(renderer, *frames[-1])
 
 
@@ -118,7 +118,7 @@ def picture(renderer: Renderer, scene: Scene, settings: Settings) -> bytes:
 
 
 @pytest.mark.parametrize(("model", "name"), [*model_fields(Skin), *model_fields(Settings)])
-def test_each_dial(renderer: Renderer, model: type[Plain], name: str) -> None:
+def test_each_dial(renderer: Renderer, model: type[FrozenModel], name: str) -> None:
     if model is Skin:
         before = base(model, name)
         frames = [(replace(BASE, skin=skin), SETTINGS) for skin in (before, changed(before, name))]
@@ -215,15 +215,15 @@ def test_only_what_a_change_makes_stale_runs(renderer: Renderer, change: str) ->
     renderer.draw(BASE, SETTINGS)
     make, expected = RUNS[change]
     renderer.draw(*make())
-    assert tuple(dict.fromkeys(renderer.graph.ran)) == expected
+    assert tuple(dict.fromkeys(renderer.graph.executed_stages)) == expected
 
 
 def test_everything_runs_when_asked(renderer: Renderer) -> None:
-    renderer.forget()
+    renderer.clear_cache()
     renderer.draw(BASE, SETTINGS)
-    first = list(renderer.graph.ran)
-    renderer.draw(BASE, SETTINGS, anew=True)
-    assert renderer.graph.ran == first and "shade" in first
+    first = list(renderer.graph.executed_stages)
+    renderer.draw(BASE, SETTINGS, force=True)
+    assert renderer.graph.executed_stages == first and "shade" in first
 
 
 def test_the_frame_can_be_written_down(renderer: Renderer) -> None:
@@ -249,5 +249,3 @@ def test_the_frame_can_be_written_down(renderer: Renderer) -> None:
     assert shade.shader == "shade" and str(shade.bindings["shade"]).startswith("record ")
     post = listing.passes[-1]
     assert post.bindings["image"] == shade.bindings["image"]  # the one reads what the other wrote
-    assert all(isinstance(line, str) for line in listing.lines())
-    assert len(listing.as_dict()["resources"]) == len(listing.resources)

@@ -44,8 +44,8 @@ def parts(m: float, rho_s: float, model: str, fresnel: str, energy: str) -> tupl
     """(3,) radiance from below and radiance off the surface."""
     to_light = np.array([-0.6, 0.0, 1.0]) / np.sqrt(1.36)
     arriving, law = 2.0 * to_light[2], ENERGY[energy]
-    entering = law.enters(twins.surface_albedo([to_light[2]], m, model, fresnel)[0], rho_s)
-    leaving = law.leaves(*twins.surface_albedo([1.0], m, model, fresnel), rho_s)
+    entering = law.entering_fraction(twins.surface_albedo([to_light[2]], m, model, fresnel)[0], rho_s)
+    leaving = law.exitance_factor(*twins.surface_albedo([1.0], m, model, fresnel), rho_s)
     lobe = MODELS[model].lobe(cosines(Z, to_light, Z), m, FRESNEL[fresnel])
     return arriving * entering * leaving * COLOUR / np.pi, float(arriving * rho_s * lobe)
 

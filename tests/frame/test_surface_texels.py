@@ -12,7 +12,7 @@ from setups import entered_light, frontal, head_of, probe, run_frame, scene_of
 
 from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.renderer import Renderer
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from_array
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.model import Scene
 
@@ -32,10 +32,10 @@ def packed(renderer: Renderer) -> tuple[Floats, Floats, list[Floats]]:
     colours = 10.0 ** random.uniform(-6, 3, (SIZE, SIZE, 1)) * random.uniform(0.2, 1, (SIZE, SIZE, 4))
     colours[0, 0, :3], colours[0, 1, :3], colours[..., 3] = 0.0, 1.0, random.uniform(0, 2, (SIZE, SIZE))
     textures = {
-        name: texture_from(renderer.device, values.astype(np.float32), "rgba32float")
+        name: texture_from_array(renderer.device, values.astype(np.float32), "rgba32float")
         for name, values in (("directions", directions), ("colours", colours))
     }
-    lit = run_frame(renderer, SCENE, atlas=SIZE).lit
+    lit = run_frame(renderer, SCENE, atlas=SIZE).bindings
     names = ["normal", "bent", "colour", "places"]
     made = probe(renderer.device, "packed_probe", (SIZE, SIZE), names, **lit, **textures)
     return directions[..., :3], colours, made
@@ -63,13 +63,13 @@ def drawn(renderer: Renderer, *scenes: Scene, atlas: int = SIZE) -> list[int]:
     found = []
     for scene in scenes:
         run_frame(renderer, scene, atlas=atlas)
-        assert "irradiance" in renderer.graph.ran or scene is SCENE
-        found.append(renderer.graph.ran.count("surface"))
+        assert "irradiance" in renderer.graph.executed_stages or scene is SCENE
+        found.append(renderer.graph.executed_stages.count("surface"))
     return found
 
 
 def test_drawn_only_when_it_changes(renderer: Renderer) -> None:
-    renderer.forget()
+    renderer.clear_cache()
     assert drawn(renderer, SCENE, SCENE) == [1, 0]
     multiplied = scene_of(HEAD, frontal(2.0), mix=0.2), scene_of(HEAD, energy="none")
     assert drawn(renderer, *multiplied) == [0, 0]  # neither lights nor what the frame multiplies with
@@ -96,7 +96,7 @@ def test_gone_with_its_atlas(renderer: Renderer) -> None:
     assert texture.size == (SIZE, SIZE, 2) and SURFACE_BYTES == 2 * 16
     gone = weakref.ref(texture)
     del texture, inputs
-    renderer.forget()
+    renderer.clear_cache()
     gc.collect()
     run_frame(renderer, scene_of(head_of(uv_sphere(30.0, 12, 6)), frontal()), atlas=SIZE)
     gc.collect()

@@ -21,7 +21,7 @@ from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import media
 from dermis.optics.profiles import write_profile
-from dermis.optics.slabs import slabs
+from dermis.optics.slabs import solve_slabs
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight
 
@@ -78,7 +78,7 @@ def test_half_space_skin_is_thin_as_its_medium(renderer: Renderer, skin1: str, d
         skin = {"albedo": "profile", "profile": skin1, "direction": "half-space", "specular": "none"}
         through, back = (face.mean(axis=0) / cosine for face in left(renderer, mesh, lamp, **skin))
         for c in range(2):
-            made = slabs(float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness, 1.0)
+            made = solve_slabs(float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness, 1.0)
             exact = [np.interp(cosine, made.cosine, part[0]) for part in (made.through, made.back)]
             assert through[c] == pytest.approx(exact[0], rel=0.15)
             assert back[c] == pytest.approx(exact[1], rel=0.25)
@@ -100,7 +100,7 @@ def test_flesh_that_scatters_forward_lets_more_through(
             float(left(renderer, mesh, lamp, anisotropy=g, **skin)[0][:, 0].mean()) / cosine
             for g in (0.0, 0.8)
         )
-        made = slabs(float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0]) * thickness, 1.0, g=0.8)
+        made = solve_slabs(float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0]) * thickness, 1.0, g=0.8)
         assert forward == pytest.approx(float(np.interp(cosine, made.cosine, made.through[0])), rel=0.12)
         assert forward > more * even
 

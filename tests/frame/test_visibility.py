@@ -83,7 +83,7 @@ def nearest(
     inputs = run_frame(renderer, scene, size=SIZE, samples=samples)
     layers = make_layers(renderer.device, SIZE, samples, triangles=triangles, compute=compute)
     frame = CommandList(renderer.device)
-    draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
+    draw_layers(frame, "nearest", layers, inputs.camera_views, inputs.resources.head)
     frame.submit()
     return [download(renderer.device, layers.texture, layer=k) for k in range(samples)]
 
@@ -147,7 +147,7 @@ def test_nothing_is_left_of_the_view_before(renderer: Renderer, triangles: bool)
     for turned, layers in ((False, used), (True, used), (True, fresh)):
         inputs = run_frame(renderer, view_of(HEADS["sphere"], turned), size=SIZE, samples=2)
         frame = CommandList(renderer.device)
-        draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
+        draw_layers(frame, "nearest", layers, inputs.camera_views, inputs.resources.head)
         frame.submit()
     for layer in range(2):
         left, right = (download(renderer.device, layers.texture, layer=layer) for layers in (used, fresh))

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths import surface_integral
+from dermis.apps.truths.irradiance_samples import MeshPoints, sample_irradiance
+from dermis.apps.truths.radial_table import GaussianSum as Profile
+from dermis.apps.truths.surface_integral import integrate_exitance
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN
 from dermis.optics.gaussians import GaussianSum
@@ -41,10 +43,10 @@ def hook(thick: float = 2.2, bend: float = 4.5, length: float = 36.0) -> Mesh:
 def straight(mesh: Mesh, places: Floats, blurred: GaussianSum) -> Floats:
     """Red light from behind, summed by straight lines."""
 
-    def light(at: surface_integral.Places) -> Floats:
+    def light(at: MeshPoints) -> Floats:
         normals = at.interpolate(mesh, mesh.normals)
         return np.repeat(np.maximum(-normals[:, 2:], 0.0), 3, axis=1)
 
-    samples = surface_integral.sample_irradiance(mesh, light, 1.0)
-    profile = surface_integral.GaussianSum(blurred.weight, blurred.variance_mm2)
-    return surface_integral.integrate(places, samples, profile, 0.005)[:, 0]
+    samples = sample_irradiance(mesh, light, 1.0)
+    profile = Profile(blurred.weight, blurred.variance_mm2)
+    return integrate_exitance(places, samples, profile, 0.005)[:, 0]

@@ -31,7 +31,7 @@ from dermis.frame.request import FrameRequest
 from dermis.frame.resources import AtlasLayout, Resources
 from dermis.frame.technique import TechniqueResources
 from dermis.frame.techniques.technique import Technique
-from dermis.gpu import Bindings, Constants, Device, Memo, MutableBindings, UniformRecord, Texture
+from dermis.gpu import Bindings, Constants, Device, Memo, MutableBindings, Texture, UniformRecord
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.head import Head
 from dermis.scene.skin import lobe_name
@@ -51,7 +51,9 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         *(device, request.head, request.albedo_from_map, settings.gamma == "right"),
         *(request.painted_side, request.has_animated_maps),
     )
-    maps = memo.submit(device.executor, upload_maps, *map_files)  # in the background: reading files takes long
+    maps = memo.submit(
+        device.executor, upload_maps, *map_files
+    )  # in the background: reading files takes long
     shadow_maps = _shadow_maps(memo, device, request)
     shapes = shape.make(memo, device, request)
     strands = hair.make(memo, device, request)
@@ -87,7 +89,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         outputs=outputs.make(memo, device, request, shapes.tables, thin),
         suns=len(request.environment_map.suns),
         gaussians=len(request.profile.variance_mm2),
-        unscattered=cached(atlases[0][0].unscattered, request.topology.mesh),
+        unscattered_fraction=cached(atlases[0][0].unscattered_fraction, request.topology.mesh),
     )
 
 
@@ -111,7 +113,9 @@ def _view(
 def _shadow_maps(memo: Memo, device: Device, request: FrameRequest) -> ShadowMaps:
     layers = request.shadow_layers
     size = request.settings.shadow_size if layers else 1
-    return memo.get(_make_shadow_maps, device, request.topology, layers, size, owner=f"{layers} {request.view_name}")
+    return memo.get(
+        _make_shadow_maps, device, request.topology, layers, size, owner=f"{layers} {request.view_name}"
+    )
 
 
 def _shared_bindings(
@@ -127,7 +131,9 @@ def _shared_bindings(
     environment, total = request.environment, request.split.total
     curvature = shapes.curvature
     return {
-        "skin": skin_record(program, skin, request.head.maps, request.profile, sum(request.light_part_counts)),
+        "skin": skin_record(
+            program, skin, request.head.maps, request.profile, sum(request.light_part_counts)
+        ),
         "environment": environment_record(program, environment, skin, total, request.has_occlusion),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,

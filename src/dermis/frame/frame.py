@@ -15,7 +15,7 @@ from dermis.frame.features import (
     shape,
     visibility,
 )
-from dermis.frame.features.outputs.stage_inputs import StageInputs, SpreadLight
+from dermis.frame.features.outputs.stage_inputs import PictureDiffusion, StageInputs
 from dermis.frame.features.surface.painting.paint import draw_expression
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.techniques.technique import Technique
@@ -44,13 +44,24 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     visibility.draw(graph, resources.visibility, inputs.camera_views, resources.head)
     image, layers = resources.post.picture.radiance, technique.subsurface_layers(resources.technique)
     radiance = shading.draw(
-        graph, bindings, view, inputs.constants, resources.visibility, scattered, image, inputs.settings.size, layers
+        graph,
+        bindings,
+        view,
+        inputs.constants,
+        resources.visibility,
+        scattered,
+        image,
+        inputs.settings.size,
+        layers,
     )
     radiance = technique.finish(graph, inputs, radiance)
     stage_inputs = _stage_inputs(graph, inputs, technique, scattered)
     shared = bindings, view, inputs.light_constants
     if resources.hair:
-        over, labels = (resources.visibility.texture, radiance), outputs.hair_labels(graph, resources.outputs, stage_inputs)
+        over, labels = (
+            (resources.visibility.texture, radiance),
+            outputs.hair_labels(graph, resources.outputs, stage_inputs),
+        )
         radiance = hair.draw(graph, resources.hair, shared, resources.head, *over, labels)
     post.draw(graph, resources.post, inputs.settings, radiance, *shared, resources.visibility.texture)
     outputs.draw(graph, resources.outputs, stage_inputs)
@@ -61,9 +72,9 @@ def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scatt
     resources, diffused = inputs.resources, None
     layers = technique.subsurface_layers(resources.output_layers)
     if layers is not None:
-        diffused = SpreadLight(layers, partial(technique.blur_subsurface_layers, graph, inputs))
+        diffused = PictureDiffusion(layers, partial(technique.blur_subsurface_layers, graph, inputs))
     return StageInputs(
-        lit=inputs.bindings,
+        lighting=inputs.bindings,
         view=inputs.view,
         centre_mm=inputs.centre_mm,
         constants=inputs.constants,
@@ -71,11 +82,12 @@ def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scatt
         camera=inputs.camera_views,
         head=resources.head,
         visibility=resources.visibility,
+        centres=(resources.outputs and resources.outputs.centres) or resources.visibility,
         shape=resources.shape.shape,
         picture=resources.post.picture,
-        hair=resources.hair is not None,
+        has_hair=resources.hair is not None,
         previous=inputs.previous,
-        thin=inputs.layouts[0].translucency,
-        spread=diffused,
-        through=partial(technique.sum_translucency, graph, inputs),
+        translucency=inputs.layouts[0].translucency,
+        picture_diffusion=diffused,
+        sum_transmitted=partial(technique.sum_translucency, graph, inputs),
     )

@@ -29,7 +29,7 @@ class FrameInputs:
     light_constants : pipeline constants of the lights in use
     camera_views : view of each sample of a pixel
     window : part of the image plane that the picture shows
-    sky_view : views of the head from the sky, and their record; None where occlusion does not follow the shape
+    sky_view : views of the head from the sky, and their record; None unless occlusion follows the shape
     view, constants : record of the camera for the shading pass, and its pipeline constants
     centre_mm : centre of the head, the origin of positions in the scene [mm]
     previous : previous scene for motion vectors, None unless requested

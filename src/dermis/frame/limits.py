@@ -33,7 +33,11 @@ _MIN_SIDE = 64  # smaller sides save nothing
 def check_limits(device: Device, request: FrameRequest) -> None:
     """Raise DermisError for sizes over the limits of the device."""
     limit, name, settings = device.max_texture_size, device.adapter.name, request.settings
-    sides = {"size": max(settings.size), "atlas": request.atlas_plan.side, "shadow_size": settings.shadow_size}
+    sides = {
+        "size": max(settings.size),
+        "atlas": request.atlas_plan.side,
+        "shadow_size": settings.shadow_size,
+    }
     for option, side in sides.items():
         if side > limit:
             name_limit = f"at most {limit} (the limit of {name})"

@@ -56,8 +56,8 @@ class Observation(ShortRepr):
     head_pose : ndarray
         (3, 4) rotation and translation [mm] from the head at rest to the camera.
     gaze : ndarray or None
-        (2, 3) unit vectors of the left and the right eye in the axes of the camera (x right, y down, z forward);
-        None for heads without modelled eyes.
+        (2, 3) unit vectors of the left and the right eye in camera axes (x right, y down, z forward); None
+        for heads without modelled eyes.
 
     Examples
     --------

@@ -55,7 +55,11 @@ def shader_folders(*options: str) -> tuple[Folder, ...]:
 
     options : names for which `//#if` holds
     """
-    numbers: dict[str, float] = {**light_shader_constants(), **isotropic_lobe_constants(), **reflection_constants()}
+    numbers: dict[str, float] = {
+        **light_shader_constants(),
+        **isotropic_lobe_constants(),
+        **reflection_constants(),
+    }
     lists: dict[str, Callable[[], Sequence[Member]]] = {"lights": light_shaders}
     for feature in _features():
         numbers |= getattr(feature, "shader_constants", dict)()

@@ -44,7 +44,10 @@ class Views(NamedTuple):
 
         size : of the picture [pixels]
         """
-        shift = (self.sample_positions - 0.5) * (-2.0 / size[0], 2.0 / size[1])  # clip space is 2 wide and high
+        shift = (self.sample_positions - 0.5) * (
+            -2.0 / size[0],
+            2.0 / size[1],
+        )  # clip space is 2 wide and high
         matrices = np.repeat(self.clips[:, None], len(shift), axis=1)
         matrices[:, :, :2] += shift[..., None] * self.clips[:, None, 3:]
         return matrices.reshape(-1, 4, 4)
@@ -134,7 +137,9 @@ def perspective(rows: Rows, window: Window, near: float, far: float) -> list[Seq
     depth = [scale * c for c in rows[2]]
     depth[3] -= far * scale
     lateral = zip(rows, window.half, window.shift, strict=False)
-    across = [[c / half - shift * w for c, w in zip(row, rows[2], strict=True)] for row, half, shift in lateral]
+    across = [
+        [c / half - shift * w for c, w in zip(row, rows[2], strict=True)] for row, half, shift in lateral
+    ]
     return [*across, depth, rows[2]]
 
 

@@ -46,7 +46,7 @@ class RenderedFrame(ShortRepr):
     frame_ms : time from recording the frame to its completion [ms]
     setup_ms : time before the frame for uploads, the atlas and shaders [ms]
     gaussians : number of Gaussians of the profile
-    unscattered : fraction of the skin's triangles without a place in the atlas; light does not scatter there
+    unscattered_fraction : fraction of the skin's triangles without a place in the atlas; light does not scatter there
     suns : number of lights that the environment adds
     settings : settings of the frame
     start_readback : function that starts the readback of the picture, with the options of `start_readback`
@@ -58,7 +58,7 @@ class RenderedFrame(ShortRepr):
     frame_ms: float
     setup_ms: float
     gaussians: int
-    unscattered: float
+    unscattered_fraction: float
     suns: int
     settings: Settings
     start_readback: Callable[..., Readback]
@@ -122,14 +122,16 @@ class RenderedFrame(ShortRepr):
 
     def _read(self, read: Callable[[FrameTextures], T]) -> T:
         if not self.is_current():
-            raise RuntimeError("a newer frame has replaced this picture: read it before drawing the next frame")
+            raise RuntimeError(
+                "a newer frame has replaced this picture: read it before drawing the next frame"
+            )
         result: T = self.run_on_device(lambda: read(self.textures))
         return result
 
 
 def _read_output(frame: FrameTextures, name: str) -> PlaneArray:
     assert frame.outputs is not None
-    planes = frame.outputs.planes_of(name)
-    start, size = planes.place(name)
+    planes = frame.outputs.planes_with(name)
+    start, size = planes.byte_range(name)
     raw = frame.device.handle.queue.read_buffer(planes.buffer, start, size)
     return planes.array(name, np.frombuffer(raw, np.uint8).copy())

@@ -210,11 +210,12 @@ class Renderer:
         force : bool
             True runs all passes instead of only stale ones.
         timed : bool or "whole"
-            True times each stage in a pass of its own, which makes the frame slower. "whole" times the frame as
-            one pass. False returns when the frame is submitted, and waits only if three frames are in flight.
+            True times each stage in a pass of its own, which makes the frame slower. "whole" times the frame
+            as one pass. False returns when the frame is submitted, and waits only if three frames are in
+            flight.
         view : str
-            Name of the scene, for callers that draw several scenes in turn: each name caches its own light and
-            shadows.
+            Name of the scene, for callers that draw several scenes in turn: each name caches its own light
+            and shadows.
         outputs : iterable of str
             Names of outputs for `RenderedFrame.output`.
         previous : Scene, optional
@@ -274,7 +275,7 @@ class Renderer:
             1e3 * (done - ready),
             setup_ms,
             resources.gaussians,
-            resources.unscattered,
+            resources.unscattered_fraction,
             resources.suns,
             inputs.settings,
             self._start_readback,
@@ -408,8 +409,13 @@ class Renderer:
         """
         if settings is None or isinstance(settings, Settings | Mapping):
             settings = repeat(as_model(Settings, settings or {}, "settings", "size=(512, 512)"))
-        requested = {"outputs": check_outputs(outputs), "landmarks": checked_landmarks(landmarks)}
-        submit = partial(self._submit_with_readback, linear=linear, alpha=alpha, **requested)
+        submit = partial(
+            self._submit_with_readback,
+            linear=linear,
+            alpha=alpha,
+            outputs=check_outputs(outputs),
+            landmarks=checked_landmarks(landmarks),
+        )
         jobs = observation_jobs(submit, scenes, previous, settings)
         return pipeline_frames(self.reopening_device, lambda: self.device, jobs)
 
@@ -434,7 +440,7 @@ def render(scene: Scene | Head, adapter: str = "auto", **settings: Any) -> NDArr
     Raises
     ------
     DermisError
-        For invalid settings, an unknown adapter, sizes over the limits of the device, and when the device fails.
+        For invalid settings, an unknown adapter, sizes over the limits of the device, or a failing device.
 
     References
     ----------

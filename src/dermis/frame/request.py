@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.frame.lights.environment import EnvironmentMap
 from dermis.frame.seams import AtlasPlan, SeamMethod, plan_atlases, seam_method
 from dermis.frame.technique import ProfileSplit, TechniqueTraits
-from dermis.human.skin.painted import MIN_SIDE, MAX_SIDE, PaintedMaps
+from dermis.human.skin.painted import MAX_SIDE, MIN_SIDE, PaintedMaps
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.environment import Environment

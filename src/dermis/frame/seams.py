@@ -15,7 +15,7 @@ FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towa
 class SeamMethod:
     """Treatment of seams: the layouts of the atlases, and the texels that blurs read beyond a chart.
 
-    layouts : names of layouts: "stitched", "mesh" for the uv of the mesh, "unwrapped" for one with other seams
+    layouts : layouts: "stitched", "mesh" for the uv of the mesh, "unwrapped" for one with other seams
     edge : filter mode at the edges of charts, one of `features.diffusion.blur.EDGES`
     feathered : whether the stretch map is edited so that blurs narrow towards the edges
     coloured : whether empty texels have the colour `Settings.seam_colour` instead of black

@@ -84,7 +84,7 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
 def irradiance_at(
     renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
 ) -> Floats:
-    """Return the (n, 3) irradiance that enters the skin at points, times albedo^mix.
+    """Return the (n, 3) irradiance that enters the skin at points, times its colour before scattering.
 
     scene : scene without maps and environment, because these need atlas positions; interreflection is left
         out
@@ -95,8 +95,12 @@ def irradiance_at(
     triangles[: len(triangle)] = triangle
     weights = np.zeros((side * side, 2))
     weights[: len(triangle)] = barycentric[:, 1:]
-    records = pack_surface_points(triangles.reshape(side, side), np.rint(65535 * weights).reshape(side, side, 2))
-    return renderer.reopening_device.run(partial(_irradiance, renderer, scene, settings, records))[: len(triangle)]
+    records = pack_surface_points(
+        triangles.reshape(side, side), np.rint(65535 * weights).reshape(side, side, 2)
+    )
+    return renderer.reopening_device.run(partial(_irradiance, renderer, scene, settings, records))[
+        : len(triangle)
+    ]
 
 
 def _irradiance(renderer: Renderer, scene: Scene, settings: Settings, records: NDArray[np.uint32]) -> Floats:

@@ -74,7 +74,7 @@ class TechniqueTraits:
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
         """Return the Gaussians that the technique relights and blurs; this base class blurs none.
 
-        normalise : whether the weights of each channel sum to 1, so that the colour map alone gives the albedo
+        normalise : whether the weights of each channel sum to 1, so that only the colour map sets the albedo
         """
         total = channel_weights(profile, normalise).sum(axis=0)
         return ProfileSplit(total, total, np.empty(0), np.empty((0, 3)))
@@ -92,5 +92,5 @@ class TechniqueTraits:
 
 
 def channel_weights(profile: GaussianSum, normalise: bool) -> Floats:
-    """Return the (k, 3) weights of the Gaussians of a profile, divided by its albedo to normalise them [-]."""
+    """Return the (k, 3) weights of the Gaussians, divided by the profile's albedo to normalise them [-]."""
     return profile.weight / profile.albedo if normalise else profile.weight

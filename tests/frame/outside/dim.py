@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dermis.frame.features.atlas.textures import AtlasTextures
-from dermis.frame.features.diffusion.levels import Blur, Levels
+from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.programs import TILE, program
 from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique
@@ -25,7 +25,7 @@ class Dim(AtlasTechnique):
         """All of the profile's light in one level."""
         return single_gaussian(profile)
 
-    def relights(self, profile: GaussianSum) -> bool:
+    def relights_narrowest(self, profile: GaussianSum) -> bool:
         """No."""
         return False
 
@@ -33,7 +33,7 @@ class Dim(AtlasTechnique):
         """None."""
         return (0, 0)
 
-    def fill(self, graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
+    def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
         """Half of the light."""
         shader = program(graph.device, Path(__file__).parent / "dim.wgsl", store=levels.texel)
         bound = {"light": levels.layer(0), "stored": levels.layer(1)}

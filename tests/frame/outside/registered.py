@@ -38,8 +38,8 @@ OUTPUTS.register("uv_sum", UV_SUM)
 import numpy as np
 from setups import frontal, head_of, place, scene_of, settings_of
 
-from dermis.apps.export.targets.pbrt.scene import lights_of
-from dermis.apps.truths.lights import lamp
+from dermis.apps.export.targets.pbrt.scene import light_lines
+from dermis.apps.truths.lights import cycles_lamp
 from dermis.base.errors import DermisError
 from dermis.cli import main
 from dermis.frame.renderer import Renderer
@@ -63,15 +63,15 @@ picture = drawn(glow, 1.0) - drawn(glow, 64.0)
 assert picture[24, 24].max() < 1e-3 * 3.14 and picture[0, 0].min() > 0.01, "the frame draws the light"
 with warnings.catch_warnings(record=True) as notes:
     warnings.simplefilter("always")
-    lines = lights_of([glow], None)
+    lines = light_lines([glow], None)
 assert [str(one.message) for one in notes] == [
     "light 1: pbrt has no after-glow light and takes it for a point light"
 ]
 assert any(line.startswith('LightSource "point"') for line in lines)
 try:
-    lamp(glow, 1)
+    cycles_lamp(glow, 1)
 except DermisError as error:
-    assert "'after-glow' came. Leave the light out, or register in dermis.apps.truths.lights.CYCLES" in str(
+    assert "got 'after-glow'. Leave the light out, or register in dermis.apps.truths.lights.CYCLES" in str(
         error
     )
 else:

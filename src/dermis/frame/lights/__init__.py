@@ -2,11 +2,18 @@
 
 from dermis.frame.lights.records import (
     light_constants,
-    light_shader_constants,
     light_part_counts,
     light_records,
+    light_shader_constants,
     light_views,
     sun_lights,
 )
 
-__all__ = ["light_constants", "light_shader_constants", "light_part_counts", "light_records", "light_views", "sun_lights"]
+__all__ = [
+    "light_constants",
+    "light_shader_constants",
+    "light_part_counts",
+    "light_records",
+    "light_views",
+    "sun_lights",
+]

@@ -12,7 +12,7 @@ from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import Sun, load_panorama
 from dermis.environment.prefilter import prefilter
 from dermis.frame.lights.records import sun_lights
-from dermis.gpu import ComputeProgram, Device, Memo, UniformRecord, Texture, make_texture, upload
+from dermis.gpu import ComputeProgram, Device, Memo, Texture, UniformRecord, make_texture, upload
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin, lobe_name
@@ -44,7 +44,9 @@ def load_environment_map(device: Device, name: str | None) -> EnvironmentMap:
     if name is None:
         return EnvironmentMap(make_texture(device, (1, 1), "rgba16float", layers=2, use="map"), ())
     prefiltered = prefilter(name)
-    return EnvironmentMap(_upload_layers(device, prefiltered.layers), prefiltered.suns, float(prefiltered.layers[0].max()))
+    return EnvironmentMap(
+        _upload_layers(device, prefiltered.layers), prefiltered.suns, float(prefiltered.layers[0].max())
+    )
 
 
 def unfiltered_panorama(device: Device, name: str) -> Texture:

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 from numpy.typing import ArrayLike
 
 from dermis.base.registry import Registry
-from dermis.frame.projection import Triple, view_axes, vector_between
+from dermis.frame.projection import Triple, vector_between, view_axes
 from dermis.gpu.wgsl_source import Member
 from dermis.mesh.head import Head
 from dermis.scene.lights import Light, PointLight
@@ -31,11 +31,11 @@ class Kind(Generic[L]):
     always : bool
         Whether all shaders include the kind; others are compiled only for scenes that use them.
     punctual : bool
-        Whether all light comes from one position or, in parallel light, from one direction; False for area lights.
+        Whether all light comes from one position or from one direction; False for area lights.
     round : bool
         Whether the shape seen from the head is a disc instead of a rectangle.
     sheet : bool
-        Whether the light is a Gaussian across the member `half_u`, so that details finer than texels are known.
+        Whether the light is a Gaussian across the member `half_u`, whose convolutions are known.
 
     Examples
     --------

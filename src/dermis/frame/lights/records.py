@@ -16,11 +16,11 @@ from dermis.frame.lights.kind import KINDS, Members, override_name
 from dermis.frame.projection import (
     ShadowView,
     Triple,
-    vector_between,
-    parallel_shadow_view,
-    world_position,
-    point_shadow_views,
     normalised,
+    parallel_shadow_view,
+    point_shadow_views,
+    vector_between,
+    world_position,
 )
 from dermis.gpu import ComputeProgram, Constants, UniformRecord
 from dermis.mesh.outline import Outline

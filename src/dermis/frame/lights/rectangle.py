@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from dermis.frame.lights.kind import Kind, Members, area_light_members
-from dermis.frame.projection import Triple, view_axes, vector_between
+from dermis.frame.projection import Triple, vector_between, view_axes
 from dermis.scene.lights import Light, RectangleLight
 
 _MAX_PART = 0.35  # side of a part over its distance

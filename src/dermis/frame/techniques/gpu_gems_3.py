@@ -45,7 +45,9 @@ class GpuGems3(AtlasTechnique):
         """Create textures for light, its blurred levels and a blurred stretch map."""
         pyramid = make_levels(device, side, halvings, HALVES)
         first, second = (make_texture(device, (side, side), HALVES) for _ in range(2))
-        return StretchedLevels(pyramid.stacks, pyramid.first, pyramid.scratch, side, HALVES, stretch=(first, second))
+        return StretchedLevels(
+            pyramid.stacks, pyramid.first, pyramid.scratch, side, HALVES, stretch=(first, second)
+        )
 
     def texel_bytes(self, levels: int) -> float:
         """Return the memory per atlas texel [bytes]."""
@@ -72,7 +74,9 @@ class GpuGems3(AtlasTechnique):
                 (levels.layer(k - 1), source, levels.scratch_view(), spare),
                 (levels.scratch_view(), spare, levels.layer(k), stretch),
             )
-            for shader, (light, stretch_source, blurred, stretch_blurred) in zip(shaders, passes, strict=True):
+            for shader, (light, stretch_source, blurred, stretch_blurred) in zip(
+                shaders, passes, strict=True
+            ):
                 linear = graph.device.sampler(mag_filter="linear", min_filter="linear")
                 bound: MutableBindings = {
                     "spread": record,

@@ -11,7 +11,7 @@ from dermis.frame.features.shape import curvature
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.technique import TechniqueResources
 from dermis.frame.techniques.technique import Technique
-from dermis.gpu import ComputeProgram, Device, Graph, Memo, UniformRecord, Texture
+from dermis.gpu import ComputeProgram, Device, Graph, Memo, Texture, UniformRecord
 from dermis.gpu.textures import texture_from_array
 from dermis.optics.fits.separable import preintegrated_kernel
 from dermis.optics.gaussians import Floats, GaussianSum
@@ -33,7 +33,7 @@ class PreIntegratedTables(TechniqueResources):
     """Tables of a profile for the shading pass.
 
     table : texture of `sphere_table` rows, then `shadow_edge` rows
-    penumbra_mm : distance over which light scatters across the edge of a shadow [mm]
+    penumbra_width_mm : distance over which light scatters across the edge of a shadow [mm]
     relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue [mm]
     """
 
@@ -55,10 +55,12 @@ class PreIntegratedSkin(Technique):
         """Return the tables of the profile."""
         return memo.get(pre_integrate, device, profile)
 
-    def write_view_record(self, view: UniformRecord, shade: ComputeProgram, own: TechniqueResources | None) -> None:
+    def write_view_record(
+        self, view: UniformRecord, shade: ComputeProgram, own: TechniqueResources | None
+    ) -> None:
         """Write the scales of the tables to the shading record."""
         assert isinstance(own, PreIntegratedTables)
-        scales = {"most_curved": MAX_CURVATURE, "penumbra": own.penumbra_mm, "relief": own.relief_mm}
+        scales = {"max_curvature": MAX_CURVATURE, "penumbra": own.penumbra_width_mm, "relief": own.relief_mm}
         view["pre"] = shade.record("PreIntegrated", **scales)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
@@ -120,23 +122,23 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
 
 
 def shadow_edge(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0.0) -> Floats:
-    """Scattered light across a shadow's straight edge, (m, c), from -radius (dark) to the radius (lit) [-].
+    """Return (m, c) scattered light across a straight shadow edge, from -radius (dark) to radius (lit) [-].
 
-    half_width_mm : of the tent filter that already softens the edge
+    half_width_mm : half width of the tent filter that already softens the edge [mm]
     """
     kernel = preintegrated_kernel(profile)
     distance = radius_mm * np.linspace(-1.0, 1.0, _COSINES)
     x, w = np.polynomial.legendre.leggauss(_NODES)
     x, w = 0.5 + 0.5 * x, w * (0.5 - 0.5 * x)  # one half of the tent, normalised
     ends = half_width_mm * np.concatenate([x, -x])
-    lit = np.concatenate([0.5 * w, 0.5 * w]) @ kernel.one_side(distance[:, None] - ends)
+    lit = np.concatenate([0.5 * w, 0.5 * w]) @ kernel.half_line_integral(distance[:, None] - ends)
     return np.asarray(np.clip(0.5 + 0.5 * lit / lit[-1], 0.0, 1.0))
 
 
 def penumbra_width_mm(profile: GaussianSum) -> float:
     """Return the distance from a shadow edge beyond which scattering changes light by at most 1 % [mm]."""
     distance = np.geomspace(0.05, _MAX_PENUMBRA_MM, 512)
-    beyond = (0.5 - preintegrated_kernel(profile).one_side(distance)).max(axis=1) > _SHADOW_TAIL
+    beyond = (0.5 - preintegrated_kernel(profile).half_line_integral(distance)).max(axis=1) > _SHADOW_TAIL
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])
 
 

@@ -1,27 +1,27 @@
-// Scattered light on curved skin and across shadow edges, from tables made once for a profile [Penner2011]: `scattered`
-// holds them, `shade.pre` their scales.
+// Scattered light on curved skin and across shadow edges from tables of the profile [Penner2011]: `scattered` is the texture
+// of the tables, `shade.pre` has their scales.
 
 override PRE_INTEGRATED: bool = false;
 
 const SPHERES: u32 = 33u; // rows, evenly by curvature
-const EDGES: u32 = 9u; // rows, evenly by the half width of the shadow's own edge up to `penumbra`
-const PROBES: u32 = 64u; // places around a point; the share of them in the light gives the distance of a shadow's edge
-const GOLDEN: f32 = 2.3999632; // angle from one place to the next, the outermost first
+const EDGES: u32 = 9u; // rows, evenly by the half width of the shadow's penumbra up to `penumbra`
+const PROBES: u32 = 64u; // points around a point; the fraction of them in the light gives the distance of a shadow edge
+const GOLDEN: f32 = 2.3999632; // angle between consecutive probes, the outermost first
 const FEWEST_PROBES: u32 = 24u; // probes after which the others are skipped if all agree
-const LEAST_COSINE: f32 = 0.3; // of the light on the probes' plane
-const HIGHEST: f32 = 3.0; // most that a point beyond the light's horizon is lifted [mm]
-const WAYS: u32 = 16u; // probes of the curvature towards the horizon
-const WAYS_MM: f32 = 2.0; // radius in which they lie around the line to the light
+const MIN_COSINE: f32 = 0.3; // of the light on the plane of the probes
+const MAX_LIFT_MM: f32 = 3.0; // largest lift of a point beyond the light's horizon [mm]
+const CURVATURE_PROBES: u32 = 16u; // probes of the curvature towards the horizon
+const CURVATURE_PROBES_MM: f32 = 2.0; // their radius around the line to the light
 
 @group(0) @binding(35) var<storage, read> curvatures: array<f32>; // of the vertices [1/mm]
 
 struct PreIntegrated {
-    most_curved: f32, // curvature of the table's last row [1/mm]
-    penumbra: f32, // radius around a point in which a shadow's edge is looked for [mm]
+    max_curvature: f32, // curvature of the table's last row [1/mm]
+    penumbra: f32, // radius around a point in which shadow edges are searched [mm]
     relief: vec3f, // standard deviation of the Gaussian that smooths the relief [mm]
 }
 
-// t: corners of the triangle, w: barycentric weights
+// t : corners of the triangle; w : barycentric weights
 fn curvature_at(t: vec4u, w: vec3f) -> f32 {
     if (!PRE_INTEGRATED) {
         return 0.0;
@@ -29,40 +29,40 @@ fn curvature_at(t: vec4u, w: vec3f) -> f32 {
     return dot(w, vec3f(curvatures[t.x], curvatures[t.y], curvatures[t.z]));
 }
 
-// Looks up the tables: rows of spheres, then of shadow edges.
+// Value of the tables: rows of spheres, then of shadow edges.
 fn table_at(x: f32, row: f32) -> vec3f {
     let size = vec2f(textureDimensions(scattered));
     return load_bilinear(scattered, (vec2f(x * (size.x - 1.0), row) + 0.5) / size).rgb;
 }
 
-// Scattered max(N.L, 0), for the cosines of red, green and blue.
-fn spread_cosine(cosines: vec3f, curvature: f32) -> vec3f {
-    let row = f32(SPHERES - 1u) * min(curvature / shade.pre.most_curved, 1.0);
+// Scattered max(N.L, 0) for the cosines of red, green and blue.
+fn scattered_cosine(cosines: vec3f, curvature: f32) -> vec3f {
+    let row = f32(SPHERES - 1u) * min(curvature / shade.pre.max_curvature, 1.0);
     let x = 0.5 + 0.5 * cosines;
     return vec3f(table_at(x.r, row).r, table_at(x.g, row).g, table_at(x.b, row).b);
 }
 
-// The normals for red, green and blue light, without the relief that each scatters over.
-fn spread_normals(point: Point, footprint: f32) -> mat3x3f {
+// Normals for red, green and blue light, without the relief that scattering smooths.
+fn smoothed_normals(point: Point, footprint: f32) -> mat3x3f {
     let mm = max(sqrt(length(point.dpdu) * length(point.dpdv)), 1e-3); // per side of the uv square
     let wide = sqrt(footprint * footprint + 12.0 * shade.pre.relief * shade.pre.relief / (mm * mm));
     return mat3x3f(surface_at(point, wide.r).normal, surface_at(point, wide.g).normal, surface_at(point, wide.b).normal);
 }
 
-// A point that faces away from the light gets its light from skin beyond its horizon: shadows are tested from there, on a
+// A point that faces away from the light receives light from skin beyond its horizon: shadows are tested from there, on a
 // plane that faces the light.
 fn above_horizon(point: Point, l: vec3f) -> Point {
     var out = point;
     let cosine = dot(point.normal, l);
     let height = (inverseSqrt(max(1.0 - cosine * cosine, 1e-4)) - 1.0) / max(point.curvature, 1e-4);
-    out.lit_position += point.normal * select(0.0, min(height, HIGHEST), cosine < 0.0);
-    out.normal = normalize(point.normal + l * max(0.0, LEAST_COSINE - cosine));
+    out.lit_position += point.normal * select(0.0, min(height, MAX_LIFT_MM), cosine < 0.0);
+    out.normal = normalize(point.normal + l * max(0.0, MIN_COSINE - cosine));
     return out;
 }
 
-// Scattered visibility of a light, for red, green and blue: by the distance to the shadow's edge, taken as straight.
-// Shadows of area lights, mostly wider, stay as they are.
-fn spread_visibility(light: Light, point: Point, l: vec3f) -> vec3f {
+// Scattered visibility of a light for red, green and blue, by the distance to the shadow edge, which is assumed straight.
+// Shadows of area lights, which are mostly wider, are unchanged.
+fn scattered_visibility(light: Light, point: Point, l: vec3f) -> vec3f {
     let raised = above_horizon(point, l);
     let seen = clamp(visibility(light, raised, l), 0.0, 1.0);
     if (light.layer < 0 || (SHAPES && light.extent.x > 0.0)) {
@@ -76,29 +76,28 @@ fn spread_visibility(light: Light, point: Point, l: vec3f) -> vec3f {
     if (soft >= radius) {
         return vec3f(seen);
     }
-    let near = soft * select(1.0 - sqrt(2.0 - 2.0 * seen), sqrt(2.0 * seen) - 1.0, seen < 0.5); // inverts the filter's tent
-    // The probes find edges farther off than the tent reaches. They miss narrow shadows, so within the tent they count
-    // only gradually.
-    let far = radius * (2.0 * around.share - 1.0);
+    let near = soft * select(1.0 - sqrt(2.0 - 2.0 * seen), sqrt(2.0 * seen) - 1.0, seen < 0.5); // inverse of the tent filter
+    // probes find edges beyond the tent; they miss narrow shadows, so their weight increases gradually outside the tent
+    let far = radius * (2.0 * around.fraction - 1.0);
     let beyond = select(min(far + soft, 0.0), max(far - soft, 0.0), seen > 0.5);
     let outside = abs(2.0 * seen - 1.0);
     let edge = near + outside * outside * outside * beyond;
     return table_at(0.5 + 0.5 * edge / radius, f32(SPHERES) + soft / radius * f32(EDGES - 1u));
 }
 
-// How much wider the shadow filter's tent is on the surface, across an edge, than on the light's map.
+// Width of the shadow filter on the surface, across an edge, relative to its width on the light's map.
 fn tent_on_surface(normal: vec3f, l: vec3f, along: vec3f) -> f32 {
     let lean = dot(along, l);
     return sqrt(max(0.0, 1.0 - lean * lean)) / dot(normal, l);
 }
 
 struct Around {
-    share: f32, // of the places around a point that a light reaches
+    fraction: f32, // of the probes around a point that are lit
     along: vec3f, // unit vector on the surface along the shadow's edge
 }
 
-// The probes lie like even points on a ball seen from above, so that an edge across them hides a share that is linear in
-// its distance. They are lifted off the surface as the filter's point is.
+// Probes are the projection of an even distribution on a ball, so that an edge occludes a fraction that is linear in its
+// distance. They are lifted off the surface like the point of the filter.
 fn light_around(light: Light, point: Point, l: vec3f, lift: f32, unknown: f32) -> Around {
     let axes = shade.pre.penumbra * beside(point.normal);
     let cosine = clamp(dot(point.normal, l), 0.0, 1.0);
@@ -106,7 +105,7 @@ fn light_around(light: Light, point: Point, l: vec3f, lift: f32, unknown: f32) -
     let centre = light.to_map * vec4f(lifted, 1.0);
     let right = light.to_map * vec4f(axes[0], 0.0);
     let up = light.to_map * vec4f(axes[1], 0.0);
-    // In hollows the surface may rise between the probes and the light: they are lifted by twice what its curvature says.
+    // in hollows the surface may rise above the probes: they are lifted by twice the height that the curvature implies
     let rise = light.to_map * vec4f(l, 0.0) * (point.curvature * shade.pre.penumbra * shade.pre.penumbra);
     var lit = 0u;
     var known = 0u;
@@ -116,22 +115,22 @@ fn light_around(light: Light, point: Point, l: vec3f, lift: f32, unknown: f32) -
             break;
         }
         let height = (f32(i) + 0.5) / f32(PROBES);
-        let place = sqrt(1.0 - height * height) * vec2f(cos(GOLDEN * f32(i)), sin(GOLDEN * f32(i)));
-        let found = sees(light, centre + place.x * right + place.y * up + dot(place, place) * rise);
-        lit += u32(found == LIGHT);
-        known += u32(found != AIR);
-        towards += place * (f32(found == LIGHT) - f32(found == HIDDEN));
+        let position = sqrt(1.0 - height * height) * vec2f(cos(GOLDEN * f32(i)), sin(GOLDEN * f32(i)));
+        let state = probe_state(light, centre + position.x * right + position.y * up + dot(position, position) * rise);
+        lit += u32(state == LIGHT);
+        known += u32(state != AIR);
+        towards += position * (f32(state == LIGHT) - f32(state == HIDDEN));
     }
     let along = normalize(axes * vec2f(-towards.y, towards.x));
     return Around(select(f32(lit) / f32(max(known, 1u)), unknown, known == 0u), along);
 }
 
-// What the shadow map shows on the way to a place.
+// State of a probe by the shadow map.
 const HIDDEN: u32 = 0u;
 const LIGHT: u32 = 1u;
-const AIR: u32 = 2u; // lit, but in the air: the skin is farther behind than light scatters
+const AIR: u32 = 2u; // lit, but in front of skin that is farther away than light scatters
 
-fn sees(light: Light, clip: vec4f) -> u32 {
+fn probe_state(light: Light, clip: vec4f) -> u32 {
     if (clip.w <= 0.0) {
         return LIGHT;
     }
@@ -150,48 +149,48 @@ fn nearest_at(light: Light, clip: vec4f) -> f32 {
     return textureLoad(shadow_maps, clamp(texel, vec2i(0), vec2i(size) - 1), light.layer, 0).x;
 }
 
-// Curvature towards the horizon, which may be farther away than the point's own says: the mean of those of spheres that
-// touch the surface here and go through a place near by that the light sees.
+// Curvature towards the horizon, which may be farther away than the curvature at the point implies: mean over spheres that
+// touch the surface here and pass through a lit point near by.
 fn curvature_towards(light: Light, point: Point, l: vec3f) -> f32 {
     let cosine = dot(point.normal, l);
-    if (cosine >= LEAST_COSINE || light.layer < 0 || (SHAPES && light.extent.x > 0.0)) {
+    if (cosine >= MIN_COSINE || light.layer < 0 || (SHAPES && light.extent.x > 0.0)) {
         return point.curvature;
     }
-    let axes = WAYS_MM * beside(l);
+    let axes = CURVATURE_PROBES_MM * beside(l);
     var sum = vec2f(0.0);
-    for (var i = 0u; i < WAYS; i++) {
-        let aside = axes * sample_point(i, true);
-        let clip = light.to_map * vec4f(point.lit_position + aside, 1.0);
-        let way = aside + l * (depth_of(light, clip.z / clip.w) - depth_of(light, nearest_at(light, clip)));
-        if (dot(way, l) > -shade.pre.penumbra) { // else it is no surface near by
-            let ball = -2.0 * dot(way, point.normal) / max(dot(way, way), 1e-4);
+    for (var i = 0u; i < CURVATURE_PROBES; i++) {
+        let lateral = axes * sample_point(i, true);
+        let clip = light.to_map * vec4f(point.lit_position + lateral, 1.0);
+        let offset = lateral + l * (depth_of(light, clip.z / clip.w) - depth_of(light, nearest_at(light, clip)));
+        if (dot(offset, l) > -shade.pre.penumbra) { // else the surface is not near
+            let ball = -2.0 * dot(offset, point.normal) / max(dot(offset, offset), 1e-4);
             sum += vec2f(clamp(ball, 0.0, point.curvature), 1.0);
         }
     }
     let found = select(sum.x / sum.y, point.curvature, sum.y == 0.0);
-    return mix(found, point.curvature, smoothstep(0.0, LEAST_COSINE, cosine));
+    return mix(found, point.curvature, smoothstep(0.0, MIN_COSINE, cosine));
 }
 
-// Irradiance that enters around a point and leaves there. The surface's reflectance is that at the mean cosine of the
-// arriving light.
+// Irradiance that enters around a point and leaves there. The reflectance of the surface is evaluated at the mean cosine of
+// the incident light.
 fn pre_integrated(point: Point, surface: Surface, footprint: f32, open: f32) -> vec3f {
-    let normals = spread_normals(point, footprint);
+    let normals = smoothed_normals(point, footprint);
     var sum = vec3f(0.0);
     for (var i = 0u; i < skin.light_count; i++) {
         let light = lights.light[i];
-        var seen = vec3f(-1.0); // visibility of the light, -1 where not known yet
+        var seen = vec3f(-1.0); // visibility of the light, -1 before it is computed
         for (var part = 0u; part < parts_of(light); part++) {
             let arriving = incident(light, point.position, part);
             let curvature = curvature_towards(light, point, arriving.direction);
-            let cosine = spread_cosine(arriving.direction * normals, curvature);
+            let cosine = scattered_cosine(arriving.direction * normals, curvature);
             if (any(cosine > vec3f(0.0))) {
                 if (seen.x < 0.0) {
-                    seen = spread_visibility(light, point, arriving.direction);
+                    seen = scattered_visibility(light, point, arriving.direction);
                 }
                 let mean = dot(cosine, vec3f(1.0 / 3.0));
                 var entering = arriving.irradiance * cosine * seen * enters(mean, surface.roughness, surface.rho_s);
                 if (HALF_SPACE) {
-                    entering *= coming_back(mean);
+                    entering *= relative_reflectance(mean);
                 }
                 sum += entering;
             }
@@ -199,9 +198,9 @@ fn pre_integrated(point: Point, surface: Surface, footprint: f32, open: f32) -> 
     }
     if (ENVIRONMENT || INTERREFLECTION) {
         let smooth_surface = Surface(normals[1], surface.colour, surface.roughness, surface.rho_s);
-        var entering = entering_from_around(point, smooth_surface, open);
+        var entering = ambient_entering(point, smooth_surface, open);
         if (HALF_SPACE) {
-            entering *= skin.back_from_everywhere;
+            entering *= skin.uniform_reflectance;
         }
         sum += entering;
     }

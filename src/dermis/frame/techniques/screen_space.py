@@ -92,7 +92,9 @@ class ScreenSpace(Technique):
         assert isinstance(own, SubsurfaceLayers) and own.kernel is not None
         return draw(graph, own, own.kernel, inputs.window, radiance)
 
-    def blur_subsurface_layers(self, graph: Graph, inputs: FrameInputs) -> tuple[TextureOrView, TextureOrView]:
+    def blur_subsurface_layers(
+        self, graph: Graph, inputs: FrameInputs
+    ) -> tuple[TextureOrView, TextureOrView]:
         """Declare the passes that diffuse the light of the outputs; return it and its transmittance."""
         layers, own = inputs.resources.output_layers, inputs.resources.technique
         assert (
@@ -107,7 +109,9 @@ class ScreenSpace(Technique):
 TECHNIQUE = ScreenSpace()
 
 
-def make_subsurface_layers(device: Device, size: tuple[int, int], with_result: bool = True) -> SubsurfaceLayers:
+def make_subsurface_layers(
+    device: Device, size: tuple[int, int], with_result: bool = True
+) -> SubsurfaceLayers:
     """Create the textures for a picture of size (width, height), without a kernel.
 
     with_result : whether a texture for the finished picture is needed
@@ -125,7 +129,9 @@ def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
     return Kernel(texture_from_array(device, table, "rgba32float"), reach_mm)
 
 
-def draw(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window, surface: Texture) -> Texture:
+def draw(
+    graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window, surface: Texture
+) -> Texture:
     """Declare the passes that diffuse the light of `layers`, and return the finished picture.
 
     window : part of the image plane that the picture shows
@@ -169,7 +175,7 @@ def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window:
 def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
     """Return the (1, n, 4) fractions of light over the root of the relative distance, and the reach [mm]."""
     reach = _reach(kernel)
-    fractions = kernel.one_side(reach * np.linspace(0.0, 1.0, _ENTRIES) ** 2)
+    fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _ENTRIES) ** 2)
     fractions *= 0.5 / fractions[-1]  # the light beyond the reach is added to the light within it
     return np.concatenate([fractions, np.zeros((_ENTRIES, 1))], axis=1)[None], reach
 
@@ -177,5 +183,5 @@ def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
 def _reach(kernel: SeparableKernel) -> float:
     """Return the distance beyond which no channel has more than `_TAIL` of its light [mm]."""
     distance = np.geomspace(_MIN_REACH_MM, _MAX_REACH_MM, 4096)
-    beyond = (0.5 - kernel.one_side(distance)).max(axis=1) > _TAIL
+    beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _TAIL
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])

@@ -1,4 +1,4 @@
-"""The interface of scattering techniques, and the base of those that diffuse light over the atlas."""
+"""Base classes of scattering techniques: without scattering, and with diffusion over the atlas."""
 
 from __future__ import annotations
 
@@ -11,8 +11,14 @@ from dermis.frame.features.atlas.passes import draw_blend, draw_stretch
 from dermis.frame.features.atlas.textures import MAX_HALVINGS, AtlasTextures
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion import mixture as mix
-from dermis.frame.features.diffusion.pyramid import Blur, Halvings, PyramidLevels, choose_halvings, make_levels
 from dermis.frame.features.diffusion.mixture import Mixture
+from dermis.frame.features.diffusion.pyramid import (
+    Blur,
+    Halvings,
+    PyramidLevels,
+    choose_halvings,
+    make_levels,
+)
 from dermis.frame.features.irradiance import irradiance
 from dermis.frame.features.irradiance.irradiance import TEXEL_AREA
 from dermis.frame.features.surface import texels
@@ -26,16 +32,18 @@ from dermis.gpu import (
     Device,
     Graph,
     Memo,
-    UniformRecord,
     Recorder,
     Texture,
     TextureOrView,
+    UniformRecord,
 )
 from dermis.gpu.textures import FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
-_RELIT_MM2 = 0.1**2  # narrower Gaussians are finer than texels and pores: they are relit in the picture, not blurred
+_RELIT_MM2 = (
+    0.1**2
+)  # narrower Gaussians are finer than texels and pores: they are relit in the picture, not blurred
 
 
 class Technique(TechniqueTraits):
@@ -51,7 +59,7 @@ class Technique(TechniqueTraits):
     """
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
-        """Return textures for light and its blurred levels; the least size where no light is on the atlas."""
+        """Create textures for light and its blurred levels, of the least size without atlas light."""
         return make_levels(device, side, halvings, FLOATS)
 
     def make_sum(self, device: Device, side: int) -> Texture:
@@ -80,11 +88,15 @@ class Technique(TechniqueTraits):
         """Return the tables and textures of the technique, cached by the memo; None for none."""
         return None
 
-    def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> TechniqueResources | None:
+    def make_subsurface_layers(
+        self, memo: Memo, device: Device, settings: Settings
+    ) -> TechniqueResources | None:
         """Return the textures for light below the skin of the outputs, None for none."""
         return None
 
-    def write_view_record(self, view: UniformRecord, shade: ComputeProgram, own: TechniqueResources | None) -> None:
+    def write_view_record(
+        self, view: UniformRecord, shade: ComputeProgram, own: TechniqueResources | None
+    ) -> None:
         """Write the technique's members of the shading record.
 
         shade : program of the shading pass
@@ -103,8 +115,10 @@ class Technique(TechniqueTraits):
         """Declare the passes after shading, and return the texture of the picture."""
         return radiance
 
-    def blur_subsurface_layers(self, graph: Graph, inputs: FrameInputs) -> tuple[TextureOrView, TextureOrView]:
-        """Spread the light of `make_apart`; return textures of it and of the share of it that leaves."""
+    def blur_subsurface_layers(
+        self, graph: Graph, inputs: FrameInputs
+    ) -> tuple[TextureOrView, TextureOrView]:
+        """Diffuse the light of `make_subsurface_layers`; return it and its transmittance as textures."""
         raise NotImplementedError
 
     def sum_translucency(self, graph: Graph, inputs: FrameInputs, into: tuple[Texture, ...]) -> Texture:
@@ -116,7 +130,7 @@ class Technique(TechniqueTraits):
 
 
 class AtlasTechnique(Technique):
-    """Light that spreads over the atlas: lit there, blurred by each of the profile's Gaussians, added up."""
+    """Technique that lights the atlas, blurs the light by each Gaussian of the profile and sums up."""
 
     uses_atlas = True
 
@@ -142,7 +156,7 @@ class AtlasTechnique(Technique):
         return make_levels(device, side, halvings, level_format(device))
 
     def texel_bytes(self, levels: int) -> float:
-        """Most memory for a texel of the atlas on a software adapter, with the space between passes."""
+        """Return the peak memory per atlas texel on a software adapter, with temporary textures [bytes]."""
         mips = sum(0.25**halving for halving in range(MAX_HALVINGS + 1))
         return FORMAT_BYTES[FLOATS] * (levels + 2 * mips)  # upper bound, as if no level were halved
 
@@ -161,19 +175,25 @@ class AtlasTechnique(Technique):
             into = levels.layer(0), levels.size, levels.texel, blur.scale, TEXEL_AREA
             graph.repeat(draw_stretch, layout.head, layout.atlas)
             if layout.gutter_update:
-                graph.repeat(gutters.draw, layout.atlas, layout.gutter_update.tracing, layout.gutter_update.head)
+                graph.repeat(
+                    gutters.draw, layout.atlas, layout.gutter_update.tracing, layout.gutter_update.head
+                )
             texels.draw(graph, layout)
             irradiance.draw(graph, layout, inputs.light_constants, *into)
             if layout.translucency:
                 graph.repeat(translucency.draw_weights, layout.translucency)
                 if layout.translucency.uses_tables:
-                    translucency.draw_direction_factors(graph, layout, layout.translucency, inputs.light_constants)
+                    translucency.draw_direction_factors(
+                        graph, layout, layout.translucency, inputs.light_constants
+                    )
             graph.repeat(self.blur_levels, levels, layout.atlas, blur)
             target = mixture.sum_layer(0) if mixture else layout.scattered
             graph.repeat(self.sum_exitance, levels, blur, layout.translucency, target)
             if mixture:
                 mix.draw_blend_weights(graph, layout, mixture, number)
-                graph.repeat(self.add_other_profiles, levels, blur, layout.atlas, mixture, number, layout.scattered)
+                graph.repeat(
+                    self.add_other_profiles, levels, blur, layout.atlas, mixture, number, layout.scattered
+                )
         if len(layouts) > 1:
             draw_blend(graph, layouts[0], layouts[1], resources.scattered)
         return resources.scattered

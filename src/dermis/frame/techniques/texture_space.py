@@ -35,7 +35,9 @@ class TextureSpace(AtlasTechnique):
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
         """Return the split with intermediate Gaussians that make blurs cheaper, and their level numbers."""
         max_halvings = len(atlas.mips_for(edge)) - 1
-        variances, steps = add_intermediate_levels(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
+        variances, steps = add_intermediate_levels(
+            split.blurred_mm2, atlas.median_texels_per_mm, max_halvings
+        )
         own = [k for k in range(len(variances)) if k + 1 not in steps]
 
         def with_all_levels(one: ProfileSplit) -> ProfileSplit:

@@ -2,6 +2,6 @@
 
 const EACH: u32 = 64u; // invocations of a workgroup
 
-fn number_of(group: vec3u, groups: vec3u, lane: u32) -> u32 {
+fn list_index(group: vec3u, groups: vec3u, lane: u32) -> u32 {
     return (group.y * groups.x + group.x) * EACH + lane;
 }

@@ -2,7 +2,7 @@
 //#if FILTERED_SOURCE
 // Level in a format that all GPUs can filter.
 
-@group(0) @binding(30) var source: texture_2d<f32>; // light; alpha is 1 on the surface
+@group(0) @binding(30) var source: texture_2d<f32>; // filtered; light, alpha is 1 on the surface
 @group(0) @binding(31) var linear: sampler;
 
 fn source_at(uv: vec2f) -> vec4f {

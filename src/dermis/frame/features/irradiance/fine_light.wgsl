@@ -1,14 +1,14 @@
-// Light that is finer than the atlas' texels, where its shape is known: stripes. Of the blurred levels of such a light the atlas
-// holds what its texels can, read between them; here is what that lacks at a place of the picture, by the same Gaussians.
+// Light finer than the texels of the atlas, for stripes, whose shape is known: difference between the exact convolution by
+// the Gaussians of the profile and the interpolated levels of the atlas.
 
 struct Fine {
-    count: u32, // of levels; 0 for none
-    texel_variance: f32, // over which texels average light [texel^2]
-    relit_mm2: f32, // variance of the level that is not blurred
+    count: u32, // number of levels, 0 for none
+    texel_variance: f32, // of the filter of light on the atlas [texels^2]
+    relit_mm2: f32, // variance of the Gaussian that is relit [mm^2]
     //#fill level: array<vec4f, {fine_levels}>, // weight, variance [mm^2]
 }
 
-// How the atlas lies on a triangle's plane: mm for a texel along u and v.
+// Vectors of a texel of the atlas in the plane of a triangle, along u and v [mm].
 struct TexelAxes {
     u: vec3f,
     v: vec3f,
@@ -26,11 +26,11 @@ fn texel_axes(triangle: u32, a: Corner, b: Corner, c: Corner, side: f32) -> Texe
     return TexelAxes(to_c.y * p - to_b.y * q, to_b.x * q - to_c.x * p);
 }
 
-// Irradiance that entered, spread by the profile, beyond what the atlas shows of it here.
-// held: of the level that is not blurred, weight
-fn finer_light(point: Point, surface: Surface, axes: TexelAxes, fine: Fine, held: vec3f, side: vec2f) -> vec3f {
+// Scattered irradiance minus its value on the atlas.
+// relit : weight of the Gaussian that is relit
+fn light_finer_than_texels(point: Point, surface: Surface, axes: TexelAxes, fine: Fine, relit: vec3f, side: vec2f) -> vec3f {
     var sum = vec3f(0.0);
-    let f = fract(point.place * side - 0.5);
+    let f = fract(point.atlas_uv * side - 0.5);
     var i = 0u;
     loop {
         if (i >= skin.light_count || fine.count == 0u) {
@@ -40,18 +40,18 @@ fn finer_light(point: Point, surface: Surface, axes: TexelAxes, fine: Fine, held
         let cosine = -dot(surface.normal, light.direction);
         if (light.sheet != 0u && cosine > 0.0) {
             var entering = light.irradiance * (cosine * enters(cosine, surface.roughness, surface.rho_s));
-            entering *= stripe_along(light, point.position) * reaching(light, point, -light.direction);
+            entering *= stripe_along(light, point.position) * total_visibility(light, point, -light.direction);
             if (HALF_SPACE) {
-                entering *= coming_back(cosine);
+                entering *= relative_reflectance(cosine);
             }
-            sum += entering * finer_stripe(light, point, axes, fine, held, f);
+            sum += entering * stripe_finer_than_texels(light, point, axes, fine, relit, f);
         }
         i++;
     }
     return sum;
 }
 
-fn finer_stripe(light: Light, point: Point, axes: TexelAxes, fine: Fine, held: vec3f, f: vec2f) -> vec3f {
+fn stripe_finer_than_texels(light: Light, point: Point, axes: TexelAxes, fine: Fine, relit: vec3f, f: vec2f) -> vec3f {
     let here = dot(point.position - light.position, light.half_u);
     let step = vec2f(dot(axes.u, light.half_u), dot(axes.v, light.half_u));
     let along = light.half_u - dot(light.half_u, point.normal) * point.normal;
@@ -60,16 +60,16 @@ fn finer_stripe(light: Light, point: Point, axes: TexelAxes, fine: Fine, held: v
     let texel = fine.texel_variance * dot(step, step);
     let first = here - dot(f, step);
     let w = bilinear_weights(f);
-    var sum = held * (stripe_across(here, seen + fine.relit_mm2 * per_mm2) - stripe_across(here, seen));
+    var sum = relit * (stripe_across(here, seen + fine.relit_mm2 * per_mm2) - stripe_across(here, seen));
     var k = 0u;
     loop {
         let level = fine.level[k];
         let spread = level.w * per_mm2;
-        let held_there = vec4f(
+        let interpolated = vec4f(
             stripe_across(first, texel + spread), stripe_across(first + step.x, texel + spread),
             stripe_across(first + step.y, texel + spread), stripe_across(first + step.x + step.y, texel + spread),
         );
-        sum += level.rgb * (stripe_across(here, seen + spread) - dot(w, held_there));
+        sum += level.rgb * (stripe_across(here, seen + spread) - dot(w, interpolated));
         k++;
         if (k >= fine.count) {
             break;

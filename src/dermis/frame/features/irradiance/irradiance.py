@@ -45,14 +45,14 @@ def draw(
     scale: float = 1.0,
     area: float = 0.0,
 ) -> None:
-    """Declare the pass that stores the irradiance of light that enters the skin, times albedo^mix.
+    """Declare the pass that stores the irradiance that enters the skin, times its colour before scattering.
 
     constants : pipeline constants of the lights
     into : texture of `side` x `side` texels
     texel : format of the texture
     scale : factor of the stored values
-    area : standard deviation of the filter of light that is finer than texels [texels]; 0 samples texel centres,
-        for texels whose neighbours are no neighbours on the surface
+    area : standard deviation of the filter of light finer than texels [texels]; 0 samples texel centres, for
+        texels whose neighbours in the texture are no neighbours on the surface
     """
     if area:  # neighbouring texels are neighbours on the surface
         constants = oblique_constants(constants)

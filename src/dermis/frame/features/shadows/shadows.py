@@ -44,7 +44,9 @@ def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
     return ShadowMaps(make_layers(device, (size, size), layers, triangles=False), bounds)
 
 
-def draw(graph: Recorder, maps: ShadowMaps, views: Views, head: HeadGeometry, with_bounds: bool = True) -> None:
+def draw(
+    graph: Recorder, maps: ShadowMaps, views: Views, head: HeadGeometry, with_bounds: bool = True
+) -> None:
     """Declare the passes that draw the depths seen from each light.
 
     with_bounds : whether the scene has area lights, which read the bounds

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import run_bounds
-from dermis.frame.programs import workgroup_grid, program
+from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Buffer, Device, Recorder
 from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Mesh
@@ -28,7 +28,7 @@ class Curvature:
 
     smoothed : buffer of the result, one float per vertex
     scratch : buffer for intermediate steps of the smoothing
-    tables : triangles and neighbours of each vertex, by their names in curvature.wgsl and curvature_smooth.wgsl
+    tables : triangles and neighbours of each vertex, by their names in the shaders
     steps : number of smoothing steps that reach `SMOOTH_MM` on the head at rest
     vertices : number of vertices
     """

@@ -1,14 +1,14 @@
-// Curvature of the surface at its vertices: how the normal changes over the triangles around a point, by their areas.
+// Curvature of the surface at its vertices: mean change of the normal over the triangles around a point, weighted by area.
 //#include "geometry.wgsl"
 //#include "each.wgsl"
 
-const LEAST_MM2: f32 = 1e-12; // of triangles around a point that has a curvature
+const MIN_MM2: f32 = 1e-12; // least area of triangles around a point with curvature
 
-@group(0) @binding(30) var<storage, read> around: array<vec4u>; // spans of the triangles and the points around each vertex
+@group(0) @binding(30) var<storage, read> around: array<vec4u>; // ranges of the triangles and of the neighbours of each vertex
 @group(0) @binding(31) var<storage, read> triangles: array<u32>;
 @group(0) @binding(32) var<storage, read_write> curvatures: array<f32>; // [1/mm]
 
-// Change of the normal with position along a triangle, symmetric, times its area [mm]; 0 without area.
+// Symmetric derivative of the normal by position in a triangle, times its area [mm]; 0 without area.
 fn bend_of(triangle: u32) -> mat3x3f {
     let t = triangle_at(triangle);
     let a = corner_at(t.x);
@@ -22,7 +22,7 @@ fn bend_of(triangle: u32) -> mat3x3f {
         return mat3x3f();
     }
     let unit = across / size;
-    // The dual basis is 1 along its own side and 0 along the other; times the area it is without the second `size`.
+    // dual basis of the two sides, times the area
     let along_s = 0.5 * cross(r, unit);
     let along_r = 0.5 * cross(unit, s);
     var m = b.normal - a.normal;
@@ -45,7 +45,7 @@ fn area_of(triangle: u32) -> f32 {
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= arrayLength(&around)) {
         return;
     }
@@ -56,7 +56,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         bend += bend_of(triangles[k]);
         area += area_of(triangles[k]);
     }
-    // The root mean square of the two principal curvatures.
+    // root mean square of the two principal curvatures
     let square = 0.5 * (dot(bend[0], bend[0]) + dot(bend[1], bend[1]) + dot(bend[2], bend[2]));
-    curvatures[index] = sqrt(square) / max(area, LEAST_MM2);
+    curvatures[index] = sqrt(square) / max(area, MIN_MM2);
 }

@@ -1,4 +1,4 @@
-// The shape of an eyeball, in mm of a usual eye around the ball's centre.
+// Shape of an eyeball, in mm of an average eye around the centre of the ball.
 
 //#fill const SCLERA_MM: f32 = {sclera_mm}; // radius of the ball
 //#fill const CORNEA_MM: f32 = {cornea_mm}; // radius of the cornea's front
@@ -6,7 +6,7 @@
 //#fill const LIMBUS_MM: f32 = {limbus_mm}; // radius of the circle where they meet
 //#fill const APEX_AT: f32 = {apex_at}; // the cornea's apex on the axis
 
-// From the centre to the surface, by the cosine of the angle from the axis.
+// Distance from the centre to the surface, by the cosine of the angle to the axis.
 fn eyeball_radius(cosine: f32) -> f32 {
     let beside = CORNEA_AT * CORNEA_AT * (1.0 - cosine * cosine);
     let cornea = CORNEA_AT * cosine + sqrt(max(CORNEA_MM * CORNEA_MM - beside, 0.0));

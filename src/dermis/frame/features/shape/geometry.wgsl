@@ -1,12 +1,12 @@
-// Points of the mesh's surface by triangle and barycentric weights.
+// Surface points of the mesh by triangle and barycentric weights.
 //#include "mesh_textures.wgsl"
 
-override MESH_IN_BUFFERS: bool = false; // whether the mesh is read from buffers, which GPUs read faster than textures
+override MESH_IN_BUFFERS: bool = false; // whether the mesh is read from buffers, which is faster on GPUs
 
 const MAPPED: u32 = 1u; // the triangle has texels in the atlas
 const OPAQUE: u32 = 2u; // plain material, no scattering
 
-@group(0) @binding(23) var<storage, read> triangle_buffer: array<vec4u>; // the texels of the textures, in order
+@group(0) @binding(23) var<storage, read> triangle_buffer: array<vec4u>; // same content as the textures
 @group(0) @binding(24) var<storage, read> vertex_buffer: array<vec4f>;
 
 struct Corner {
@@ -19,10 +19,10 @@ struct Corner {
 
 struct Point {
     position: vec3f, // [mm]
-    lit_position: vec3f, // moved onto the smooth surface, for shadow rays
+    lit_position: vec3f, // on the smooth surface, start of shadow rays
     normal: vec3f, // interpolated, unit
     uv: vec2f, // in the maps
-    place: vec2f, // in the atlas, set only by the shading
+    atlas_uv: vec2f, // in the atlas, set only by passes that need it
     dpdu: vec3f, // [mm per unit of uv]
     dpdv: vec3f,
     curvature: f32, // root mean square over directions [1/mm], set only by the shading of pre-integrated skin
@@ -40,14 +40,14 @@ fn triangle_at(index: u32) -> vec4u {
     return triangle_row(index, 0u);
 }
 
-// Place in the atlas, from 0 to 1, of a point of a triangle.
-fn place_of_point(index: u32, w: vec3f) -> vec2f {
+// Position in the atlas, from 0 to 1, of a point of a triangle.
+fn atlas_position(index: u32, w: vec3f) -> vec2f {
     let ab = bitcast<vec4f>(triangle_row(index, 1u));
     let c = bitcast<vec4f>(triangle_row(index, 2u));
     return w.x * ab.xy + w.y * ab.zw + w.z * c.xy;
 }
 
-// Texels of the atlas in a unit of uv.
+// Texels of the atlas per unit of uv.
 fn texels_per_uv(index: u32) -> f32 {
     return bitcast<f32>(triangle_row(index, 2u).z);
 }
@@ -77,7 +77,7 @@ fn corner_of(p: vec4f, n: vec4f, du: vec4f, dv: vec4f) -> Corner {
     return Corner(p.xyz, n.xyz, vec2f(p.w, n.w), du.xyz, dv.xyz);
 }
 
-// Side of a triangle in the maps over its side in the atlas.
+// Size of a triangle in the maps relative to its size in the atlas.
 fn maps_over_atlas(index: u32, a: Corner, b: Corner, c: Corner) -> f32 {
     let ab = bitcast<vec4f>(triangle_row(index, 1u));
     let ac = bitcast<vec4f>(triangle_row(index, 2u)).xy - ab.xy;
@@ -94,8 +94,8 @@ fn interpolate(a: Corner, b: Corner, c: Corner, w: vec3f, flags: u32) -> Point {
     let p = w.x * a.position + w.y * b.position + w.z * c.position;
     var point: Point;
     point.position = p;
-    // Facets shade themselves where the smooth normal still sees the light: shadow rays start on the
-    // curved surface that the corner normals suggest [Hanika2021].
+    // facets would shadow themselves where the smooth normal faces the light: shadow rays start on the curved surface
+    // that the corner normals define [Hanika2021]
     point.lit_position = w.x * lifted(p, a) + w.y * lifted(p, b) + w.z * lifted(p, c);
     point.normal = normalize(w.x * a.normal + w.y * b.normal + w.z * c.normal);
     point.uv = w.x * a.uv + w.y * b.uv + w.z * c.uv;
@@ -105,8 +105,8 @@ fn interpolate(a: Corner, b: Corner, c: Corner, w: vec3f, flags: u32) -> Point {
     return point;
 }
 
-// Barycentric weights of where a ray from the eye meets a triangle's plane are linear in the ray, up to scale. They are
-// made of the triangle's sides: products of its corners, seen from far away, would cancel each other to noise.
+// The barycentric weights at which a ray from the eye meets the plane of a triangle are linear in the ray, up to scale. They
+// are computed from the sides: products of distant corners would lose all precision.
 fn ray_to_weights(eye: vec3f, a: vec3f, b: vec3f, c: vec3f) -> mat3x3f {
     let away = a - eye;
     let to_b = cross(c - a, away);
@@ -114,16 +114,16 @@ fn ray_to_weights(eye: vec3f, a: vec3f, b: vec3f, c: vec3f) -> mat3x3f {
     return transpose(mat3x3f(cross(b - a, c - a) - to_b - to_c, to_b, to_c));
 }
 
-const FARTHEST_WEIGHT: f32 = 1e4; // where a ray runs along the plane
+const MAX_BARYCENTRIC: f32 = 1e4; // limit for rays that are parallel to the plane
 
 fn meet(weights: mat3x3f, ray: vec3f) -> vec3f {
     let w = weights * ray;
     let sum = w.x + w.y + w.z;
     let scaled = w / select(sum, 1e-20, abs(sum) < 1e-20);
-    return clamp(scaled, vec3f(-FARTHEST_WEIGHT), vec3f(FARTHEST_WEIGHT));
+    return clamp(scaled, vec3f(-MAX_BARYCENTRIC), vec3f(MAX_BARYCENTRIC));
 }
 
-// The nearest to weights that lies within the triangle.
+// Weights clamped to the triangle.
 fn within(w: vec3f) -> vec3f {
     let clamped = max(w, vec3f(0.0));
     let sum = clamped.x + clamped.y + clamped.z;

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dermis.frame.features.shape.curvature import Curvature, make_curvature
-from dermis.frame.features.shape.shape import Shape, ShapeTables, make_shape, shape_tables, make_rest_shape
+from dermis.frame.features.shape.shape import Shape, ShapeTables, make_rest_shape, make_shape, shape_tables
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Device, Memo
 from dermis.mesh.head import Head

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.programs import workgroup_grid, program
+from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import (
     Bindings,
     Buffer,
@@ -133,12 +133,16 @@ def _buffers(device: Device, tables: dict[str, NDArray[np.generic]]) -> dict[str
 
 
 def _vertices(device: Device, count: int) -> dict[str, Texture | Buffer]:
-    """Create a buffer of vertices for GPUs or a texture for software adapters, and a placeholder of the other."""
+    """Create a vertex buffer for GPUs or a vertex texture for software, and a placeholder of the other."""
     rows, software = -(-count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
     words = np.zeros((1 if software else rows * VERTICES_PER_ROW, 4, 4), np.float32)
     return dict(
-        zip(VERTEX_RESOURCES, (table, device.buffer(words, "STORAGE"), _floats(device, 4 * count)), strict=True)
+        zip(
+            VERTEX_RESOURCES,
+            (table, device.buffer(words, "STORAGE"), _floats(device, 4 * count)),
+            strict=True,
+        )
     )
 
 
@@ -301,8 +305,8 @@ def _evaluate(graph: Recorder, shape: Shape) -> None:
         _each(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
     if shape.stencils:
         _each(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
-    constants = (("MIN_UV_CROSS", MIN_UV_CROSS), ("MIN_TANGENT", MIN_TANGENT))
-    _each(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, constants)
+    limits = (("MIN_UV_CROSS", MIN_UV_CROSS), ("MIN_TANGENT", MIN_TANGENT))
+    _each(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
 
 
 def _each(graph: Recorder, name: str, bound: Bindings, count: int, constants: Constants = ()) -> None:

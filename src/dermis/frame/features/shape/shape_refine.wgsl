@@ -1,19 +1,19 @@
-// Points of a subdivided surface, each a mean of some control points.
+// Points of a subdivided surface, each a weighted mean of control points.
 //#include "each.wgsl"
 
 struct Term {
     point: u32,
-    weight: f32, // those of one mean add up to 1
+    weight: f32, // the weights of a point sum to 1
 }
 
-@group(0) @binding(0) var<storage, read> control: array<f32>; // three of each point [mm]
-@group(0) @binding(1) var<storage, read> first: array<u32>; // where a point's terms begin
+@group(0) @binding(0) var<storage, read> control: array<f32>; // three floats per point [mm]
+@group(0) @binding(1) var<storage, read> first: array<u32>; // start of the terms of each point
 @group(0) @binding(2) var<storage, read> terms: array<Term>;
 @group(0) @binding(3) var<storage, read_write> points: array<f32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= arrayLength(&first) - 1u) {
         return;
     }

@@ -1,16 +1,16 @@
-// Vertices of the surface that points span: each gathers its normal and its tangents from the triangles around it.
+// Vertices of the surface: positions, and normals and tangents from the triangles around each vertex.
 //#include "each.wgsl"
 
-override MESH_IN_BUFFERS: bool = false; // where vertices go, see geometry.wgsl
-override MIN_UV_CROSS: f32; // least twice-signed uv area of a triangle that has a direction of u and v
-override MIN_TANGENT: f32; // share of dpdu across the normal, below which any other direction serves as well
+override MESH_IN_BUFFERS: bool = false; // whether vertices are stored to the buffer, see geometry.wgsl
+override MIN_UV_CROSS: f32; // least cross product of the uv sides of a triangle with defined tangents
+override MIN_TANGENT: f32; // least length of dpdu without its part along the normal, relative to dpdu; shorter ones are replaced
 
-const LEAST_MM: f32 = 1e-6; // of dpdu and dpdv, per unit of uv
+const MIN_MM: f32 = 1e-6; // of dpdu and dpdv, per unit of uv
 
 struct Vertex {
     uv: vec2f,
     point: u32,
-    normal: vec3f, // its own, seen from the smooth one: along that, along u and beside u
+    normal: vec3f, // in the frame of the smooth normal, the u direction across it, and their cross product
 }
 
 struct Tangents {
@@ -18,12 +18,12 @@ struct Tangents {
     v: vec3f,
 }
 
-@group(0) @binding(0) var<storage, read> points: array<f32>; // three of each [mm]
+@group(0) @binding(0) var<storage, read> points: array<f32>; // three floats per point [mm]
 @group(0) @binding(1) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(2) var<storage, read> spans: array<vec4u>; // corners around the vertex' point; those of its own
-@group(0) @binding(3) var<storage, read> corners: array<vec2u>; // the next two vertices of the triangle
+@group(0) @binding(2) var<storage, read> spans: array<vec4u>; // ranges of the corners at the vertex' point, and of those at the vertex itself
+@group(0) @binding(3) var<storage, read> corners: array<vec2u>; // the other two vertices of the triangle
 @group(0) @binding(4) var<storage, read_write> vertex_buffer: array<vec4f>;
-@group(0) @binding(6) var<storage, read_write> vertex_lengths: array<vec4f>; // of both tangents, the cosine between them
+@group(0) @binding(6) var<storage, read_write> vertex_lengths: array<vec4f>; // of both tangents, and the cosine between them
 @group(0) @binding(5) var vertex_table: texture_storage_2d<rgba32float, write>;
 
 fn position_of(vertex: u32) -> vec3f {
@@ -31,7 +31,7 @@ fn position_of(vertex: u32) -> vec3f {
     return vec3f(points[at], points[at + 1u], points[at + 2u]);
 }
 
-// Mean of the normals of the triangles around, weighted by the angles of their corners.
+// Mean normal of the triangles around a point, weighted by the angles of their corners.
 fn smooth_normal(p: vec3f, span: vec2u) -> vec3f {
     var sum = vec3f(0.0);
     for (var k = span.x; k < span.y; k++) {
@@ -47,7 +47,7 @@ fn smooth_normal(p: vec3f, span: vec2u) -> vec3f {
     return select(vec3f(0.0, 0.0, 1.0), sum / size, size > 0.0);
 }
 
-// A direction across a normal, made from the axis that is least along it.
+// A direction orthogonal to a normal.
 fn across(n: vec3f) -> vec3f {
     let a = abs(n);
     var axis = vec3f(0.0, 0.0, 1.0);
@@ -59,7 +59,7 @@ fn across(n: vec3f) -> vec3f {
     return normalize(cross(axis, n));
 }
 
-// Change of position with u and v, the mean over the vertex' triangles by their areas.
+// Derivatives of position by u and v: mean over the triangles of the vertex, weighted by area.
 fn tangents_of(index: u32, p: vec3f, n: vec3f, span: vec2u) -> Tangents {
     let uv = vertices[index].uv;
     var sum = Tangents(vec3f(0.0), vec3f(0.0));
@@ -79,26 +79,26 @@ fn tangents_of(index: u32, p: vec3f, n: vec3f, span: vec2u) -> Tangents {
         }
     }
     let mean = Tangents(sum.u / max(total, 1e-30), sum.v / max(total, 1e-30));
-    if (total > 0.0 && min(length(mean.u), length(mean.v)) >= LEAST_MM) {
+    if (total > 0.0 && min(length(mean.u), length(mean.v)) >= MIN_MM) {
         return mean;
     }
     let u = across(n);
     return Tangents(u, cross(u, n));
 }
 
-// The vertex' own normal, which keeps its place beside the smooth one.
+// Normal of the vertex from its coordinates in the frame of the smooth normal.
 fn own_normal(own: vec3f, n: vec3f, dpdu: vec3f) -> vec3f {
-    var forth = dpdu - dot(dpdu, n) * n;
-    let size = length(forth);
+    var tangent = dpdu - dot(dpdu, n) * n;
+    let size = length(tangent);
     if (size > MIN_TANGENT * length(dpdu)) {
-        forth /= size;
+        tangent /= size;
     } else {
-        forth = across(n);
+        tangent = across(n);
     }
-    return normalize(own.x * n + own.y * forth + own.z * cross(n, forth));
+    return normalize(own.x * n + own.y * tangent + own.z * cross(n, tangent));
 }
 
-fn put(index: u32, k: u32, row: vec4f) {
+fn store_row(index: u32, k: u32, row: vec4f) {
     if (MESH_IN_BUFFERS) {
         vertex_buffer[4u * index + k] = row;
     } else {
@@ -109,7 +109,7 @@ fn put(index: u32, k: u32, row: vec4f) {
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= arrayLength(&vertices)) {
         return;
     }
@@ -119,10 +119,10 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let n = smooth_normal(p, span.xy);
     let along = tangents_of(index, p, n, span.zw);
     let normal = own_normal(vertex.normal, n, along.u);
-    put(index, 0u, vec4f(p, vertex.uv.x));
-    put(index, 1u, vec4f(normal, vertex.uv.y));
-    put(index, 2u, vec4f(along.u, 0.0));
-    put(index, 3u, vec4f(along.v, 0.0));
+    store_row(index, 0u, vec4f(p, vertex.uv.x));
+    store_row(index, 1u, vec4f(normal, vertex.uv.y));
+    store_row(index, 2u, vec4f(along.u, 0.0));
+    store_row(index, 3u, vec4f(along.v, 0.0));
     let lengths = vec2f(length(along.u), length(along.v));
     vertex_lengths[index] = vec4f(lengths, dot(along.u, along.v) / max(lengths.x * lengths.y, 1e-12), 0.0);
 }

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from dermis.frame.features.surface.painting.paint import painting_constants, texture_names
-from dermis.frame.features.surface.record import eye_constants, lobe_shaders, lobe_constants
+from dermis.frame.features.surface.record import eye_constants, lobe_constants, lobe_shaders
 from dermis.gpu.wgsl_source import Member
 
 

@@ -1,64 +1,64 @@
-// Colours of an eye: the white, and the iris as it is seen through the cornea.
+// Colours of an eye: the sclera, and the iris seen through the cornea.
 //#include "shape/eyeball.wgsl"
 
 //#fill const IRIS_AT: f32 = {iris_at}; // plane of the iris on the axis [mm]
 
-const EYE_ETA: f32 = 1.336; // of the cornea's front and what is behind, as one surface
+const EYE_ETA: f32 = 1.336; // of the cornea and the aqueous humour as one medium
 const IRIS_MM: f32 = 6.0; // radius
-const CONCAVE: f32 = 0.30; // light is gathered on the side of the iris opposite to it: slope at its rim
-// What a diffuse disc under the cornea shows of its colour: light that leaves water spreads over a wider cone, by the index
-// squared, and a lens of that curvature draws what arrives together on its way to the iris.
+const CONCAVE: f32 = 0.30; // slope of the iris normal at its rim: the cornea focuses light on the opposite side
+// Radiance of a diffuse disc under the cornea: light that leaves the medium spreads over a solid angle larger by the squared
+// index, and the cornea concentrates incident light on the iris.
 const FOCUS_MM: f32 = EYE_ETA * CORNEA_MM / (EYE_ETA - 1.0); // behind the apex
-const DRAWN_TO: f32 = 1.0 - (CORNEA_AT + CORNEA_MM - IRIS_AT) / FOCUS_MM; // part of a beam's width
-const UNDER_WATER: f32 = 1.0 / (EYE_ETA * EYE_ETA * DRAWN_TO * DRAWN_TO);
-const LIMBUS_SOFT_MM: f32 = 0.55; // half of the width over which the white turns clear
-const AROUND: f32 = 1.0; // how far normals of the white, which scatters light over some mm, turn to its front
-// Artist's values, linear.
-const STROMA: vec3f = vec3f(0.20, 0.27, 0.33); // without pigment, which scatters blue
+const FOCUSED_WIDTH: f32 = 1.0 - (CORNEA_AT + CORNEA_MM - IRIS_AT) / FOCUS_MM; // width of a beam on the iris relative to its width outside
+const IRIS_FACTOR: f32 = 1.0 / (EYE_ETA * EYE_ETA * FOCUSED_WIDTH * FOCUSED_WIDTH);
+const LIMBUS_SOFT_MM: f32 = 0.55; // half of the width over which the sclera becomes transparent
+const FORWARD: f32 = 1.0; // tilt of the normals of the sclera towards the front, as light scatters over some mm in it
+// Artistic values, linear.
+const STROMA: vec3f = vec3f(0.20, 0.27, 0.33); // without pigment; scattering makes it blue
 const PIGMENT: vec3f = vec3f(0.085, 0.040, 0.018); // of eumelanin
 const WHITE: vec3f = vec3f(0.52, 0.465, 0.435);
 const VESSEL: vec3f = vec3f(0.62, 0.20, 0.17);
 
 struct Eye {
-    to_own: mat4x4f, // from the head's space to mm of a usual eye, z along its axis
+    to_own: mat4x4f, // from head space to the space of the eye, in mm of an average eye with z along its axis
     material: u32,
     eumelanin: f32,
     pupil_mm: f32,
     redness: f32,
     seed: f32,
-    middle_mm: f32, // where on the axis the middle of the ball lies: 0 for one of usual size
+    middle_mm: f32, // position of the centre of the eyeball on the axis: 0 for an average eye
 }
 
-// Random numbers at whole places of the plane, and smooth noise between them.
+// Random numbers at integer points of the plane, and smooth noise between them.
 fn eye_random(cell: vec2f, seed: f32) -> f32 {
     return fract(sin(dot(cell, vec2f(127.1, 311.7)) + 17.3 * seed) * 43758.5453);
 }
 
-fn eye_noise(place: vec2f, seed: f32) -> f32 {
-    let cell = floor(place);
-    let t = (place - cell) * (place - cell) * (3.0 - 2.0 * (place - cell));
+fn eye_noise(position: vec2f, seed: f32) -> f32 {
+    let cell = floor(position);
+    let t = (position - cell) * (position - cell) * (3.0 - 2.0 * (position - cell));
     let near = mix(eye_random(cell, seed), eye_random(cell + vec2f(1.0, 0.0), seed), t.x);
     let far = mix(eye_random(cell + vec2f(0.0, 1.0), seed), eye_random(cell + vec2f(1.0, 1.0), seed), t.x);
     return mix(near, far, t.y);
 }
 
-// Noise around the axis, the same after a whole turn.
+// Noise around the axis, periodic in the angle.
 fn around_axis(turn: f32, fibres: f32, radius: f32, along: f32, seed: f32) -> f32 {
-    let place = turn / 6.2831853 * fibres;
-    let back = place - fibres;
+    let position = turn / 6.2831853 * fibres;
+    let back = position - fibres;
     let share = smoothstep(0.75, 1.0, turn / 6.2831853);
-    return mix(eye_noise(vec2f(place, radius * along), seed), eye_noise(vec2f(back, radius * along), seed), share);
+    return mix(eye_noise(vec2f(position, radius * along), seed), eye_noise(vec2f(back, radius * along), seed), share);
 }
 
-// Where the plane of the iris is seen through the cornea, from its axis [mm]: p, d of a point and the way of sight, own space.
-fn seen_on_iris(p: vec3f, d: vec3f) -> vec2f {
+// Point of the iris plane, relative to the axis [mm], that is visible through the cornea at p along the view direction d.
+fn refracted_to_iris(p: vec3f, d: vec3f) -> vec2f {
     let n = normalize(p - vec3f(0.0, 0.0, CORNEA_AT));
     let inside = refract(d, n, 1.0 / EYE_ETA);
     let far = (IRIS_AT - p.z) / min(inside.z, -0.05);
     return p.xy + max(far, 0.0) * inside.xy;
 }
 
-// Colour of the iris at a place of its plane: fibres of the stroma over a dark back, pigment among them.
+// Colour of the iris at a point of its plane: fibres of the stroma over a dark background, with pigment.
 fn iris_colour(eye: Eye, q: vec2f) -> vec3f {
     let r = length(q);
     let turn = atan2(q.y, q.x) + 3.14159265;
@@ -72,7 +72,7 @@ fn iris_colour(eye: Eye, q: vec2f) -> vec3f {
     let ruff = smoothstep(0.0, 0.06, share);
     let rim = 1.0 - 0.85 * smoothstep(0.80, 1.0, r / IRIS_MM + 0.06 * wave);
     let patches = around_axis(turn, 7.0, share, 1.6, eye.seed + 4.0);
-    // pigment lies around the pupil first
+    // pigment concentrates around the pupil
     let inner = 1.2 * exp(-pow(share / 0.42, 2.0));
     let pigment = eye.eumelanin * (0.55 + 0.9 * patches + inner) + 0.10 * inner;
     let hidden = 1.0 - exp(-2.6 * pigment * max(eye.eumelanin, 0.15));
@@ -82,7 +82,7 @@ fn iris_colour(eye: Eye, q: vec2f) -> vec3f {
     return mix(vec3f(0.0015), colour * mix(0.35, 1.0, ruff), open);
 }
 
-// Colour of the white at a place of the ball, with vessels towards its sides.
+// Colour of the sclera at a point of the eyeball, with vessels towards its sides.
 fn white_colour(eye: Eye, p: vec3f) -> vec3f {
     let off = length(p.xy);
     let aside = smoothstep(6.5, 11.5, off);
@@ -96,17 +96,17 @@ fn white_colour(eye: Eye, p: vec3f) -> vec3f {
     return mix(WHITE * yellow, VESSEL, clamp(red, 0.0, 0.8));
 }
 
-// Share of the surface at a place that is clear.
-fn clear_at(p: vec3f) -> f32 {
+// Transparency of the surface at a point.
+fn clearness(p: vec3f) -> f32 {
     return (1.0 - smoothstep(LIMBUS_MM - LIMBUS_SOFT_MM, LIMBUS_MM + LIMBUS_SOFT_MM, length(p.xy))) * step(0.0, p.z);
 }
 
-// The same place of the iris or, beside it, of its edge.
-fn on_iris_at(q: vec2f) -> vec2f {
+// Point of the iris plane, clamped to the iris.
+fn clamped_to_iris(q: vec2f) -> vec2f {
     return q * min(1.0, IRIS_MM / max(length(q), 1e-3));
 }
 
-// The iris' normal at such a place as if it gathered light, which the cornea does.
-fn gathered_at(on_iris: vec2f) -> vec3f {
+// Normal of the iris at a point, tilted to imitate the focusing by the cornea.
+fn iris_normal(on_iris: vec2f) -> vec3f {
     return normalize(vec3f(-CONCAVE * on_iris / IRIS_MM, 1.0));
 }

@@ -1,9 +1,9 @@
-// A map at half the resolution: the mean of what each texel covers, three texels of an odd side.
+// Map at half the resolution: mean over the area of each texel, three texels wide for odd sizes.
 //#include "store.wgsl"
 
 @group(0) @binding(0) var finer: texture_2d<f32>;
 
-// Weights of the texels 2 at, 2 at + 1 and 2 at + 2 of a side.
+// Weights of the texels 2 at, 2 at + 1 and 2 at + 2 along a side.
 fn taps(at: u32, side: u32) -> vec3f {
     if (side == 1u) {
         return vec3f(1.0, 0.0, 0.0);

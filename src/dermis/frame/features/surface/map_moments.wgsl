@@ -1,4 +1,4 @@
-// Slopes and their squares: a footprint's means give its normal and roughness [OlanoBaker2010].
+// Slopes and their squares; their means over a footprint give its normal and roughness [OlanoBaker2010].
 //#include "store.wgsl"
 
 @group(0) @binding(0) var slopes: texture_2d<f32>;

@@ -26,7 +26,7 @@ DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map [-]."""
 _EYE_SEEDS = 1000  # number of different eyes
 _NO_BAND = -1.0
-_MOST_ASIDE_MM = 3.0  # limit, as the surface is flat only near a texel
+_MAX_OFFSET_MM = 3.0  # limit, as the surface is flat only near a texel
 
 
 def lobe_shaders() -> list[Member]:
@@ -110,15 +110,15 @@ def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Float
 def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Return the members that direction.wgsl reads, for a half-space of mean skin colour."""
     half_space = mean_half_space(skin, maps, profile)
-    law = anisotropic_response(*half_space, skin.anisotropy)
+    response = anisotropic_response(*half_space, skin.anisotropy)
     return {
-        "inner_eta": law.eta,
-        "aside_mm": min(oblique_offset_mm(equivalent_medium(profile, *half_space)), _MOST_ASIDE_MM),
-        "mean_once": law.mean_kernel,
-        "once": law.single_scattering,
-        "back_from_everywhere": law.relative_diffuse_reflectance,
-        "back": np.pad(law.relative_reflectance, ((0, 0), (0, 1))),
-        "across": np.pad(
+        "eta_below": response.eta,
+        "oblique_offset_mm": min(oblique_offset_mm(equivalent_medium(profile, *half_space)), _MAX_OFFSET_MM),
+        "mean_single_scattering": response.mean_kernel,
+        "single_scattering": response.single_scattering,
+        "uniform_reflectance": response.relative_diffuse_reflectance,
+        "reflectance": np.pad(response.relative_reflectance, ((0, 0), (0, 1))),
+        "transmittance": np.pad(
             oblique_transmittance(*half_space, profile.from_photons, skin.anisotropy), ((0, 0), (0, 1))
         ),
     }

@@ -1,13 +1,13 @@
-// Slopes of a height map along +u and down [mm per texel], Scharr's, and their squares, with the first mip.
+// Slopes of a height map along +u and down [mm/texel] by Scharr's filter, their squares, and the first mip level.
 //#include "store.wgsl"
 
-@group(0) @binding(0) var<storage, read> top: array<u32>; // the first row of a band of the map
-@group(0) @binding(1) var<storage, read> heights: array<f32>; // of the band [mm], with a texel more on all sides
+@group(0) @binding(0) var<storage, read> top: array<u32>; // first row of the band
+@group(0) @binding(1) var<storage, read> heights: array<f32>; // of the band, with a border of one texel [mm]
 @group(0) @binding(33) var halved: texture_storage_2d<rgba16float, write>;
 
-const ROWS: u32 = 32u; // of an invocation, which takes two columns: what it has read it keeps
+const ROWS: u32 = 32u; // per invocation, which handles two columns and reuses the rows that it has read
 
-// At two columns of a row: what is right of each less what is left, and the three by 3, 10, 3.
+// Differences across two columns of a row, and sums of three heights weighted by 3, 10, 3.
 struct Row {
     change: vec2f,
     sum: vec2f,

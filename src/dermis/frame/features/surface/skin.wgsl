@@ -1,4 +1,4 @@
-// The skin's own parameters and its maps: colour, relief as a surface gradient, gloss.
+// Maps of the skin: colour, relief as a surface gradient, gloss.
 //#include "surface.wgsl"
 
 @group(0) @binding(3) var map_sampler: sampler;
@@ -8,7 +8,7 @@
 @group(0) @binding(7) var specular_map: texture_2d<f32>; // filtered: factor of rho_s
 @group(0) @binding(8) var roughness_map: texture_2d<f32>; // filtered: factor of the roughness
 
-@group(0) @binding(14) var detail_map: texture_2d_array<f32>; // filtered: a tile, slopes of pores and of furrows; then their squares
+@group(0) @binding(14) var detail_map: texture_2d_array<f32>; // filtered, a tile: slopes of pores and of furrows, then their squares
 @group(0) @binding(15) var detail_sampler: sampler;
 
 override DETAIL: bool = false; // whether the skin has relief finer than its maps
@@ -26,13 +26,13 @@ fn mip_for(image: texture_2d<f32>, footprint: f32) -> f32 {
     return max(0.0, log2(footprint * max(size.x, size.y)));
 }
 
-// The skin's surface at a point, filtered over `footprint`, a share of the uv square's side.
-// Relief too fine for it widens the lobe by its slope variance [OlanoBaker2010].
+// Surface at a point, filtered over `footprint`, relative to the side of the uv square. Finer relief widens the lobe by its
+// slope variance [OlanoBaker2010].
 fn surface_at(point: Point, footprint: f32) -> Surface {
     let length_u = length(point.dpdu);
     let length_v = length(point.dpdv);
     let s = textureSampleLevel(slope_map, map_sampler, point.uv, mip_for(slope_map, footprint));
-    // The height map adds only what is finer than the normal map: both usually come from one relief.
+    // the height map adds only relief finer than the normal map: usually both have the same source
     let size = vec2f(textureDimensions(relief_map));
     var mip = mip_for(relief_map, footprint);
     var coarse = vec4f(0.0);
@@ -59,19 +59,19 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     return out;
 }
 
-// Slopes along u and down of pores and furrows, and the variance of what the footprint does not show.
-// amounts: of both; density: binary logarithm of the mm in a unit of uv
-// The tile is laid at powers of two, so that charts of any density have pores of true size to a factor of 1.4.
+// Slopes of pores and furrows along u and down, and the variance of slopes finer than the footprint.
+// amounts : of pores and furrows; density : log2 of the mm per unit of uv
+// Tiles are scaled by powers of two, so that pores have their true size to a factor of 1.4 in all charts.
 fn detail_at(uv: vec2f, footprint: f32, amounts: vec2f, density: f32) -> vec3f {
     let level = density - log2(TILE_MM);
-    let whole = floor(level);
-    let part = smoothstep(0.4, 0.6, level - whole);
+    let octave = floor(level);
+    let part = smoothstep(0.4, 0.6, level - octave);
     var found = vec3f(0.0);
     if (part < 1.0) {
-        found = (1.0 - part) * tiled(uv, footprint, amounts, exp2(whole));
+        found = (1.0 - part) * tiled(uv, footprint, amounts, exp2(octave));
     }
     if (part > 0.0) {
-        found += part * tiled(uv, footprint, amounts, exp2(whole + 1.0));
+        found += part * tiled(uv, footprint, amounts, exp2(octave + 1.0));
     }
     return found;
 }
@@ -84,12 +84,12 @@ fn tiled(uv: vec2f, footprint: f32, amounts: vec2f, tiles: f32) -> vec3f {
     return vec3f(amounts.x * slopes.xy + amounts.y * slopes.zw, dot(amounts * amounts, hidden));
 }
 
-// The colour map's part before (mix) or after (1 - mix) scattering; pow(0, 0) is undefined, so black is nearly black.
-fn share_of(colour: vec3f, exponent: f32) -> vec3f {
+// Colour map applied before (mix) or after (1 - mix) scattering; black is clamped, as pow(0, 0) is undefined.
+fn colour_power(colour: vec3f, exponent: f32) -> vec3f {
     return pow(max(colour, vec3f(1e-8)), vec3f(exponent));
 }
 
-// The normal of the surface raised by a height whose change with uv is `gradient` [mm]. Source: [Mikkelsen2010].
+// Normal of a surface displaced by a height with this gradient over uv [mm]. Source: [Mikkelsen2010].
 fn bend(point: Point, gradient: vec2f) -> vec3f {
     let n = point.normal;
     let across = cross(point.dpdv, n);

@@ -1,35 +1,35 @@
-// The skin's numbers, and the tables of its surface.
+// Parameters of the skin, and the tables of its surface.
 //#include "bilinear.wgsl"
 
 const PI: f32 = 3.14159265358979;
 
-// Members named as a field or property of scene/skin.py hold it; frame/features/surface/record.py derives the others.
+// Members with the name of a field or property of scene/skin.py have its value; frame/features/surface/record.py derives the others.
 struct Skin {
-    m: f32, // Beckmann roughness with the skin's oil where the roughness map is 1
-    strength: f32, // rho_s with the skin's oil where the specular map is 1
+    m: f32, // Beckmann roughness, oil included, where the roughness map is 1
+    strength: f32, // rho_s, oil included, where the specular map is 1
     f0: f32, // Schlick's reflectance at normal incidence
     eta: f32, // index of refraction
-    loss: f32, // factor of the surface's albedo in what enters and leaves: 0 for no term, 1, or the published pi
-    returned: f32, // 1 when light that the surface reflects back inside comes out after all, else 0
-    tint: f32, // 1 colours the reflection by the colour map, which is wrong for skin
-    mix: f32, // share of the colour map applied before scattering
-    relief_band: f32, // mip of the height map from which on the normal map has the relief, -1 for none
+    loss: f32, // factor of the specular albedo in the transmission: 0 without this term, 1, or the published pi
+    returned: f32, // 1 if light that the surface reflects back inside leaves in the end, else 0
+    tint: f32, // 1 multiplies the reflection by the colour map, which is wrong for skin
+    mix: f32, // exponent of the colour map that is applied before scattering
+    relief_band: f32, // mip of the height map from which the normal map has the relief, -1 for none
     light_count: u32,
-    inner_eta: f32, // index of half-spaces, 1 for those without a surface; see direction.wgsl
-    mean_once: f32, // of 1/(a + b) over both directions
-    aside_mm: f32, // how far beside where it entered the middle of light comes back that came along the surface
-    once: vec3f, // strength of single scattering
-    back_from_everywhere: vec3f, // share of uniform light that comes back, over that of light from straight above
-    back: array<vec4f, 32>, // the same for light from one direction, by evenly spaced roots of its cosine
-    across: array<vec4f, 32>, // of light from one direction, what passes deep slabs, over that of uniform light that comes back alike
+    eta_below: f32, // index of refraction of the half-space, 1 without a surface; see direction.wgsl
+    mean_single_scattering: f32, // mean of 1/(a + b) over both directions
+    oblique_offset_mm: f32, // lateral offset of the mean exit point for grazing incidence [mm]
+    single_scattering: vec3f, // strength of single scattering
+    uniform_reflectance: vec3f, // reflectance of uniform light over that at normal incidence
+    reflectance: array<vec4f, 32>, // reflectance of light from one direction over that at normal incidence, by evenly spaced roots of the cosine
+    transmittance: array<vec4f, 32>, // light from one direction that passes deep slabs, over that of uniform light with equal reflectance
 }
 
 @group(0) @binding(2) var<uniform> skin: Skin;
-@group(0) @binding(13) var nearest_sampler: sampler; // non-filtering, to gather with
+@group(0) @binding(13) var nearest_sampler: sampler; // non-filtering
 @group(0) @binding(9) var beckmann_table: texture_2d<f32>;
 @group(0) @binding(10) var albedo_table: texture_2d<f32>; // rho_dt and its mean over directions
 
-// Bilinear weights of the four texels in the order in which they are gathered; whole numbers are texel centres.
-fn gather_weights(place: vec2f) -> vec4f {
-    return bilinear_weights(place).zwyx;
+// Bilinear weights of four texels in the order of textureGather; integers are texel centres.
+fn gather_weights(position: vec2f) -> vec4f {
+    return bilinear_weights(position).zwyx;
 }

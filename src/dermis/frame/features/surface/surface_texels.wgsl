@@ -1,4 +1,4 @@
-// The surface at each texel of the atlas: where it is, its normals, its colour and its gloss.
+// Surface at each texel of the atlas: position, normals, colour and gloss.
 //#include "packed_surface.wgsl"
 
 @group(0) @binding(30) var atlas: texture_2d<u32>; // triangle + 1, two barycentric weights packed
@@ -11,7 +11,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let texel = textureLoad(atlas, id.xy, 0);
-    var made = Packed(vec4u(0u), vec4u(0u));
+    var packed = Packed(vec4u(0u), vec4u(0u));
     if (texel.x > 0u) {
         let t = triangle_at(texel.x - 1u);
         let w = unpack2x16unorm(texel.y);
@@ -19,8 +19,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let b = corner_at(t.y);
         let c = corner_at(t.z);
         let point = interpolate(a, b, c, vec3f(1.0 - w.x - w.y, w), t.w);
-        made = pack_surface(point, surface_at(point, maps_over_atlas(texel.x - 1u, a, b, c) / f32(size.x)));
+        packed = pack_surface(point, surface_at(point, maps_over_atlas(texel.x - 1u, a, b, c) / f32(size.x)));
     }
-    textureStore(surfaces, id.xy, 0, made.place);
-    textureStore(surfaces, id.xy, 1, made.look);
+    textureStore(surfaces, id.xy, 0, packed.geometry);
+    textureStore(surfaces, id.xy, 1, packed.appearance);
 }

@@ -12,7 +12,9 @@ SURFACE_BYTES = 32
 
 def make_surface_texture(device: Device, side: int) -> Texture:
     """Create the texture of positions, normals, colours and gloss of texels, see packed_surface.wgsl."""
-    return mark_scratch(device, make_texture(device, (side, side), "rgba32uint", layers=2, name="atlas's surface"))
+    return mark_scratch(
+        device, make_texture(device, (side, side), "rgba32uint", layers=2, name="atlas's surface")
+    )
 
 
 def draw(graph: Recorder, layout: LitAtlas) -> None:

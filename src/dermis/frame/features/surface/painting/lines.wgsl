@@ -1,15 +1,15 @@
-// Height of the skin over its smooth surface, as far as maps show it [mm].
+// Height of the skin above its smooth surface, as fine as maps resolve [mm].
 //#include "spot.wgsl"
 
-// Artist's values.
-const MOVED: f32 = 0.7; // depth that a full movement adds, over that of an old face
-const MOVED_OLD: f32 = 0.4;
+// Artistic values.
+const MOVEMENT_DEPTH: f32 = 0.7; // depth that a full movement adds to a fold, relative to its depth in an old face
+const MOVEMENT_DEPTH_AGE: f32 = 0.4;
 const GRAIN_MM: f32 = 0.040;
 const LINE_MM: f32 = 0.07;
 const CREASE_MM: f32 = 0.16;
 const MOLE_MM: f32 = 0.18;
 
-// Depth of a groove where noise crosses zero, no sharper than texels can show.
+// Depth of a groove along the zeros of a noise, limited to the resolution of texels.
 fn groove(n: f32, sharpness: f32, texel_mm: f32, blob_mm: f32) -> f32 {
     let finest = min(sharpness, 0.45 * blob_mm / texel_mm);
     let side = max(1.0 - abs(n) * finest, 0.0);
@@ -29,11 +29,11 @@ fn relief(spot: Spot, lip: f32) -> f32 {
     let creases = (0.6 + 0.6 * noise[NOISE_CREASE_DEPTH]) * groove(noise[NOISE_CREASES], 2.2, texel, 1.7)
         + 0.3 * groove(noise[NOISE_FINE_CREASES], 2.5, texel, 0.8);
     height -= lip * CREASE_MM * creases * smoothstep(0.2, 2.0, abs(spot.fields.y));
-    return height + MOLE_MM * smoothstep(0.1, 0.6, dotted[DOT_MOLES]) + folded(spot);
+    return height + MOLE_MM * smoothstep(0.1, 0.6, dotted[DOT_MOLES]) + fold_height(spot);
 }
 
-// Furrows along the face's own lines, with the skin a little raised beside them; and what movements add to them.
-fn folded(spot: Spot) -> f32 {
+// Height of the folds of the face, with slightly raised borders; sets the heights that movements add.
+fn fold_height(spot: Spot) -> f32 {
     var height = 0.0;
     for (var k = 0u; k < FOLDING; k++) {
         deepened[k] = 0.0;
@@ -45,7 +45,7 @@ fn folded(spot: Spot) -> f32 {
     );
     let p = spot.left + FOLD_WANDER_MM * bend;
     var k = 0u;
-    loop { // over those that reach here, as in make_noise
+    loop { // over the folds that reach this texel, as in make_noise
         loop {
             if (k >= FOLDS) {
                 break;
@@ -67,7 +67,7 @@ fn folded(spot: Spot) -> f32 {
         let part = ends * shape * fold.size.x / width * max(0.8 + 0.6 * noise[NOISE_LINE_DEPTH], 0.0);
         height += mix(fold.size.y, fold.size.z, paint.age) * part;
         if (fold.size.w > 0.0) {
-            deepened[u32(fold.size.w) - 1u] += (MOVED + MOVED_OLD * paint.age) * fold.size.z * part;
+            deepened[u32(fold.size.w) - 1u] += (MOVEMENT_DEPTH + MOVEMENT_DEPTH_AGE * paint.age) * fold.size.z * part;
         }
         k++;
     }
@@ -78,12 +78,12 @@ fn reaches(fold: Fold, p: vec3f, texel_mm: f32) -> bool {
     return distance(p, fold.ball.xyz) < fold.ball.w + FOLD_REACH * width_of(fold, texel_mm);
 }
 
-// Squared distance to a fold [mm2], and how far along it that is.
+// Squared distance to a fold [mm2], and position along it.
 fn nearest(p: vec3f, knots: vec4f) -> vec2f {
     var found = vec2f(1e9, 0.0);
     var k = u32(knots.x);
     var knot = tables.knots[k];
-    loop { // with its test at the end, as in lighting.wgsl
+    loop { // with the test at the end, as in lighting.wgsl
         k++;
         let next = tables.knots[k];
         let along = next - knot;

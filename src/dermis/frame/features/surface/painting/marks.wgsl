@@ -1,21 +1,21 @@
-// Freckles, moles, spots of age and shaved hair: dots, as many as the skin and its zones have.
+// Freckles, moles, age spots and stubble: dots with densities of the skin and its zones.
 //#include "spot.wgsl"
 
 fn scatter_dots(spot: Spot, scalp: f32, lip: f32) {
-    var kept: array<f32, DOTS>;
+    var density: array<f32, DOTS>;
     let sun = saturate(zone_of(ZONE_SUN));
     let freckled = paint.freckles * (0.12 + 0.88 * sun) * (0.75 + 0.75 * noise[NOISE_SUN]) * (1.0 - lip);
-    kept[DOT_FRECKLES] = 0.7 * freckled;
-    kept[DOT_SMALL_FRECKLES] = freckled;
-    kept[DOT_MOLES] = 0.3 * paint.moles * (1.0 - lip);
-    kept[DOT_AGE_SPOTS] = 0.8 * paint.spots * (0.1 + 0.9 * sun) * (1.0 - lip);
-    kept[DOT_STUBBLE] = select(0.0, 1.0, max(scalp * paint.stubble, saturate(zone_of(ZONE_BEARD)) * paint.beard) > 0.0);
+    density[DOT_FRECKLES] = 0.7 * freckled;
+    density[DOT_SMALL_FRECKLES] = freckled;
+    density[DOT_MOLES] = 0.3 * paint.moles * (1.0 - lip);
+    density[DOT_AGE_SPOTS] = 0.8 * paint.spots * (0.1 + 0.9 * sun) * (1.0 - lip);
+    density[DOT_STUBBLE] = select(0.0, 1.0, max(scalp * paint.stubble, saturate(zone_of(ZONE_BEARD)) * paint.beard) > 0.0);
     for (var k = 0u; k < DOTS; k++) {
         dotted[k] = 0.0;
-        if (kept[k] > 0.0) {
+        if (density[k] > 0.0) {
             let kind = tables.dot_kinds[k];
             let bent = spot.body + kind.ragged_mm * vec3f(noise[NOISE_RAGGED_X], noise[NOISE_RAGGED_Y], 0.0);
-            dotted[k] = dots(bent, spot.normal, kind, kept[k], spot.texel_mm, 64u * paint.seed + 40u + 2u * k);
+            dotted[k] = dots(bent, spot.normal, kind, density[k], spot.texel_mm, 64u * paint.seed + 40u + 2u * k);
         }
     }
 }

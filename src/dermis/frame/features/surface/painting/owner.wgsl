@@ -1,10 +1,10 @@
-// Which triangle each texel of the skin's maps belongs to: the one that it lies on, beside the charts the nearest.
+// Triangle of each texel of the skin's maps; around charts, the nearest triangle.
 //#include "each.wgsl"
 //#include "painted_surface.wgsl"
 
-@group(0) @binding(3) var<storage, read_write> owners: array<atomic<u32>>; // of each texel, 0 for none
+@group(0) @binding(3) var<storage, read_write> owners: array<atomic<u32>>; // distance code and triangle + 1 of each texel, 0 for none
 
-// How far outside of a triangle a place is [texels], about.
+// Approximate distance of a point outside a triangle [texels].
 fn outside(p: vec2f, corners: array<vec2f, 3>, turn: f32) -> f32 {
     var far = 0.0;
     for (var k = 0u; k < 3u; k++) {
@@ -18,7 +18,7 @@ fn outside(p: vec2f, corners: array<vec2f, 3>, turn: f32) -> f32 {
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = number_of(group, groups, lane);
+    let index = list_index(group, groups, lane);
     if (index >= arrayLength(&triangles) / 4u) {
         return;
     }
@@ -28,14 +28,14 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let a = corners[1] - corners[0];
     let b = corners[2] - corners[0];
     let turn = sign(a.x * b.y - a.y * b.x);
-    let margin = select(0.0, MARGIN, t.w > 0u); // only at a chart's border is anything beside the triangle
+    let margin = select(0.0, MARGIN, t.w > 0u); // only triangles at the border of a chart are extended
     let low = vec2i(max(ceil(min(min(corners[0], corners[1]), corners[2]) - margin), vec2f(0.0)));
     let high = vec2i(min(floor(max(max(corners[0], corners[1]), corners[2]) + margin), vec2f(side - 1.0)));
     for (var y = low.y; y <= high.y; y++) {
         for (var x = low.x; x <= high.x; x++) {
             let far = outside(vec2f(vec2i(x, y)), corners, turn);
             if (turn != 0.0 && far <= margin) {
-                // The nearest wins, among triangles that share an edge the last.
+                // the nearest triangle wins; on a shared edge, the last one
                 let near = NEAREST - u32(far * STEPS);
                 atomicMax(&owners[u32(y) * paint.side + u32(x)], (near << ID_BITS) | (index + 1u));
             }

@@ -24,9 +24,9 @@ from dermis.gpu import (
     Device,
     Graph,
     MutableBindings,
-    UniformRecord,
     Recorder,
     Texture,
+    UniformRecord,
     make_texture,
     upload,
 )
@@ -35,11 +35,18 @@ from dermis.gpu.shader_types import make_record, struct_dtype
 from dermis.gpu.textures import download
 from dermis.gpu.wgsl_source import Member
 from dermis.human.skin import face, textures
-from dermis.human.skin.face import ZONE_AMOUNTS, HAIRLINE_STEP_DEGREES, FOLD_MOVEMENTS, table_sizes
+from dermis.human.skin.face import FOLD_MOVEMENTS, HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, table_sizes
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.painted import face_and_lip_colours
 from dermis.human.skin.surface import PaintedSurface
-from dermis.human.skin.textures import DOT_LAYERS, NOISE_REGIONS, NOISES, TILE_LENGTH_MM, ZONE_BORDER_NOISES, noise_table
+from dermis.human.skin.textures import (
+    DOT_LAYERS,
+    NOISE_REGIONS,
+    NOISES,
+    TILE_LENGTH_MM,
+    ZONE_BORDER_NOISES,
+    noise_table,
+)
 from dermis.mesh.maps import Maps
 from dermis.scene.skin import DEFAULT_RHO_S
 
@@ -67,7 +74,11 @@ def painting_constants() -> dict[str, float]:
     """Return the constants of the painting shaders, by their `//#fill` names."""
     names = {name: len(names) for name, names in _NAMES.items()}
     own = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM, "folding": FOLD_MOVEMENTS}
-    rows = {"noise_rows": len(noise_table()), "wander_rows": ZONE_BORDER_NOISES, "amount_rows": len(ZONE_AMOUNTS) // 4}
+    rows = {
+        "noise_rows": len(noise_table()),
+        "wander_rows": ZONE_BORDER_NOISES,
+        "amount_rows": len(ZONE_AMOUNTS) // 4,
+    }
     return own | names | table_sizes() | rows
 
 
@@ -123,7 +134,9 @@ def _face_tables(recession: float) -> bytes:
     folds, edge = face.fold_curves(), face.hairline_heights(recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
     curves = np.pad(np.hstack([folds.curves, ends]), ((0, 0), (0, _VECTOR_FLOATS - 2)))
-    hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), ((0, 0), (0, _VECTOR_FLOATS - 2)))
+    hairline = np.pad(
+        np.column_stack([edge, np.append(edge[1:], edge[-1])]), ((0, 0), (0, _VECTOR_FLOATS - 2))
+    )
     tables = (
         textures.noise_table(),
         textures.dot_table(),
@@ -222,7 +235,9 @@ def _downloaded(device: Device, maps: RestMaps, animated: bool) -> Arrays:
     arrays = {name: download(device, getattr(maps, name).texture) for name in _MAPS}
     arrays["heights"] = np.frombuffer(device.handle.queue.read_buffer(maps.heights), np.float32)
     if animated and maps.expression_deltas is not None:
-        arrays["expression_deltas"] = np.stack([download(device, maps.expression_deltas, layer=layer) for layer in range(2)])
+        arrays["expression_deltas"] = np.stack(
+            [download(device, maps.expression_deltas, layer=layer) for layer in range(2)]
+        )
     return arrays
 
 
@@ -235,7 +250,9 @@ def _uploaded(device: Device, arrays: Arrays, side: int) -> RestMaps:
         expression_deltas = make_texture(device, (side, side), HALVES, layers=2)
         for layer, texels in enumerate(arrays["expression_deltas"]):
             upload(device, expression_deltas, texels, layer=layer)
-    return RestMaps(**maps, heights=device.buffer(arrays["heights"], "STORAGE"), expression_deltas=expression_deltas)
+    return RestMaps(
+        **maps, heights=device.buffer(arrays["heights"], "STORAGE"), expression_deltas=expression_deltas
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,7 +356,9 @@ def paint_textures(
         relief = map_mips.relief_from_buffers(device, [maps.heights], (side, side), side)
         return PaintedTextures(colour.texture, *gloss, relief, None)
     relief_texture = map_mips.empty_map(device, (side, side))
-    expression_maps = make_expression_maps(device, maps.colour.texture, maps.heights, maps.expression_deltas, (colour, relief_texture))
+    expression_maps = make_expression_maps(
+        device, maps.colour.texture, maps.heights, maps.expression_deltas, (colour, relief_texture)
+    )
     return PaintedTextures(colour.texture, *gloss, relief_texture.texture, expression_maps)
 
 

@@ -11,7 +11,7 @@ from dermis.frame.features.surface.painting import paint
 from dermis.frame.features.surface.record import fill_eye
 from dermis.frame.programs import program
 from dermis.gpu import CommandList, Device, download, make_texture
-from dermis.human.skin.painted import MIN_SIDE, MAX_SIDE, PaintedMaps
+from dermis.human.skin.painted import MAX_SIDE, MIN_SIDE, PaintedMaps
 from dermis.human.skin.surface import painted_surface
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import FALLING, RIM, EyePictures

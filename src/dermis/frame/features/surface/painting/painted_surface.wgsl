@@ -1,14 +1,14 @@
-// The surface that skin is painted on: a human's triangles, and where on the average person their corners are.
+// Surface that is painted: triangles of a human, with positions of their corners on the average person.
 
-const MARGIN: f32 = 8.0; // texels around charts that are painted too
+const MARGIN: f32 = 8.0; // width around charts that is painted too [texels]
 const ID_BITS: u32 = 20u;
 const NEAREST: u32 = 0xfffu;
-const STEPS: f32 = 256.0; // of a texel, that distances are told apart by
+const STEPS: f32 = 256.0; // steps per texel of quantised distances
 
 struct Paint {
     side: u32, // of the maps [texels]
     seed: u32,
-    melanin: f32, // fields of SkinLook from here on
+    melanin: f32, // this and the following: fields of SkinLook
     blood: f32,
     redness: f32,
     freckles: f32,
@@ -24,15 +24,15 @@ struct Paint {
 
 struct Vertex {
     uv: vec2f,
-    place: vec3f, // on the average person [mm]
+    position: vec3f, // on the average person [mm]
     normal: vec3f,
     fields: vec3f, // distances [mm], see human/skin/surface.py
-    density: f32, // binary logarithm of the mm in a unit of uv
+    density: f32, // log2 of the mm per unit of uv
 }
 
 @group(0) @binding(0) var<uniform> paint: Paint;
-@group(0) @binding(1) var<storage, read> vertices: array<f32>; // twelve of each
-@group(0) @binding(2) var<storage, read> triangles: array<u32>; // three corners, and 1 at a chart's border
+@group(0) @binding(1) var<storage, read> vertices: array<f32>; // twelve floats per vertex
+@group(0) @binding(2) var<storage, read> triangles: array<u32>; // three corners, and 1 at the border of a chart
 
 fn triangle_of(index: u32) -> vec4u {
     let at = 4u * index;
@@ -43,11 +43,11 @@ fn uv_of(index: u32) -> vec2f {
     return vec2f(vertices[12u * index], vertices[12u * index + 1u]);
 }
 
-fn three(at: u32) -> vec3f {
+fn vector_at(at: u32) -> vec3f {
     return vec3f(vertices[at], vertices[at + 1u], vertices[at + 2u]);
 }
 
 fn vertex_of(index: u32) -> Vertex {
     let at = 12u * index;
-    return Vertex(uv_of(index), three(at + 2u), three(at + 5u), three(at + 8u), vertices[at + 11u]);
+    return Vertex(uv_of(index), vector_at(at + 2u), vector_at(at + 5u), vector_at(at + 8u), vertices[at + 11u]);
 }

@@ -1,4 +1,4 @@
-// What is known of a texel of the skin's maps: its place on the average person, noise, zones and dots.
+// Attributes of a texel of the skin's maps: position on the average person, noise, zones and dots.
 //#include "painted_surface.wgsl"
 //#include "noise.wgsl"
 
@@ -18,22 +18,22 @@
 //#fill const DEGREES: f32 = {degrees};
 
 struct Noise {
-    x: vec4f, // rows of the matrix to the lattice; the size of texel that shows it [mm], 0 for always
-    y: vec4f, // strength
-    z: vec4f, // seed, as bits
-    which: vec4f, // noise, space and where it shows, as bits
+    x: vec4f, // rows of the matrix to the lattice; w of the first: feature size [mm], 0 for noise that is never filtered
+    y: vec4f, // w: strength
+    z: vec4f, // w: seed, as bits
+    which: vec4f, // noise, space and region, as bits
 }
 
 struct Zone {
     centre: vec4f, // [mm]
-    reach: vec4f, // one over the radii
+    inverse_radii: vec4f, // [1/mm]
     //#fill amounts: array<vec4f, {amount_rows}>,
 }
 
 struct Fold {
     ball: vec4f, // centre and radius [mm]
-    size: vec4f, // width, depth in a young and in an old face [mm], movement
-    knots: vec4f, // its first one and its last
+    size: vec4f, // width, depth in a young and in an old face [mm], number of the movement
+    knots: vec4f, // first and last index
 }
 
 struct Tables {
@@ -41,29 +41,29 @@ struct Tables {
     //#fill dot_kinds: array<Dots, {dots}>,
     //#fill zones: array<Zone, {zones}>,
     //#fill folds: array<Fold, {folds}>,
-    //#fill knots: array<vec4f, {knots}>, // places [mm], how far along
-    //#fill hairline: array<vec4f, {edges}>, // height, and that of the next [mm]
+    //#fill knots: array<vec4f, {knots}>, // positions [mm], and position along the fold
+    //#fill hairline: array<vec4f, {edges}>, // height of this and of the next entry [mm]
 }
 
-@group(0) @binding(4) var<uniform> tables: Tables; // software adapters read storage more slowly
+@group(0) @binding(4) var<uniform> tables: Tables; // uniform, as software adapters read storage buffers more slowly
 
-// Artist's values.
-const WANDER_MM: f32 = 5.0; // of the zones' borders
-const LIP_WANDER_MM: f32 = 0.45; // and of the lips'
-const LIP_MM: vec2f = vec2f(-1.1, 1.3); // beside their border, between which skin turns into them
-const HAIRLINE_MM: vec2f = vec2f(-9.0, 16.0); // beside the hairline, between which hair gets dense
+// Artistic values.
+const WANDER_MM: f32 = 5.0; // displacement of the borders of zones
+const LIP_WANDER_MM: f32 = 0.45; // displacement of the border of the lips
+const LIP_MM: vec2f = vec2f(-1.1, 1.3); // range around their border over which skin turns into lips
+const HAIRLINE_MM: vec2f = vec2f(-9.0, 16.0); // range around the hairline over which hair becomes dense
 const HAIRLINE_WANDER_MM: vec2f = vec2f(5.0, 4.0);
 const LOWEST_HAIR_MM: f32 = -80.0;
-const EYE: vec2f = vec2f(29.5, -0.5); // that lines run around [mm]
+const EYE: vec2f = vec2f(29.5, -0.5); // centre of the lines around an eye [mm]
 const HEAD_AXIS_Z: f32 = -72.0;
 
 const FOLD_WANDER_MM: f32 = 2.4;
-const FOLD_REACH: f32 = 6.0; // in widths
+const FOLD_REACH: f32 = 6.0; // in widths of a fold
 
-// What is known of a texel.
+// Attributes of a texel.
 struct Spot {
-    body: vec3f, // place on the average person [mm]
-    left: vec3f, // the same on its left half
+    body: vec3f, // position on the average person [mm]
+    left: vec3f, // the same, mirrored to the left half
     normal: vec3f,
     fields: vec3f,
     texel_mm: f32,
@@ -89,14 +89,14 @@ fn spot_of(owner: u32, at: vec2u) -> Spot {
     let ap = p - a.uv;
     let w = vec2f(ap.x * ac.y - ap.y * ac.x, ab.x * ap.y - ab.y * ap.x) / (ab.x * ac.y - ab.y * ac.x);
     let u = 1.0 - w.x - w.y;
-    let place = u * a.place + w.x * b.place + w.y * c.place;
+    let position = u * a.position + w.x * b.position + w.y * c.position;
     let normal = normalize(u * a.normal + w.x * b.normal + w.y * c.normal);
     let density = u * a.density + w.x * b.density + w.y * c.density;
     let fields = u * a.fields + w.x * b.fields + w.y * c.fields;
-    return Spot(place, vec3f(abs(place.x), place.yz), normal, fields, exp2(density) / f32(paint.side), density);
+    return Spot(position, vec3f(abs(position.x), position.yz), normal, fields, exp2(density) / f32(paint.side), density);
 }
 
-// Where a noise is looked up; later ones are bent by those before.
+// Position at which a noise is evaluated; earlier noises displace later ones.
 fn in_space(spot: Spot, space: u32) -> vec3f {
     let p = spot.body;
     switch (space) {
@@ -116,26 +116,26 @@ fn in_space(spot: Spot, space: u32) -> vec3f {
     }
 }
 
-// How much of a row of noise shows at a texel.
-// grounds: bits of where the texel is; noise that shows elsewhere alone is left 0
-fn shown(row: u32, texel_mm: f32, grounds: u32) -> f32 {
+// Amplitude of a row of noise at a texel.
+// grounds : bits of the regions of the texel; noise of other regions is 0
+fn amplitude(row: u32, texel_mm: f32, grounds: u32) -> f32 {
     let blob_mm = tables.noises[row].x.w;
     let here = (grounds & (1u << bitcast<u32>(tables.noises[row].which.z))) != 0u;
     return select(0.0, select(visible(blob_mm, texel_mm), 1.0, blob_mm == 0.0), here);
 }
 
-// Noise of all sizes, of rows from the first on. Software adapters run what is in a branch for nothing, but for no row
-// that is passed over here.
+// Noise of all sizes, for a range of rows. Rows without effect are skipped in an inner loop, because software adapters
+// execute both sides of branches.
 fn make_noise(spot: Spot, first: u32, end: u32, grounds: u32) {
     var k = first;
     loop {
-        var much = 0.0;
+        var strength = 0.0;
         loop {
             if (k >= end) {
                 break;
             }
-            much = shown(k, spot.texel_mm, grounds);
-            if (much > 0.0) {
+            strength = amplitude(k, spot.texel_mm, grounds);
+            if (strength > 0.0) {
                 break;
             }
             k++;
@@ -147,12 +147,12 @@ fn make_noise(spot: Spot, first: u32, end: u32, grounds: u32) {
         let p = in_space(spot, bitcast<u32>(one.which.y));
         let lattice = vec3f(dot(one.x.xyz, p), dot(one.y.xyz, p), dot(one.z.xyz, p));
         let seed = bitcast<u32>(one.z.w) + 64u * paint.seed;
-        noise[bitcast<u32>(one.which.x)] += one.y.w * much * gradient_noise(lattice, seed);
+        noise[bitcast<u32>(one.which.x)] += one.y.w * strength * gradient_noise(lattice, seed);
         k++;
     }
 }
 
-// All that noise makes up: where zones reach to comes first, as noise shows in some of them alone.
+// All noise of a texel. Zones come first, as some noise is limited to zones.
 fn make_textures(spot: Spot) {
     for (var k = 0u; k < NOISES; k++) {
         noise[k] = 0.0;
@@ -162,13 +162,13 @@ fn make_textures(spot: Spot) {
     make_noise(spot, WANDER_ROWS, NOISE_ROWS, grounds_of(spot));
 }
 
-// Bits of where a texel is, no wider than noise bends their borders.
+// Bits of the regions of a texel, extended by the largest displacement of their borders.
 fn grounds_of(spot: Spot) -> u32 {
-    let lips = spot.fields.x > LIP_MM.x - LIP_WANDER_MM * MOST_NOISE;
+    let lips = spot.fields.x > LIP_MM.x - LIP_WANDER_MM * MAX_NOISE;
     let lines = zone_of(ZONE_LEVEL) != 0.0 || zone_of(ZONE_AROUND) != 0.0;
     let veined = zone_of(ZONE_VEINS) > 0.0 && paint.veins > 0.0;
     let above = above_hairline(spot);
-    let bent = MOST_NOISE * (HAIRLINE_WANDER_MM.x + HAIRLINE_WANDER_MM.y);
+    let bent = MAX_NOISE * (HAIRLINE_WANDER_MM.x + HAIRLINE_WANDER_MM.y);
     let edge = spot.left.y >= LOWEST_HAIR_MM && above > HAIRLINE_MM.x - bent && above < HAIRLINE_MM.y + bent;
     let folds = near_folds(spot);
     return (1u << GROUND_ALL)
@@ -184,12 +184,12 @@ fn width_of(fold: Fold, texel_mm: f32) -> f32 {
     return sqrt(fold.size.x * fold.size.x + 0.64 * texel_mm * texel_mm);
 }
 
-// Whether a fold may reach a texel, however it is bent.
+// Whether a fold can reach a texel with any displacement.
 fn near_folds(spot: Spot) -> bool {
     var near = false;
     for (var k = 0u; k < FOLDS; k++) {
         let fold = tables.folds[k];
-        let reach = fold.ball.w + FOLD_REACH * width_of(fold, spot.texel_mm) + 1.5 * MOST_NOISE * FOLD_WANDER_MM;
+        let reach = fold.ball.w + FOLD_REACH * width_of(fold, spot.texel_mm) + 1.5 * MAX_NOISE * FOLD_WANDER_MM;
         near = near || distance(spot.left, fold.ball.xyz) < reach;
     }
     return near;
@@ -201,13 +201,13 @@ fn sum_zones(spot: Spot) {
     }
     let p = spot.left + WANDER_MM * vec3f(noise[NOISE_WANDER_X], noise[NOISE_WANDER_Y], 0.0);
     var k = 0u;
-    loop { // over those that reach here, as in make_noise
+    loop { // over the zones that reach this texel, as in make_noise
         var away = 0.0;
         loop {
             if (k >= ZONES) {
                 break;
             }
-            let off = (p - tables.zones[k].centre.xyz) * tables.zones[k].reach.xyz;
+            let off = (p - tables.zones[k].centre.xyz) * tables.zones[k].inverse_radii.xyz;
             away = dot(off, off);
             if (away < 14.0) {
                 break;
