@@ -78,6 +78,7 @@ def make_scene(person: Path, size: list[int]) -> None:
 
 
 def set_render(size: list[int]) -> None:
+    """Set up Cycles, the size and the passes."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = size
@@ -129,11 +130,13 @@ def combined(path: Path) -> Any:
 
 
 def aim(thing: Any, place: Vector, target: Vector) -> None:
+    """Place an object and turn it towards a target."""
     thing.location = place
     thing.rotation_euler = (target - place).to_track_quat("-Z", "Y").to_euler()
 
 
 def add(name: str, data: Any) -> Any:
+    """Add an object with the given data to the scene and return it."""
     made = bpy.data.objects.new(name, data)
     bpy.context.collection.objects.link(made)
     return made

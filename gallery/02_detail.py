@@ -1,7 +1,7 @@
 """Scanned detail, off and on.
 
-The mesh alone is smooth. Pores and wrinkles come from a normal map and from a height map of up to 4096
-texels a side, in mm. Detail that is too fine for a pixel makes its surface rougher instead.
+The mesh alone is smooth. Pores and wrinkles are in a normal map and in a height map of up to 4096 texels per
+side, in mm. Detail that is finer than a pixel increases the roughness instead.
 
 Deck: S1
 Sources: dEonLuebke2007, OlanoBaker2010

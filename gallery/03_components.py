@@ -1,7 +1,7 @@
-"""The two components by themselves.
+"""The two components of skin.
 
-Reflection off the oily surface is white and shows every pore. Light scattered below is soft and has the
-skin's colour. Their sum is skin.
+The reflection off the oily surface is white and shows every pore. Light scattered below the surface is soft
+and has the colour of the skin. Skin is the sum of both.
 
 Deck: S2, S7
 Equation: L = L_reflected + L_scattered

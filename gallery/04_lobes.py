@@ -1,7 +1,7 @@
 """Five models of surface reflection.
 
-The same skin with each model: on the head, alone (twice as bright), and in close-up. Phong and
-Blinn-Phong reflect far too little at grazing angles.
+The same skin with each model: on the head, alone (twice as bright), and in close-up. Phong and Blinn-Phong
+reflect far too little at grazing angles.
 
 Deck: S3, S4, S5
 Equation: f_r = ρ_s D(m, N·H) F(V·H) / (4 (V·H)²) (Kelemen and Szirmay-Kalos)

@@ -1,7 +1,7 @@
 """Fresnel reflectance: Schlick's approximation and the exact curve.
 
-Skin's index of refraction is 1.4, so it reflects 2.8 % of light at normal incidence and all of it at grazing
-angles. Schlick's approximation is good enough: the difference is shown twenty times as bright.
+The index of refraction of skin is 1.4, so it reflects 2.8 % of the light at normal incidence and all of it at
+grazing angles. Schlick's approximation is good enough: the difference is shown twenty times as bright.
 
 Deck: S6
 Equation: F ≈ F₀ + (1 − F₀)(1 − V·H)⁵, F₀ = 0.028

@@ -1,6 +1,6 @@
-"""One roughness for the face, or one for each region.
+"""One roughness for the face, or one per region.
 
-Roughness and strength by region, and one value for all; beside each its reflection alone, three times as
+Roughness and strength by region, and one value everywhere; beside each its reflection alone, three times as
 bright. Below, both maps in grey: roughness 0.2 to 0.4, strength 0 to 1.2. The values are an artist's choice.
 
 Deck: S9, S10

@@ -1,11 +1,11 @@
-"""White reflections, and tinted ones.
+"""White reflections and tinted ones.
 
-Skin is no metal: its surface reflects in the colour of the light. Multiplied by the colour map, it looks like
-painted clay. Shown on oily skin.
+Skin is not a metal: its surface reflects in the colour of the light. Multiplied by the colour map, it looks
+like painted clay. Shown on oily skin.
 
 Deck: S7
 Sources: Dudash2007
-Slider: white, as it is | tinted, as it is not
+Slider: white (correct) | tinted (wrong)
 """
 
 import dermis
@@ -15,7 +15,7 @@ from dermis.apps.gallery.script import draw_script
 def draw(studio):
     head = studio.head()
     camera = dermis.three_quarter(head)
-    ways = {"white, as it is": "white", "tinted, as it is not": "wrong"}
+    ways = {"white (correct)": "white", "tinted (wrong)": "wrong"}
     return {
         name: studio.render(
             dermis.Scene(head, camera=camera, skin=dermis.Skin(specular_colour=colour, oiliness=0.5)), 1.4

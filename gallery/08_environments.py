@@ -1,8 +1,8 @@
 """Image-based light.
 
-A hall with many lamps and a room with one large window, each rotated about the head. Reflections read a
-panorama prefiltered for each roughness, scattered light its irradiance; peaks as small as a sun become
-lights with shadows.
+A hall with many lamps and a room with one large window, each rotated about the head. Reflections use a
+panorama prefiltered for each roughness, scattered light its irradiance; small bright peaks such as the sun
+become lights with shadows.
 
 Deck: S8
 Sources: KautzMcCool2000, RamamoorthiHanrahan2001

@@ -1,7 +1,7 @@
 """One layer looks like wax, three like skin.
 
-A single layer (skin1) and three layers (dj3): their profiles, and the shadow of a nose with both. The printed
-coefficients of the three layers do not give the six published Gaussians in any unit.
+A single layer (skin1) and three layers (dj3): their profiles, and the shadow of a nose with both. The
+published coefficients of the three layers do not give the six published Gaussians in any unit.
 
 Deck: S12
 Sources: Jensen2001, DonnerJensen2005, dEonLuebke2007

@@ -1,8 +1,8 @@
 """A narrow white beam on a slab of skin.
 
-A beam as thin as a hair enters in the centre; red light leaves up to a centimetre away. The upper half shows
-a Monte Carlo count of photons, the lower half the six Gaussians that a frame uses. Each picture is 8 mm wide,
-exposed so that red is equally bright a millimetre from the beam.
+The beam enters at the centre; red light leaves up to a centimetre away. The upper half shows a Monte Carlo
+simulation, the lower half the six Gaussians that a frame uses. Each picture is 8 mm wide, exposed so that red
+is equally bright at one millimetre from the beam.
 
 Deck: S14
 Sources: DonnerJensen2005, Wang1995
@@ -12,7 +12,7 @@ import numpy as np
 
 import dermis
 from dermis.apps.gallery.script import draw_script
-from dermis.apps.truths.slab_mc import counted_profile
+from dermis.apps.truths.slab_mc import monte_carlo_profile
 
 HALF_MM, EXPOSED_MM, PHOTONS = 4.0, 1.0, 400_000
 
@@ -20,7 +20,7 @@ HALF_MM, EXPOSED_MM, PHOTONS = 4.0, 1.0, 400_000
 def draw(studio):
     panels = {}
     for name in ("dj3", "skin1", "skin2"):
-        counted = counted_profile(dermis.load_tissue(name).medium, photons=PHOTONS)
+        counted = monte_carlo_profile(dermis.load_tissue(name).medium, photons=PHOTONS)
         panels[name] = spot(counted, dermis.load_profile(name), studio.side)
     return panels
 

@@ -1,7 +1,7 @@
 """One Gaussian cannot match a profile, a sum of six can.
 
 r R(r) of three-layer skin in red, green and blue: the model, the best single Gaussian, and six Gaussians with
-the same widths for all colours.
+the same variances for all colours.
 
 Deck: S14
 Equation: R(r) ≈ Σ_k w_k G(v_k, r), G(v, r) = exp(−r²/2v) / 2πv

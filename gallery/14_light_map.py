@@ -1,8 +1,8 @@
 """Light on the unwrapped skin.
 
-The head's surface is laid out flat, each texel is lit where it lies on the head, and the light is blurred
-there: the light that enters, a blur of medium width, and the widest. The gutters between the charts are
-filled with light from across the seam, as far as the blurs reach.
+The surface of the head is flattened to the atlas, each texel is lit at its position on the head, and the
+light is blurred in the atlas: the incoming light, a blur of medium width, and the widest. The gutters between
+the charts are filled with light from across the seam, as far as the blurs reach.
 
 Deck: S15
 Equation: E(texel) = Σ_lights E max(N·L, 0) V (1 − ρ_s ρ_dt) albedo^mix

@@ -1,8 +1,8 @@
-"""A cascade of Gaussians, each blurred from the one before.
+"""A cascade of Gaussians, each blurred from the previous one.
 
-Six widths from 0.08 to 2.7 mm. Wide blurs start from narrow ones and add the difference of the variances,
-on ever coarser maps. Weighted by colour they add up to skin; the narrowest is finer than the map, so each
-pixel is lit directly instead.
+Six widths from 0.08 to 2.7 mm. Wide blurs start from narrow ones and add the difference of the variances, at
+lower and lower resolution. Weighted by colour they add up to skin; the narrowest is finer than the atlas, so
+each pixel is lit directly instead.
 
 Deck: S15, S16, S21
 Equation: E_k = E_{k−1} ∗ G(v_k − v_{k−1})

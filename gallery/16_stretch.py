@@ -1,11 +1,11 @@
-"""A map stretches skin, so blurs must be stretched too.
+"""The atlas stretches skin, so blurs must be stretched too.
 
-A fine grid of light on the ear, blurred by the same Gaussians: with one width for the whole map, with widths
-corrected along u and v, and with the full metric, which knows that u and v are rarely perpendicular. Then the
-map's stretch.
+A fine grid of light on the ear, blurred by the same Gaussians: with one width for the whole atlas, with
+widths corrected along u and v, and with the full metric, because u and v are rarely perpendicular. Then the
+stretch of the atlas.
 
 Deck: S17
-Equation: σ_u = σ |∂(u,v)/∂x|, slanted where u and v are
+Equation: σ_u = σ |∂(u,v)/∂x|, sheared where u and v are oblique
 Sources: dEonLuebke2007, Geusebroek2003
 Columns: 4
 """

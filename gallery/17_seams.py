@@ -1,7 +1,7 @@
-"""Seams of the map, and the remedies.
+"""Seams of the atlas, and their treatments.
 
-Blurs work on the map, so light stops or bleeds at its seams. From left: no remedy, a colour around the
-charts, blurs that narrow at chart edges, blurs that skip empty texels, a second map cut elsewhere, and
+Blurs work in the atlas, so light stops or bleeds at its seams. From left: no treatment, a colour around the
+charts, blurs that narrow at chart edges, blurs that skip empty texels, a second layout with other seams, and
 blurs that continue across the seam along the surface. Below each, four times its difference from the last.
 
 Deck: S18
@@ -14,7 +14,7 @@ import numpy as np
 import dermis
 from dermis.apps.gallery.script import draw_script
 
-REMEDIES = ("none", "clear-colour", "stretch-map", "alpha", "multi-uv", "stitch")
+TREATMENTS = ("none", "clear-colour", "stretch-map", "alpha", "multi-uv", "stitch")
 
 
 def draw(studio):
@@ -23,9 +23,9 @@ def draw(studio):
     behind = dermis.Camera(position=(900, -200, -500), target=(52, -62, -28), frame_mm=105)
     skin = dermis.Skin(profile="skin1", specular="none")
     scene = dermis.Scene(head, lights=[light], camera=behind, skin=skin)
-    panels = {name: studio.linear(scene, 0.6, seams=name) for name in REMEDIES}
+    panels = {name: studio.linear(scene, 0.6, seams=name) for name in TREATMENTS}
     right = panels["stitch"]
-    return panels | {f"{name}: difference": 4 * np.abs(panels[name] - right) for name in REMEDIES}
+    return panels | {f"{name}: difference": 4 * np.abs(panels[name] - right) for name in TREATMENTS}
 
 
 if __name__ == "__main__":

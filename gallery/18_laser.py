@@ -1,7 +1,7 @@
-"""A laser's line on cheek and ear.
+"""A laser line on cheek and ear.
 
-A vertical sheet of light shows how far light spreads on curved skin: without scattering, as this package
-scatters it, and the truth, path traced through the medium itself.
+A vertical sheet of light shows how far light spreads in curved skin: without scattering, with the scattering
+of this package, and path traced through the medium as the reference.
 
 Deck: S19
 Sources: Dudash2007, JensenBuhler2002, Jakob2022
@@ -21,7 +21,7 @@ def draw(studio):
     techniques = ("none", "texture-space")
     made = compare(studio.head(), against, techniques, light="laser", region="ear", settings=settings)
     shown = {"dry": made.images["none"], "texture space": made.images["texture-space"]}
-    shown |= {f"truth ({against})": made.truth.image}
+    shown |= {f"truth ({against})": made.reference.image}
     return {label: np.float32(3 * made.exposure * image) for label, image in shown.items()}
 
 

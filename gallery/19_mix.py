@@ -1,7 +1,7 @@
 """The colour map before the blur, after it, or half and half.
 
-Multiplied before the blur, its detail is lost; after it, no colour bleeds. With a mix of one half, the square
-root of the map is applied on both sides.
+Multiplied before the blur, the map loses its detail; after it, no colour bleeds. With a mix of one half, the
+square root of the map is applied on both sides.
 
 Deck: S20
 Equation: E′ = E albedo^mix, L = (E′ ∗ R) albedo^(1−mix)

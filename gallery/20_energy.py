@@ -1,8 +1,8 @@
-"""What is reflected does not enter.
+"""Reflected light does not enter the skin.
 
-With the talk's surface. Above, the head without an energy term, with the published one, and with the full
-one. Below, the same head in white under uniform light: it should return exactly what it receives, shown as
-grey; blue is up to 10 % too dark, red up to 10 % too bright.
+With the surface of the 2007 talk. Above, the head without an energy term, with the published one, and with
+the full one. Below, the same head in white under uniform light: it should return exactly what it receives,
+shown as grey; blue is up to 10 % too dark, red up to 10 % too bright.
 
 Deck: S22
 Equation: E_in = Σ_lights E max(N·L, 0) (1 − ρ_s ρ_dt(N·L, m))

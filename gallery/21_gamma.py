@@ -1,11 +1,11 @@
-"""Lighting in linear values, and in gamma-encoded ones.
+"""Lighting with linear values and with gamma-encoded ones.
 
 Colour maps are decoded, light is added linearly, and the picture is encoded at the end. Without decoding and
-encoding, colours are too strong and shading falls off too fast.
+encoding, colours are too saturated and shading falls off too fast.
 
 Deck: S23
 Sources: SRGB1999, Dudash2007
-Slider: linear, as it is | encoded, as it is not
+Slider: linear (correct) | encoded (wrong)
 """
 
 import dermis
@@ -14,7 +14,7 @@ from dermis.apps.gallery.script import draw_script
 
 def draw(studio):
     scene = dermis.Scene(studio.head(), camera=dermis.three_quarter(studio.head()))
-    ways = {"linear, as it is": "right", "encoded, as it is not": "wrong"}
+    ways = {"linear (correct)": "right", "encoded (wrong)": "wrong"}
     return {label: studio.render(scene, 1.4, gamma=gamma) for label, gamma in ways.items()}
 
 

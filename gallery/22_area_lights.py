@@ -1,4 +1,4 @@
-"""Shadows of a point, a sphere and a rectangle in the same place.
+"""Shadows of a point, a sphere and a rectangle at the same position.
 
 The larger the light, the softer its shadows; yet every shadow is sharp at contact, below the wing of the nose
 and between the lips, and softens with distance.

@@ -1,10 +1,10 @@
 """Ears lit from behind.
 
 Light that enters behind an ear leaves in front. Red light penetrates deepest, so the glow is red, and
-strongest where the ear is thinnest. Above the head of this gallery, below the package's own.
+strongest where the ear is thinnest. Above the head of this gallery, below the human of the package.
 
 Deck: +
-Equation: E_through = Σ_places A (R(straight distance) − R(way along the surface)) E_there
+Equation: E_through = Σ_cells A (R(straight distance) − R(distance along the surface)) E_cell
 Sources: dEonLuebke2007
 Columns: 2
 """

@@ -1,8 +1,8 @@
-"""Six ways to scatter light, with their errors and times.
+"""Six techniques of scattering, with their errors and times.
 
 The shadow of the nose, compared with the same profile integrated over the surface by straight-line distance:
 relative RMSE, and the milliseconds of a frame on this machine. Texture space as in this package; no
-scattering; one blur for all colours; the passes of 2007; and what engines use, blurs over the picture and
+scattering; one blur for all colours; the passes of 2007; and the methods of engines, screen-space blurs and
 tables over curvature.
 
 Deck: S24, S25
@@ -18,9 +18,9 @@ from dermis.scene.techniques import TECHNIQUES
 def draw(studio):
     settings = studio.settings(0.6)
     made = compare(studio.head(), "surface-integral", TECHNIQUES.names, region="nose", settings=settings)
-    panels = {"the surface integral": (255 * made.shown(made.truth.image)).round().astype("uint8")}
+    panels = {"the surface integral": (255 * made.tone_mapped(made.reference.image)).round().astype("uint8")}
     for row in made.rows:
-        image = (255 * made.shown(made.images[row.technique])).round().astype("uint8")
+        image = (255 * made.tone_mapped(made.images[row.technique])).round().astype("uint8")
         panels[f"{row.technique}: {row.relrmse:.1%}, {row.ms:.0f} ms"] = image
     return panels
 

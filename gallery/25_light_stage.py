@@ -1,7 +1,7 @@
 """A light stage: relighting by adding pictures.
 
-The head under 48 surrounding lights, one at a time, as a light stage photographs it. Any environment is
-then a weighted sum of these pictures, without rendering. Beside it the same room rendered directly.
+The head under 48 surrounding lights, one at a time, as a light stage photographs it. Any environment is then
+a weighted sum of these pictures, without rendering. Beside it the same room rendered directly.
 
 Deck: S24
 Equation: L = Σ_i E_i L_i
@@ -12,7 +12,7 @@ import numpy as np
 
 import dermis
 from dermis.apps.gallery.script import draw_script
-from dermis.scene.light_stage import light_stage, stage_weights
+from dermis.scene.light_stage import light_stage, light_stage_weights
 
 ROOM = dermis.Environment(name="lebombo")
 
@@ -21,7 +21,7 @@ def draw(studio):
     head = studio.head()
     camera, lights = dermis.three_quarter(head), light_stage(48)
     stage = [studio.linear(dermis.Scene(head, lights=[light], camera=camera), 0.7) for light in lights]
-    relit = np.einsum("lc,lyxc->yxc", stage_weights(lights, ROOM), stage)
+    relit = np.einsum("lc,lyxc->yxc", light_stage_weights(lights, ROOM), stage)
     room = dermis.Scene(head, camera=camera, environment=ROOM)
     return {
         "one light after the other": [3 * picture for picture in stage],

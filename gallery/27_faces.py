@@ -1,7 +1,7 @@
 """Faces by melanin and blood.
 
 The same head without a colour map, its colour from the profile alone: melanosomes in the epidermis across,
-blood in the dermis down. Melanin takes blue first, blood takes green.
+blood in the dermis down. Melanin absorbs mostly blue, blood mostly green.
 
 Deck: S24
 Sources: DonnerJensen2006

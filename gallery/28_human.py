@@ -1,6 +1,6 @@
-"""The head in the package.
+"""The human of the package.
 
-A person between all, from MakeHuman's parametric human, which comes with the package: no scan, no file, no
+The average person of MakeHuman's parametric human, which is part of the package: no scan, no file, no
 network. With scattering above, without below.
 
 Deck: S11

@@ -1,7 +1,7 @@
 """Six people of one model.
 
-Ancestry, sex, age, weight and muscle are numbers, and so is each feature of the face. All have the same
-points: one head becomes another by where its points are.
+Ancestry, sex, age, weight, muscle and each feature of the face are numbers. All people share one mesh and
+differ only in its vertex positions.
 
 Columns: 3
 """

@@ -1,6 +1,6 @@
 """Light that the lens scatters.
 
-A share of the picture's light, spread by ever wider Gaussians, as lens and eye do around bright spots.
+A fraction of the light is spread by wider and wider Gaussians, as lens and eye do around bright spots.
 Exaggerated here to be visible.
 
 Deck: +

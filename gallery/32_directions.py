@@ -1,9 +1,9 @@
-"""Skin that looks the same from everywhere, and skin that does not.
+"""Direction-independent and direction-dependent diffuse reflection.
 
-A Lambertian surface reflects the same in all directions. A half-space of tissue reflects more of light at
-grazing angles, and light that scattered only once leaves mostly at grazing angles: cheeks look flatter,
-outlines and shadow edges brighter. Beside both a path-traced picture, and their relative RMSE from it.
-Without surface reflection.
+A Lambertian surface reflects the same in all directions. A half-space of tissue reflects more of the light at
+grazing incidence, and singly scattered light leaves mostly at grazing angles: cheeks look flatter, outlines
+and shadow edges brighter. Beside both a path-traced picture, and their relative RMSE from it. Without surface
+reflection.
 
 Deck: +
 Sources: Chandrasekhar1960, Jensen2001, Jakob2022
@@ -24,9 +24,9 @@ def draw(studio):
     for direction in ("lambertian", "half-space"):
         made = compare(studio.head(), against, (TECHNIQUE,), settings=settings, direction=direction)
         label = f"{direction}: {made.rows[0].relrmse:.1%}" if traced else direction
-        panels[label] = made.shown(made.images[TECHNIQUE])
+        panels[label] = made.tone_mapped(made.images[TECHNIQUE])
     if traced:
-        panels["path traced"] = made.shown(made.truth.image)
+        panels["path traced"] = made.tone_mapped(made.reference.image)
     return {label: (255 * image).round().astype("uint8") for label, image in panels.items()}
 
 

@@ -1,7 +1,7 @@
-"""The six expressions that people everywhere know.
+"""The six universal expressions.
 
-Weights of ARKit's targets move the skin; the folds that belong to a movement deepen with it, lips that are
-pressed turn pale, and the eyes turn with the lids. Shape, shadows and what scatters below the skin follow.
+Weights of ARKit's morph targets move the skin; folds deepen with the movement, pressed lips turn pale, and
+the eyes turn with the lids. Shape, shadows and subsurface scattering follow.
 
 Deck: +
 Columns: 3

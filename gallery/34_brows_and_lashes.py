@@ -1,7 +1,7 @@
 """Brows and lashes.
 
-Single hairs, grown by code on the package's human and drawn by compute: what a hair scatters follows from its
-pigments, and it shades the skin. Hairs go along with the skin.
+Single hairs, generated on the human and rendered by compute shaders: their scattering follows from their
+pigments, and they cast shadows on the skin. Hairs move with the skin.
 
 Deck: +
 Equation: L = Σ_lobes A M N E

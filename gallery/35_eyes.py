@@ -1,7 +1,7 @@
-"""Eyes without paint.
+"""Procedural eyes.
 
-Fibres of the iris scatter blue, eumelanin over them makes it green and brown; sight is refracted by the
-cornea. From the side the iris comes forward.
+The fibres of the iris scatter blue light; eumelanin above them makes it green or brown. The cornea refracts
+the view, so that the iris bulges when seen from the side.
 
 Deck: +
 Columns: 4

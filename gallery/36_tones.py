@@ -1,6 +1,6 @@
-"""One person in the skins that people have.
+"""One person with different skin tones.
 
-From the least to the most melanin that is measured, with as much blood in all of them.
+From the least to the most measured melanin, all with the same blood.
 
 Deck: S24
 Columns: 4

@@ -1,7 +1,7 @@
-"""Three people whom nobody has met.
+"""Three random people.
 
-Drawn at random and painted by numbers: pigments, pores, folds that follow the face, eyes, brows, lashes. All
-of it is in the package; none of it is a photograph.
+Drawn at random and painted from numbers: pigments, pores, folds that follow the face, eyes, brows and lashes.
+Everything is part of the package; nothing is a photograph.
 
 Deck: +
 Columns: 3

@@ -1,7 +1,7 @@
 """Short hair and beards.
 
-Tens of thousands of hairs on whoever it is, cropped, combed or coiled, by their pigments. They shade each
-other, and pass on light.
+Tens of thousands of hairs on any person, cropped, combed or coiled, coloured by their pigments. They cast
+shadows on each other and scatter light between them.
 
 Deck: +
 Equation: T = exp(-n (1 - a_f))

@@ -1,7 +1,7 @@
-"""What a frame knows besides its colour.
+"""Outputs of a frame besides its colour.
 
-Depth, normals, motion since the frame before, light before and after it spreads, pigments, labels: each at
-the centre of every pixel, so that they agree. Hair is drawn over them.
+Depth, normals, motion since the previous frame, light before and after scattering, pigments and labels, all
+sampled at the pixel centres, so that they agree. Hair is rendered over them.
 
 Deck: +
 Columns: 7

@@ -1,7 +1,7 @@
 """Ground truth of a face.
 
-Landmarks, green where they are seen and red where they are hidden, and the parts of the face: known to the
-renderer, not guessed from the picture. Left and right are the person's own.
+Landmarks, green where visible and red where hidden, and the parts of the face: known to the renderer, not
+estimated from the picture. Left and right are those of the person.
 
 Deck: +
 Columns: 3

@@ -1,7 +1,7 @@
-"""The scan in other skins.
+"""The scan with other skin.
 
-Each texel's melanin and blood are found from its colour alone, changed, and turned into colour again; brows,
-lips and stubble, which are no such skin, stay.
+Melanin and blood of each texel are estimated from its colour alone, changed, and converted back to colour.
+Brows, lips and stubble, which the skin model does not describe, remain.
 
 Deck: S24
 Columns: 4

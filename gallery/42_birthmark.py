@@ -1,6 +1,7 @@
-"""A birthmark that scatters less far.
+"""A birthmark that scatters less.
 
-Lines of light across a port-wine stain stay narrow but for their red: blood takes the rest near by.
+Lines of light across a port-wine stain remain narrow except for their red, because blood absorbs the other
+colours within a short distance.
 
 Sources: DonnerJensen2006, dEonLuebke2007
 """

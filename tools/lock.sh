@@ -1,7 +1,7 @@
 #!/bin/sh
-# Write requirements.lock, what a picture from a clone needs, and requirements-dev.lock, with all that the dev extra adds:
-# every package pinned by hash, for every platform. What both have is of one version.
-# Options are handed to uv (`--upgrade` takes newer versions than the lock has now).
+# Write requirements.lock with the requirements of the package, and requirements-dev.lock with those of the extra `dev`:
+# every package pinned by hash, for all platforms. Packages in both files have the same version.
+# Options are passed to uv (`--upgrade` selects newer versions).
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -17,7 +17,7 @@ find_uv() {
 }
 
 uv=$(find_uv)
-# Where packages come from is the machine's affair: no index address may get into the file.
+# The package index is a setting of the machine: no index address may be written to the file.
 lock() {
     lock_file=$1
     shift

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Make .venv and see to a Vulkan driver. Run again, it does only what is missing.
-# setup.sh [dev]: what a picture needs, from requirements.lock; with dev all that tests and docs need too.
-# PYTHON=... names the interpreter to use instead of the first one that is new enough.
+# Create .venv and install a Vulkan driver if necessary. A second run does only what is missing.
+# setup.sh [dev]: install the requirements of the package from requirements.lock; with dev also those of tests and docs.
+# PYTHON=... names the Python interpreter to use instead of the first one that is new enough.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -14,9 +14,9 @@ dev) lock=requirements-dev.lock ;;
     exit 2
     ;;
 esac
-# What was installed, for which pins and in which folder (an environment does not survive a move).
+# Record of the installed pins and of the folder, because an environment cannot be moved.
 installed_stamp=.venv/.installed-$level
-# The Vulkan drivers among which an adapter was found.
+# Record of the Vulkan drivers among which an adapter was found.
 adapter_stamp=.venv/.adapter
 
 say() { echo "setup: $*"; }
@@ -39,7 +39,7 @@ find_python() {
         "Install it, or name one: make setup PYTHON=/path/to/python3.12"
 }
 
-# Run a command in silence; if it fails, show what it said.
+# Run a command silently; if it fails, print its output.
 quietly() {
     if ! said=$("$@" 2>&1); then
         printf '%s\n' "$said" >&2
@@ -47,7 +47,7 @@ quietly() {
     fi
 }
 
-# Install Debian packages where that needs no password; else return 1.
+# Install Debian packages if no password is needed; otherwise return 1.
 install_packages() {
     command -v apt-get >/dev/null 2>&1 || return 1
     sudo=
@@ -56,13 +56,13 @@ install_packages() {
         sudo=sudo
     fi
     say "installing $* with apt-get"
-    # A stale list of packages is worth a try, so a failing update is not the end.
+    # Continue after a failed update, because a stale package list may be sufficient.
     quietly $sudo apt-get -qq update || true
     quietly $sudo env DEBIAN_FRONTEND=noninteractive \
         apt-get -qq -y -o DPkg::Lock::Timeout=120 install --no-install-recommends "$@"
 }
 
-# Three ways to an environment with pip; Debian's bare python3 has neither venv nor pip.
+# Three methods to create an environment with pip; the minimal python3 of Debian has neither venv nor pip.
 create_venv() {
     "$1" -m venv .venv >/dev/null 2>&1 && return
     rm -rf .venv
@@ -84,7 +84,7 @@ make_venv() {
     say "made .venv with Python $version ($python)"
 }
 
-# Does .venv run, with pip, in the folder it was made in?
+# Return whether .venv works, with pip, in the folder where it was created.
 venv_works() {
     new_enough .venv/bin/python || return 1
     for stamp in .venv/.installed-*; do
@@ -98,7 +98,7 @@ wanted_stamp() {
     cksum "$1" pyproject.toml
 }
 
-# Is all of a level there, with the pins as they are now?
+# Return whether everything of a level is installed with the current pins.
 installed() { [ -f ".venv/.installed-$1" ] && [ "$(wanted_stamp "$2")" = "$(cat ".venv/.installed-$1")" ]; }
 
 pip_install() { quietly .venv/bin/python -m pip install --quiet --no-input --disable-pip-version-check "$@"; }
@@ -114,13 +114,13 @@ install_locked() {
     wanted_stamp $lock >"$installed_stamp"
 }
 
-# Which drivers the Vulkan loader would find; asking wgpu takes a second, this does not.
+# List the drivers that the Vulkan loader would find, which is much faster than asking wgpu.
 list_drivers() {
     echo "${VK_DRIVER_FILES:-} ${VK_ICD_FILENAMES:-}"
     ls -l /usr/share/vulkan/icd.d /usr/local/share/vulkan/icd.d /etc/vulkan/icd.d 2>/dev/null || true
 }
 
-# Name of the first Vulkan adapter; nothing when there is none. (Drivers chatter on stderr.)
+# Print the name of the first Vulkan adapter, if any. Drivers print messages on stderr.
 find_adapter() {
     .venv/bin/python - 2>/dev/null <<'PYTHON' || true
 import wgpu
