@@ -127,8 +127,8 @@ def test_facets_of_both_kinds_that_are_seen_fill_just_what_the_surface_fills(deg
 
 
 def test_two_lobes_alike_are_torrance_and_sparrows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dermis.specular.two_lobe.NARROW", 1.0)
-    monkeypatch.setattr("dermis.specular.two_lobe.WIDE", 1.0)
+    monkeypatch.setattr("dermis.specular.two_lobe.NARROW_FACTOR", 1.0)
+    monkeypatch.setattr("dermis.specular.two_lobe.WIDE_FACTOR", 1.0)
     angles = cosines(Z, towards(np.array([75.0]), np.zeros(1)), towards(np.array([60.0]), np.array([170.0])))
     one, other = (MODELS[name].lobe(angles, 0.3) for name in ("two-lobe", "torrance-sparrow-smith"))
     assert one == pytest.approx(other, rel=1e-12)

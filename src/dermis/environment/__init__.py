@@ -1,1 +1,1 @@
-"""Light from all around: panoramas, their sun-like peaks, and what the frame reads of them."""
+"""Environment light: panoramas, their sun-like peaks, and prefiltering."""

@@ -1,4 +1,4 @@
-"""Spherical harmonics of a panorama, and its convolution with round kernels."""
+"""Spherical harmonics of a panorama, and its convolution with isotropic kernels."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _KERNEL_NODES = 4096
 
 
 def legendre(cosine: Floats, degree: int, orders: int) -> list[Floats]:
-    """For each order m < orders the (degree + 1 - m, n) Legendre functions of degrees m, m + 1, ...
+    """Return the associated Legendre functions (degree + 1 - m, n) of each order m < orders.
 
     cosine : (n,) of the polar angle
 
-    Associated functions, fully normalised: times exp(i m phi), the integral of their squares over the sphere
-    is 1. Recurrence in the degree [HolmesFeatherstone2002].
+    They are fully normalised: times exp(i m phi), the integral of their squared modulus over the sphere is 1.
+    Recurrence in the degree [HolmesFeatherstone2002].
     """
     sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
     diagonal = np.full(cosine.shape, np.sqrt(0.25 / np.pi))
@@ -37,7 +37,7 @@ def legendre(cosine: Floats, degree: int, orders: int) -> list[Floats]:
 
 
 def analyse(radiance: Floats, degree: int) -> list[Complex]:
-    """For each order m >= 0 the (degree + 1 - m, c) coefficients of a panorama (h, w, c)."""
+    """Return the coefficients (degree + 1 - m, c) of a panorama (h, w, c) for each order m >= 0."""
     height, width = radiance.shape[:2]
     weighted = radiance * (_row_weights(height) * 2.0 * np.pi / width)[:, None, None]
     around = np.fft.rfft(weighted, axis=1)
@@ -51,9 +51,10 @@ def analyse(radiance: Floats, degree: int) -> list[Complex]:
 
 
 def zonal(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
-    """(degree + 1,) factors by which a kernel of the angle theta multiplies the coefficients.
+    """Return the factors (degree + 1,) by which convolution with a kernel multiplies the coefficients.
 
-    kernel : weight at theta in 0..pi/2, 0 beyond; the factor of degree 0 is its integral over the sphere
+    kernel : function of the angle theta in 0..pi/2, 0 beyond; the factor of degree 0 is its integral over the
+        sphere
 
     Source: the Funk-Hecke theorem, as in [RamamoorthiHanrahan2001].
     """
@@ -63,7 +64,7 @@ def zonal(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
 
 
 def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
-    """The panorama (height, 2 height, c) of the coefficients, each degree multiplied by its factor."""
+    """Return the panorama (height, 2 height, c) of coefficients multiplied by a factor for each degree."""
     width = 2 * height
     degree = len(factors) - 1
     table = _legendre_table(height, degree)
@@ -74,21 +75,21 @@ def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Flo
     return np.fft.irfft(around, width, axis=1) * width
 
 
-@lru_cache(maxsize=2)  # of panoramas that are read and of those that are made: 51 kB a row at degree 112
+@lru_cache(maxsize=2)  # input and output size; 51 kB a row at degree 112
 def _legendre_table(height: int, degree: int) -> list[Floats]:
-    """Functions of all orders at the rows of a panorama."""
+    """Return the Legendre functions of all orders at the rows of a panorama."""
     return legendre(_polar_cosines(height), degree, degree + 1)
 
 
 @lru_cache(maxsize=1)
 def _kernel_polynomials(degree: int) -> Floats:
-    """(degree + 1, n) Legendre's at the nodes of kernels."""
+    """Return the Legendre polynomials (degree + 1, n) at the quadrature angles of kernels."""
     (functions,) = legendre(np.cos(_kernel_angles()), degree, orders=1)
     return np.asarray(functions * np.sqrt(4.0 * np.pi / (2.0 * np.arange(degree + 1) + 1.0))[:, None])
 
 
 def _kernel_angles() -> Floats:
-    """(n,) angles at which kernels are read."""
+    """Return the quadrature angles (n,) of kernels."""
     return np.asarray(0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES)
 
 
@@ -98,7 +99,7 @@ def _polar_cosines(height: int) -> Floats:
 
 @lru_cache(maxsize=2)
 def _row_weights(height: int) -> Floats:
-    """(h,) weights of the rows by Fejer's first rule: exact for what is smooth, so even light stays even."""
+    """Return the quadrature weights (h,) of rows by Fejer's first rule, exact for low degrees."""
     twice = 2.0 * np.pi * (np.arange(height) + 0.5) / height
     k = np.arange(1, height // 2 + 1)
     series = np.cos(np.outer(twice, k)) @ (2.0 / (4.0 * k**2 - 1.0))

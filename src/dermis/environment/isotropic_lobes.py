@@ -1,4 +1,4 @@
-"""Lobes as a few round ones: what prefiltered panoramas can be asked for, at any angle of view."""
+"""Tables of isotropic lobes that approximate specular lobes, for prefiltered panoramas."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 def isotropic_lobe_constants() -> dict[str, float]:
-    """Numbers that environment.wgsl fills in."""
+    """Return the constants that are filled into environment.wgsl."""
     return {
         "mirror_rough": ROUGHNESS_COUNT,
         "mirror_views": VIEW_COUNT,
@@ -35,18 +35,17 @@ def isotropic_lobe_constants() -> dict[str, float]:
 
 @cache
 def isotropic_lobe_table(model: str = "kelemen") -> Floats:
-    """(12, 16, 5, 4) by roughness and view: where round lobes point (x, y), their roughness, weight.
+    """Return the table of isotropic lobes by roughness and view (12, 16, 5, 4): x, y, roughness, weight.
 
     model : name in MODELS
 
-    Rows are even in the logarithm of the roughness from 0.05 to 1, columns in the root of the view's
-    cosine. A direction is given as a place (x, y), by stereographic projection about the mirror direction:
-    it is 2 x away from the eye, 2 y beside the plane of view and 1 - x^2 - y^2 along the mirror direction,
-    all over 1 + x^2 + y^2. So lobes follow that direction between the columns, the last two of which are 29
-    degrees apart. The weighted sum of the five stands for the lobe, which towards grazing views leaves the
-    mirror direction, gets longer in the plane of view than across, and ends at the horizon. Lobes without
-    weight need not be looked up. Models that the package does not ship are fitted when they are first used,
-    in half a minute.
+    Rows are uniform in the logarithm of the roughness from 0.05 to 1, columns in the square root of the
+    view's cosine. Directions are stereographic coordinates (x, y) about the mirror direction: the direction
+    is 2 x away from the viewer, 2 y across the plane of incidence and 1 - x^2 - y^2 along the mirror
+    direction, all divided by 1 + x^2 + y^2. So lobes follow the mirror direction between the columns, the
+    last two of which are 29 degrees apart. The weighted sum of five lobes approximates the specular lobe,
+    which at grazing views is elongated, off the mirror direction, and ends at the horizon. Lobes of weight 0
+    need no lookup. Models without a shipped table are fitted on first use, which takes half a minute.
     """
     rows = [row for row in read_rows("dermis.environment", "data/mirrors") if row["model"] == model]
     columns = " ".join(

@@ -1,4 +1,4 @@
-"""Latitude-longitude pictures of distant light, and the sun-like peaks that are taken out of them."""
+"""Latitude-longitude panoramas of distant light, and extraction of their sun-like peaks."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ Floats = NDArray[np.float64]
 UNIFORM = "uniform"
 """Name of the panorama with radiance 1 everywhere."""
 _MIN_ROWS, _MAX_ROWS = 256, 512
-"""Fewer are split, as texel sums stand for integrals; more are averaged: the narrowest lobe spans 16."""
-_MAX_RADIANCE = 1e12  # far beyond any sun; keeps single precision on the device from overflowing
+"""Rows of a loaded panorama: smaller ones are resampled for accurate integrals, larger ones averaged."""
+_MAX_RADIANCE = 1e12  # far above that of the sun; prevents overflow of single precision
 MAX_SUNS = 4
-_PEAK_FACTOR = 32.0  # times the mean radiance: what is brighter may belong to a sun
+_PEAK_FACTOR = 32.0  # of the mean radiance, above which a texel may belong to a sun
 _CLUSTER_DEGREES = 8.0
-_MIN_SUN_FRACTION = 0.05  # of the irradiance that the mean radiance gives
+_MIN_SUN_FRACTION = 0.05  # of the irradiance of the mean radiance
 
 
 def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
-    """(h, w, 3) radiance, linear Rec. 709; the picture's middle is -Z, its right +X, its top +Y.
+    """Load a panorama of radiance (h, w, 3), linear Rec. 709; centre -Z, right +X, top +Y.
 
     name : a sample, a file (.hdr, .exr), or "uniform"
-    most_rows : of what is returned; where the picture has more, they are averaged
+    max_rows : maximum number of rows; larger pictures are averaged
 
-    Raises DermisError for any other name, and for a picture that holds no radiance.
+    Raises DermisError for any other name, and for a picture without radiance.
     """
     path = panorama_file(name)
     if path is None:
@@ -54,7 +54,7 @@ def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
 
 
 def directions(height: int, width: int) -> Floats:
-    """(h, w, 3) unit vectors towards the centres of a panorama's texels."""
+    """Return the unit vectors (h, w, 3) towards the centres of a panorama's texels."""
     theta = np.pi * (np.arange(height) + 0.5) / height
     phi = 2.0 * np.pi * ((np.arange(width) + 0.5) / width - 0.5)
     sine = np.sin(theta)[:, None]
@@ -63,19 +63,19 @@ def directions(height: int, width: int) -> Floats:
 
 
 def solid_angles(height: int, width: int) -> Floats:
-    """(h, 1) solid angle of a texel of each row [sr]."""
+    """Return the solid angle (h, 1) of a texel in each row [sr]."""
     edges = np.cos(np.pi * np.arange(height + 1) / height)
     return np.asarray((edges[:-1] - edges[1:])[:, None] * 2.0 * np.pi / width)
 
 
 def mean_radiance(radiance: Floats) -> Floats:
-    """(3,) mean over all directions."""
+    """Return the mean radiance (3,) over all directions."""
     height, width = radiance.shape[:2]
     return np.asarray((radiance * solid_angles(height, width)[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi))
 
 
 def resample(radiance: NDArray[np.floating], height: int) -> Floats:
-    """The panorama as (height, 2 height, 3): means over each texel's solid angle, whatever the sizes."""
+    """Return a panorama of another size (height, 2 height, 3), averaged over texel solid angles."""
     rows, columns = radiance.shape[:2]
     ours, theirs = (-np.cos(np.linspace(0.0, np.pi, n + 1)) for n in (rows, height))
     upright = _means(radiance, ours, theirs)
@@ -84,7 +84,7 @@ def resample(radiance: NDArray[np.floating], height: int) -> Floats:
 
 
 def _means(values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
-    """Means over the intervals `target_edges`, along the first axis, of values constant over `edges`."""
+    """Return means over target intervals of values that are constant between edges, on the first axis."""
     first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(values) - 1)
     after = np.clip(np.searchsorted(edges, target_edges[1:], "left"), 1, len(values))
     means = np.empty((len(first), *values.shape[1:]))
@@ -95,9 +95,9 @@ def _means(values: NDArray[np.floating], edges: Floats, target_edges: Floats) ->
 
 
 def panorama_file(name: str) -> Path | None:
-    """Where a panorama lies; None for the uniform one.
+    """Return the path of a panorama; None for the uniform one.
 
-    Raises DermisError when there is none of this name.
+    Raises DermisError for an unknown name.
     """
     if name == UNIFORM:
         return None
@@ -120,11 +120,11 @@ def _sample_names() -> list[str]:
 
 @dataclass(frozen=True)
 class Sun:
-    """A peak as light from one direction.
+    """Peak of a panorama as a directional light.
 
     direction : (3,) unit vector towards it
     irradiance : (3,) on a surface that faces it, linear Rec. 709
-    radius : half of the angle that it spans [rad]
+    radius : angular radius [rad]
     """
 
     direction: Floats
@@ -133,28 +133,27 @@ class Sun:
 
 
 def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
-    """The panorama without its peaks, and the peaks, strongest first; together they hold all of its light.
+    """Return the panorama without its peaks, and the peaks, strongest first; their sum conserves energy.
 
     radiance : (h, w, 3)
 
-    Each peak is the light above 32 times the mean within 8 degrees of the middle of what is bright. At most
-    four are taken, and none that gives less than a twentieth of what the mean radiance gives. A lighter
-    cousin of the median cut of light probes [Debevec2005].
+    A peak is the radiance above 32 times the mean within 8 degrees of the centre of a bright cluster. At most
+    four peaks are extracted, each with at least a twentieth of the irradiance of the mean radiance. This is a
+    simplified median cut of light probes [Debevec2005].
     """
     mean = float(luminance(mean_radiance(radiance)))
     brightness = np.asarray(luminance(radiance), np.float64)
     above = brightness > _PEAK_FACTOR * mean
-    directions_to_peak = directions(*radiance.shape[:2])[above]
+    towards = directions(*radiance.shape[:2])[above]
     weight = np.broadcast_to(solid_angles(*radiance.shape[:2]), above.shape)[above]
     kept_fraction = _PEAK_FACTOR * mean / brightness[above]
     light = radiance[above] * ((1.0 - kept_fraction) * weight)[:, None]
     remaining, suns = np.ones(len(kept_fraction)), list[Sun]()
-    for inside in sorted(
-        _clusters(brightness[above], directions_to_peak, weight), key=lambda c: -_luminance_sum(light[c])
-    ):
+    clusters = _clusters(brightness[above], towards, weight)
+    for inside in sorted(clusters, key=lambda cluster: -_luminance_sum(light[cluster])):
         if len(suns) == MAX_SUNS or _luminance_sum(light[inside]) < _MIN_SUN_FRACTION * np.pi * mean:
             break
-        suns.append(_fit_sun(light[inside], directions_to_peak[inside], weight[inside]))
+        suns.append(_fit_sun(light[inside], towards[inside], weight[inside]))
         remaining[inside] = kept_fraction[inside]
     remainder = radiance.copy()
     remainder[above] *= remaining[:, None]
@@ -165,24 +164,24 @@ def _luminance_sum(light: Floats) -> float:
     return float(luminance(light.sum(axis=0)))
 
 
-def _fit_sun(light: Floats, directions_to_peak: Floats, weight: Floats) -> Sun:
-    """One light for the texels of a peak (n, 3), as wide as an even disc with the same mean square."""
+def _fit_sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
+    """Return the light of a peak's texels (n, 3), a uniform disc with the same mean square radiance."""
     grey = np.asarray(luminance(light), np.float64)
-    middle = grey @ directions_to_peak
+    centre = grey @ towards
     solid_angle = grey.sum() ** 2 / (grey**2 / weight).sum()
-    return Sun(middle / np.linalg.norm(middle), light.sum(axis=0), float(np.sqrt(solid_angle / np.pi)))
+    return Sun(centre / np.linalg.norm(centre), light.sum(axis=0), float(np.sqrt(solid_angle / np.pi)))
 
 
-def _clusters(brightness: Floats, directions_to_peak: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
-    """Bright texels (n,) sorted into peaks: those around the middle of those around the brightest left."""
+def _clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
+    """Return masks of bright texels (n,) for each peak, in order of brightness."""
     near = np.cos(np.radians(_CLUSTER_DEGREES))
     remaining = np.ones(len(brightness), bool)
     clusters = []
     while remaining.any():
         peak = np.where(remaining, brightness, 0.0).argmax()
-        around = remaining & (directions_to_peak @ directions_to_peak[peak] > near)
-        middle = weight[around] @ directions_to_peak[around]
-        inside = remaining & (directions_to_peak @ middle > near * np.linalg.norm(middle))
+        around = remaining & (towards @ towards[peak] > near)
+        centre = weight[around] @ towards[around]
+        inside = remaining & (towards @ centre > near * np.linalg.norm(centre))
         inside[peak] = True
         remaining &= ~inside
         clusters.append(inside)

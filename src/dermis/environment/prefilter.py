@@ -1,4 +1,4 @@
-"""A panorama as the frame reads it: irradiance by normal, and reflections in ever rougher mirrors."""
+"""Prefiltering of a panorama: irradiance by normal, and reflections by roughness."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from dermis.specular.beckmann import beckmann
 Floats = NDArray[np.float64]
 SMOOTHEST, ROUGHEST = 0.018, 1.0
 ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 13)
-"""Of the reflections' layers, even in the logarithm, between which the shader interpolates."""
+"""Roughnesses of the reflection layers, uniform in the logarithm; the shader interpolates between them."""
 HEIGHT = 192
-_DEGREE = 160  # the smoothest lobe multiplies this degree by 2e-4: hardly any ringing around lamps
+_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
 
 
 def isotropic_lobe(theta: Floats, m: float) -> Floats:
-    """Weight of light at an angle from the mirror direction, seen along the normal [1/sr, up to a factor].
+    """Return the weight of light at an angle from the mirror direction, viewed along the normal.
 
     theta : [rad], 0 to pi / 2
     m : roughness [-]
 
-    The Kelemen lobe with n = v = r [Karis2013]: the half vector is at theta / 2, and h.h is
-    4 cos^2(theta / 2).
+    It is the Kelemen lobe with n = v = r [Karis2013], up to a constant factor: the half vector is at theta /
+    2, and h.h is 4 cos^2(theta / 2).
     """
     half = np.cos(0.5 * theta)
     with np.errstate(under="ignore"):
@@ -35,7 +35,7 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
 
 
 def reflection_constants() -> dict[str, float]:
-    """Numbers that environment.wgsl fills in."""
+    """Return the constants that are filled into environment.wgsl."""
     return {
         "reflections": len(ROUGHNESSES),
         "smoothest_reflection": SMOOTHEST,
@@ -45,10 +45,11 @@ def reflection_constants() -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Prefiltered:
-    """A panorama, prefiltered.
+    """Prefiltered panorama.
 
-    layers : (14, h, 2 h, 3) float32: irradiance by normal, then mean radiance by mirror direction
-    suns : its peaks, which the layers leave out
+    layers : (14, h, 2 h, 3) float32: irradiance by normal, then mean radiance by mirror direction for each
+        roughness
+    suns : peaks of the panorama, which are not part of the layers
     """
 
     layers: NDArray[np.float32]
@@ -57,12 +58,12 @@ class Prefiltered:
 
 @logged_step("filtering the environment")
 def prefilter(name: str) -> Prefiltered:
-    """A panorama's layers and suns. It takes a quarter of a second, so nothing is kept on disk.
+    """Return the prefiltered layers and the suns of a panorama.
 
-    name : as for `load_panorama`
+    name : see `load_panorama`
 
-    Each layer is the panorama convolved with a round kernel, exactly, in spherical harmonics of degree 160:
-    no samples are drawn, so lamps leave no fireflies.
+    Each layer is the exact convolution with an isotropic kernel in spherical harmonics up to degree 160, so
+    there is no noise from sampling.
 
     Sources: [KautzMcCool2000] for reflections by roughness, [RamamoorthiHanrahan2001] for irradiance.
     """
@@ -74,6 +75,6 @@ def prefilter(name: str) -> Prefiltered:
 
 
 def isotropic_kernel(m: float) -> Floats:
-    """(161,) factors of the round lobe of roughness m, with the sum 1 over the sphere."""
+    """Return the factors (161,) of the isotropic lobe of roughness m, normalised over the sphere."""
     factors = zonal(lambda theta: isotropic_lobe(theta, m), _DEGREE)
     return np.asarray(factors / factors[0])

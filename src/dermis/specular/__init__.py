@@ -1,1 +1,1 @@
-"""Surface lobes, each in NumPy and WGSL, with Fresnel curves, albedo and energy."""
+"""Specular lobes in NumPy and WGSL, with Fresnel reflectance, albedo and energy conservation."""

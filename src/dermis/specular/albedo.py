@@ -1,4 +1,4 @@
-"""How much the surface reflects in all directions: the share that does not enter the skin."""
+"""Directional albedo of specular lobes: the reflected fraction of light, which does not enter the skin."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 MIN_ROUGHNESS_ROOT = 0.2
 TABLE_COSINES: Floats = np.linspace(0.0, 1.0, 64) ** 2
 TABLE_ROUGHNESSES: Floats = np.linspace(MIN_ROUGHNESS_ROOT, 1.0, 32) ** 2
-"""Columns and rows of the shader's table: evenly spaced roots, for albedos bend at grazing angles."""
+"""Columns and rows of the shader's table, uniform in the square root to resolve grazing angles."""
 
 _TABLE_NODES = (24, 12)
 _MIN_COSINE = 1e-3
@@ -29,16 +29,16 @@ def directional_albedo(
     fresnel: Fresnel = schlick,
     nodes: tuple[int, int] = (48, 32),
 ) -> Floats:
-    """Hemispherical reflectance rho_dt of a lobe for rho_s = 1 [-].
+    """Return the directional-hemispherical reflectance rho_dt of a lobe for rho_s = 1 [-].
 
-    cos_theta : cosine of the exitant angle or, for reciprocal models the same, of the incident one
+    cos_theta : cosine of the exitant angle or, equally for reciprocal models, of the incident angle
     m : roughness; broadcast against cos_theta
-    nodes : points of the quadrature along and across the plane of the view
+    nodes : numbers of quadrature nodes along and across the plane of incidence
 
-    The integral runs over slopes (x, y) of the half vector, where lobes are smooth and m wide. The light is
-    above the surface for slopes within a circle of radius 1 / cos theta around (tan theta, 0): Gauss rules in
-    atan(x / m) and atan(y / m) from edge to edge meet no corner, and find narrow peaks and grazing angles
-    that the 80 x 80 directions of the published rule miss.
+    The integral runs over the slopes (x, y) of the half vector, where lobes are smooth and of width m. The
+    light is above the surface for slopes within a circle of radius 1 / cos theta around (tan theta, 0).
+    Gauss-Legendre rules in atan(x / m) and atan(y / m) between its borders resolve narrow peaks and grazing
+    angles, unlike the 80 x 80 directions of the published rule.
 
     Source: [dEonLuebke2007] section 14.3 for the quantity.
     """
@@ -53,13 +53,13 @@ def directional_albedo(
     v_h = c * (1.0 + tangent * x) * n_h
     n_l = np.maximum(2.0 * v_h * n_h - c, 0.0)
     reflected = n_l * lobe(Cosines(n_l, c, n_h, v_h), m, fresnel)
-    # A half vector's solid angle is n_h^3 dx dy, the light's 4 v_h times that; both sides of the plane count.
+    # The solid angle of the half vector is n_h^3 dx dy, that of the light 4 v_h times it; both halves count.
     albedo: Floats = (8.0 * reflected * v_h * n_h**3 * dx * dy).sum(axis=(-2, -1))
     return albedo
 
 
 def _slope_quadrature(low: Floats, high: Floats, m: Floats, nodes: int) -> tuple[Floats, Floats]:
-    """Places and weights between two slopes, dense within m of 0; along the last axis."""
+    """Return quadrature nodes and weights between two slopes, dense within m of 0, on the last axis."""
     nodes_unit, weight = np.polynomial.legendre.leggauss(nodes)
     first, last = np.arctan(low / m), np.arctan(high / m)
     t = np.tan(0.5 * (first + last) + 0.5 * (last - first) * nodes_unit)
@@ -68,13 +68,14 @@ def _slope_quadrature(low: Floats, high: Floats, m: Floats, nodes: int) -> tuple
 
 @cache
 def albedo_table(model: str = "kelemen", fresnel: str = "schlick") -> NDArray[np.float32]:
-    """(roughness, cosine, 2) table for the shader, at TABLE_ROUGHNESSES and TABLE_COSINES, of
-    `directional_albedo` and its mean over all directions, weighed by their cosine.
+    """Return the shader's table (roughness, cosine, 2) of the directional albedo and the mean albedo.
+
+    Rows and columns are TABLE_ROUGHNESSES and TABLE_COSINES.
 
     model, fresnel : names in MODELS and FRESNEL
     """
     lobe, reflectance = MODELS[model].lobe, FRESNEL[fresnel]
-    # row by row: the nodes of all rows at once would not fit into a processor's cache
+    # row by row, so that the nodes fit into the CPU's cache
     rows = [directional_albedo(TABLE_COSINES, m, lobe, reflectance, _TABLE_NODES) for m in TABLE_ROUGHNESSES]
     rho = np.stack(rows)
     mean = np.asarray(2.0 * np.trapezoid(rho * TABLE_COSINES, TABLE_COSINES, axis=1))[:, None]

@@ -1,4 +1,4 @@
-"""The Beckmann distribution of microfacet slopes, and the table that the shader reads."""
+"""Beckmann distribution of microfacet slopes, and its table for the shader."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _EXPONENT = 0.1
 
 
 def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
-    """exp(-tan^2 / m^2) / (m^2 cos^4), without the 1/pi of a normalised distribution [-].
+    """Return exp(-tan^2 / m^2) / (m^2 cos^4), without the 1/pi of a normalised distribution [-].
 
     cos_h : cosine between normal and half vector
     m : roughness, the root mean square slope
@@ -28,11 +28,11 @@ def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
 
 @cache
 def beckmann_table(size: int = TABLE_SIZE) -> NDArray[np.float32]:
-    """(size, size) of beckmann(x, y)^0.1 / 2: columns cos_h from 0 to 1, rows m at texel centres.
+    """Return the table (size, size) of beckmann(x, y)^0.1 / 2 for the shader.
 
-    The last column is cos_h = 1 itself: a table of texel centres would cut the highlight's peak off.
+    Columns are cos_h from 0 to 1 inclusive, so that the peak of the highlight is in the table; rows are m at
+    texel centres. The power flattens the peak for accurate interpolation; the value is decoded as (2 t)^10.
 
-    The power flattens the peak so that interpolation between texels stays close; decoded as (2 t)^10.
     Source: [dEonLuebke2007] section 14.3.
     """
     cos_h = np.arange(size) / (size - 1)

@@ -1,4 +1,4 @@
-"""Blinn's highlight around the half vector, as first used and with its energy put right."""
+"""Blinn-Phong lobes: the original highlight and an energy-conserving version."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dermis.specular.models import Model
 
 
 def exponent(m: ArrayLike) -> Floats:
-    """The power s of a cosine lobe that is as wide as Beckmann's of roughness m: 2 / m^2 - 2 [-].
+    """Return the exponent s of a cosine lobe as wide as a Beckmann lobe of roughness m: 2 / m^2 - 2 [-].
 
     Source: [Walter2007] section 5.2.
     """
@@ -19,12 +19,12 @@ def exponent(m: ArrayLike) -> Floats:
 
 
 def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """BRDF F (s + 2) / 8 pi (n.h)^s [1/sr].
+    """Return the BRDF F (s + 2) / 8 pi (n.h)^s [1/sr].
 
     m : roughness, broadcast against the angles [-]
 
-    The factor is that of a normalised distribution of slopes over 4; without shadowing or the division by
-    both cosines the lobe fades at grazing angles, where skin does not.
+    The factor is that of a normalised slope distribution divided by 4. Without masking and division by both
+    cosines the lobe fades at grazing angles, where that of skin does not.
 
     Source: [Blinn1977]; the distribution as normalised in [Walter2007] section 5.2.
     """
@@ -34,10 +34,10 @@ def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
 
 
 def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """The highlight F (n.h)^s of old pipelines as a BRDF: divided by the cosine that it does not have [1/sr].
+    """Return the highlight F (n.h)^s of early renderers as a BRDF, divided by n.l [1/sr].
 
-    The division makes it not reciprocal. It was added to a diffuse term without 1/pi; both are divided by
-    pi here.
+    The highlight has no factor n.l, so the BRDF is not reciprocal. It was added to a diffuse term without
+    1/pi; here both are divided by pi.
 
     Source: [Blinn1977].
     """
@@ -51,13 +51,13 @@ def _power(angles: Cosines, s: Floats) -> Floats:
 
 BLINN_PHONG = Model(
     blinn_phong,
-    "a power of n.h with its energy put right",
+    "normalised power of n.h",
     reciprocal=True,
     sources=("Blinn1977", "Walter2007"),
 )
 BLINN_PHONG_PLAIN = Model(
     blinn_phong_plain,
-    "a power of n.h as first used; not reciprocal, for its highlight has no cosine of the light",
+    "original power of n.h; not reciprocal, as its highlight lacks the cosine of the light",
     reciprocal=False,
     sources=("Blinn1977",),
 )

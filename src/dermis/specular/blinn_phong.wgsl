@@ -1,13 +1,13 @@
-// Powers of n.h: normalised [Walter2007], and as first used [Blinn1977], divided by the cosine that the caller multiplies by.
+// Blinn-Phong lobes: normalised [Walter2007], and original [Blinn1977], divided by the cosine that the caller applies.
 //#include "cosines.wgsl"
 //#include "fresnel.wgsl"
 
-// The power that is as wide as Beckmann's lobe [Walter2007].
+// Exponent of the lobe as wide as a Beckmann lobe of roughness m [Walter2007].
 fn exponent(m: f32) -> f32 {
     return 2.0 / (m * m) - 2.0;
 }
 
-// log(1 + t), also where 1 + t has lost t's digits.
+// log(1 + t), accurate for small t.
 fn log_of_one_plus(t: f32) -> f32 {
     let y = t / (2.0 + t);
     let y2 = y * y;

@@ -1,4 +1,4 @@
-"""What sets the surface models apart, in numbers."""
+"""Numbers that compare the specular models."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 def normal_incidence_peak(model: str, m: float) -> float:
-    """BRDF towards the light that stands over the surface, for rho_s = 1 [1/sr]."""
+    """Return the BRDF for light and view along the normal, for rho_s = 1 [1/sr]."""
     return float(MODELS[model].lobe(cosines(_UP, _UP, _UP), m))
 
 
 def reciprocity_error(model: str) -> float:
-    """Largest change of the BRDF when light and view change places, of the largest value [-].
+    """Return the largest change of the BRDF when light and view are exchanged, relative to its maximum [-].
 
-    Over directions up to 85 degrees from the normal and ROUGHNESSES.
+    Directions are up to 85 degrees from the normal, with all ROUGHNESSES.
     """
     rng = np.random.default_rng(1)
     l, v = (_directions(rng) for _ in range(2))
@@ -39,7 +39,7 @@ def reciprocity_error(model: str) -> float:
 
 
 def albedo_rows(model: str) -> list[dict[str, float]]:
-    """`directional_albedo` over ROUGHNESSES and COSINES, in plain numbers: m, cos_theta, rho."""
+    """Return `directional_albedo` over ROUGHNESSES and COSINES as rows with m, cos_theta and rho."""
     rho = directional_albedo(COSINES, ROUGHNESSES[:, None], MODELS[model].lobe)
     return [
         {"m": float(m), "cos_theta": float(c), "rho": float(rho[i, k])}

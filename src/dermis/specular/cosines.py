@@ -1,4 +1,4 @@
-"""The angles that a surface lobe depends on."""
+"""Cosines between normal, light, view and half vector."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cosines:
-    """Cosines between normal n, light l, view v and the half vector h = (l + v) / |l + v|; arrays alike.
+    """Cosines between normal n, light l, view v and half vector h = (l + v) / |l + v|, of equal shape.
 
-    Enough for every isotropic lobe of microfacets: l.v is 2 v_h^2 - 1.
+    They suffice for isotropic microfacet lobes, as l.v is 2 v_h^2 - 1.
     """
 
     n_l: Floats
@@ -24,12 +24,12 @@ class Cosines:
 
     @property
     def above(self) -> NDArray[np.bool_]:
-        """Where light and view both stand above the surface."""
+        """Return the mask of light and view directions that are both above the surface."""
         return (self.n_l > 0.0) & (self.n_v > 0.0)
 
 
 def cosines(n: Floats, l: Floats, v: Floats) -> Cosines:
-    """The cosines of unit vectors (..., 3): normal, to the light, to the eye."""
+    """Return the cosines of unit vectors (..., 3): normal, direction to the light, and to the viewer."""
     h = l + v
     unit = h / np.sqrt(np.maximum((h * h).sum(-1), 1e-12))[..., None]
     n_l, n_v, n_h, v_h = ((a * b).sum(-1) for a, b in ((n, l), (n, v), (n, unit), (v, unit)))

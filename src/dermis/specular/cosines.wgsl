@@ -1,4 +1,4 @@
-// The angles between normal n, light l, view v and the half vector h, for all lobes; constants of the skin's surface.
+// Cosines between normal n, light l, view v and half vector h, for all lobes.
 
 const GRAZING: f32 = 1e-6;
 
@@ -7,7 +7,7 @@ struct Angles {
     n_v: f32,
     n_h: f32,
     v_h: f32,
-    tan2_h: f32, // tan^2 between n and h; from a cross product, for 1 - n_h^2 has no digits left at the peak
+    tan2_h: f32, // tan^2 between n and h, from a cross product, as 1 - n_h^2 cancels at the peak
 }
 
 fn angles_between(n: vec3f, l: vec3f, v: vec3f) -> Angles {

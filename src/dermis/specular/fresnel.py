@@ -1,4 +1,4 @@
-"""Fresnel reflectance of skin, and what becomes of the energy that the surface does not pass."""
+"""Fresnel reflectance of skin, and energy conservation between specular and diffuse light."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Fresnel = Callable[[Floats], Floats]
-"""Reflectance [-] by the cosine between view and half vector."""
+"""Function from the cosine between view and half vector to the Fresnel reflectance [-]."""
 
 SKIN_F0 = 0.028
 """Reflectance of skin at normal incidence, ((1.4 - 1) / (1.4 + 1))^2 rounded [-] [dEonLuebke2007]."""
@@ -20,14 +20,17 @@ SKIN_ETA = 1.4
 
 
 def schlick(cos_theta: ArrayLike, f0: float = SKIN_F0) -> Floats:
-    """Fresnel reflectance at the angle between view and half vector [-]. Source: [Schlick1994]."""
+    """Return Schlick's approximation of the Fresnel reflectance [-]. Source: [Schlick1994].
+
+    cos_theta : cosine between view and half vector
+    """
     c = np.clip(np.asarray(cos_theta, dtype=np.float64), 0.0, 1.0)
     reflectance: Floats = f0 + (1.0 - f0) * (1.0 - c) ** 5
     return reflectance
 
 
 def dielectric(cos_theta: ArrayLike, eta: float = SKIN_ETA) -> Floats:
-    """Exact reflectance of unpolarised light that comes from air onto a dielectric [-].
+    """Return the exact Fresnel reflectance for unpolarised light from air onto a dielectric [-].
 
     eta : index of refraction, 1 or more
 
@@ -41,11 +44,11 @@ def dielectric(cos_theta: ArrayLike, eta: float = SKIN_ETA) -> Floats:
 
 
 FRESNEL: dict[str, Fresnel] = {"schlick": schlick, "exact": dielectric}
-"""Both ways, by the names that scenes use."""
+"""Fresnel functions by their names in scene files."""
 
 
 def hemispherical_reflectance(fresnel: Fresnel = dielectric, nodes: int = 64) -> float:
-    """Share of light from everywhere that a smooth surface reflects, 2 int F mu dmu [-]."""
+    """Return the reflectance of a smooth surface under uniform illumination, 2 int F mu dmu [-]."""
     x, w = np.polynomial.legendre.leggauss(nodes)
     mu = 0.5 * (x + 1.0)
     return float(w @ (fresnel(mu) * mu))
@@ -53,32 +56,33 @@ def hemispherical_reflectance(fresnel: Fresnel = dielectric, nodes: int = 64) ->
 
 @dataclass(frozen=True)
 class EnergyModel:
-    """What enters and leaves the skin, with c = 1 unless `returned` divides by the mean of what leaves.
+    """Energy conservation of the diffuse light below a specular lobe.
 
-    f = (1 - loss rho_s rho_dt(n.l)) (1 - loss rho_s rho_dt(n.v)) / (pi c)
+    f = (1 - loss rho_s rho_dt(n.l)) (1 - loss rho_s rho_dt(n.v)) / (pi c), where c = 1 unless `returned`
+    divides by the mean of the second factor.
 
-    loss : factor of the surface's albedo: 0 for no term, 1, or pi
-    returned : whether light that the surface throws back inside comes out after all
+    loss : factor of the lobe's albedo: 0 for no correction, 1, or pi
+    returned : whether light that the surface reflects back inside leaves the skin later
     """
 
     loss: float
     returned: bool
 
     def entering_fraction(self, albedo: ArrayLike, rho_s: float) -> Floats:
-        """Share of light from a direction that enters, by the surface's albedo there [-]."""
+        """Return the fraction of light from a direction that enters the skin, from the lobe's albedo [-]."""
         return np.maximum(0.0, 1.0 - self.loss * rho_s * np.asarray(albedo, float))
 
     def exitance_factor(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
-        """What leaves in a direction, of light that would leave evenly [-].
+        """Return the factor of uniform diffuse radiance in a direction [-].
 
-        albedo : of the surface there
-        mean : albedo over all directions, weighed by their cosine
+        albedo : directional albedo of the lobe
+        mean : mean albedo, cosine-weighted
         """
         lost = self.loss * rho_s * np.asarray(mean, float) if self.returned else 0.0
         return np.asarray(self.entering_fraction(albedo, rho_s) / np.maximum(1.0 - lost, 0.5))
 
     def furnace_radiance(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
-        """Outgoing over incoming radiance of white skin under the same light from everywhere [-]."""
+        """Return the outgoing radiance of white skin under uniform incoming radiance 1 [-]."""
         inside = 1.0 - self.loss * rho_s * np.asarray(mean, float)
         return np.asarray(
             rho_s * np.asarray(albedo, float) + inside * self.exitance_factor(albedo, mean, rho_s)
@@ -90,9 +94,9 @@ ENERGY: dict[str, EnergyModel] = {
     "published": EnergyModel(np.pi, returned=False),
     "full": EnergyModel(1.0, returned=True),
 }
-"""By the names that scenes use.
+"""Energy models by their names in scene files.
 
-`published` takes the book's rho_dt [dEonLuebke2007], whose lobe and integral lack 1/pi: it overstates the
-loss by pi where diffuse light is divided by pi. `full` divides, and by the mean of what leaves it returns
-light that the surface reflects back inside: as a matte layer under a glossy one [Kelemen2001].
+`published` uses rho_dt of the book [dEonLuebke2007], whose lobe and integral lack 1/pi, and so overestimates
+the loss by pi for diffuse light that is divided by pi. `full` has the factor and also returns the light that
+the surface reflects back inside, as for a matte layer below a glossy one [Kelemen2001].
 """

@@ -1,4 +1,4 @@
-// Reflectance of a smooth surface by angle: Schlick's curve or the exact one.
+// Fresnel reflectance: Schlick's approximation or exact.
 
 override EXACT_FRESNEL: bool = false;
 
@@ -8,7 +8,7 @@ fn schlick(cos_theta: f32, f0: f32) -> f32 {
     return f0 + (1.0 - f0) * c2 * c2 * c;
 }
 
-// Unpolarised light from air onto a dielectric. Source: [CookTorrance1982].
+// Exact reflectance for unpolarised light from air onto a dielectric. Source: [CookTorrance1982].
 fn dielectric(cos_theta: f32, eta: f32) -> f32 {
     let c = clamp(cos_theta, 0.0, 1.0);
     let g = sqrt(eta * eta - 1.0 + c * c);

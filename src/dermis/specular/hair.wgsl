@@ -1,15 +1,15 @@
-// What a hair scatters, a rough dielectric cylinder that absorbs, seen from afar. Sources: [Marschner2003; dEon2011; Chiang2016].
+// Far-field scattering of a hair: a rough, absorbing dielectric cylinder. Sources: [Marschner2003; dEon2011; Chiang2016].
 
 //#fill const HAIR_ETA: f32 = {hair_eta};
-//#fill const HAIR_WIDTH: f32 = {hair_width}; // of the distribution around the fibre [rad]
-//#fill const HAIR_LOGISTIC_NORM: f32 = {hair_logistic_norm}; // its factor, as it ends at half a turn
-//#fill const HAIR_VARIANCE: f32 = {hair_variance}; // along it, of reflected light
-//#fill const HAIR_TILT: f32 = {hair_tilt}; // of the cuticle's scales [rad]
-//#fill const HAIR_SAMPLES: u32 = {hair_samples}; // across the fibre that light is followed through
+//#fill const HAIR_WIDTH: f32 = {hair_width}; // of the azimuthal logistic distribution [rad]
+//#fill const HAIR_LOGISTIC_NORM: f32 = {hair_logistic_norm}; // normalisation of that distribution on (-pi, pi)
+//#fill const HAIR_VARIANCE: f32 = {hair_variance}; // longitudinal, of the lobe R
+//#fill const HAIR_TILT: f32 = {hair_tilt}; // of the scales of the cuticle [rad]
+//#fill const HAIR_SAMPLES: u32 = {hair_samples}; // rays across the fibre
 
 const HAIR_PI: f32 = 3.14159265358979;
 
-// Shares of light over the fibre's width: reflected, let through, reflected internal, and the residual.
+// Fractions of light in the lobes R, TT, TRT and all further ones.
 struct FibreTerms {
     reflected: f32,
     transmitted: vec3f,
@@ -17,7 +17,7 @@ struct FibreTerms {
     residual: vec3f,
 }
 
-// exp(-a) I0(a), by Abramowitz' and Stegun's polynomials.
+// exp(-a) I0(a), with the polynomials of Abramowitz and Stegun.
 fn scaled_bessel(a: f32) -> f32 {
     if (a < 3.75) {
         let t = a * a / 14.0625;
@@ -29,15 +29,15 @@ fn scaled_bessel(a: f32) -> f32 {
     return (0.39894228 + t * (0.01328592 + t * (0.00225319 + t * (-0.00157565 + t * u)))) / sqrt(a);
 }
 
-// Share by the sines of light and view along the fibre.
+// Longitudinal scattering function of the sines of light and view along the fibre.
 fn hair_longitudinal(sin_i: f32, sin_o: f32, v: f32) -> f32 {
     let a = sqrt(max(1.0 - sin_i * sin_i, 0.0) * max(1.0 - sin_o * sin_o, 0.0)) / v;
     return scaled_bessel(a) * exp(a - sin_i * sin_o / v - 1.0 / v) / (v * (1.0 - exp(-2.0 / v)));
 }
 
 fn hair_azimuthal(x: f32) -> f32 {
-    let turned = abs(x - 2.0 * HAIR_PI * round(x / (2.0 * HAIR_PI)));
-    let e = exp(-turned / HAIR_WIDTH);
+    let wrapped = abs(x - 2.0 * HAIR_PI * round(x / (2.0 * HAIR_PI)));
+    let e = exp(-wrapped / HAIR_WIDTH);
     return e / (HAIR_WIDTH * (1.0 + e) * (1.0 + e)) * HAIR_LOGISTIC_NORM;
 }
 
@@ -48,23 +48,23 @@ fn hair_fresnel(c: f32) -> f32 {
     return 0.5 * (parallel * parallel + across * across);
 }
 
-// depth: absorption over a radius
+// Fractions of light in each lobe; depth: absorption over a radius; h: offset of the ray across the fibre, -1 to 1
 fn hair_fibre_terms(sin_o: f32, depth: vec3f, h: f32) -> FibreTerms {
     let cos_o = sqrt(max(1.0 - sin_o * sin_o, 1e-5));
     let inner = h * cos_o / sqrt(HAIR_ETA * HAIR_ETA - sin_o * sin_o);
     let path_length = 2.0 * sqrt(1.0 - inner * inner) / sqrt(1.0 - sin_o * sin_o / (HAIR_ETA * HAIR_ETA));
-    let through = exp(-depth * path_length);
+    let attenuation = exp(-depth * path_length);
     let f = hair_fresnel(cos_o * sqrt(1.0 - h * h));
-    let transmitted = (1.0 - f) * (1.0 - f) * through;
-    let internal = transmitted * through * f;
-    return FibreTerms(f, transmitted, internal, internal * f * through / (1.0 - f * through));
+    let transmitted = (1.0 - f) * (1.0 - f) * attenuation;
+    let internal = transmitted * attenuation * f;
+    return FibreTerms(f, transmitted, internal, internal * f * attenuation / (1.0 - f * attenuation));
 }
 
 fn hair_offset(k: u32) -> f32 {
     return (2.0 * f32(k) + 1.0) / f32(HAIR_SAMPLES) - 1.0;
 }
 
-// Means of the shares: what light from all around each lobe gives.
+// Means over the fibre's width: albedo of each lobe.
 fn hair_albedo(sin_o: f32, depth: vec3f) -> FibreTerms {
     var mean = FibreTerms(0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0));
     for (var k = 0u; k < HAIR_SAMPLES; k += 1u) {
@@ -77,18 +77,18 @@ fn hair_albedo(sin_o: f32, depth: vec3f) -> FibreTerms {
     return mean;
 }
 
-// Sine of an angle that scales of the cuticle turn.
+// Sine of an angle changed by a multiple of the tilt of the scales.
 fn hair_tilted(sine: f32, scales: f32) -> f32 {
     return sine * cos(scales * HAIR_TILT) + sqrt(max(1.0 - sine * sine, 0.0)) * sin(scales * HAIR_TILT);
 }
 
-// More precise than asin on some devices.
+// Arc sine that is more accurate than asin on some devices.
 fn hair_asin(sine: f32) -> f32 {
     return atan2(sine, sqrt(1.0 - sine * sine));
 }
 
-// Radiance over the irradiance of a plane that faces the light [1/sr].
-// phi: angle between light and view around the fibre
+// Radiance per irradiance of a plane that faces the light [1/sr].
+// phi: azimuth between light and view
 fn hair_scattered(sin_i: f32, sin_o: f32, phi: f32, depth: vec3f) -> vec3f {
     let cos_o = sqrt(max(1.0 - sin_o * sin_o, 1e-5));
     let along = vec4f(

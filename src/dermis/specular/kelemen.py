@@ -1,4 +1,4 @@
-"""The surface lobe of skin after Kelemen and Szirmay-Kalos."""
+"""Kelemen and Szirmay-Kalos lobe."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from dermis.specular.models import Model
 
 
 def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """BRDF of the rough surface for rho_s = 1, without the cosine [1/sr].
+    """Return the BRDF for rho_s = 1, without the cosine [1/sr].
 
     m : roughness, broadcast against the angles [-]
 
-    f = D F / (h.h) with h = l + v not normalised, so h.h = 4 (v.h)^2 of the unit half vector. The published
-    lobe leaves out the 1/pi of the Beckmann distribution, because its diffuse term does too; here both carry
-    it, so their ratio is the published one.
+    f = D F / (h.h) with the unnormalised h = l + v, so h.h = 4 (v.h)^2 of the unit half vector. The published
+    lobe omits the 1/pi of the Beckmann distribution, as its diffuse term does; here both have it, so their
+    ratio is the published one.
 
     Source: [Kelemen2001]; [dEonLuebke2007] section 14.3.
     """
@@ -31,8 +31,8 @@ def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats
 
 KELEMEN = Model(
     kelemen,
-    "Beckmann's slopes over the unnormalised half vector, shaded by table",
+    "Beckmann distribution over the squared length of l + v, evaluated with a table",
     reciprocal=True,
     sources=("Kelemen2001", "Beckmann1963"),
 )
-KELEMEN_DIRECT = replace(KELEMEN, note="the first, shaded without its table")
+KELEMEN_DIRECT = replace(KELEMEN, note="the model kelemen, evaluated without its table")

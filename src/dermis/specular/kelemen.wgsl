@@ -1,4 +1,4 @@
-// Kelemen and Szirmay-Kalos' lobe, divided by pi, by table and computed. Source: [Kelemen2001].
+// Kelemen and Szirmay-Kalos lobe, divided by pi, with and without a table. Source: [Kelemen2001].
 //#include "beckmann.wgsl"
 //#include "cosines.wgsl"
 //#include "fresnel.wgsl"

@@ -1,4 +1,4 @@
-"""Every model of the surface by its name, behind one protocol."""
+"""Registry of the specular models."""
 
 from __future__ import annotations
 
@@ -18,23 +18,40 @@ if TYPE_CHECKING:
 
 
 class Lobe(Protocol):
-    """BRDF for rho_s = 1, without the cosine [1/sr], 0 unless light and view are above the surface."""
+    """BRDF for rho_s = 1, without the cosine [1/sr]; 0 unless light and view are above the surface."""
 
     def __call__(self, angles: Cosines, m: ArrayLike, fresnel: Fresnel = ...) -> Floats:
-        """m : roughness, broadcast against the angles [-]."""
+        """Return the BRDF for an array of angles.
+
+        m : roughness, broadcast against the angles [-]
+        """
 
 
 @dataclass(frozen=True)
 class Model:
-    """A lobe and what is to be said of it.
+    """Specular model: a lobe, its shader and its description.
 
-    Its shader lies beside the lobe's module under the same name and has `fn NAME(a: Angles, m: f32) -> f32`,
-    NAME as in scene files, with underscores for hyphens.
+    The shader has the file name of the lobe's module and defines `fn NAME(a: Angles, m: f32) -> f32`, where
+    NAME is the name in scene files with underscores for hyphens.
 
-    note : what the model is; for one that is not reciprocal, why
-    reciprocal : whether light and view may change places
-    sources : keys of the bibliography
-    numbers : constants that its shader fills in
+    Parameters
+    ----------
+    lobe : Lobe
+        The BRDF in NumPy.
+    note : str
+        Short description; for a lobe that is not reciprocal with the reason.
+    reciprocal : bool
+        Whether light and view may be exchanged.
+    sources : tuple of str
+        Keys of the bibliography.
+    numbers : mapping
+        Constants that are filled into the shader.
+
+    Examples
+    --------
+    >>> from dermis.specular.models import MODELS
+    >>> MODELS["kelemen"].reciprocal, MODELS["kelemen"].shader.name
+    (True, 'kelemen.wgsl')
     """
 
     lobe: Lobe
@@ -45,7 +62,7 @@ class Model:
 
     @property
     def shader(self) -> Path:
-        """The file of its shader."""
+        """Return the path of the shader."""
         return Path(inspect.getfile(self.lobe)).with_suffix(".wgsl")
 
 
@@ -63,7 +80,7 @@ MODELS: Registry[Model] = Registry(
         "kelemen-direct": "dermis.specular.kelemen:KELEMEN_DIRECT",
     },
 )
-"""By the names that scenes use, the default first; imported when needed: a command's help is quick."""
+"""Specular models by their names in scene files, the default first; imported on first use."""
 
 SpecularName = Annotated[str, RegisteredName(MODELS, "none")]
 FresnelName = Literal["schlick", "exact"]

@@ -1,4 +1,4 @@
-"""Phong's highlight around the mirror direction, as first published and with its energy put right."""
+"""Phong lobes: the original highlight and an energy-conserving version."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from dermis.specular.models import Model
 
 
 def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """BRDF with the factor (s + 2) / 2 pi that has it reflect F at normal incidence [1/sr].
+    """Return the BRDF with a normalisation (s + 2) / 2 pi that reflects F at normal incidence [1/sr].
 
-    m : roughness; s is a quarter of `exponent(m)`, for the mirror direction turns twice as far as h
+    m : roughness; s is a quarter of `exponent(m)`, as the mirror direction rotates twice as far as h
 
-    Source: [LafortuneWillems1994], with Fresnel's reflectance on v.h, which keeps it reciprocal.
+    Source: [LafortuneWillems1994], with the Fresnel reflectance of v.h, which keeps it reciprocal.
     """
     s = 0.25 * exponent(m)
     lobe = fresnel(angles.v_h) * (s + 2.0) / (2.0 * np.pi) * _power(angles, s)
@@ -24,10 +24,10 @@ def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
 
 
 def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """The highlight W(i) cos^s of 1975 as a BRDF: divided by the cosine that it does not have [1/sr].
+    """Return the highlight W(i) cos^s of 1975 as a BRDF, divided by n.l [1/sr].
 
-    W(i) is Fresnel's reflectance at the angle of incidence. That and the division make it not reciprocal. It
-    was added to a diffuse term without 1/pi; both are divided by pi here.
+    W(i) is the Fresnel reflectance of the angle of incidence. That and the division make it not reciprocal.
+    It was added to a diffuse term without 1/pi; here both are divided by pi.
 
     Source: [Phong1975].
     """
@@ -37,21 +37,21 @@ def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
 
 
 def _power(angles: Cosines, s: Floats) -> Floats:
-    """(r.v)^s with r the mirrored light."""
+    """Return (r.v)^s, with the mirrored light direction r."""
     r_v = 2.0 * angles.n_l * angles.n_v - (2.0 * angles.v_h**2 - 1.0)
     return np.asarray(np.clip(r_v, 0.0, 1.0) ** s)
 
 
 PHONG = Model(
     phong,
-    "a power of the mirror direction with its energy put right",
+    "normalised power of r.v",
     reciprocal=True,
     sources=("Phong1975", "LafortuneWillems1994"),
 )
 PHONG_PLAIN = Model(
     phong_plain,
-    "a power of the mirror direction as first published; not reciprocal, for its highlight has no cosine "
-    "of the light and its reflectance is that of the angle of incidence",
+    "original power of r.v; not reciprocal, as its highlight lacks the cosine of the light and its "
+    "Fresnel reflectance is that of the angle of incidence",
     reciprocal=False,
     sources=("Phong1975",),
 )

@@ -1,4 +1,4 @@
-// Powers of r.v: normalised [LafortuneWillems1994], and as first published [Phong1975], divided by the light's cosine.
+// Phong lobes: normalised [LafortuneWillems1994], and original [Phong1975], divided by the cosine of the light.
 //#include "blinn_phong.wgsl"
 
 fn power_of_r_v(a: Angles, s: f32) -> f32 {

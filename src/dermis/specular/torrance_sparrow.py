@@ -1,4 +1,4 @@
-"""Microfacets after Torrance and Sparrow: Beckmann's slopes, masked by V-cavities or after Smith."""
+"""Torrance-Sparrow microfacet lobes: Beckmann slopes with V-cavity or Smith masking."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _GRAZING = 1e-6
 
 
 def torrance_sparrow(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """BRDF D F G / (4 n.l n.v) with the masking of V-shaped grooves [1/sr].
+    """Return the BRDF D F G / (4 n.l n.v) with V-cavity masking [1/sr].
 
     m : roughness, broadcast against the angles [-]
 
@@ -28,7 +28,7 @@ def torrance_sparrow(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) 
 
 
 def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """BRDF D F G1(l) G1(v) / (4 n.l n.v) with Smith's masking of a random surface [1/sr].
+    """Return the BRDF D F G1(l) G1(v) / (4 n.l n.v) with Smith masking [1/sr].
 
     m : roughness, broadcast against the angles [-]
 
@@ -40,13 +40,13 @@ def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = sch
 def masked_lobe(
     angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Callable[[Floats], Floats]
 ) -> Floats:
-    """BRDF of slopes distributed as `slopes` over pi; `masking` is the share seen by cosine [1/sr]."""
+    """Return the BRDF for a slope distribution `slopes` / pi and a masking function of the cosine [1/sr]."""
     n_l, n_v = _raised(angles)
     return _lobe(angles, slopes, fresnel, masking(n_l) * masking(n_v))
 
 
 def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
-    """Share of facets seen from a direction, G1, exact for Beckmann's slopes [-].
+    """Return the visible fraction of facets G1 in a direction, exact for Beckmann slopes [-].
 
     Source: [Smith1967]; [Walter2007] section 5.2, before its rational approximation.
     """
@@ -58,7 +58,7 @@ def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
 
 
 def _raised(angles: Cosines) -> tuple[Floats, Floats]:
-    """Cosines of light and view, kept from 0."""
+    """Return the cosines of light and view, clamped to a positive minimum."""
     return np.maximum(angles.n_l, _GRAZING), np.maximum(angles.n_v, _GRAZING)
 
 
@@ -70,13 +70,13 @@ def _lobe(angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Floats) ->
 
 TORRANCE_SPARROW = Model(
     torrance_sparrow,
-    "Beckmann's slopes masked by V-cavities",
+    "Beckmann distribution with V-cavity masking",
     reciprocal=True,
     sources=("TorranceSparrow1967", "CookTorrance1982", "Beckmann1963"),
 )
 TORRANCE_SPARROW_SMITH = Model(
     torrance_sparrow_smith,
-    "Beckmann's slopes masked after Smith",
+    "Beckmann distribution with Smith masking",
     reciprocal=True,
     sources=("TorranceSparrow1967", "Smith1967", "Walter2007"),
 )

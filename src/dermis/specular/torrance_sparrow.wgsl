@@ -1,4 +1,4 @@
-// Torrance and Sparrow's microfacets, masked by V-cavities [TorranceSparrow1967] or after Smith [Smith1967].
+// Torrance-Sparrow microfacet lobes with V-cavity masking [TorranceSparrow1967] or Smith masking [Smith1967].
 //#include "beckmann.wgsl"
 //#include "cosines.wgsl"
 //#include "fresnel.wgsl"
@@ -15,8 +15,8 @@ fn torrance_sparrow_smith(a: Angles, m: f32) -> f32 {
     return beckmann(a, m) * fresnel(a.v_h) / (4.0 * PI * smith_area(a.n_l, m) * smith_area(a.n_v, m));
 }
 
-// c / G1(c), the area that the facets would fill in a direction if none hid another, exact but for erf, which is
-// within 2e-7 [AbramowitzStegun1964] 7.1.26.
+// c / G1(c), the projected area of all facets without masking, exact except for erf, which has an error of 2e-7
+// [AbramowitzStegun1964] 7.1.26.
 fn smith_area(c: f32, m: f32) -> f32 {
     let across = m * sqrt(max(1.0 - c * c, 1e-12));
     let x = c / across;

@@ -1,4 +1,4 @@
-"""Two lobes of two roughnesses, as engines shade skin today, off one surface that masks itself."""
+"""Two-lobe model of game engines: two roughnesses with common masking."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from dermis.specular.models import Model
 from dermis.specular.torrance_sparrow import masked_lobe, smith_masking
 
 NARROW_FACTOR, WIDE_FACTOR = 0.75**2, 1.3**2
-"""Factors of m: an engine's 0.75 and 1.3 belong to its roughness, whose square is m [EpicGames2025]."""
+"""Factors of m of both lobes; the engine's 0.75 and 1.3 apply to the root of m [EpicGames2025]."""
 
 NARROW_WEIGHT = 0.85
-"""Weight of the narrow lobe, the rest is the wide one's [-] [EpicGames2025]."""
+"""Weight of the narrow lobe; that of the wide lobe is the rest [-] [EpicGames2025]."""
 
 MIN_ROUGHNESS, MAX_ROUGHNESS = 0.05, 1.0
 
 
 def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """BRDF of a random surface with slopes of two kinds about m: a sharp core in a wide veil [1/sr].
+    """Return the BRDF of a mixture of a narrow and a wide Beckmann slope distribution [1/sr].
 
-    m : roughness, broadcast against the angles [-]; both kinds' stay within 0.05 to 1
+    m : roughness, broadcast against the angles [-]; those of both lobes are clamped to 0.05 to 1
 
-    Source: [EpicGames2025] for the two; [Walter2007] section 5 for the lobe.
+    Source: [EpicGames2025] for the two lobes; [Walter2007] section 5 for the BRDF.
     """
     slopes = _mean(lambda rough: beckmann(angles.n_h, rough), m)
     return masked_lobe(angles, slopes, fresnel, lambda cosine: two_lobe_masking(cosine, m))
 
 
 def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
-    """Share of the facets seen from a direction, G1 [-].
+    """Return the visible fraction of facets G1 in a direction [-].
 
-    Smith's integral, 1 / G1 - 1, is linear in the distribution of slopes: 1 / G1 mixes as they do.
+    Smith's 1 / G1 - 1 is an integral over the slope distribution, so 1 / G1 is mixed like the distributions.
     """
     return np.asarray(1.0 / _mean(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
 
 
 def _mean(quantity: Callable[[Floats], Floats], m: ArrayLike) -> Floats:
-    """Of both kinds of slopes, by their weights."""
+    """Return the weighted mean of a quantity for the roughnesses of both lobes."""
     narrow, wide = (
         np.clip(factor * np.asarray(m), MIN_ROUGHNESS, MAX_ROUGHNESS)
         for factor in (NARROW_FACTOR, WIDE_FACTOR)
@@ -52,7 +52,7 @@ def _mean(quantity: Callable[[Floats], Floats], m: ArrayLike) -> Floats:
 
 TWO_LOBE = Model(
     two_lobe,
-    "a narrow and a wide kind of slopes, masked after Smith",
+    "narrow and wide Beckmann distributions with Smith masking",
     reciprocal=True,
     sources=("EpicGames2025", "Smith1967", "Walter2007", "Beckmann1963"),
     numbers={"narrow": NARROW_FACTOR, "wide": WIDE_FACTOR, "narrow_weight": NARROW_WEIGHT},
