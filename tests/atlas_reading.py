@@ -1,4 +1,4 @@
-"""Reading an atlas as shaders do, and the surface that its texels show."""
+"""Sampling of an atlas as in shaders, and the surface that its texels represent."""
 
 from __future__ import annotations
 
@@ -17,26 +17,29 @@ Flags = NDArray[np.bool_]
 
 
 class Points(NamedTuple):
-    """Points (n,) of a surface: triangle and weights (n, 3) of its corners."""
+    """Points (n,) of a surface: triangle, and weights (n, 3) of its corners."""
 
     triangle: Index
     weights: Floats
 
     def on(self, corners: NDArray[np.floating]) -> Floats:
-        """(n, c) of an attribute (f, 3, c)."""
+        """Return the (n, c) values of an attribute (f, 3, c)."""
         return np.asarray(np.einsum("nk,nkc->nc", self.weights, corners[self.triangle].astype(np.float64)))
 
 
 def shown(atlas: Atlas, mesh: Mesh, own: bool = False) -> Floats:
-    """(n, n, 3) position that each texel shows, NaN where none; with `own` only where light is computed."""
+    """Return the (n, n, 3) position that each texel represents, NaN for none.
+
+    own : only texels whose light is computed
+    """
     there = atlas.lit if own else atlas.coverage
     return np.where(there[..., None], atlas.interpolate(mesh, mesh.positions), np.nan)
 
 
 def read(values: Floats, at: Floats) -> Floats:
-    """(k, c) values (n, n, c) between four texels; NaN of a texel counts only where it has a share.
+    """Return (k, c) bilinear samples of values (n, n, c); NaN of a texel counts only if its weight is not 0.
 
-    at : (k, 2) x and y [texel], whole numbers at texel centres
+    at : (k, 2) x and y [texel], integers at texel centres
     """
     last = len(values) - 1
     low = np.clip(np.floor(at).astype(np.int64), 0, last)
@@ -51,12 +54,12 @@ def read(values: Floats, at: Floats) -> Floats:
 
 
 def lit_at(values: Floats, atlas: Atlas, points: Points) -> Floats:
-    """(k, c) of values (n, n, c) where the atlas has these points."""
+    """Return the (k, c) samples of values (n, n, c) at the positions of the points in the atlas."""
     return read(values, points.on(atlas.corner_uv) * atlas.size - 0.5)
 
 
 def random_points(mesh: Mesh, count: int, seed: int = 0) -> Points:
-    """Points anywhere on a mesh, a quarter of them on sides and some at corners of triangles."""
+    """Return random points on a mesh, a quarter of them on edges and some at corners of triangles."""
     rng = np.random.default_rng(seed)
     weights = rng.dirichlet(np.ones(3), count)
     weights[: count // 4, 0] = 0
@@ -65,7 +68,7 @@ def random_points(mesh: Mesh, count: int, seed: int = 0) -> Points:
 
 
 def seam_points(mesh: Mesh, count: int = 4) -> tuple[Points, Points]:
-    """The same points along all seams, once for each side: where space meets and uv does not, or folds."""
+    """Return the same points along all seams for both sides, where uv is discontinuous or folded."""
     uv, place = mesh.uv[mesh.triangles].astype(np.float64), mesh.point[mesh.triangles]
     cross = uv_cross(uv) > 0
     sides: dict[tuple[int, int], list[tuple[int, int]]] = {}
@@ -87,7 +90,7 @@ def seam_points(mesh: Mesh, count: int = 4) -> tuple[Points, Points]:
 
 
 def _along(sides: Index, count: int) -> Points:
-    """Points on sides (s, 3) from one corner to another: triangle, corner, corner."""
+    """Return points on edges (s, 3), given as triangle, corner, corner."""
     t = np.tile((np.arange(count) + 0.5) / count, len(sides))
     triangle, first, second = np.repeat(sides, count, axis=0).T
     weights = np.zeros((len(t), 3))

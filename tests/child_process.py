@@ -15,7 +15,7 @@ ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 def start(command: list[str], **options: Any) -> subprocess.Popen[Any]:
-    """Start a process as `subprocess.Popen` does, in which no signal of ENDING is ignored."""
+    """Start a process as `subprocess.Popen` does, with no signal of ENDING ignored."""
     with default_signals():
         return subprocess.Popen(command, **options)
 
@@ -34,7 +34,7 @@ def default_signals() -> Iterator[None]:
 
 @contextmanager
 def ignored_signals() -> Iterator[None]:
-    """Ignore the signals of ENDING, as what `nohup` starts in the background does."""
+    """Ignore the signals of ENDING, as for a background process started by `nohup`."""
     before = {number: signal.signal(number, signal.SIG_IGN) for number in ENDING}
     try:
         yield

@@ -1,4 +1,4 @@
-"""InputDriver on a page in Chromium: what it shows, drags of a mouse, and fingers."""
+"""Input driver of a page in Chromium: its picture, mouse drags, and fingers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Place = tuple[float, float]
 
 @contextmanager
 def opened_browser() -> Iterator[Any]:
-    """Chromium, without a window."""
+    """Yield Chromium without a window."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as play:
@@ -41,7 +41,7 @@ def opened_browser() -> Iterator[Any]:
 
 @contextmanager
 def visited(browser: Any, url: str, expected: str = "no error", **given: Any) -> Iterator[Any]:
-    """The page, showing something; an error in its console fails the test unless it was expected."""
+    """Yield the page when it shows something; unexpected errors in its console fail the test."""
     one = browser.new_page(**{"viewport": SIZE} | given)
     errors: list[str] = []
     one.set_default_timeout(1000 * PATIENCE_S)
@@ -60,7 +60,7 @@ def wait_for_picture(page: Any) -> None:
 
 
 def wait(page: Any, reached: Callable[[], Any]) -> bool:
-    """Whether something comes to be; the page goes on meanwhile."""
+    """Return whether a condition becomes true, while the page continues."""
     end = time.monotonic() + PATIENCE_S
     while not reached() and time.monotonic() < end:
         page.wait_for_timeout(50)
@@ -68,7 +68,7 @@ def wait(page: Any, reached: Callable[[], Any]) -> bool:
 
 
 def listen(page: Any) -> None:
-    """Remember the kinds of the frames that come to the page; before it goes anywhere."""
+    """Record the kinds of frames that the page receives; call it before the page is opened."""
     page.frames_come = []
 
     def hear(message: Any) -> None:
@@ -79,7 +79,7 @@ def listen(page: Any) -> None:
 
 
 def is_final(page: Any) -> bool:
-    """Whether the last frame that came is without loss: those come when nothing changes any more."""
+    """Return whether the last frame is lossless, which is sent when nothing changes any more."""
     return bool(page.frames_come) and page.frames_come[-1] == "image/png"
 
 
@@ -90,7 +90,7 @@ def pixels(page: Any) -> NDArray[np.int64]:
 
 
 def still(page: Any, judge: Callable[[NDArray[np.int64]], bool]) -> NDArray[np.int64]:
-    """The first picture that satisfies `judge` and does not change any more."""
+    """Return the first picture that satisfies `judge` and does not change any more."""
     last, end = pixels(page), time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         page.wait_for_timeout(400)
@@ -102,7 +102,7 @@ def still(page: Any, judge: Callable[[NDArray[np.int64]], bool]) -> NDArray[np.i
 
 
 def head(image: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The part that the panel does not cover."""
+    """Return the part that the panel does not cover."""
     return image[40:430, 205:]
 
 
@@ -115,7 +115,7 @@ def differs_from(before: NDArray[np.int64]) -> Callable[[NDArray[np.int64]], boo
 
 
 def looks_like(before: NDArray[np.int64]) -> Callable[[NDArray[np.int64]], bool]:
-    """Whether an image is the same but for its encoding: a new frame comes as JPEG, then as PNG."""
+    """Return whether two images differ only by their encoding: a new frame is sent as JPEG, then as PNG."""
     return lambda image: bool(np.abs(head(image) - head(before)).mean() < 0.5)
 
 
@@ -127,7 +127,7 @@ def drag(page: Any, start: tuple[float, float], end: tuple[float, float]) -> Non
 
 
 def touch(page: Any, *moments: Sequence[Place]) -> None:
-    """Fingers that go from moment to moment, each finger by its place in the list; then they leave."""
+    """Move fingers through positions, each finger by its index in the list, and lift them."""
     session = page.context.new_cdp_session(page)
     for k, places in enumerate(moments):
         points = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(places)]
@@ -139,5 +139,5 @@ def touch(page: Any, *moments: Sequence[Place]) -> None:
 
 
 def height(image: NDArray[np.int64]) -> int:
-    """Rows of the picture that show some of the head."""
+    """Return the number of rows of the picture that show the head."""
     return int((head(image).max(axis=(1, 2)) > 25).sum())

@@ -1,4 +1,4 @@
-"""What every test relies on: a private cache, strict floating point, sample data and a device when asked for.
+"""Common setup of all tests: a private cache, strict floating point, sample data and a device on request.
 
 `DERMIS_DATA` names the folder of sample data; tests that need it (the fixture `sample_folder` or the mark
 `samples`) are skipped without it and counted at the end. `DERMIS_TEST_ADAPTER` names another adapter than
@@ -50,13 +50,13 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 @pytest.fixture(scope="session")
 def sample_folder() -> Path:
-    """The folder of sample data; skips the test when DERMIS_DATA is unset."""
+    """Return the folder of sample data; skip the test if DERMIS_DATA is not set."""
     return _find_samples()
 
 
 @pytest.fixture(scope="session")
 def device() -> Device:
-    """The software adapter, opened once; a machine without one fails the test, it does not skip it."""
+    """Return the software adapter, opened once; a machine without one fails the test."""
     from dermis.gpu.device import open_device
 
     return open_device(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
@@ -64,7 +64,7 @@ def device() -> Device:
 
 @pytest.fixture(scope="session", autouse=True)
 def private_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """No test reads or writes the user's own cache."""
+    """Use a cache folder of the tests instead of the user's."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("DERMIS_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
@@ -72,7 +72,7 @@ def private_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def strict_floating_point() -> Iterator[None]:
-    """A division by zero, an overflow or a NaN is an error; underflow to zero is what exp(-large) is for."""
+    """Turn a division by zero, an overflow or a NaN into an error; underflow to zero is permitted."""
     before = np.seterr(divide="raise", over="raise", invalid="raise")
     yield
     np.seterr(**before)

@@ -1,4 +1,4 @@
-"""Simple surfaces cut into charts that are turned, scaled, mirrored or folded, for what happens at seams."""
+"""Simple surfaces cut into charts that are rotated, scaled, mirrored or folded, to test seams."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Floats = NDArray[np.float64]
 
 
 class Patch(NamedTuple):
-    """A grid of cells on a surface and where its chart lies.
+    """Grid of cells on a surface and the position of its chart.
 
     points : (rows, columns, 3) [mm], rows downwards and columns to the right as seen from outside
-    flat : (rows, columns, 2) the same laid flat, x to the right and y down
+    flat : (rows, columns, 2) flattened points, x to the right and y down
     """
 
     points: Floats
@@ -26,7 +26,7 @@ class Patch(NamedTuple):
 
 
 class Lay(NamedTuple):
-    """How a chart lies in the map: middle of it in uv, scale, turn, and whether it is mirrored."""
+    """Placement of a chart in uv: centre, scale, rotation, and whether it is mirrored."""
 
     middle: tuple[float, float]
     scale: float
@@ -35,7 +35,7 @@ class Lay(NamedTuple):
 
 
 def assemble(patches: Sequence[Patch], lays: Sequence[Lay]) -> Mesh:
-    """One mesh of all patches; points in the same place are one."""
+    """Return one mesh of all patches; points at the same position are merged."""
     positions, uv, triangles, first = [], [], [], 0
     for patch, lay in zip(patches, lays, strict=True):
         rows, columns = patch.points.shape[:2]
@@ -68,7 +68,7 @@ SPHERE_LAYS = (
 
 
 def cut_sphere(radius_mm: float, cells: int, lays: Sequence[Lay] = SPHERE_LAYS) -> Mesh:
-    """A sphere about the origin as six charts of `cells` x `cells`, each bulging cube face laid flat."""
+    """Return a sphere about the origin as six charts of `cells` x `cells`, one per face of a cube."""
     along = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
     x, y = np.meshgrid(along, along)
     front = np.stack((x, -y, np.ones_like(x)), axis=-1)
@@ -93,7 +93,7 @@ CYLINDER_LAYS = (
 
 
 def cut_cylinder(radius_mm: float, height_mm: float, cells: int, lays: Sequence[Lay] = CYLINDER_LAYS) -> Mesh:
-    """An open cylinder around the Y axis in as many charts as there are lays, without stretch."""
+    """Return an open cylinder around the Y axis with one unstretched chart per placement."""
     patches = []
     share = 2 * np.pi / len(lays)
     for k in range(len(lays)):
@@ -113,7 +113,7 @@ def cut_cylinder(radius_mm: float, height_mm: float, cells: int, lays: Sequence[
 
 
 def cut_cone(radius_mm: float, gap_degrees: float, rings: int = 16, segments: int = 64) -> Mesh:
-    """A cone cut open along one line and laid flat: a disc with a slit that gets narrow towards the apex."""
+    """Return a cone cut along one line and flattened to a disc with a slit that narrows towards the apex."""
     whole = 2 * np.pi - np.radians(gap_degrees)
     away, angle = np.meshgrid(
         radius_mm * np.linspace(0, 1, rings + 1), whole * np.linspace(0, 1, segments + 1)
@@ -133,7 +133,7 @@ def cut_cone(radius_mm: float, gap_degrees: float, rings: int = 16, segments: in
 
 
 def folded_sheet(side_mm: float, cells: int) -> Mesh:
-    """A flat square whose left half has the uv of the right half, mirrored; joined along the middle."""
+    """Return a flat square whose left half has the mirrored uv of the right half."""
     x, y = np.meshgrid(np.linspace(-0.5, 0.5, 2 * cells + 1), np.linspace(-0.5, 0.5, 2 * cells + 1))
     points = side_mm * np.stack((x, -y, 0 * x), axis=-1)
     flat = np.stack((np.abs(x), y), axis=-1)

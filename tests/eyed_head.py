@@ -1,4 +1,4 @@
-"""A small glTF head with openings for eyes, and a ball behind each."""
+"""A small glTF head with openings for eyes and a ball behind each."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from gltf_file import GltfFile, add_mesh
 from numpy.typing import NDArray
 
-from dermis.mesh.eyeball import globe
-from dermis.mesh.geometry import halves
+from dermis.mesh.eyeball import build_eyeball
+from dermis.mesh.geometry import split_quads
 from dermis.mesh.primitives import uv_sphere
 
 Floats = NDArray[np.float64]
@@ -25,22 +25,22 @@ MIRROR = np.array([-1.0, 1.0, 1.0])
 
 
 def ball(radius_mm: float = 12.0, stretch: float = 1.0) -> tuple[Floats, NDArray[np.int32]]:
-    """A plain ball."""
+    """Return a plain ball."""
     mesh = uv_sphere(radius_mm, 24, 16)
     return mesh.positions * np.array([1.0, stretch, 1.0]), mesh.triangles
 
 
 def ball_with_cornea(radius_mm: float, axis: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """An eyeball that looks along an axis, (3,)."""
-    points, quads = globe(16)
+    """Return an eyeball that looks along an axis (3,)."""
+    points, quads = build_eyeball(16)
     across = np.cross((0.0, 1.0, 0.0), axis)
     across /= np.linalg.norm(across)
     size = radius_mm / -points[:, 2].min()
-    return size * points @ np.stack([across, np.cross(axis, across), axis]), halves(quads)
+    return size * points @ np.stack([across, np.cross(axis, across), axis]), split_quads(quads)
 
 
 def skin() -> tuple[Floats, NDArray[np.int32]]:
-    """An egg with two openings."""
+    """Return an ellipsoid with two openings."""
     mesh = uv_sphere(1.0, 112, 112)
     places = mesh.positions * HALF_MM
     middle = places[mesh.triangles].mean(axis=1)
@@ -58,11 +58,11 @@ def write_head(
     targets: dict[str, Floats] | None = None,
     joints: tuple[str, ...] = (),
 ) -> Path:
-    """The head in millimetres.
+    """Write the head in millimetres.
 
-    left, right : (points around the middle, triangles); plain balls when left out
-    targets : by name displacements of the left ball's points
-    joints : names of a head's joint and of one for each ball, which these follow
+    left, right : (points around the centre, triangles); plain balls if omitted
+    targets : displacements of the left ball's points by name
+    joints : names of joints of the head and of each ball
     """
     file, nodes, made = GltfFile(), list[int](), {}
     parts = [("skin", *skin())]

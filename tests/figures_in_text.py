@@ -1,4 +1,4 @@
-"""Comparison of texts that hold computed figures: words exactly, figures within their tolerance.
+"""Comparison of texts that contain computed figures: words exactly, figures within their tolerance.
 
 The last printed digit of a computed figure depends on the processor, so no test compares such text by
 equality.
@@ -23,10 +23,10 @@ class _Figure(NamedTuple):
 
 
 def differences(found: str, expected: str) -> list[str]:
-    """Return the lines that differ, each with what was found and what was expected.
+    """Return the lines that differ, each with the found and the expected line.
 
-    Words, spaces and whole numbers are compared exactly. Numbers with decimals or an exponent and percentages
-    may differ by one in the last digit of the one with fewer decimals, and by the share PRINTED.
+    Words, spaces and integers are compared exactly. Numbers with decimals or an exponent and percentages may
+    differ by one in the last digit of the one with fewer decimals, and by the relative tolerance PRINTED.
     """
     lines = zip_longest(found.splitlines(), expected.splitlines())
     return [f"found    {one}\nexpected {other}" for one, other in lines if not _same(one, other)]

@@ -16,7 +16,7 @@ KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
 
 class GltfFile:
-    """The tree of a file and its buffer; `numbers` and `sparse` add accessors and return their index."""
+    """Tree of a file and its buffer; `numbers` and `sparse` add accessors and return their index."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -37,7 +37,7 @@ class GltfFile:
         return len(self.tree["accessors"]) - 1
 
     def numbers(self, values: ArrayLike, kind: str = "<f4", *, normalized: bool = False, gap: int = 0) -> int:
-        """Rows of numbers, with a gap [byte] after each."""
+        """Add rows of numbers, with a gap [byte] after each."""
         rows = np.asarray(values, kind)
         rows = rows.reshape(len(rows), -1)
         size = rows.itemsize * rows.shape[1]
@@ -48,7 +48,7 @@ class GltfFile:
         return self._accessor(rows.shape, kind, bufferView=view, **more)
 
     def sparse(self, values: ArrayLike) -> int:
-        """The same with only the rows stored that are not 0."""
+        """Add rows of numbers, storing only the non-zero rows."""
         rows = np.asarray(values, "<f4")
         index = np.flatnonzero(rows.any(axis=1)).astype("<u2")
         told = {
@@ -59,12 +59,12 @@ class GltfFile:
         return self._accessor(rows.shape, "<f4", sparse=told)
 
     def add(self, kind: str, **entry: Any) -> int:
-        """A mesh, node, skin or animation."""
+        """Add a mesh, node, skin or animation."""
         self.tree[kind].append(entry)
         return len(self.tree[kind]) - 1
 
     def write(self, path: Path, *roots: int) -> Path:
-        """The file, with its scene of these nodes."""
+        """Write the file with a scene of the given nodes."""
         tree = {key: value for key, value in self.tree.items() if value}
         tree["buffers"] = [{"byteLength": len(self.data)}]
         if roots:
@@ -95,7 +95,7 @@ def add_mesh(
     attributes: dict[str, int] | None = None,
     **more: Any,
 ) -> int:
-    """A mesh of one primitive with uv from its x and y; targets by name, as accessors."""
+    """Add a mesh of one primitive with uv from its x and y; targets are accessors by name."""
     places = np.asarray(positions, float)
     uv = (places[:, :2] - places[:, :2].min()) / np.ptp(places[:, :2])
     primitive: dict[str, Any] = {

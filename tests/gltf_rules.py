@@ -1,4 +1,4 @@
-"""Rules of glTF 2.0 for .glb files, of those that the Khronos validator checks, and that validator itself."""
+"""Rules of glTF 2.0 for .glb files that the Khronos validator checks, and that validator itself."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ validator.validateBytes(bytes).then(found => console.log(JSON.stringify(found.is
 
 
 def check_rules(path: Path) -> Document:
-    """The file, after all rules were checked."""
+    """Check all rules and return the parsed file."""
     data = path.read_bytes()
     _check_chunks(data)
     document = read_document(path)
@@ -68,7 +68,7 @@ def _check_chunks(data: bytes) -> None:
 
 def _check_accessor(document: Document, number: int) -> None:
     accessor = document.tree["accessors"][number]
-    values = document.numbers(number)
+    values = document.read_values(number)
     assert accessor["count"] >= 1 and np.isfinite(values).all()
     if "min" in accessor:
         assert accessor["min"] == values.min(axis=0).tolist(), number
@@ -79,7 +79,7 @@ def _check_accessor(document: Document, number: int) -> None:
         view = document.tree["bufferViews"][sparse["indices"]["bufferView"]]
         kind = {5123: "<u2", 5125: "<u4"}[sparse["indices"]["componentType"]]
         assert view["byteLength"] == sparse["count"] * np.dtype(kind).itemsize
-        index = np.frombuffer(document.view(sparse["indices"]["bufferView"]), kind).astype(np.int64)
+        index = np.frombuffer(document.read_view(sparse["indices"]["bufferView"]), kind).astype(np.int64)
         assert (np.diff(index) > 0).all() and index[-1] < accessor["count"]
 
 
@@ -93,9 +93,9 @@ def _check_primitive(document: Document, mesh: dict[str, Any], primitive: dict[s
         assert accessor["count"] == count
         assert document.tree["bufferViews"][accessor["bufferView"]]["target"] == VERTICES
     assert "min" in accessors[given["POSITION"]]
-    lengths = np.linalg.norm(document.real(given["NORMAL"]), axis=1)
+    lengths = np.linalg.norm(document.read_floats(given["NORMAL"]), axis=1)
     np.testing.assert_allclose(lengths, 1.0, atol=1e-4)
-    index = document.numbers(primitive["indices"]).ravel()
+    index = document.read_values(primitive["indices"]).ravel()
     assert document.tree["bufferViews"][accessors[primitive["indices"]]["bufferView"]]["target"] == INDICES
     assert len(index) % 3 == 0 and index.max() < min(count, np.iinfo(index.dtype).max)
     assert len(np.unique(index)) == count  # no vertex is left over
@@ -113,7 +113,7 @@ def _check_primitive(document: Document, mesh: dict[str, Any], primitive: dict[s
 
 def _check_influences(document: Document, given: dict[str, int]) -> None:
     (skin,) = document.tree["skins"]
-    joint, weight = (document.numbers(given[name]) for name in ("JOINTS_0", "WEIGHTS_0"))
+    joint, weight = (document.read_values(given[name]) for name in ("JOINTS_0", "WEIGHTS_0"))
     assert joint.max() < len(skin["joints"]) and (weight >= 0).all()
     assert (joint[weight == 0] == 0).all()
     missed = np.abs(weight.astype(np.float64).sum(axis=1) - 1)
@@ -134,7 +134,7 @@ def _check_nodes(document: Document) -> None:
         assert not ("matrix" in node and "translation" in node)
         assert "skin" not in node or tree["nodes"].index(node) in roots
     for skin in tree.get("skins", []):
-        bound = document.numbers(skin["inverseBindMatrices"])
+        bound = document.read_values(skin["inverseBindMatrices"])
         assert bound.shape == (len(skin["joints"]), 16) and (bound[:, 3:15:4] == 0).all()
         assert (bound[:, 15] == 1).all() and len(set(skin["joints"])) == len(skin["joints"])
         above = {child: k for k, node in enumerate(tree["nodes"]) for child in node.get("children", [])}
@@ -144,7 +144,7 @@ def _check_nodes(document: Document) -> None:
 
 
 def _check_views(document: Document) -> None:
-    """Views lie one after the other, aligned, and none holds more than what is read of it."""
+    """Check that buffer views are contiguous and aligned, and contain nothing unused."""
     views, end = document.tree["bufferViews"], 0
     for view in views:
         start = view.get("byteOffset", 0)
@@ -158,7 +158,7 @@ def _check_views(document: Document) -> None:
 
 
 def _check_use(document: Document) -> None:
-    """Nothing is left over."""
+    """Check that every part is used."""
     tree = {key: value for key, value in document.tree.items() if key != "asset"}
     used = {number for kind, number in _references(tree) if kind == "accessor"}
     assert used == set(range(len(tree["accessors"])))
@@ -176,7 +176,7 @@ def _check_use(document: Document) -> None:
 
 
 def _references(value: Any) -> Iterator[tuple[str, int]]:
-    """Numbers of accessors, buffer views and textures that parts of the tree name."""
+    """Return the indices of accessors, buffer views and textures that parts of the tree refer to."""
     if isinstance(value, list):
         for one in value:
             yield from _references(one)
@@ -194,7 +194,7 @@ def _references(value: Any) -> Iterator[tuple[str, int]]:
 
 
 def khronos_issues(path: Path) -> dict[str, Any]:
-    """What the Khronos validator finds; skips the test where there is none."""
+    """Return the issues that the Khronos validator finds; skip the test if it is not available."""
     node, folder = shutil.which("node"), os.environ.get(VALIDATOR_VARIABLE)
     if node is None or not folder:
         pytest.skip(f"{VALIDATOR_VARIABLE} is not set, or there is no node")

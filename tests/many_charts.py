@@ -1,4 +1,4 @@
-"""A head whose uv layout is as bad as seams can make it: the human's skin in hundreds of charts."""
+"""A head whose uv layout has extreme seams: the human's skin in hundreds of charts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LEAST_MM2 = 1e-6
 
 
 def many_charts_mesh(charts: int, subdivide: int = 0) -> Mesh:
-    """The skin of the human without eyes, teeth and tongue, each chart turned its own way."""
+    """Return the skin of the human without eyes, teeth and tongue, each chart with its own rotation."""
     mesh = Human().head(subdivide=subdivide).mesh
     points = mesh.point[mesh.triangles[mesh.material == 0]].astype(np.int64)
     positions, normals = (np.zeros((int(mesh.point.max()) + 1, 3)) for _ in range(2))

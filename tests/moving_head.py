@@ -1,4 +1,4 @@
-"""A head small enough to render in a moment that moves: two targets, a bone, and clips in its own file."""
+"""A moving head small enough to render quickly: two targets, a bone, and clips in its file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CAPTURE = """Timecode,BlendShapeCount,JawOpen,MouthSmileLeft,TongueOut
 
 
 def write_moving_head(path: Path, clips: int = 1) -> Path:
-    """A .glb: an ellipsoid in metres, with the clips "talk" and, where two are wanted, "nod"."""
+    """Write a .glb with an ellipsoid in metres, the clip "talk" and optionally "nod"."""
     ball, file = uv_sphere(0.5, 24, 12), GltfFile()
     places = ball.positions * np.array(SIZE) / 1000
     low = np.clip(-ball.positions[:, 1] / 0.5, 0, 1) * np.clip(ball.positions[:, 2] / 0.5, 0, 1)

@@ -1,4 +1,4 @@
-"""Input to a viewer without a window: pointer and key events, and a clock that only they move."""
+"""Input driver of a viewer without a window: pointer and key events, and a controlled clock."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SETTINGS = Settings(atlas=128, samples=2, shadow_size=256)
 
 @dataclass
 class InputDriver:
-    """A viewer on an offscreen canvas, with a clock that only the test moves."""
+    """Viewer on an offscreen canvas, with a clock that only the test advances."""
 
     viewer: Any
     canvas: Any
@@ -27,7 +27,7 @@ class InputDriver:
     patient: bool = True  # whether frames wait for a head that is prepared
 
     def frame(self, seconds: float = 0.05) -> NDArray[np.uint8]:
-        """The next frame's (h, w, 3) pixels, some time later [s]."""
+        """Return the (h, w, 3) pixels of the next frame, after some time [s]."""
         self.now += seconds
         self.canvas._process_events()
         drawn = np.array(self.canvas.draw())[..., :3]
@@ -38,7 +38,7 @@ class InputDriver:
         return self.frame(0.0)
 
     def settled(self) -> NDArray[np.uint8]:
-        """The picture when nothing moves any more."""
+        """Return the picture when nothing moves any more."""
         for _ in range(60):
             self.frame()
             if self.viewer.is_still:
@@ -49,7 +49,7 @@ class InputDriver:
         self.canvas.submit_event({"event_type": kind, "modifiers": (), **fields})
 
     def drag(self, start: tuple[float, float], end: tuple[float, float], **fields: Any) -> None:
-        """Press, move in a few steps, and let go."""
+        """Press, move in a few steps, and release."""
         self.event("pointer_move", x=start[0], y=start[1], button=0, buttons=())
         self.frame()
         self.event("pointer_down", x=start[0], y=start[1], button=1, buttons=(1,), **fields)
@@ -65,7 +65,7 @@ class InputDriver:
         self.drag(place, place)
 
     def position(self, label: str) -> tuple[float, float]:
-        """Where a control of the panel is, which scrolls as far as it must; the panel must be drawn."""
+        """Return the position of a control of the panel, after scrolling to it; the panel must be drawn."""
         self.frame()
         height = self.canvas.get_logical_size()[1]
         for _ in range(_MOST_TURNS):
@@ -83,6 +83,6 @@ class InputDriver:
         self.frame()
 
     def choose(self, label: str, name: str) -> None:
-        """One of the names of a list of the panel."""
+        """Choose an entry of a list of the panel."""
         self.press(label)
         self.click(self.position(f"{label}/{name}"))

@@ -1,4 +1,4 @@
-"""What a page does, without a browser."""
+"""Client with the protocol of the page, without a browser."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PATIENCE_S, _QUIET_S = 120.0, 0.7
 
 
 class Page:
-    """Confirms only the frames that the test wants."""
+    """Client that confirms only the frames that the test selects."""
 
     def __init__(self, socket: Any) -> None:
         self._socket = socket
@@ -44,7 +44,7 @@ class Page:
         self.tell("pointer_up", x=end, **button)
 
     def hear(self, quiet_s: float = _QUIET_S, *, confirming: bool = False) -> None:
-        """Take what comes until nothing comes any more."""
+        """Receive messages until none arrives any more."""
         while True:
             try:
                 message = self._socket.recv(timeout=quiet_s)
@@ -61,14 +61,14 @@ class Page:
     def wait(
         self, reached: Callable[[], Any], quiet_s: float = _QUIET_S, *, confirming: bool = False
     ) -> None:
-        """Take what comes until something has happened."""
+        """Receive messages until a condition is true."""
         end = time.monotonic() + PATIENCE_S
         while not reached():
             assert time.monotonic() < end, "what the page waits for never comes"
             self.hear(quiet_s, confirming=confirming)
 
     def still(self) -> NDArray[np.int64]:
-        """The picture when it is sent without loss and nothing follows."""
+        """Return the lossless picture after which nothing follows."""
         from PIL import Image
 
         end = time.monotonic() + PATIENCE_S
@@ -81,12 +81,12 @@ class Page:
 
 
 def visit(viewer: Any) -> Any:
-    """A socket to a viewer that `served` shows."""
+    """Return a socket to a viewer of `served`."""
     from websockets.sync.client import connect
 
     return connect(viewer.url.replace("http", "ws", 1), max_size=None)
 
 
 def difference(a: NDArray[np.int64], b: NDArray[np.int64]) -> float:
-    """Mean over the part that neither the panel nor text covers."""
+    """Return the mean difference over the part that neither the panel nor text covers."""
     return float(np.abs(a[:200, 205:] - b[:200, 205:]).mean())

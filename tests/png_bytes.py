@@ -1,4 +1,4 @@
-"""PNG files of any header and any rows, with sound checksums."""
+"""PNG files with any header and any rows, with valid checksums."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import zlib
 
 
 def png(width: int, height: int, bits: int, colour: int, rows: bytes, *more: tuple[bytes, bytes]) -> bytes:
-    """A file whose rows, each behind the number of its filter, are as given.
+    """Return a file with the given rows, each after its filter number.
 
-    more : kinds and bytes of parts before the pixels
+    more : types and bytes of chunks before the pixels
     """
     header = struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0)
     parts = [(b"IHDR", header), *more, (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]

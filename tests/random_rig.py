@@ -1,4 +1,4 @@
-"""A smooth rig like a head with numbers drawn at random: a ball of points, bumps as targets, four bones."""
+"""A smooth random rig like a head: a ball of points, bumps as targets, four bones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def ball(count: int = 3000) -> np.ndarray:
 
 
 def random_rig(seed: int = 0, targets: int = 8, unit_mm: float = 1000.0) -> Rig:
-    """A rig whose file is in units of `unit_mm` and whose bones' spaces point anywhere."""
+    """Return a rig whose file is in units of `unit_mm` and whose bones have arbitrary frames."""
     rng = np.random.default_rng(seed)
     points = (ball() * SIZE_MM).astype(np.float32)
     moved, deltas = [], []

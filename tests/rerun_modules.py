@@ -1,7 +1,7 @@
-"""Test modules whose tests run a second time when they fail, with the reason of each.
+"""Test modules whose failed tests are run a second time, with the reason for each.
 
-All others are independent of the clock: they wait for an event with a generous limit, count events, or move a
-clock of their own.
+All others do not depend on real time: they wait for an event with a generous limit, count events, or advance
+their own clock.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The small head with expressions and bones as a glTF file, and takes that move it."""
+"""The small head with expressions and bones as a glTF file, and motions for it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def write_rigged_head(path: Path) -> Path:
 
 
 def write_take(path: Path, *jaw: float) -> Path:
-    """A CSV of Live Link Face at 10 frames a second, in which the jaw opens by these weights."""
+    """Write a CSV of Live Link Face with 10 frames per second in which the jaw opens by the given weights."""
     rows = [f"10:00:{k // 10:02}:{k % 10:02}.000,61,{weight}" for k, weight in enumerate(jaw)]
     path.write_text("\n".join(["Timecode,BlendShapeCount,JawOpen", *rows, ""]))
     return path

@@ -1,4 +1,4 @@
-"""A viewer that a server in this process shows to pages."""
+"""A viewer that is served to pages by this process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.apps.viewer.state import ViewerState
 
 @contextmanager
 def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[Any]:
-    """The viewer, in a thread of its own; `viewer.url` is its page."""
+    """Yield the viewer, served by a thread; `viewer.url` is its page."""
     from rendercanvas.http import asgi
 
     from dermis.apps.viewer.browser.canvas import PageCanvas

@@ -1,4 +1,4 @@
-"""A head small enough to render in a moment: an ellipsoid as the text of an OBJ file."""
+"""A head small enough to render quickly: an ellipsoid as the text of an OBJ file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SIZE = (160.0, HEIGHT_MM, 190.0)
 
 
 def obj_text() -> str:
-    """Vertices, uv (v upwards, as OBJ has it) and faces in the group `skin`; millimetres, face to +Z."""
+    """Return vertices [mm], uv (v upwards) and faces in the group `skin`, with the face towards +Z."""
     ball = uv_sphere(0.5, 24, 12)
     places = [f"v {x:.6g} {y:.6g} {z:.6g}" for x, y, z in ball.positions * SIZE]
     uv = [f"vt {u:.6g} {1 - v:.6g}" for u, v in ball.uv]

@@ -1,4 +1,4 @@
-"""What a renderer would have seen, made from numbers: for tests of the files of data sets."""
+"""Synthetic observations of a renderer, for tests of data set files."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ OUTPUT_NAMES = "depth", "normal", "uv", "triangle", "motion", "alpha"
 
 
 def small_spec(**values: Any) -> Spec:
-    """Seven images in shards of three."""
+    """Return a spec of seven images in shards of three."""
     told = {"count": 7, "shard_size": 3, "size": SIZE, "outputs": OUTPUT_NAMES}
     return parse_spec({**told, **values})
 
 
 def observation(number: int, alpha: bool = False, outputs: tuple[str, ...] = OUTPUT_NAMES) -> Observation:
-    """Values as outputs can have them, by the image's number."""
+    """Return plausible outputs for an image number."""
     rng = np.random.default_rng(number)
     width, height = SIZE
     camera = OpenCvCamera(np.diag([500.0, 500.0, 1.0]), np.eye(3), np.array([0.0, 1.0, 600.0 + number]))
@@ -61,7 +61,7 @@ def _values(name: str, rng: np.random.Generator) -> Any:
 
 
 def write_shard(out: Path, shard: Shard, spec: Spec) -> None:
-    """A shard as a worker writes it."""
+    """Write a shard as a worker does."""
     with ShardWriter(out, shard, spec, "an adapter") as writer:
         for number in range(shard.first, shard.stop):
             seen = observation(number, spec.format == "folder", spec.outputs)
@@ -69,7 +69,7 @@ def write_shard(out: Path, shard: Shard, spec: Spec) -> None:
 
 
 def write_all(out: Path, spec: Spec) -> None:
-    """A data set without its index."""
+    """Write a data set without its index."""
     out.mkdir(parents=True, exist_ok=True)
     for shard in list_shards(spec):
         write_shard(out, shard, spec)

@@ -1,4 +1,4 @@
-"""A data set that is drawn in a moment: a ball of two sizes, seen from around."""
+"""A data set that renders quickly: a ball of two sizes, seen from around."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ yaw_deg = {{uniform = [-90, 90]}}
 
 
 def write_spec(folder: Path, *bad: str) -> Path:
-    """The spec and its heads in a folder.
+    """Write the spec and its heads to a folder.
 
     bad : names of heads that cannot be read, which some images show
     """
@@ -63,13 +63,13 @@ def read(path: Path) -> Spec:
 
 
 def drawn(spec: Spec, out: Path, workers: int = 1, encoders: int = 0, **more: object) -> RunReport:
-    """Run to the end with processes."""
+    """Run to the end with worker processes."""
     keep_going = bool(more.pop("keep_going", False))
     return run(RunOptions(spec, out, encoders, keep_going), ProcessPool([HERE] * workers), **more)  # type: ignore[arg-type]
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    """All files of a data set by their names."""
+    """Return all files of a data set by name."""
     return {
         path.relative_to(out).as_posix(): path.read_bytes()
         for path in sorted(out.rglob("*"))

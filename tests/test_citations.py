@@ -19,7 +19,7 @@ _KEY = re.compile(r"\b[A-Za-z]{2,}\d{4}[a-z]?\b")
 
 
 def cited_keys(text: str) -> list[str]:
-    """Keys in square brackets: `[Key1999]`, `[Key1999 eq. 3]` and `[Key1999, Other2001]`."""
+    """Return keys in square brackets: `[Key1999]`, `[Key1999 eq. 3]` and `[Key1999, Other2001]`."""
     return [key for inside in _BRACKETS.findall(text) for key in _KEY.findall(inside)]
 
 

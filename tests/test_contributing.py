@@ -1,4 +1,4 @@
-"""Tables and paths of CONTRIBUTING.md against the packages and files."""
+"""Tables and paths of CONTRIBUTING.md agree with the packages and files."""
 
 from __future__ import annotations
 

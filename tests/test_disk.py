@@ -1,4 +1,4 @@
-"""Atlases on disk: found again, and harmless when the disk is not as it should be."""
+"""Cached atlases on disk: they are found again, and damaged ones are harmless."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def built(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Sizes of the atlases that were computed and not read."""
+    """Return the list of sizes of atlases that were computed instead of loaded."""
     sizes: list[int] = []
     build = cached.build_atlas
 
@@ -111,14 +111,14 @@ def shaped(told: dict[str, Any], *shape: int) -> None:
 
 
 def forged(whole: bytes, change: Callable[[dict[str, Any]], object]) -> bytes:
-    """A file whose head is another, with the hash that fits."""
+    """Return a file with another header and the matching hash."""
     _, head, data = whole.split(b"\n", 2)
     change(told := json.loads(head))
     return headed(json.dumps(told).encode()) + data
 
 
 def headed(head: bytes) -> bytes:
-    """A file's head after its hash."""
+    """Return the header of a file after its hash."""
     return hashlib.sha256(head + b"\n").hexdigest().encode() + b"\n" + head + b"\n"
 
 
@@ -135,7 +135,7 @@ def test_a_broken_file_is_made_again(folder: Path, built: list[int], broken: str
 
 
 def test_a_file_under_another_name_is_made_again(folder: Path, built: list[int]) -> None:
-    """It is whole, but of another mesh, size or kind."""
+    """It is valid, but of another mesh, size or kind."""
     first = cached_atlas(plane(10.0), 64)
     path = only(folder)
     cached_atlas(plane(11.0), 64)
@@ -258,7 +258,7 @@ def test_the_order_of_sources_counts(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_what_the_folder_cannot_hold_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It would drive out all others, and itself, each time."""
+    """It would evict all others, and itself, each time."""
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     monkeypatch.setattr(disk, "_MOST_BYTES", 1000)
     for k in (1, 2):
@@ -269,7 +269,7 @@ def test_what_the_folder_cannot_hold_is_not_kept(tmp_path: Path, monkeypatch: py
 def test_of_what_the_folder_cannot_hold_at_once_some_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The maps of one head may be too many: each start would make and write all of them again."""
+    """The maps of one head may exceed the limit; otherwise each start would compute and write all of them."""
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     monkeypatch.setattr(disk, "_MOST_BYTES", 100_000)
     made: list[int] = []
@@ -318,7 +318,7 @@ def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
     first, second = (cached_rigged(b"file", "up y", load).mesh for _ in range(2))
     for one in (first, second):
         assert one.materials == mesh.materials and np.array_equal(
-            one.outline.places_mm, mesh.outline.places_mm
+            one.outline.points_mm, mesh.outline.points_mm
         )
         for name in ("positions", "normals", "uv", "dpdu", "dpdv", "point", "triangles", "material"):
             kept, given = getattr(one, name), getattr(mesh, name)
@@ -330,7 +330,7 @@ def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_a_flipped_bit_anywhere_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And the file goes, so that the next start need not read it."""
+    """The file is removed, so that the next start does not read it."""
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     disk.save_arrays("few", "one", {"a": np.arange(3, dtype=np.uint8)})
     path = only(tmp_path / "few")

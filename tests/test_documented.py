@@ -1,4 +1,4 @@
-"""What the pages show can be typed: commands, Python, files; and the scripts beside the package start."""
+"""Commands, Python code and files in the documentation are valid, and the scripts start."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ MADE_UP = {"src/dermis/apps/viewer/panel/sections/name.py"}  # an example's name
 
 
 def commands(page: Path) -> list[str]:
-    """Lines that begin with `dermis` in fences, and such code inside of text."""
+    """Return lines that begin with `dermis` in code blocks, and such inline code."""
     text = page.read_text(encoding="utf-8")
     fenced = [line.strip() for found in FENCE.finditer(text) for line in found["text"].splitlines()]
     return [line for line in [*fenced, *INLINE.findall(FENCE.sub("", text))] if line.startswith("dermis ")]
 
 
 def app() -> App:
-    """The command line as `dermis.cli` makes it."""
+    """Return the command line as made by `dermis.cli`."""
     made = App(name="dermis", result_action="return_value")
     for name in COMMANDS:
         made.command(f"dermis.cli.{name}:{name}", name=name)
@@ -46,7 +46,7 @@ def app() -> App:
 
 
 def words(command: str) -> list[str]:
-    """What is typed: no comment or redirection, no dots for more, no brackets around what may be left out."""
+    """Return the arguments of a command, without comments, redirections, ellipses and optional brackets."""
     shown = command.replace("\\|", "|").split("...")[0].split(" > ")[0]
     typed = shlex.split(re.sub(r"[\[\]]", "", shown), comments=True)[1:]
     return ["8765" if word == "N" else word for word in typed]
@@ -122,7 +122,7 @@ for script in sys.argv[2:]:
 
 
 def test_scripts_explain_themselves_and_refuse_other_options() -> None:
-    """All in one process; extras that a script needs, it imports when it runs."""
+    """All in one process; scripts import extras only when they run."""
     scripts = [str(path) for path in SCRIPTS if '__name__ == "__main__"' in path.read_text("utf-8")]
     command = [sys.executable, "-c", RUN_ALL, "", *scripts]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""A picture needs none of the extras' packages, and what needs one says which."""
+"""A picture needs no package of the extras, and features that need one name it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ WITHOUT = "import sys; sys.modules.update(dict.fromkeys({names}, None)); import 
 
 
 def run(*options: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """The command where no extra is installed."""
+    """Return a function that runs the command without any extra."""
     code = WITHOUT.format(names=[*EXTRAS, "imgui_bundle", "uvicorn"])
     environment = {**os.environ, "PYTHONPATH": str(SOURCE)}
     return subprocess.run(

@@ -1,4 +1,4 @@
-"""Texts with figures: rounding passes, and nothing else."""
+"""Comparison of texts with figures: rounding differences pass, all others fail."""
 
 from __future__ import annotations
 

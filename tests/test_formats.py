@@ -1,4 +1,4 @@
-"""Every example of the page of files is one that the package reads, and every key of a light stands there."""
+"""Every example on the page about files is valid, and every key of a light is described there."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import pytest
 import dermis
 from dermis.human.person_file import read_person
 from dermis.human.regions.average import average_head
-from dermis.human.regions.labels import average_landmarks, load_landmarks, to_average
-from dermis.human.regions.zones import load_table
-from dermis.optics.profiles import find_table
+from dermis.human.regions.labels import average_landmarks, load_landmarks, warp_to_average
+from dermis.human.regions.region_table import load_region_table
+from dermis.optics.profiles import find_gaussians
 from dermis.optics.tissue import load_tissue
 from dermis.scene.lights import LIGHTS
 
@@ -24,7 +24,7 @@ FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """All files of the page, under the names in their first lines."""
+    """Return a folder with all files of the page, under the names in their first lines."""
     for kind, text in FENCE.findall(PAGE):
         name = "person.json" if kind == "json" else text.splitlines()[0].removeprefix("# ")
         (tmp_path / name).write_text(text, encoding="utf-8")
@@ -53,11 +53,11 @@ def test_every_key_of_a_light_is_explained() -> None:
 
 
 def test_the_table_of_regions_and_its_landmarks(folder: Path) -> None:
-    table = load_table(folder / "regions.toml")
+    table = load_region_table(folder / "regions.toml")
     assert table.landmarks == folder / "landmarks.csv"
     places, head = load_landmarks(folder / "landmarks.csv"), average_head()
     points = np.array(list(places.values())) + head.centre_mm
-    found = to_average(head, places, points)
+    found = warp_to_average(head, places, points)
     expected = [average_landmarks()[name] for name in places]
     np.testing.assert_allclose(found, expected, atol=0.2)
     section = " ".join(PAGE.partition("## Landmarks")[2].split())
@@ -67,8 +67,8 @@ def test_the_table_of_regions_and_its_landmarks(folder: Path) -> None:
 def test_the_tissue_and_the_profile(folder: Path) -> None:
     medium = load_tissue(str(folder / "tissue.toml")).medium
     assert medium.name == "thin over thick" and len(medium.layers) == 2 and medium.semi_infinite
-    table = find_table(folder / "profile.csv")
-    published = find_table("gpu-gems-3")
+    table = find_gaussians(folder / "profile.csv")
+    published = find_gaussians("gpu-gems-3")
     assert table is not None and published is not None
     np.testing.assert_allclose(table.weight, published.weight)
 

@@ -1,4 +1,4 @@
-"""Real heads end to end: finite, skin-coloured, upright, and without black or bright seams."""
+"""Real heads: finite, skin-coloured, upright, and without black or bright seams."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Picture = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Subject:
-    """A head with the renderer that keeps its maps, and the head without maps with another."""
+    """Head with a renderer that caches its maps, and the head without maps with another renderer."""
 
     head: dermis.Head
     renderer: dermis.Renderer
@@ -72,7 +72,7 @@ def subject(subjects: dict[str, Subject], request: pytest.FixtureRequest) -> Sub
 
 
 def _from_the_camera(camera: dermis.Camera) -> dermis.DirectionalLight:
-    """White light along the view that casts no shadows: all that is seen is lit."""
+    """Return white light along the view direction without shadows, which lights everything visible."""
     x, y, z = np.subtract(camera.target, camera.position)
     return dermis.DirectionalLight(direction=(x, y, z), irradiance=(3.14, 3.14, 3.14), shadows=False)
 
@@ -90,7 +90,7 @@ def _frontal(
 
 
 def _inside(subject: Subject, camera: dermis.Camera) -> NDArray[np.bool_]:
-    """Pixels of the head three away from its outline, without the inside of an open neck."""
+    """Return the pixels of the head at least three from its outline, without the inside of an open neck."""
     before = _frontal(subject.bare_renderer, subject.bare, camera, technique="none", background=(7, 7, 7))
     inside = binary_erosion(before.max(axis=2) < 3, iterations=3)
     if camera.position[2] < 900:

@@ -1,4 +1,4 @@
-"""The page of labels lists the classes and the sets that there are, and its Python runs."""
+"""The page about labels lists all classes and sets, and its Python code runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Machine code on disk: found again, and never run unless it is as it was written, by this user."""
+"""Cached machine code: it is found again, and never run if it was changed or written by another user."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dermis.base.errors import DermisWarning
 
 @pytest.fixture
 def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The cache folder, below one that all may enter."""
+    """Return the cache folder, below one that everybody may enter."""
     with tempfile.TemporaryDirectory() as made:
         Path(made).chmod(0o755)
         monkeypatch.setenv("DERMIS_CACHE", made)
@@ -28,7 +28,7 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def _outer() -> Any:
-    """A function that calls another one, both anew, as a new process has them."""
+    """Return a new function that calls another new one, as in a new process."""
     inner = compiled(_inner)
     namespace = {"inner": inner, "__name__": __name__}
     function = type(_call)(_call.__code__, namespace, "_call")
@@ -69,7 +69,7 @@ def test_other_types_and_other_texts_have_other_code(folder: Path, monkeypatch: 
 
 
 class _Marks:
-    """What leaves a file behind when it is unpickled."""
+    """Object that creates a file when it is unpickled."""
 
     def __init__(self, mark: Path) -> None:
         self.mark = mark

@@ -1,4 +1,4 @@
-"""The page of outputs says what the registry holds, and its Python runs."""
+"""The page about outputs agrees with the registry, and its Python code runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PAGE = (ROOT / "docs" / "outputs.md").read_text("utf-8")
 
 
 def test_the_table_is_that_of_the_registry(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Written anew by python tools/outputs_page.py."""
+    """Updated by python tools/outputs_page.py."""
     monkeypatch.syspath_prepend(ROOT / "tools")
     from outputs_page import page
 

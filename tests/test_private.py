@@ -1,4 +1,4 @@
-"""What others could have written is not read, and what is kept is this user's alone."""
+"""Files that others could have written are not read, and cached files belong to this user alone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NOBODY = 54321
 
 @pytest.fixture
 def place(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A cache folder that is not there yet, below one that all may enter."""
+    """Return a cache folder that does not exist yet, below one that everybody may enter."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder).chmod(0o755)
         monkeypatch.setenv("DERMIS_CACHE", str(Path(folder, "cache")))
@@ -29,7 +29,7 @@ def place(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def _kept() -> bool:
-    """Whether an array that is made once is found the next time."""
+    """Return whether an array that was computed once is found the next time."""
     made: list[int] = []
     for _ in range(2):
         array = disk.cached_array(np.zeros(1), "one", lambda: made.append(1) or np.arange(5.0))
@@ -38,7 +38,7 @@ def _kept() -> bool:
 
 
 def _not_kept(why: str) -> bool:
-    """Whether nothing is kept, and a note says so once."""
+    """Return whether nothing is cached, with one note about it."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", DermisWarning)
         kept = _kept()
@@ -47,7 +47,7 @@ def _not_kept(why: str) -> bool:
 
 
 def _give_away(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a path belong to somebody else."""
+    """Make a path belong to another user."""
     if os.geteuid() == 0:
         os.chown(path, _NOBODY, _NOBODY, follow_symlinks=False)
     else:
@@ -157,7 +157,7 @@ def test_a_place_that_cannot_be_a_folder_costs_only_time(
 
 
 def test_a_user_without_a_home_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And makes no folder called ~ in the current one."""
+    """No folder called ~ is created in the current folder."""
     monkeypatch.chdir(tmp_path)
     for name in ("DERMIS_CACHE", "HOME", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)

@@ -1,4 +1,4 @@
-"""The names that the package promises, and the six lines of its description on a small head."""
+"""The public names, and the six lines of the package's description on a small head."""
 
 from __future__ import annotations
 
@@ -138,10 +138,10 @@ def test_a_head_alone_is_drawn_as_its_portrait(
     head = dermis.load_head(write_head(tmp_path / "head.obj"))
     whole = dermis.render(dermis.Scene(head), size=32, atlas=64)
     np.testing.assert_array_equal(dermis.render(head, size=32, atlas=64), whole)
-    for wrong, said in ((None, "None came"), ((dermis.Scene(head), 1), "came"), ("s.toml", "load_scene")):
+    for wrong, said in ((None, "got None"), ((dermis.Scene(head), 1), "got"), ("s.toml", "load_scene")):
         with pytest.raises(dermis.DermisError, match=f"^scene: expected a head to show, .*{said}"):
             dermis.render(wrong)  # type: ignore[arg-type]
-    with pytest.raises(dermis.DermisError, match=r"^adapter: .*a Settings came\. .*draw\(scene, settings\)"):
+    with pytest.raises(dermis.DermisError, match=r"^adapter: .*got a Settings\. .*draw\(scene, settings\)"):
         dermis.render(head, dermis.Settings())  # type: ignore[arg-type]
 
 
@@ -161,15 +161,15 @@ def test_a_picture_is_written_by_what_it_is(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("slip", "said"),
     [
-        (lambda path: dermis.load_head(path, unit_mm="cm"), r"unit_mm: .*'cm' came\. Write unit_mm=10\."),
-        (lambda path: dermis.load_head(path, unit_mm="ell"), "unit_mm: .*'ell' came"),
-        (lambda path: dermis.load_head(path, subdivide=1.0), "subdivide: .*1.0 came"),
-        (lambda path: dermis.load_head(path, colour=np.ones((8, 8, 3))), "colour: .*a ndarray came"),
-        (lambda path: dermis.load_head(dermis.load_head(path)), "load_head: .*a Head came"),
+        (lambda path: dermis.load_head(path, unit_mm="cm"), r"unit_mm: .*got 'cm'\. Write unit_mm=10\."),
+        (lambda path: dermis.load_head(path, unit_mm="ell"), "unit_mm: .*got 'ell'"),
+        (lambda path: dermis.load_head(path, subdivide=1.0), "subdivide: .*got 1.0"),
+        (lambda path: dermis.load_head(path, colour=np.ones((8, 8, 3))), "colour: .*got a ndarray"),
+        (lambda path: dermis.load_head(dermis.load_head(path)), "load_head: .*got a Head"),
         (lambda path: dermis.load_head(path, opaque="eyes"), "'eyes' is none"),
-        (lambda path: dermis.load_lights(None), "file: .*a NoneType came"),
-        (lambda path: dermis.load_scene(None), "file: .*a NoneType came"),
-        (lambda path: dermis.Human(sex="male"), "sex: expected a number from 0 to 1, but 'male' came"),
+        (lambda path: dermis.load_lights(None), "file: .*got a NoneType"),
+        (lambda path: dermis.load_scene(None), "file: .*got a NoneType"),
+        (lambda path: dermis.Human(sex="male"), "sex: expected a number from 0 to 1, but got 'male'"),
         (lambda path: dermis.Human(targets=["nose"]), "targets: expected weights of targets by name"),
     ],
 )

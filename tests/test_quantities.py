@@ -1,4 +1,4 @@
-"""Numbers that callers and files give."""
+"""Validation of numbers from callers and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one door for bytes that others wrote."""
+"""The single entry point for files written by others."""
 
 from __future__ import annotations
 

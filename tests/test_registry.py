@@ -1,4 +1,4 @@
-"""Registries: imported on first use, open to other packages, and strict about names."""
+"""Registries: imported on first use, extensible by other packages, and strict about names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ANIMALS: Registry[Any] = Registry("animal", {"cat": 1, "root": "math:sqrt"})
 
 
 class Owner(FrozenModel):
-    """Someone with an animal."""
+    """Model of a person with an animal."""
 
     animal: Annotated[str, RegisteredName(ANIMALS)] = "cat"
     """What it owns."""
@@ -26,7 +26,7 @@ class Owner(FrozenModel):
 
 @pytest.fixture
 def wet() -> Iterator[None]:
-    """A technique that another package registers."""
+    """Register a technique of another package."""
     TECHNIQUES.register("wet", "math:pi", "shines all over")
     yield
     del TECHNIQUES._entries["wet"], TECHNIQUES._summaries["wet"]

@@ -1,4 +1,4 @@
-"""No test runs a second time but those of the modules that are listed with a reason."""
+"""Only tests of listed modules, each with a reason, run a second time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of settings of every kind, hostile ones too: refused in a sentence that names them, or read."""
+"""Settings files of all kinds, hostile ones too: refused with a sentence that names them, or read."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.formats.motion.live_link import load_live_link
 from dermis.formats.motion.mediapipe import load_mediapipe
 from dermis.human.person_file import read_person
 from dermis.human.regions.labels import load_landmarks
-from dermis.human.regions.zones import load_table
+from dermis.human.regions.region_table import load_region_table
 from dermis.mesh.head import Head
 from dermis.scene.files import load_camera
 
@@ -27,7 +27,7 @@ MEDIAPIPE = '{"time": 0, "blendshapes": {"jawOpen": 0.5}}\n'
 
 
 class Kind(NamedTuple):
-    """How a file is read, a good one, and what in it is a number."""
+    """Reader of a kind of file, a valid file, and the names of its numbers."""
 
     load: Callable[[Any, Head], object]
     text: str
@@ -46,7 +46,7 @@ KINDS = {
     ),
     "lights.toml": Kind(lambda path, _: dermis.load_lights(path), _example("lights.toml"), "-750"),
     "camera.toml": Kind(load_camera, "[camera]\nposition = [0, 0, 900]\n", "900"),
-    "regions.toml": Kind(lambda path, _: load_table(path), _example("regions.toml"), "0.29"),
+    "regions.toml": Kind(lambda path, _: load_region_table(path), _example("regions.toml"), "0.29"),
     "landmarks.csv": Kind(lambda path, _: load_landmarks(path), _example("landmarks.csv"), "-4.5"),
     "tissue.toml": Kind(lambda path, _: dermis.load_tissue(path), _example("tissue.toml"), "1.4"),
     "profile.csv": Kind(lambda path, _: dermis.load_profile(path), _example("profile.csv"), "7.41"),
@@ -82,7 +82,7 @@ def head() -> Head:
 
 
 def _placed(folder: Path, name: str, place: str) -> Path:
-    """A name under which there is no file to read."""
+    """Return a file name at which nothing can be read."""
     path = folder / name
     if place == "device":
         path.symlink_to("/dev/zero")

@@ -1,4 +1,4 @@
-"""Constructors say what they take: in `inspect.signature`, in `help()`, and to editors."""
+"""Constructors show their fields in `inspect.signature`, in `help()`, and in editors."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import pytest
 from pydantic import Field
 
 import dermis
-from dermis.base.registry import Named, Registry
-from dermis.scene.field_errors import Words
-from dermis.scene.plain import Plain
+from dermis.base.registry import RegisteredName, Registry
+from dermis.scene.field_errors import Keywords
+from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.skin import Pigments, TissueLayer
 
 MOST_LINES = 140
 """Lines of `help()` of any public class; `Skin` alone had 521."""
 PUBLIC = [thing for name in dermis.__all__ if isinstance(thing := getattr(dermis, name), type)]
 CLASSES = [*(one for one in PUBLIC if not issubclass(one, Exception)), Pigments, TissueLayer]
-MODELS = [one for one in CLASSES if issubclass(one, Plain)]
+MODELS = [one for one in CLASSES if issubclass(one, FrozenModel)]
 KIND = inspect.formatannotation(Literal["raw", "cooked"] | None)
 GAIN = inspect.formatannotation(float | Literal["auto"])
 COLOURS = Registry("colour", {"red": "", "blue": ""})
 
 
-class Sample(Plain):
+class Sample(FrozenModel):
     """A model with a field of each kind.
 
     More about it.
@@ -40,9 +40,9 @@ class Sample(Plain):
     """Where it is, with a text so long that it does not fit on one line of a help text of the usual width."""
     kind: Literal["raw", "cooked"] | None = None
     """How it was made."""
-    gain: Annotated[float, Field(gt=0), Words("auto")] = 1.0
+    gain: Annotated[float, Field(gt=0), Keywords("auto")] = 1.0
     """Factor."""
-    colour: Annotated[str, Named(COLOURS)] = "red"
+    colour: Annotated[str, RegisteredName(COLOURS)] = "red"
     """Which it has."""
 
 
@@ -50,7 +50,7 @@ def helped(kind: type) -> str:
     return pydoc.plain(pydoc.render_doc(kind))
 
 
-def default_of(model: type[Plain], name: str) -> Any:
+def default_of(model: type[FrozenModel], name: str) -> Any:
     info = model.model_fields[name]
     return inspect.Parameter.empty if info.is_required() else info.get_default(call_default_factory=True)
 
@@ -69,7 +69,7 @@ def test_every_value_is_in_the_signature_and_in_the_help(kind: type) -> None:
 
 
 @pytest.mark.parametrize("kind", MODELS, ids=lambda kind: kind.__name__)
-def test_models_show_defaults_and_nothing_of_pydantic(kind: type[Plain]) -> None:
+def test_models_show_defaults_and_nothing_of_pydantic(kind: type[FrozenModel]) -> None:
     parameters, text = inspect.signature(kind).parameters, helped(kind)
     assert {name: one.default for name, one in parameters.items()} == {
         name: default_of(kind, name) for name in kind.model_fields
@@ -91,7 +91,7 @@ def test_a_model_lists_its_fields() -> None:
 
 def test_the_signature_stays_when_a_model_is_used() -> None:
     class Used(Sample):
-        """As the sample, until it is used."""
+        """Model that equals the sample until it is used."""
 
     before = inspect.signature(Used)
     assert Used("a").name == "a"

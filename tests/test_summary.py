@@ -1,4 +1,4 @@
-"""What heads and other data of many numbers print as."""
+"""Printed summaries of heads and other large data."""
 
 from __future__ import annotations
 

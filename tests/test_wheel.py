@@ -1,4 +1,4 @@
-"""The wheel, installed where nothing of the checkout is: it renders."""
+"""The wheel renders when it is installed outside the checkout."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(not (ROOT / "pyproject.toml").is_file(), reason=
 
 @pytest.fixture(scope="module")
 def empty(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment with the wheel alone; what it depends on is read from the tests' own, as is."""
+    """Return an environment with only the wheel; its dependencies are those of the tests."""
     folder = tmp_path_factory.mktemp("wheel")
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input"]
     offline = ["--no-deps", "--no-index", "--quiet"]
@@ -59,7 +59,7 @@ def test_nothing_of_the_checkout_is_found(empty: Path) -> None:
 
 
 def test_all_that_is_no_python_is_in_it(empty: Path) -> None:
-    """Shaders, tables, presets, and the gallery's scripts."""
+    """Shaders, tables, presets, and the scripts of the gallery."""
     python = str(binaries(empty / "env") / "python")
     installed = Path(json.loads(run([python, "-c", WHERE], empty))[0]).parent
     here = {path.relative_to(ROOT / "src" / "dermis") for path in (ROOT / "src" / "dermis").rglob("*.*")}
@@ -75,7 +75,7 @@ def binaries(environment: Path) -> Path:
 
 
 def run(words: list[str], folder: Path) -> str:
-    """What a command prints, run in that folder with a cache there."""
+    """Return the output of a command, run in that folder with a cache there."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     kept["DERMIS_CACHE"] = str(folder / "cache")
     ended = subprocess.run(words, cwd=folder, env=kept, capture_output=True, text=True, check=False)

@@ -1,6 +1,6 @@
-"""How close is close: every tolerance of the tests, once, with its reason.
+"""Tolerances of the tests, each once and with its reason.
 
-A test that needs another number than these says so where it stands.
+A test that needs another tolerance states it in place.
 """
 
 from __future__ import annotations

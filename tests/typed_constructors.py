@@ -1,4 +1,4 @@
-"""Calls of constructors for mypy: right ones, and wrong ones, where an unused `ignore` is an error."""
+"""Constructor calls for mypy: valid ones, and invalid ones, where an unused `ignore` is an error."""
 
 from __future__ import annotations
 

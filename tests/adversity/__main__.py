@@ -1,8 +1,8 @@
-"""Every kind of input that the package reads, damaged at random: `python -m tests.adversity --minutes 60`.
+"""Test random damage to all kinds of input that the package reads: `python -m tests.adversity --minutes 60`.
 
-Each input is taken in by a process of its own under limits of time and memory. It must be refused in the
-package's one form, or accepted with a result that is finite and right. Failures are kept with all that they
-need, and tried again by `--replay`. It ends with 1 when there were any.
+Each input is read by a separate process under limits of time and memory. It must be refused with the
+package's form of message, or accepted with a finite and correct result. Failures are stored with everything
+needed to repeat them with `--replay`. The exit status is 1 if there were any.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _TOLD_S = 30.0
 
 
 def main() -> int:
-    """Run a campaign, or one of its inputs again."""
+    """Run a campaign, or repeat one of its inputs."""
     told = _arguments()
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder, caches(Path(folder)):
@@ -46,13 +46,13 @@ def main() -> int:
 
 
 class _Progress:
-    """A line now and then on standard error."""
+    """Progress lines on standard error at intervals."""
 
     def __init__(self, began: float) -> None:
         self._began = self._last = began
 
     def note(self, tally: Tally) -> None:
-        """Tell how far it is."""
+        """Print the progress."""
         now = time.monotonic()
         if now - self._last > _TOLD_S:
             self._last = now

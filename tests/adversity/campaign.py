@@ -1,4 +1,4 @@
-"""Many inputs one after the other, in several processes; each failure is kept and can be tried again."""
+"""Campaign of many inputs in several processes; each failure is stored and can be repeated."""
 
 from __future__ import annotations
 
@@ -31,35 +31,35 @@ Job = tuple[str, int]
 
 @dataclass
 class Tally:
-    """What came of all inputs.
+    """Results of all inputs.
 
-    counts : by kind and outcome
-    places : by kind, outcome and place of failures, where the first ones were kept, none beyond `_MOST_KEPT`
+    counts : number of inputs by kind and outcome
+    places : stored failures by kind, outcome and location, at most `_MOST_KEPT` each
     """
 
     counts: dict[str, Counter[str]] = field(default_factory=dict)
     places: dict[tuple[str, str, str], list[str]] = field(default_factory=dict)
 
     def add(self, outcome: Outcome, kept: str = "") -> None:
-        """Count one."""
+        """Count an outcome."""
         self.counts.setdefault(outcome.kind, Counter())[outcome.outcome] += 1
         if outcome.failed:
             found = self.places.setdefault((outcome.kind, outcome.outcome, outcome.place), [])
             found += [kept] * bool(kept)
 
     def wants(self, outcome: Outcome) -> bool:
-        """Whether one more failure at its place is worth keeping."""
+        """Return whether one more failure at this location is stored."""
         return len(self.places.get((outcome.kind, outcome.outcome, outcome.place), [])) < _MOST_KEPT
 
     @property
     def failures(self) -> int:
-        """How many inputs the package failed."""
+        """Return the number of inputs on which the package failed."""
         both = (ACCEPTED, REFUSED)
         return sum(n for one in self.counts.values() for outcome, n in one.items() if outcome not in both)
 
 
 def rounds(kinds: Mapping[str, Kind], until: float) -> Iterator[Job]:
-    """Inputs of all kinds in turn, each as often as its share, until a time (`time.monotonic`)."""
+    """Yield inputs of all kinds, each with its frequency, until a time (`time.monotonic`)."""
     number = 0
     while True:
         for name, kind in kinds.items():
@@ -79,12 +79,12 @@ def run(
     limits: Limits | None = None,
     told: Callable[[Tally], None] = lambda _: None,
 ) -> Tally:
-    """Try inputs and count what comes of them.
+    """Run inputs and return their tally.
 
-    jobs : the same inputs in the same order, whenever it is called; each worker takes its share of them
+    jobs : function that returns the same inputs in the same order; each worker takes its part of them
     keep : folder for failures
-    limits : those of each kind when left out
-    told : called after each input
+    limits : limits for all kinds; those of each kind if omitted
+    told : function called after each input
     """
     tally, ways = Tally(), []
     start = multiprocessing.get_context("fork")
@@ -109,7 +109,7 @@ def run(
 
 
 def _coming(ways: list[Connection]) -> Iterator[Outcome]:
-    """Outcomes from all workers until the last one is done."""
+    """Yield the outcomes of all workers until the last one has finished."""
     left = list(ways)
     while left:
         for way in wait(left):
@@ -128,14 +128,14 @@ def _work(
     limits: Limits | None,
     way: Connection,
 ) -> None:
-    """One worker: every n-th input, each in a folder of its own."""
+    """Run every n-th input in a folder of its own, in a worker process."""
     for name, number in islice(jobs(), share[0], None, share[1]):
         way.send(tried(kinds[name], seed, number, limits))
     way.close()
 
 
 def tried(kind: Kind, seed: int, number: int, limits: Limits | None = None) -> Outcome:
-    """What comes of one input; what was too slow once is tried again, as others may have held it up."""
+    """Return the outcome of an input; one that was too slow is repeated."""
     for attempt in range(2):
         with _folder() as folder:
             plan = kind.make(folder, seed, number)
@@ -146,7 +146,7 @@ def tried(kind: Kind, seed: int, number: int, limits: Limits | None = None) -> O
 
 
 def tried_again(kinds: Mapping[str, Kind], kept: Path, limits: Limits | None = None) -> Outcome:
-    """What comes of a failure that was kept."""
+    """Return the outcome of a stored failure."""
     told = json.loads((kept / _CASE).read_text("utf-8"))
     with _folder() as folder:
         if (kept / _INPUT).exists():
@@ -161,7 +161,7 @@ def _outcome(kind: Kind, plan: Plan, folder: Path, limits: Limits | None) -> Out
 
 
 def _keep(keep: Path, outcome: Outcome, kind: Kind) -> str:
-    """Put a failure's input and what is known of it into a folder of its own; its name."""
+    """Store the input of a failure and its description in a folder, and return the name of the folder."""
     name = f"{outcome.kind}-{outcome.seed}-{outcome.number}".replace(" ", "-")
     folder = keep / name
     shutil.rmtree(folder, ignore_errors=True)
@@ -173,7 +173,7 @@ def _keep(keep: Path, outcome: Outcome, kind: Kind) -> str:
 
 @contextmanager
 def _folder() -> Iterator[Path]:
-    """A folder for one input; readable again before it is removed."""
+    """Yield a folder for one input, made readable again before it is removed."""
     folder = Path(tempfile.mkdtemp(prefix="adversity-"))
     try:
         yield folder
@@ -183,7 +183,7 @@ def _folder() -> Iterator[Path]:
 
 @contextmanager
 def caches(folder: Path) -> Iterator[None]:
-    """What the package keeps for later goes into a folder of the campaign's own."""
+    """Use a cache folder of the campaign inside the block."""
     before = os.environ.get("DERMIS_CACHE")
     os.environ["DERMIS_CACHE"] = str(folder)
     try:

@@ -1,4 +1,4 @@
-"""One input: how it is made, taken in by the package, and what came of it."""
+"""One input: how it is made and read by the package, and its outcome."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Plan = dict[str, Any]
 
 
 class FoundError(Exception):
-    """What was made of an input is not as it must be."""
+    """Error for a result that is not as it must be."""
 
     def __init__(self, outcome: str, what: str) -> None:
         super().__init__(what)
@@ -29,10 +29,10 @@ class Input:
     """Files, and what is done with them.
 
     files : bytes by name
-    plan : for the kind's `take`, as JSON; what messages must name one of under "culprits", the files where it
-        is not there; how names begin that may be written under "outputs", and that may stay after a refusal
-        under "kept"
-    changed : files that are to be damaged, all where empty
+    plan : JSON for the `take` function of the kind; "culprits": names of which messages must contain one,
+        instead of those of the files; "outputs": prefixes of files that may be written; "kept": those that
+        may remain after a refusal
+    changed : files to damage; all if empty
     """
 
     files: Mapping[str, bytes]
@@ -40,7 +40,7 @@ class Input:
     changed: tuple[str, ...] = ()
 
     def write(self, folder: Path) -> Plan:
-        """Put the files into a folder; the plan."""
+        """Write the files to a folder and return the plan."""
         for name, data in self.files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_bytes(data)
@@ -49,12 +49,12 @@ class Input:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of an input.
+    """Outcome of an input.
 
-    kind, seed, number : which it is
+    kind, seed, number : identification of the input
     outcome : "accepted", "refused" or one of `FAILURES`
-    place : by which equal failures are told: where it was raised, or the outcome alone
-    last : the last lines that it printed
+    place : location of the error, or the outcome alone, by which equal failures are recognised
+    last : last lines that were printed
     """
 
     kind: str
@@ -67,5 +67,5 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether the package is at fault."""
+        """Return whether the package is at fault."""
         return self.outcome in FAILURES

@@ -1,4 +1,4 @@
-"""Whether what was made of an input is finite."""
+"""Checks that results are finite."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BRIGHTEST = 1e12  # of radiance
 def check_finite(value: Any, where: str) -> None:
     """Raise `FoundError` for a number in a tree of values, arrays and records that is not finite.
 
-    where : what it is called
+    where : name of the value in messages
     """
     if isinstance(value, float | np.floating | np.ndarray):
         array = np.asarray(value)
@@ -37,7 +37,7 @@ def check_finite(value: Any, where: str) -> None:
 
 
 def check_picture(path: Path) -> None:
-    """Raise `FoundError` for a written picture that cannot be read, or has pixels that are no radiance."""
+    """Raise `FoundError` for a written picture that cannot be read or whose pixels are not radiance."""
     from dermis.base.errors import DermisError
     from dermis.images.io import read_image
 
@@ -51,7 +51,7 @@ def check_picture(path: Path) -> None:
 
 
 def check_equal(made: Any, truth: Any, where: str) -> None:
-    """Raise `FoundError` where two arrays differ in a single bit."""
+    """Raise `FoundError` if two arrays differ in a single bit."""
     a, b = np.asarray(made), np.asarray(truth)
     if a.dtype != b.dtype or a.shape != b.shape or a.tobytes() != b.tobytes():
         raise FoundError(WRONG, f"{where} is not what it was made as")

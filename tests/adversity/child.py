@@ -1,4 +1,4 @@
-"""An input in a process of its own, under limits of time and memory, and what came of it."""
+"""Processing of an input in a separate process under limits of time and memory."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ _OWN = str(Path(__file__).parent)
 
 @dataclass(frozen=True)
 class Limits:
-    """What an input may take.
+    """Limits for the processing of an input.
 
-    cpu_s : time on processors [s]
-    stalled_s : time in which it does nothing at all [s]
-    bytes : memory above that of the process before it
+    cpu_s : CPU time [s]
+    stalled_s : time without any activity [s]
+    bytes : memory in addition to that of the parent process
     """
 
     cpu_s: float = 10.0
@@ -49,7 +49,7 @@ class Limits:
 
 
 def outcome_of(kind: Kind, plan: Plan, folder: Path, limits: Limits) -> tuple[str, str, str]:
-    """Outcome, place and last lines of an input whose files lie in a folder."""
+    """Return outcome, location and last lines of an input whose files are in a folder."""
     os.mkfifo(folder / PIPE)
     before = _listed(folder)
     idle, held_open = os.pipe()  # standard input that never ends
@@ -74,7 +74,7 @@ def outcome_of(kind: Kind, plan: Plan, folder: Path, limits: Limits) -> tuple[st
 
 
 def _take(kind: Kind, plan: Plan, folder: Path, idle: int) -> None:
-    """In the child: take the input in, tell what came of it, and end."""
+    """Process the input in the child, report the outcome, and end."""
     try:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         printed = os.open(folder / _PRINTED, os.O_WRONLY | os.O_CREAT)
@@ -93,7 +93,7 @@ def _take(kind: Kind, plan: Plan, folder: Path, idle: int) -> None:
 
 
 def _told(kind: Kind, plan: Plan) -> tuple[str, str, str]:
-    """Outcome, place, and what it says."""
+    """Return outcome, location and message."""
     try:
         kind.take(plan)
     except DermisError as refusal:
@@ -107,7 +107,7 @@ def _told(kind: Kind, plan: Plan) -> tuple[str, str, str]:
 
 
 def _of_refusal(refusal: DermisError, plan: Plan) -> tuple[str, str, str]:
-    """A refusal has the package's form, and begins with a file of the input or a name that one holds."""
+    """Check that a refusal has the package's form and begins with a file of the input or a name in it."""
     message = str(refusal)
     culprit = message.partition(": expected ")[0]
     names = any(one in culprit for one in plan["culprits"]) or _is_held(culprit.strip("'\""))
@@ -119,7 +119,7 @@ def _of_refusal(refusal: DermisError, plan: Plan) -> tuple[str, str, str]:
 
 
 def _is_held(culprit: str) -> bool:
-    """Whether it is a name that a damaged file may hold, as it is or shortened."""
+    """Return whether a damaged file may contain the name, complete or shortened."""
     begin, shortened, _ = culprit.partition(" ... ")
     if shortened:
         return any(begin in one for one in _HELD)
@@ -127,7 +127,7 @@ def _is_held(culprit: str) -> bool:
 
 
 def _place(fault: BaseException) -> str:
-    """The last line of the package that a fault went through, and its kind."""
+    """Return the last line of the package in the traceback, and the kind of the error."""
     frames = [one for one in traceback.extract_tb(fault.__traceback__) if not one.filename.startswith(_OWN)]
     ours = [one for one in frames if "/dermis/" in one.filename and one.name != "refuse"]
     last = next(reversed(ours or frames), None)
@@ -136,13 +136,13 @@ def _place(fault: BaseException) -> str:
 
 
 def _place_of_dump(printed: str) -> str:
-    """The package's innermost line of what `faulthandler` wrote."""
+    """Return the innermost line of the package in the output of `faulthandler`."""
     found = re.search(r'File ".*?/dermis/([^"]+)", line (\d+) in (\w+)', printed)
     return f"{found[1]}:{found[2]} {found[3]}" if found else ""
 
 
 def _watch(process: int, limits: Limits) -> str:
-    """Wait for a child; the limit that it broke, empty for none."""
+    """Wait for a child and return the limit that it exceeded, empty for none."""
     watched, used, moved = os.pidfd_open(process), 0.0, time.monotonic()
     with contextlib.closing(os.fdopen(watched)):
         base = max(_state(process)[1], _state(os.getpid())[1])  # a child loads what its parent had as well
@@ -162,7 +162,7 @@ def _watch(process: int, limits: Limits) -> str:
 
 
 def _end(process: int, broken: str) -> str:
-    """Have a child write where it is, and kill it."""
+    """Make a child write its traceback, and kill it."""
     with contextlib.suppress(ProcessLookupError):
         os.kill(process, signal.SIGABRT)
         time.sleep(0.1)
@@ -172,7 +172,7 @@ def _end(process: int, broken: str) -> str:
 
 
 def _state(process: int) -> tuple[float, int, bool]:
-    """Time on processors [s], resident bytes, and whether it runs just now."""
+    """Return CPU time [s], resident bytes, and whether a process is running."""
     try:
         stat = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     except (OSError, ProcessLookupError):
@@ -182,13 +182,13 @@ def _state(process: int) -> tuple[float, int, bool]:
 
 
 def _listed(folder: Path) -> set[str]:
-    """Names of all files in a folder, but for those of the campaign."""
+    """Return the names of all files in a folder except those of the campaign."""
     found = (str(one.relative_to(folder)) for one in folder.rglob("*") if not one.is_dir())
     return {one for one in found if one not in (_TOLD, _PRINTED)}
 
 
 def _left_behind(outcome: str, plan: Plan, before: set[str], after: set[str]) -> list[str]:
-    """Files that should not be there: unfinished ones, and any beside a refusal."""
+    """Return files that should not exist: incomplete ones, and any beside a refusal."""
     new = {one for one in after - before if not one.startswith(_CACHE)}
     allowed = tuple(plan.get("outputs" if outcome == case.ACCEPTED else "kept", ()))
     left = {one for one in new if _UNFINISHED.search(Path(one).name) or not one.startswith(allowed)}

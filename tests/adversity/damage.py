@@ -1,4 +1,4 @@
-"""A file damaged as fits its kind: lines of text, trees, pictures with sound checksums, bytes."""
+"""Damage suited to the kind of a file: lines of text, trees, pictures with valid checksums, bytes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _PLY_END = b"end_header\n"
 
 
 def damaged(sound: Input, rng: Random) -> Input:
-    """The input with one of its files damaged, now and then two."""
+    """Return the input with one or sometimes two of its files damaged."""
     files = dict(sound.files)
     for _ in range(rng.choice((1, 1, 1, 2))):
         name = rng.choice(sound.changed or tuple(files))
@@ -31,13 +31,13 @@ def damaged(sound: Input, rng: Random) -> Input:
 
 
 def scarred(sound: Input, rng: Random) -> Input:
-    """The input with bytes of one of its files changed, as by a disk: checksums tell."""
+    """Return the input with changed bytes in one file, as by a faulty disk, which checksums detect."""
     name = rng.choice(sound.changed or tuple(sound.files))
     return replace(sound, files={**sound.files, name: changed_bytes(sound.files[name], rng)})
 
 
 def _or_bytes(how: Callable[[bytes, Random], bytes], data: bytes, rng: Random) -> bytes:
-    """What was damaged once may not be parted any more."""
+    """Apply a change, or change bytes if the file is already too damaged to be parsed."""
     try:
         return how(data, rng)
     except (ValueError, KeyError, IndexError, RecursionError, struct.error):
@@ -59,7 +59,7 @@ def _json(data: bytes, rng: Random) -> bytes:
 
 
 def _json_lines(data: bytes, rng: Random) -> bytes:
-    """One line as a tree, or lines as text."""
+    """Change one line as a tree, or lines as text."""
     lines = data.splitlines()
     if rng.random() < 0.3:
         return _text(data, rng)
@@ -69,7 +69,7 @@ def _json_lines(data: bytes, rng: Random) -> bytes:
 
 
 def _glb(data: bytes, rng: Random) -> bytes:
-    """Its tree, or its buffer."""
+    """Change the tree or the buffer of a .glb file."""
     tree, binary = split_glb(data)
     if rng.random() < 0.2:
         return joined_glb(encoded(json_text(tree)), changed_bytes(binary, rng))
@@ -77,7 +77,7 @@ def _glb(data: bytes, rng: Random) -> bytes:
 
 
 def _ply(data: bytes, rng: Random) -> bytes:
-    """Lines of its header, or of all of it where it is text."""
+    """Change lines of the header, or any line of a text file."""
     head, sign, body = data.partition(_PLY_END)
     if b"ascii" in head and rng.random() < 0.5:
         return _text(data, rng)

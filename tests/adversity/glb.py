@@ -1,4 +1,4 @@
-"""A .glb file as its tree and its buffer."""
+""".glb files as their JSON tree and buffer."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 
 
 def split_glb(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Tree and buffer of a .glb file."""
+    """Return tree and buffer of a .glb file."""
     (length,) = struct.unpack_from("<I", data, 12)
     return json.loads(data[20 : 20 + length]), data[28 + length :]
 
 
 def joined_glb(text: bytes, binary: bytes) -> bytes:
-    """A .glb file of the text of its tree and its buffer."""
+    """Return a .glb file with the given tree text and buffer."""
     text += b" " * (-len(text) % 4)
     chunks = ((b"JSON", text), (b"BIN\0", binary))
     body = b"".join(struct.pack("<I4s", len(one), kind) + one for kind, one in chunks)

@@ -1,4 +1,4 @@
-"""Changes to the headers of pictures that leave the rest sound, checksums too."""
+"""Changes to headers of pictures that keep everything else valid, including checksums."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SHORT, _LONG = 3, 4  # TIFF's kinds of numbers
 
 
 def changed_header(data: bytes, rng: Random) -> bytes:
-    """The picture with another size, depth or kind written in its header; bytes changed where it has none."""
+    """Return the picture with another size, depth or type in its header; change bytes if there is none."""
     for start, change in _KINDS.items():
         if data.startswith(start):
             return change(bytearray(data), rng)
@@ -27,7 +27,7 @@ def changed_header(data: bytes, rng: Random) -> bytes:
 
 
 def _png(data: bytearray, rng: Random) -> bytes:
-    """A field of one of the first parts, or the part again, with the checksum that belongs to it."""
+    """Change a field of one of the first chunks, or repeat the chunk, with the right checksum."""
     parts, place = [], _PNG_START
     while place + 12 <= len(data):
         (length,) = struct.unpack_from(">I", data, place)
@@ -44,7 +44,7 @@ def _png(data: bytearray, rng: Random) -> bytes:
 
 
 def _tiff(data: bytearray, rng: Random) -> bytes:
-    """Kind, count or value of an entry of the directory."""
+    """Change type, count or value of an entry of the directory."""
     order = "<" if data[:2] == b"II" else ">"
     (place,) = struct.unpack_from(order + "I", data, 4)
     (count,) = struct.unpack_from(order + "H", data, place)

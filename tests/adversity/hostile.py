@@ -1,4 +1,4 @@
-"""Numbers, names and texts that programs trip over."""
+"""Numbers, names and texts that often break programs."""
 
 from __future__ import annotations
 
@@ -57,22 +57,22 @@ LENGTHS = (300, 70_000, 1_000_000)
 
 
 def number(rng: Random) -> str:
-    """The text of one, hostile three times of four."""
+    """Return the text of a number, hostile three times out of four."""
     return rng.choice(NUMBERS if rng.random() < 0.75 else PLAUSIBLE)
 
 
 def name(rng: Random) -> str:
-    """That of no file that should be read."""
+    """Return a file name that should not be read."""
     return rng.choice(NAMES)
 
 
 def word(rng: Random) -> str:
-    """Any text."""
+    """Return any text."""
     if rng.random() < 0.3:
         return rng.choice("aé\0 \"'\\[{#") * rng.choice(LENGTHS)
     return number(rng) if rng.random() < 0.5 else name(rng)
 
 
 def whole(rng: Random, size: int) -> int:
-    """A number for a field of so many bytes."""
+    """Return an integer for a field of the given number of bytes."""
     return rng.choice(WHOLE) % (1 << 8 * size)

@@ -13,15 +13,15 @@ from adversity.damage import damaged
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of input.
+    """Kind of input.
 
-    sound : an input that the package takes
-    take : does so in a process of its own, in the folder of the files; raises DermisError where the package
-        refuses, `FoundError` where the result is not as it must be
+    sound : returns an input that the package accepts
+    take : processes it in a separate process, in the folder of the files; raises DermisError if the package
+        refuses it and `FoundError` if the result is wrong
     change : damages an input
-    share : inputs of this kind in each round of a campaign
-    cpu_s : time for one on processors [s]
-    opens_device : whether it may, which the process that others are forked from must not
+    share : number of inputs of this kind in each round of a campaign
+    cpu_s : CPU time for one input [s]
+    opens_device : whether it opens a device, which the process that others are forked from must not
     """
 
     name: str
@@ -33,6 +33,6 @@ class Kind:
     opens_device: bool = False
 
     def make(self, folder: Path, seed: int, number: int) -> Plan:
-        """Write an input's files into a folder; its plan."""
+        """Write the files of an input to a folder and return its plan."""
         rng = Random(f"{self.name} {seed} {number}")
         return self.change(self.sound(rng), rng).write(folder)

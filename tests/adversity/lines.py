@@ -1,4 +1,4 @@
-"""Changes to texts of lines with words: OBJ, CSV, headers of PLY and HDR, lines of JSON."""
+"""Changes to texts of lines with words: OBJ, CSV, headers of PLY and HDR, JSON lines."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _MOST = 4_000_000  # letters
 
 
 def _replace(lines: list[str], k: int, rng: Random) -> None:
-    """A word by a number, a name or a text."""
+    """Replace a word by a number, a name or a text."""
     found = list(_WORD.finditer(lines[k]))
     if found:
         one = rng.choice(found)
-        came = rng.choice((number, number, name, word))(rng)
-        lines[k] = lines[k][: one.start()] + came + lines[k][one.end() :]
+        actual = rng.choice((number, number, name, word))(rng)
+        lines[k] = lines[k][: one.start()] + actual + lines[k][one.end() :]
 
 
 def _remove(lines: list[str], k: int, rng: Random) -> None:
@@ -35,14 +35,14 @@ def _exchange(lines: list[str], k: int, rng: Random) -> None:
 
 
 def _stretch(lines: list[str], k: int, rng: Random) -> None:
-    """Long runs of one letter before, in or after a line."""
+    """Insert long runs of one character before, in or after a line."""
     run = rng.choice('  \t/#,\\\0-e9"[{') * rng.choice((*LENGTHS[:2], DEPTHS[-1]))
     place = rng.choice((0, len(lines[k]), lines[k].find(" ") + 1))
     lines[k] = lines[k][:place] + run + lines[k][place:]
 
 
 def _shorten(lines: list[str], k: int, rng: Random) -> None:
-    """A line without its last words, or the file without its last lines."""
+    """Remove the last words of a line, or the last lines of the file."""
     if rng.random() < 0.3:
         del lines[k:]
     else:
@@ -55,9 +55,9 @@ _CHANGES: tuple[Callable[[list[str], int, Random], None], ...] = (
 
 
 def changed_lines(text: str, rng: Random, *, rare: bool = False) -> str:
-    """The same with one to four changes.
+    """Return the text with one to four changes.
 
-    rare : change lines of seldom kinds as often as those of which there are many, by their first word
+    rare : change rare kinds of lines as often as frequent ones, by their first word
     """
     lines = text.split("\n")
     for _ in range(rng.choice((1, 1, 2, 4))):
@@ -76,5 +76,5 @@ def _line(lines: list[str], rng: Random, rare: bool) -> int:
 
 
 def encoded(text: str) -> bytes:
-    """UTF-8, in which half a character stays what it is."""
+    """Encode as UTF-8, preserving lone surrogates."""
     return text.encode("utf-8", "surrogatepass")

@@ -1,4 +1,4 @@
-"""All options of all commands, as the command line itself has them, and words to give them."""
+"""All options of all commands, as defined by the command line itself, and values for them."""
 
 from __future__ import annotations
 
@@ -77,10 +77,10 @@ _TEXTS = tuple(one.replace("\0", "").replace("\ud800", "\udc80") for one in NAME
 
 @dataclass(frozen=True)
 class Option:
-    """An option of a command.
+    """Option of a command.
 
-    names : as typed; one in capitals is a word in its place
-    kind : what the command takes
+    names : names as typed; one in capitals is a positional argument
+    kind : type of the value
     """
 
     names: tuple[str, ...]
@@ -88,11 +88,11 @@ class Option:
 
     @property
     def positional(self) -> bool:
-        """Whether it is a word in its place."""
+        """Return whether it is a positional argument."""
         return not self.names[0].startswith("-")
 
     def words(self, rng: Random) -> list[str]:
-        """The option with a value, plausible as often as hostile."""
+        """Return the option with a value, plausible as often as hostile."""
         name = rng.choice(self.names)
         if self.kind is bool:
             return [name]
@@ -114,7 +114,7 @@ class Option:
 
 
 def _choices(kind: Any) -> tuple[Any, ...]:
-    """The words that a type allows."""
+    """Return the words that a type permits."""
     if get_origin(kind) is Literal:
         return get_args(kind)
     if get_origin(kind) in (Union, UnionType):
@@ -124,7 +124,7 @@ def _choices(kind: Any) -> tuple[Any, ...]:
 
 @cache
 def options_of_commands() -> Mapping[str, tuple[Option, ...]]:
-    """Options by command."""
+    """Return the options by command."""
     from cyclopts import App
 
     from dermis.cli import COMMANDS
@@ -140,7 +140,7 @@ def options_of_commands() -> Mapping[str, tuple[Option, ...]]:
 
 
 def _bare(kind: Any) -> Any:
-    """A type without None."""
+    """Return a type without None."""
     if get_origin(kind) in (Union, UnionType):
         some = [one for one in get_args(kind) if one is not type(None)]
         return some[0] if len(some) == 1 else Union[tuple(some)]  # noqa: UP007

@@ -1,4 +1,4 @@
-"""A fixed part of the campaign: `python -m tests.adversity.part --seed 20` prints what it found, as JSON."""
+"""A fixed part of the campaign: `python -m tests.adversity.part --seed 20` prints its results as JSON."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FEW = {"options": 4, "drawn": 2, "large": 2, "viewer": 1}  # of those that take
 
 
 def main() -> None:
-    """Try a sound input and some damaged ones of each kind."""
+    """Run a valid input and some damaged ones of each kind."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=1)
     seed = parser.parse_args().seed

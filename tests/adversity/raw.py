@@ -1,4 +1,4 @@
-"""Changes to bytes of which nothing is known."""
+"""Changes to bytes of unknown meaning."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _CHANGES: tuple[Callable[[bytearray, Random], None], ...] = (
 
 
 def changed_bytes(data: bytes, rng: Random) -> bytes:
-    """The same with one to three changes."""
+    """Return the bytes with one to three changes."""
     made = bytearray(data)
     for _ in range(rng.choice((1, 1, 2, 3))):
         if made:
@@ -69,5 +69,5 @@ def changed_bytes(data: bytes, rng: Random) -> bytes:
 
 
 def _place(data: bytearray, rng: Random) -> int:
-    """Anywhere, and as often as not near the beginning."""
+    """Return a position, half of the time near the beginning."""
     return rng.randrange(min(len(data), _HEADER) if rng.random() < 0.5 else len(data))

@@ -1,4 +1,4 @@
-"""What a campaign found, as a table or as JSON."""
+"""Results of a campaign as a table or as JSON."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _SHOWN = 100  # letters of a place
 
 
 def as_json(tally: Tally, seed: int, seconds: float) -> dict[str, Any]:
-    """All of it."""
+    """Return all results."""
     return {
         "seed": seed,
         "seconds": round(seconds, 1),
@@ -26,7 +26,7 @@ def as_json(tally: Tally, seed: int, seconds: float) -> dict[str, Any]:
 
 
 def as_text(tally: Tally, seed: int, seconds: float) -> str:
-    """A row for each kind of input, then the places of failures with the inputs that show them."""
+    """Return a row per kind of input, then the locations of failures with inputs that show them."""
     columns = (ACCEPTED, REFUSED, *FAILURES)
     rows = [("", "tried", *columns)]
     for kind, one in tally.counts.items():

@@ -1,4 +1,4 @@
-"""The campaign finds what it is to find, and a part of it that takes a minute finds nothing."""
+"""The campaign detects what it must detect, and a part of it that takes a minute finds nothing."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _kind(take: Callable[[Plan], None]) -> Kind:
 
 @pytest.fixture(scope="module")
 def prepared(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Everything imported, and a cache for all inputs."""
+    """Import everything, and use one cache for all inputs."""
     with caches(tmp_path_factory.mktemp("cache")):
         prepare()
         yield
@@ -204,7 +204,7 @@ def test_all_options_of_all_commands_are_tried() -> None:
 
 @pytest.fixture(scope="module")
 def part() -> Any:
-    """What a fixed part of the campaign found, in a process that has opened no device."""
+    """Return the results of a fixed part of the campaign, in a process without a device."""
     ended = _program("adversity.part", "--seed", str(_SEED))
     return json.loads(ended.stdout)
 

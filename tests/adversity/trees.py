@@ -1,4 +1,4 @@
-"""Changes to trees of tables, lists and values, written as JSON or TOML with texts that no library writes."""
+"""Changes to trees of tables, lists and values, written as JSON or TOML with text that no library writes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Place = tuple[Any, Any]  # a table or list, and the key or index in it
 
 
 class Written(str):
-    """What stands in the file as it is, without quotes."""
+    """Text that is written to the file verbatim, without quotes."""
 
 
 def places(tree: Any) -> Iterator[Place]:
-    """Of all values of a tree."""
+    """Yield the paths of all values of a tree."""
     keys = list(tree) if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()
     for key in keys:
         yield tree, key
@@ -27,7 +27,7 @@ def places(tree: Any) -> Iterator[Place]:
 
 
 def changed_tree(tree: Tree, rng: Random) -> Tree:
-    """The same with one to three changes."""
+    """Return the tree with one to three changes."""
     made = copy.deepcopy(tree)
     for _ in range(rng.choice((1, 1, 2, 3))):
         found = list(places(made))
@@ -37,7 +37,7 @@ def changed_tree(tree: Tree, rng: Random) -> Tree:
 
 
 def _hostile(holder: Any, key: Any, rng: Random, _: list[Place]) -> None:
-    """Another value, of the same kind as often as not."""
+    """Return another value, half of the time of the same type."""
     old = holder[key]
     if isinstance(old, str) and rng.random() < 0.6:
         holder[key] = name(rng)
@@ -70,7 +70,7 @@ def _repeat(holder: Any, key: Any, rng: Random, _: list[Place]) -> None:
 
 
 def _exchange(holder: Any, key: Any, rng: Random, found: list[Place]) -> None:
-    """A copy of another part of the tree."""
+    """Return a copy of another part of the tree."""
     other, there = rng.choice(found)
     holder[key] = copy.deepcopy(other[there])
 
@@ -81,7 +81,7 @@ _CHANGES: tuple[Callable[[Any, Any, Random, list[Place]], None], ...] = (
 
 
 def json_text(value: Any) -> str:
-    """JSON."""
+    """Return the tree as JSON."""
     if isinstance(value, dict):
         return "{" + ",".join(f"{json.dumps(key)}:{json_text(one)}" for key, one in value.items()) + "}"
     if isinstance(value, list):
@@ -90,7 +90,7 @@ def json_text(value: Any) -> str:
 
 
 def toml_text(tree: Tree) -> str:
-    """TOML: tables of the first level under headings, all others inline."""
+    """Return the tree as TOML: tables of the first level under headings, all others inline."""
     plain = {key: one for key, one in tree.items() if not isinstance(one, dict) and not _tables(one)}
     lines = [f"{_key(key)} = {_value(one)}" for key, one in plain.items()]
     for key, one in tree.items():

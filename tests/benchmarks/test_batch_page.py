@@ -1,4 +1,4 @@
-"""The page of data sets at scale says what follows from what was measured."""
+"""The page about large data sets follows from the measurements."""
 
 from __future__ import annotations
 

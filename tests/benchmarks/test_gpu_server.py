@@ -1,4 +1,4 @@
-"""`benchmarks/gpu_server.py` at tiny sizes: each part has its figures, and what fails or is late is told."""
+"""`benchmarks/gpu_server.py` at tiny sizes: figures of each part, and reports of failures and timeouts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 @pytest.fixture
 def run(server: Any, device: Device, tmp_path: Path, opened: None) -> Any:
-    """A quick run of some parts; what it wrote."""
+    """Return a function that runs some parts quickly and returns the written figures."""
     from small_head import write_head
 
     head, out = write_head(tmp_path / "head.obj"), tmp_path / "figures.json"
@@ -93,7 +93,7 @@ def test_a_program_that_hangs_ends_with_all_that_it_started(
     other, heard, usual = tmp_path / "other", threading.Event(), subprocess.Popen.wait
 
     def wait(program: Any, timeout: float | None = None) -> int:
-        """Let the time be over when the program has said something."""
+        """Let the time limit pass when the program has printed something."""
         if timeout is None:
             return int(usual(program))
         assert heard.wait(120.0)
@@ -111,7 +111,7 @@ def test_a_program_that_hangs_ends_with_all_that_it_started(
 
 
 def _runs(process: int) -> bool:
-    """Whether a process is there and is no zombie."""
+    """Return whether a process exists and is not a zombie."""
     status = Path(f"/proc/{process}/stat")
     try:
         return status.read_text(encoding="utf-8").rsplit(")", 1)[1].split()[0] not in "ZX"

@@ -1,4 +1,4 @@
-"""The page of unmixing says what was measured."""
+"""The page about unmixing agrees with the measurements."""
 
 from __future__ import annotations
 

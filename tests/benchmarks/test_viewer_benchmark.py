@@ -1,4 +1,4 @@
-"""`benchmarks/viewer.py` on a small head: what it runs, and what it makes of its figures."""
+"""`benchmarks/viewer.py` on a small head: its measurements, and the tables made from them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def found_modules() -> Any:
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """At the sizes of the quick trial: a pointer in the middle must be beside what brings the panel back."""
+    """Return a plan of small sizes, at which the centre is beside the button that opens the panel."""
     from gpu_server import quick_plan
     from viewer_input import Plan
 

@@ -1,4 +1,4 @@
-"""The command `dermis`, run inside the tests' own process, and bad files of every kind to run it on."""
+"""The command `dermis`, run inside the test process, and invalid files of all kinds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dermis.images.io import write_exr, write_png
 
 
 class Outcome(NamedTuple):
-    """How a command ended and what it printed."""
+    """Exit status and output of a command."""
 
     code: int
     stdout: str
@@ -29,7 +29,7 @@ FORM = re.compile(r"dermis: (?P<culprit>.+?): expected .+, but .+\. \S.+[.?]\n")
 
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    """Call with the words after `dermis`; anything but an orderly exit is an error."""
+    """Return a function that runs the command with the given arguments; it must end with an exit status."""
     from dermis.cli import main
 
     def call(*words: object) -> Outcome:
@@ -46,20 +46,20 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
 
 @pytest.fixture(autouse=True)
 def plainly_exposed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures are radiance over black, which tests can reckon with; marked `photographed` they are not."""
+    """Replace exposure and background by neutral ones, except for tests marked `photographed`."""
     if not request.node.get_closest_marker("photographed"):
-        monkeypatch.setattr("dermis.cli.scene_options.PHOTOGRAPHED", {"background": (0.0, 0.0, 0.0)})
+        monkeypatch.setattr("dermis.cli.scene_options.PHOTOGRAPHIC_SETTINGS", {"background": (0.0, 0.0, 0.0)})
 
 
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
-    """Commands use the session's device instead of opening one each."""
+    """Make commands use the device of the test session."""
     monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with head.obj in it, which is also the current one."""
+    """Return a folder with head.obj that is also the current folder."""
     write_head(tmp_path / "head.obj")
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -67,13 +67,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def render(run: Run, folder: Path, opened: None) -> Run:
-    """`dermis render` at a tiny size; call with the head and the options."""
+    """Return a function that runs `dermis render` at a tiny size, given the head and options."""
     return lambda head, *words: run("render", head, "--size", "64x64", "--atlas", "64", *words)
 
 
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a good head and with bad files of every kind."""
+    """Return a folder with a valid head and with invalid files of all kinds."""
     folder = tmp_path_factory.mktemp("inputs")
     for name, text in _texts().items():
         (folder / name).write_text(text)
@@ -135,7 +135,7 @@ def _save(path: Path, pixels: np.ndarray) -> None:
 def refused(
     run: Run, inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., re.Match[str]]:
-    """Run `dermis render` and check all that every refusal has in common; the message."""
+    """Return a function that runs `dermis render`, checks its clean refusal, and returns the message."""
     monkeypatch.chdir(inputs)
 
     def call(*words: str, output: str | Path = tmp_path / "out.png") -> re.Match[str]:

@@ -1,4 +1,4 @@
-"""Bad meshes, maps, numbers and names: each is refused with the culprit first, as `refused` checks."""
+"""Invalid meshes, maps, numbers and names: the message begins with the culprit, as `refused` checks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Run = Callable[..., Any]
 
 
 class Bad(NamedTuple):
-    """The words of a command; its culprit as the message begins; a part of what came."""
+    """Arguments of a command, the culprit at the beginning of its message, and a part of the message."""
 
     words: str
     culprit: str
@@ -52,7 +52,7 @@ MAPS = {
     "grey for colour": Bad("head.obj --colour grey.png", "grey.png", "grey"),
     "colour for grey": Bad("head.obj --specular-map red.png", "red.png", "differ"),
     "colour for normals": Bad("head.obj --normal red.png", "red.png", "no unit vectors"),
-    "height without mm": Bad("head.obj --height grey.png", "grey.png", "none was given"),
+    "height without mm": Bad("head.obj --height grey.png", "grey.png", "it is not set"),
     "mm without height": Bad("head.obj --height-mm 0.02", "height_mm", "without a height map"),
     "negative mm": Bad("head.obj --height grey.png --height-mm -1", "--height-mm", "-1"),
     "NaN mm": Bad("head.obj --height grey.png --height-mm nan", "--height-mm", "nan"),

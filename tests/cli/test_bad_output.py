@@ -1,4 +1,4 @@
-"""Places that cannot be written to: nothing half-written stays, and what was there is kept."""
+"""Locations that cannot be written to: no partial files remain, and existing files are kept."""
 
 from __future__ import annotations
 

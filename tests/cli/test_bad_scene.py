@@ -1,4 +1,4 @@
-"""Bad scene files: the message names the file and the part of it that is at fault."""
+"""Invalid scene files: the message names the file and the part at fault."""
 
 from __future__ import annotations
 

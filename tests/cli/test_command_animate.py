@@ -1,4 +1,4 @@
-"""`dermis animate` of a small head: frames at their times, what is kept of them, what is refused."""
+"""`dermis animate` with a small head: frame times, reuse of frames, and refusals."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from moving_head import CAPTURE, write_moving_head
 
 import dermis
 from dermis.images.io import read_image
-from dermis.mesh.pose import laid_over
+from dermis.mesh.pose import merge_poses
 
 Run = Callable[..., Any]
 SMALL = ("--size", "32x32", "--atlas", "64", "--samples", "1", "--shadow-size", "64")
@@ -24,7 +24,7 @@ KEYS = ["file", "adapter", "size", "subdivide", "fps", "frames", "drawn", "secon
 
 @pytest.fixture
 def animate(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, opened: None) -> Run:
-    """`dermis animate` at a tiny size in a folder with face.glb, two.glb and take.csv."""
+    """Return a function that runs `dermis animate` in a folder with face.glb, two.glb and take.csv."""
     monkeypatch.chdir(tmp_path)
     write_moving_head(Path("face.glb"))
     write_moving_head(Path("two.glb"), clips=2)
@@ -92,7 +92,7 @@ def test_whole_frames_are_not_drawn_again(animate: Run) -> None:
 def test_an_interruption_leaves_whole_frames_and_no_movie(
     animate: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    laid, left = laid_over, [0]
+    laid, left = merge_poses, [0]
 
     def interrupted(*words: Any) -> Any:
         left[0] -= 1
@@ -100,7 +100,7 @@ def test_an_interruption_leaves_whole_frames_and_no_movie(
             raise KeyboardInterrupt
         return laid(*words)
 
-    monkeypatch.setattr("dermis.mesh.pose.laid_over", interrupted)
+    monkeypatch.setattr("dermis.mesh.pose.merge_poses", interrupted)
     left[0] = 3
     ended = animate("face.glb", "-o", "a.mp4")
     assert (ended.code, ended.stdout, ended.stderr) == (130, "", "")
@@ -222,7 +222,7 @@ def test_the_writer_is_public() -> None:
 
 @pytest.mark.photographed
 def test_one_exposure_for_all_frames_is_metered_at_the_first(animate: Run, run: Run) -> None:
-    """Whichever frames are drawn; and pictures over nothing have alpha."""
+    """Independent of the rendered frames; pictures without a background have alpha."""
     words = ("face.glb", "-o", "f/%d.png", "--fps", "10", "--background", "none")
     ended = animate(*words)
     assert ended.code == 0 and ended.stderr.startswith("note: --exposure ")

@@ -1,4 +1,4 @@
-"""`dermis batch`: what it prints, and what it refuses before anything is drawn."""
+"""`dermis batch`: its output, and refusals before anything is rendered."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Run = Callable[..., Any]
 
 @pytest.fixture
 def spec(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """In the current folder."""
+    """Return the path of a spec in the current folder."""
     monkeypatch.chdir(tmp_path)
     return write_spec(tmp_path)
 

@@ -15,12 +15,12 @@ from dermis.apps.validation.benchmarks.measure import FrameCounts, measure_case
 from dermis.base.errors import DermisError
 
 Run = Callable[..., Any]
-BRIEF = FrameCounts(warming=0, between=0, timed=1, row=1)
+BRIEF = FrameCounts(warmup=0, between=0, timed=1, sequence=1)
 
 
 @pytest.fixture
 def bench(run: Run, folder: Path, opened: None, device: Any, monkeypatch: pytest.MonkeyPatch) -> Run:
-    """`dermis bench` with presets of two tiny frames."""
+    """Return a function that runs `dermis bench` with presets of two tiny frames."""
     usual = Case((32, 32), atlas=64, gaussians=2, lights=1, samples=1)
     tiny = Preset(
         usual,

@@ -21,7 +21,7 @@ Run = Callable[..., Any]
 
 @pytest.fixture
 def compare(run: Run, device: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
-    """`dermis compare` on the session's device; call with the words after it."""
+    """Return a function that runs `dermis compare` on the device of the session."""
     monkeypatch.setattr("dermis.gpu.open_device", lambda adapter: device)
     monkeypatch.chdir(tmp_path)
     return lambda *words: run("compare", *words)
@@ -142,7 +142,7 @@ def test_wrong_colour_needs_a_map_to_be_seen(render: Run, folder: Path) -> None:
 
 
 def test_techniques_against_a_truth(run: Run, folder: Path, opened: None) -> None:
-    """Rows in JSON, and a page that needs no other file."""
+    """Rows in JSON, and a self-contained page."""
     words = ("--size", "24x24", "--atlas", "128", "--techniques", "none,texture-space")
     ended = run("compare", "head.obj", *words, "-o", "report.html", "--json")
     assert ended.code == 0, ended.stderr

@@ -1,4 +1,4 @@
-"""`dermis export` as it is typed."""
+"""The command `dermis export`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`dermis fit`: what it refuses before long work."""
+"""`dermis fit`: refusals before long work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`dermis head`: a file, and what it refuses."""
+"""`dermis head`: its file, and refusals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Run = Callable[..., Any]
 
 
 def same_shape(head: Head, person: Human) -> bool:
-    """By the extent of the control points."""
+    """Return whether two heads have the same extent of control points."""
     ends = [(one.min(axis=0), one.max(axis=0)) for one in (head.positions_mm, person.positions_mm)]
     return bool(np.abs(np.subtract(*ends)).max() < 1e-3)
 

@@ -1,4 +1,4 @@
-"""`dermis lights`: its text is a file that `--lights` takes."""
+"""`dermis lights`: its output is a file for `--lights`."""
 
 from __future__ import annotations
 

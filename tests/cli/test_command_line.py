@@ -1,4 +1,4 @@
-"""The command as a program: help, start-up, exit codes, and the two small commands' words."""
+"""The command as a program: help, start-up, exit codes, and the output of the two small commands."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_a_process_renders(folder: Path) -> None:
     ],
 )
 def test_help_loads_nothing_heavy(words: list[str]) -> None:
-    """The help of a command that takes a model's fields needs the model, and with it pydantic."""
+    """The help of a command with model options needs the model, and therefore pydantic."""
     heavy = {"numpy", "wgpu", "trimesh", "scipy"} | ({"pydantic"} if len(words) == 1 else set())
     code = (
         f"import sys, dermis.cli; sys.argv = ['dermis', *{words}]\n"

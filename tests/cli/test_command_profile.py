@@ -1,4 +1,4 @@
-"""`dermis profile`: what it prints and writes, and what it refuses."""
+"""`dermis profile`: output, files and refusals."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ KEYS = {
 
 @pytest.fixture
 def told(run: Run) -> Callable[..., dict[str, Any]]:
-    """The JSON of `dermis profile` with these words."""
+    """Return the JSON output of `dermis profile` with the given arguments."""
 
     def call(*words: object) -> dict[str, Any]:
         ended = run("profile", *words, "--json")
@@ -180,7 +180,7 @@ def test_written_profile_is_read_back(run: Run, folder: Path, told: Callable[...
 
 
 def test_render_takes_it(run: Run, render: Run, folder: Path) -> None:
-    """The same head, the same light: another profile, another picture."""
+    """Another profile gives another picture of the same head in the same light."""
     assert run("profile", "skin2", "-o", "own.toml").code == 0
     pictures = []
     for number, name in enumerate(("own.toml", "gpu-gems-3", "skin2")):

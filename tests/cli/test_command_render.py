@@ -1,4 +1,4 @@
-"""`dermis render` of a small head: what it writes, what it prints, and which of file and option wins."""
+"""`dermis render` of a small head: files, output, and precedence of file and option."""
 
 from __future__ import annotations
 

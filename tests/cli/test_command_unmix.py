@@ -1,4 +1,4 @@
-"""`dermis unmix`: the maps it writes, and what it refuses."""
+"""`dermis unmix`: the maps it writes, and refusals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Run = Callable[..., Any]
 
 @pytest.fixture
 def picture(folder: Path) -> Path:
-    """An artist's map of 2 % melanin, 1 % blood, with a black edge."""
+    """Return the path of a map with 2 % melanin and 1 % blood, with a black border."""
     colours = np.zeros((24, 32, 3), np.float32)
     colours[:, 4:] = skin_model().colours(np.array([0.02]), np.array([0.01]))[0]
     write_image(folder / "skin.png", colours)

@@ -1,4 +1,4 @@
-"""`dermis view` as far as it goes without a window."""
+"""`dermis view` as far as possible without a window."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_the_package_imports_without_the_extra() -> None:
 
 
 def test_without_a_display_it_names_the_way_out(folder: Path) -> None:
-    """In a process of its own: glfw ends the one in which a window is asked for after its warning."""
+    """In a separate process, because glfw ends the process that requests a window after its warning."""
     pytest.importorskip("glfw", reason="the extra `viewer` is not installed")
     environment = {name: value for name, value in os.environ.items() if name != "WAYLAND_DISPLAY"}
     command = [sys.executable, "-m", "dermis", "view", "head.obj", "--adapter", "cpu"]
@@ -143,7 +143,7 @@ def test_a_motion_without_a_name_of_the_heads_is_refused(run: Run, folder: Path)
 
 
 def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without a notebook at hand: a canvas in the place of rendercanvas' own."""
+    """Without a notebook: a canvas replaces that of rendercanvas."""
     pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
     from rendercanvas.offscreen import OffscreenRenderCanvas
 

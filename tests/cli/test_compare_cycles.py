@@ -1,4 +1,4 @@
-"""`dermis compare HEAD --against cycles` with a program in the place of Blender's Python."""
+"""`dermis compare HEAD --against cycles` with a substitute for Blender's Python."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ done = {"version": "5.0.1", "times": [[0.5, 1.0]] * len(scene["passes"])}
 
 @pytest.fixture
 def compare(run: Run, folder: Path, opened: None, monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Call with a shell script that stands for Blender's Python, then the options."""
+    """Return a function that runs the command with a shell script instead of Blender's Python."""
     script = folder / "python"
     monkeypatch.setenv(PYTHON_VARIABLE, str(script))
 

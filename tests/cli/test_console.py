@@ -1,4 +1,4 @@
-"""What commands tell on a terminal while they prepare a picture."""
+"""Terminal output of commands during preparation."""
 
 from __future__ import annotations
 

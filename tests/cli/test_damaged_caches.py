@@ -1,4 +1,4 @@
-"""Whatever happened to the cache, the picture is the same to the bit, and the cache is whole again."""
+"""A damaged cache gives the same picture bit for bit, and is repaired."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""--eyes, --eye-groups and --eye on heads from files, and what is said where there are none."""
+"""--eyes, --eye-groups and --eye on heads from files, and notes where there are no eyes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SMALL = ("--unit-mm", 1, "--size", "48x48", "--atlas", 128, "--samples", 1)
 
 @pytest.fixture
 def camera(tmp_path: Path) -> Path:
-    """Close before the left eye."""
+    """Return the path of a camera close to the left eye."""
     path, (x, y, z) = tmp_path / "camera.toml", EYE_MM
     y += 5.0  # the head's centre is 120 mm below its crown
     path.write_text(f"[camera]\nposition = [{x}, {y}, 600]\ntarget = [{x}, {y}, {z}]\nframe_mm = 30\n")

@@ -1,4 +1,4 @@
-"""How a head's file is read, told to commands other than `dermis render`."""
+"""Options of head files in commands other than `dermis render`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Run = Callable[..., Any]
 
 @pytest.fixture
 def in_cm(folder: Path) -> str:
-    """The small head in a unit of 10 mm, and a picture beside it."""
+    """Return a folder with the small head in units of 10 mm and a picture."""
     lines = [line.split() for line in obj_text().splitlines()]
     places = [
         [one if one == "v" else f"{float(one) / 10:.6g}" for one in line] for line in lines if line[0] == "v"

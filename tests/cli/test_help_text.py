@@ -1,4 +1,4 @@
-"""Help fits terminals of any width, without lines that end where the source's do."""
+"""Help fits terminals of any width, without the line breaks of the source."""
 
 from __future__ import annotations
 

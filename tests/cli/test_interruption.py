@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and SIGHUP at the worst moment: nothing half-written stays, and the exit status tells."""
+"""Ctrl-C, SIGTERM and SIGHUP at the worst moment: no partial files remain, and the exit status is right."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ Path.replace = replace
 IN_THE_CACHE = AT_THE_END.replace("if not path", "if path")
 AT_A_FRAME = """
 import dermis.mesh.pose as module
-usual, drawn = module.laid_over, []
-def laid_over(*given):
+usual, drawn = module.merge_poses, []
+def merge_poses(*given):
     drawn.append(1)
     if len(drawn) == 3:
         asked(signal.{0})
     return usual(*given)
-module.laid_over = laid_over
+module.merge_poses = merge_poses
 """
 SMALL = "--size 32x32 --atlas 64 --adapter cpu"
 
 
 def _interrupted(folder: Path, moment: str, number: signal.Signals, words: str) -> tuple[int, str]:
-    """Return exit status and stderr of a command that gets a signal at a moment."""
+    """Return exit status and stderr of a command that receives a signal at a given moment."""
     code = START.format(moment.format(number.name))
     environment = os.environ | {"DERMIS_CACHE": str(folder / "cache")}
     command, pipe = [sys.executable, "-c", code, *words.split()], subprocess.PIPE
@@ -136,7 +136,7 @@ def _start(
 
 
 def test_asked_again_it_ends_at_once() -> None:
-    """Also while it cleans up, and in a library that holds the main thread."""
+    """Also during cleanup, and in a library that blocks the main thread."""
     slow = "import hashlib; hashlib.pbkdf2_hmac('sha256', b'', b'', 10**9)"  # minutes
     with _start("sys.stdout.write('ready\\n'); sys.stdout.flush(); time.sleep(60)", slow) as ran:
         assert ran.stdout is not None
@@ -148,7 +148,10 @@ def test_asked_again_it_ends_at_once() -> None:
 
 
 def _ends_when_asked_again(ran: subprocess.Popen[str]) -> int:
-    """Return the exit status of a process that gets SIGTERM every 0.7 s: two of less than 0.5 s are one."""
+    """Return the exit status of a process that receives SIGTERM every 0.7 s.
+
+    Two signals within 0.5 s count as one.
+    """
     for _ in range(100):
         time.sleep(0.7)
         if ran.poll() is not None:
@@ -207,7 +210,7 @@ def test_where_an_exception_would_be_lost_it_comes_later(place: str) -> None:
 
 @pytest.mark.parametrize("number", SIGNALS)
 def test_what_the_caller_ignores_stays_ignored(number: signal.Signals) -> None:
-    """As nohup does with SIGHUP, and a shell with SIGINT in the background."""
+    """As by nohup for SIGHUP, and by a shell for SIGINT in the background."""
     with child_process.ignored_signals():
         ran = _start(f"os.kill(os.getpid(), {int(number)}); time.sleep(0.1)", start=subprocess.Popen)
     with ran:

@@ -1,4 +1,4 @@
-"""A head whose halves share one uv: each half gets a place of its own, except on the mesh's own layout."""
+"""A head whose halves share one uv: each half gets its own charts, except with the mesh's own layout."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dermis.cli import main
 
 @pytest.fixture
 def folded(tmp_path: Path) -> Path:
-    """A head whose uv is folded along the middle."""
+    """Return the path of a head whose uv is folded along the middle."""
     lines = []
     for line in obj_text().splitlines():
         if line.startswith("vt "):

@@ -1,4 +1,4 @@
-"""No option of any command takes a number that is none, or one beyond what can be."""
+"""Options of all commands refuse invalid numbers and numbers out of range."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ IN_WORDS = {
 
 
 def _options() -> Iterator[tuple[str, str, str]]:
-    """Command, option and how a number is written for it; those of scenes once."""
+    """Yield command, option and number format; scene options only once."""
     seen = set()
     for command in COMMANDS:
         app = App(name=command)

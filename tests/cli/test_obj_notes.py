@@ -1,4 +1,4 @@
-"""What `dermis render` says of an OBJ file whose pictures are missing."""
+"""Notes of `dermis render` about an OBJ file with missing pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options come from the models: a new field is an option, a key of scene files and a row of the docs."""
+"""Options generated from the models: a new field is an option, a key of scene files and a row of the docs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MODELS = (*_OF_SKIN, Settings, Environment, HeadTable, EyeTable, Camera)
 
 
 class WaxedSkin(Skin):
-    """A skin of another package, with fields of its own."""
+    """Skin of another package, with additional fields."""
 
     wax: Annotated[float, Field(ge=0, le=1)] = 0.25
     """Share of the skin that is waxed,
@@ -45,7 +45,7 @@ WaxOptions = model_options(WaxedSkin, without=("mix",), names={"coats": "wax_coa
 
 
 def taken(*words: str) -> Any:
-    """What a command with the options of the toy model is called with."""
+    """Return the arguments that a command with the options of the toy model receives."""
     app = App(result_action="return_value")
 
     @app.command

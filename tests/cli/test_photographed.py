@@ -1,4 +1,4 @@
-"""What the commands choose by themselves: exposure and background; alpha in files; clipped pictures."""
+"""Default exposure and background of the commands; alpha in files; overexposed pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""--pose and --bone of `dermis render`: what they do to the picture, and what is no pose."""
+"""--pose and --bone of `dermis render`: their effect on the picture, and invalid poses."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ def test_pose_and_bone_move_the_picture(render: Run, face: str) -> None:
 def test_options_are_laid_over_a_scenes_pose(face: str) -> None:
     told = "[pose.weights]\njawOpen = 0.25\nmouthSmileLeft = 0.5\n[pose.bones]\nhead = [1, 2, 3]\n"
     Path("s.toml").write_text(f'[head]\nname = "{face}"\n{told}')
-    plain = Pose.of(assemble_scene("s.toml", SceneOptions())[0].pose)
+    plain = Pose.coerce(assemble_scene("s.toml", SceneOptions())[0].pose)
     assert plain and plain.weights == {"jawOpen": 0.25, "mouthSmileLeft": 0.5}
-    pose = Pose.of(assemble_scene("s.toml", SceneOptions(pose=["jawOpen=1"], camera="profile"))[0].pose)
+    pose = Pose.coerce(assemble_scene("s.toml", SceneOptions(pose=["jawOpen=1"], camera="profile"))[0].pose)
     assert pose and pose.weights == {"jawOpen": 1.0, "mouthSmileLeft": 0.5}
     assert pose.bones == {"head": [1, 2, 3]}
 

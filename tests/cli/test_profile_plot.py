@@ -1,4 +1,4 @@
-"""The figure of `dermis profile --plot`: what it draws, and what becomes of it on a bad disk."""
+"""The figure of `dermis profile --plot`: its contents, and errors of the disk."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Drawn = Callable[..., Figure]
 
 @pytest.fixture
 def drawn(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Drawn:
-    """The figure that `dermis profile` makes of these words."""
+    """Return the figure that `dermis profile` makes with the given arguments."""
     figures: list[Figure] = []
     monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: figures.append(self))
 
@@ -67,7 +67,7 @@ def test_photons_too_few_to_draw_leave_the_fit(run: Run, folder: Path) -> None:
 
 
 def test_disk_that_fills_up(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Under every format, because all are drawn in memory first."""
+    """For every format, because all are rendered in memory first."""
     whole = Path.write_bytes
 
     def full(path: Path, data: bytes) -> int:

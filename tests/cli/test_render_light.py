@@ -1,4 +1,4 @@
-"""`dermis render` under environments and rigs, with bloom and tone curves: what wins, and what is refused."""
+"""`dermis render` with environments, rigs, bloom and tone curves: precedence and refusals."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Run = Callable[..., Any]
 
 @pytest.fixture
 def sky(folder: Path) -> str:
-    """A panorama that is bright on the head's left, with a lamp like a sun."""
+    """Return the path of a panorama that is bright on the head's left, with a sun-like peak."""
     towards = directions(64, 128)
     radiance = np.full((64, 128, 3), 0.2, np.float32)
     radiance[towards[..., 0] > 0.5] = 2.0

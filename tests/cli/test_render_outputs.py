@@ -1,4 +1,4 @@
-"""`dermis render --outputs`: files beside the image or parts of it, with the same numbers, and refusals."""
+"""`dermis render --outputs`: separate files or parts of the image with equal values, and refusals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Run = Callable[..., Any]
 
 
 def parts(path: Path) -> dict[str, dict[str, np.ndarray]]:
-    """Channels of each part of an OpenEXR file."""
+    """Return the channels of each part of an OpenEXR file."""
     file = OpenEXR.File(str(path), separate_channels=True)
     return {one.name(): {name: found.pixels for name, found in one.channels.items()} for one in file.parts}
 
@@ -87,7 +87,7 @@ def test_files_are_the_same_to_the_byte(kind: Any) -> None:
 
 
 def test_numbers_of_any_channels_are_encoded() -> None:
-    """A channel for each light, and whole numbers of a byte."""
+    """One channel per light, and integers of one byte."""
     many = np.random.default_rng(0).random((5, 4, 2)).astype(np.float32)
     assert np.array_equal(np.load(io.BytesIO(encode_output("uv", many, "npy"))), many)
     levels = np.arange(20, dtype=np.uint8).reshape(4, 5)

@@ -1,4 +1,4 @@
-"""Standard streams that are full, closed, left by their reader, or of few letters: told in a line at most."""
+"""Standard streams that are full, closed, abandoned by the reader, or of a small encoding."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SINKS = {
 
 
 class Ended(NamedTuple):
-    """How a shell's command ended."""
+    """Exit status and output of a shell command."""
 
     code: int
     stdout: str
@@ -34,7 +34,7 @@ class Ended(NamedTuple):
 
 
 def _shell(line: str, folder: Path, **more: str) -> Ended:
-    """Run a line; `dermis` in it is the command."""
+    """Run a shell command line in which `dermis` is the command."""
     line = line.replace("dermis ", f"'{sys.executable}' -m dermis ")
     ran = subprocess.run(["/bin/sh", "-c", line], capture_output=True, env=os.environ | more, cwd=folder)
     return Ended(ran.returncode, ran.stdout.decode("latin-1"), ran.stderr.decode("latin-1"))
@@ -67,7 +67,7 @@ SMALL = "head.obj --size 32x32 --atlas 64 --adapter cpu"
 
 
 def test_no_file_gets_the_number_of_a_closed_stream(folder: Path) -> None:
-    """What libraries print would land in it."""
+    """Otherwise libraries would print into it."""
     assert _shell(f"dermis render {SMALL} -o a.png >&- 2>&- <&-", folder).code == 2
     data = (folder / "a.png").read_bytes()
     assert data.startswith(b"\x89PNG") and data.endswith(b"IEND\xaeB`\x82")

@@ -1,4 +1,4 @@
-"""The tutorials say what is so: their Python runs, their commands too, and these write what they name."""
+"""The tutorials are correct: their Python code and commands run and write the named files."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_tutorial_runs(
 
 
 def _check(run: Run, line: str) -> None:
-    """Run a command, which must write what it says and have nothing to remark."""
+    """Run a command, which must write the named file without notes."""
     command, _, target = line.partition(" > ")
     name, *words = shlex.split(command)
     assert name == "dermis"

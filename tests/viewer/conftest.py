@@ -1,4 +1,4 @@
-"""What the viewer's tests share: a small head, a studio on the session's adapter, and an offscreen viewer."""
+"""Shared fixtures of the viewer tests: a small head, a renderer, and an offscreen viewer."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def rigged_head(rigged_file: Path) -> Head:
 
 @pytest.fixture
 def rigged(rigged_head: Head, rigged_file: Path) -> ViewerState:
-    """A head with expressions and bones."""
+    """Return the state of a head with expressions and bones."""
     return ViewerState(Scene(rigged_head), SETTINGS, {"name": str(rigged_file)})
 
 
@@ -60,7 +60,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def shown(head: Head, head_file: Path) -> Iterator[Any]:
-    """A viewer that a server in this process shows, `shown.url` is its page."""
+    """Yield a viewer served by this process; `shown.url` is its page."""
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
     with served(ViewerState(Scene(head), SETTINGS, {"name": str(head_file)}), (400, 480)) as one:
         yield one
@@ -68,7 +68,7 @@ def shown(head: Head, head_file: Path) -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def make_driver(head: Head, head_file: Path) -> Callable[..., InputDriver]:
-    """A viewer of 400 x 480 pixels, of the small head or of another state."""
+    """Return a function that opens a viewer of 400 x 480 pixels with the small head or another state."""
     pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
@@ -91,7 +91,7 @@ def shared_driver(make_driver: Callable[[], InputDriver]) -> InputDriver:
 
 @pytest.fixture
 def driver(shared_driver: InputDriver, caplog: pytest.LogCaptureFixture) -> Iterator[InputDriver]:
-    """The module's viewer, back at its first state; errors that rendercanvas only logs fail the test."""
+    """Yield the shared viewer in its initial state; errors that rendercanvas only logs fail the test."""
     history = shared_driver.viewer.session.history
     while history.can_undo:
         history.undo()

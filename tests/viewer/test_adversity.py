@@ -1,4 +1,4 @@
-"""Windows that keep changing size or have none, lost devices, and input faster than frames."""
+"""Windows that change size or have none, lost devices, and input faster than frames."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ FEW_BYTES = 1.02  # of what was held: a picture of another size may have taken t
 
 @pytest.fixture(autouse=True)
 def steady(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures in motion that are alike, and take the same memory, on quick and on busy machines."""
+    """Disable adaptive quality, so that pictures in motion are equal on fast and on busy machines."""
     monkeypatch.setattr(
         "dermis.apps.viewer.view_renderer.QualityController.record_frame_time", lambda *_: None
     )
 
 
 def resized(driver: InputDriver, width: int, height: int) -> None:
-    """As windows tell it, before anything is drawn."""
+    """Resize the canvas as a window does, before anything is drawn."""
     driver.canvas._size_info.set_physical_size(width, height, 1.0)
 
 
@@ -196,7 +196,7 @@ def test_a_device_that_is_not_to_be_had_again_closes_the_window_with_a_word(
 def test_a_state_that_takes_too_much_memory_leaves_the_last_picture(
     driver: InputDriver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is no loss: another device would have no more."""
+    """This is not a lost device: another device would have no more memory."""
     before, session = driver.settled(), driver.viewer.session
     view_renderer = session.view_renderer
 
@@ -214,7 +214,7 @@ def test_a_state_that_takes_too_much_memory_leaves_the_last_picture(
 def test_input_during_a_frame_is_in_the_next_one(
     driver: InputDriver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All of it at once: nothing queues, and it is one step of the history."""
+    """All input of the frame is processed at once and is one step of the history."""
     driver.settled()
     session = driver.viewer.session
     start, image, frames = session.state, session.view_renderer.render_image, []
@@ -242,7 +242,7 @@ def test_input_during_a_frame_is_in_the_next_one(
 
 
 def slowly(driver: InputDriver) -> None:
-    """The same drag in a few frames."""
+    """Repeat the drag in a few frames."""
     move(driver, ON_HEAD[0], kind="pointer_down")
     for k in (100, 200, 299):
         move(driver, ON_HEAD[0] - 0.3 * k)

@@ -1,4 +1,4 @@
-"""The atlas as a flat picture: its texels, zooming at the cursor, panning."""
+"""The view of the flat atlas: its texels, zooming at the cursor, panning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The viewer in a real browser: the head is there, turns, obeys the panel, and comes back after a loss."""
+"""The viewer in a real browser: it shows the head, responds to input, and recovers from a lost connection."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium h
 
 @pytest.fixture(scope="module")
 def url(head_file: Path) -> Iterator[str]:
-    """Of a page that `dermis view --browser --token` serves."""
+    """Yield the URL of a page served by `dermis view --browser --token`."""
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
     options = "--browser --token --port 0 --size 400x480 --atlas 128 --samples 1 --background #000000"
     command = [sys.executable, "-m", "dermis", "view", str(head_file), *options.split(), "--adapter", ADAPTER]
@@ -69,7 +69,7 @@ def test_the_page_shows_the_head_and_a_drag_turns_it(page: Any) -> None:
 
 @pytest.fixture(scope="module")
 def places(make_driver: Callable[[], InputDriver]) -> dict[str, tuple[float, float]]:
-    """Where the panel's controls are in a window of the page's size, with the list of views open."""
+    """Return the positions of the controls in a window of the page's size, with the list of views open."""
     driver = make_driver()
     driver.press("show")
     return driver.viewer.session.positions
@@ -105,7 +105,7 @@ def test_a_reloaded_page_shows_the_head_again(page: Any) -> None:
 
 @pytest.fixture
 def watcher(browser: Any) -> Iterator[Any]:
-    """A second page, closed whatever happens: it would watch the other tests, or be in command of them."""
+    """Yield a second page, which is always closed, because it would watch or control the other tests."""
     one = browser.new_page(viewport=SIZE)
     listen(one)
     yield one
@@ -146,7 +146,7 @@ def test_one_finger_turns_the_head_and_two_come_nearer_and_pan(browser: Any, url
 
 
 def lowest(image: NDArray[np.int64]) -> int:
-    """The last row of the picture that shows some of the head."""
+    """Return the last row of the picture that shows the head."""
     return int(np.flatnonzero(head(image).max(axis=(1, 2)) > 25)[-1])
 
 
@@ -196,7 +196,7 @@ _RECORD_SOCKETS = """
 def test_a_page_that_came_encrypted_opens_an_encrypted_socket(
     page_at: str, socket_at: str, browser: Any, url: str
 ) -> None:
-    """As behind a proxy, which here driver the server's own files on."""
+    """As behind a proxy, which is simulated with the server's own files."""
     page, base = browser.new_page(), url.partition("?")[0]
     page.add_init_script(_RECORD_SOCKETS)
     elsewhere = f"{page_at}//skin.example/some/folder/"

@@ -1,4 +1,4 @@
-"""Quick drags in a real browser: a slider ends where the pointer did, whatever frames were drawn."""
+"""Quick drags in a real browser: a slider ends at the position of the release, whatever frames were drawn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files in a real browser: what is saved comes as a download, heads are sent."""
+"""Files in a real browser: saved files are downloaded, heads are uploaded."""
 
 from __future__ import annotations
 

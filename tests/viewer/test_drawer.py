@@ -1,4 +1,4 @@
-"""A narrow window: the panel is a drawer over the picture, which has the whole width."""
+"""A narrow window, in which the panel is a drawer over the full-width picture."""
 
 from __future__ import annotations
 

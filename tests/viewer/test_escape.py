@@ -1,4 +1,4 @@
-"""The key Escape: it closes what is open, the topmost first, and clears the search."""
+"""The key Escape: it closes the topmost open element and clears the search."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors that nobody foresaw end one frame, are told once, and leave the next one whole."""
+"""Unexpected errors end one frame, are reported once, and do not affect the next frame."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PANEL, PICTURE = np.s_[:470, :195], np.s_[:380, 205:]  # without the messages at
 
 @pytest.fixture
 def calm(shared_driver: InputDriver, caplog: pytest.LogCaptureFixture) -> Iterator[InputDriver]:
-    """The module's viewer, with an empty list of what it has told, as it was before when the test ends."""
+    """Yield the shared viewer without reported errors, and restore its list of errors afterwards."""
     session = shared_driver.viewer.session
     session._faults.clear()
     session.message = ""

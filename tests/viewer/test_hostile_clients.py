@@ -1,4 +1,4 @@
-"""Clients that send what no page does, say nothing, or come in crowds; what responses tell browsers."""
+"""Clients that send invalid data, send nothing, or open many connections; headers of the responses."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def test_headers_that_do_not_come_are_not_waited_for(
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """The server's connections, as they are made."""
+    """Return the list of connections that the server accepts."""
     found, usual = list[Any](), server.LimitedConnection.connection_made
 
     def connection_made(one: Any, transport: Any) -> None:
@@ -157,7 +157,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 
 def comes(reached: Callable[[], bool]) -> bool:
-    """Return whether something comes to be."""
+    """Return whether a condition becomes true."""
     end = time.monotonic() + PATIENCE_S
     while not reached() and time.monotonic() < end:
         time.sleep(0.01)

@@ -1,4 +1,4 @@
-"""What a page may send: events with values that can be, and nothing else."""
+"""Validation of the messages of a page: events with plausible values, and nothing else."""
 
 from __future__ import annotations
 

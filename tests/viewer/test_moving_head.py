@@ -1,4 +1,4 @@
-"""The panel's expressions and motions, moved by a pointer and by keys on an offscreen canvas."""
+"""Expressions and motions in the panel, changed by pointer and keys on an offscreen canvas."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PICTURE = np.s_[:380, 205:]
 
 @pytest.fixture(autouse=True)
 def steady(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures in motion that are alike on quick and on busy machines."""
+    """Disable adaptive quality, so that pictures in motion are equal on fast and on busy machines."""
     monkeypatch.setattr(
         "dermis.apps.viewer.view_renderer.QualityController.record_frame_time", lambda *_: None
     )
@@ -32,14 +32,14 @@ def steady(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def player(make_driver: Callable[..., InputDriver], rigged_head: Head, rigged_file: Path) -> InputDriver:
-    """A viewer of a head with a motion, which plays."""
+    """Yield a viewer that plays a motion."""
     first = ViewerState(Scene(rigged_head), SETTINGS, {"name": str(rigged_file)})
     return make_driver(first, MotionFile(rigged_file))
 
 
 @pytest.fixture
 def faces(player: InputDriver, caplog: pytest.LogCaptureFixture) -> Iterator[InputDriver]:
-    """The same at rest and paused, in a window that holds the sections of what moves."""
+    """Yield the viewer paused in the rest pose, in a window that shows the sections about motion."""
     session = player.viewer.session
     session.player.stop()
     while session.history.can_undo:
@@ -175,7 +175,7 @@ def test_buttons_and_the_slider_of_time(faces: InputDriver) -> None:
 
 
 def _talk(seconds: float) -> float:
-    """How far the jaw is open in the head's own clip."""
+    """Return how far the jaw is open in the head's own clip."""
     return 1.0 - abs(seconds - 1.0)
 
 

@@ -1,4 +1,4 @@
-"""Moves of cameras and lights, and what a pixel shows."""
+"""Camera and light navigation, and picking."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_a_picked_place_is_where_its_pixel_looks(head: Head) -> None:
 
 
 def test_a_picked_place_follows_the_pose(rigged_head: Head) -> None:
-    """A camera that goes around the head with it sees the place that it saw."""
+    """A camera that rotates with the head picks the same point."""
     degrees = 40.0
     turned = Scene(rigged_head, pose=Pose({"jawOpen": 0.8}, {"neck": (0.0, degrees, 0.0)}))
     open_jaw = pick(Scene(rigged_head, pose={"jawOpen": 0.8}), CAMERA, 0.1, -0.3, 1.0)

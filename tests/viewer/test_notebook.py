@@ -1,4 +1,4 @@
-"""The viewer in a notebook: rendercanvas' own widget, with messages as a page would send them."""
+"""The viewer in a notebook: the widget of rendercanvas, with the messages of a page."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SIZE = (480, 200)
 
 
 class Page:
-    """What the notebook's page does: it tells its size, sends events, shows frames and confirms them."""
+    """Client with the protocol of the notebook page: it sends size and events, and confirms frames."""
 
     def __init__(self, widget: Any) -> None:
         self.canvas, self.frames, self.sent = widget, [], 0
@@ -49,7 +49,7 @@ class Page:
         self.canvas._has_visible_views = True
 
     async def still(self) -> NDArray[np.int64]:
-        """The last frame, when no more come."""
+        """Return the last frame, when no more arrive."""
         for _ in range(100):
             count = len(self.frames)
             await asyncio.sleep(0.5)

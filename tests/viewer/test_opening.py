@@ -1,4 +1,4 @@
-"""A page is served before there is something to show, and tells how far that is or why there is nothing."""
+"""A page is served before the first picture, and shows the progress or the reason of a failure."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Start = Callable[[Callable[[], Any]], Any]
 
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
-    """Begins to serve what a function loads, in a thread; `url` is the page, `ended` waits for its end."""
+    """Return a function that starts to serve in a thread; `url` is the page, `ended` waits for the end."""
     made, threads, told = list[Any](), list[threading.Thread](), list[str]()
     usual, begun = server.make_server, SimpleNamespace(error=None)
     monkeypatch.setattr(server, "make_server", lambda *given: made.append(usual(*given)) or made[0])
@@ -61,7 +61,7 @@ def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
 
 
 def heard(socket: Any, kind: str) -> dict[str, Any]:
-    """The next message of a kind."""
+    """Return the next message of a kind."""
     while True:
         message = socket.recv(timeout=PATIENCE_S)
         if isinstance(message, str) and (told := json.loads(message))["type"] == kind:

@@ -1,4 +1,4 @@
-"""Who gets through to the canvas, and where it is served."""
+"""Access to the canvas, and the address at which it is served."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HOST = "127.0.0.1:8765"
 
 
 async def _app(scope: Any, receive: Any, send: Any) -> None:
-    """Answers "in", or echoes what a socket receives."""
+    """Answer "in", or echo what a socket receives."""
     if scope["type"] == "websocket":
         await send({"type": "websocket.accept"})
         await send({"type": "websocket.send", "text": (await receive())["text"]})
@@ -35,7 +35,7 @@ def ask(
     scheme: str = "",
     **headers: str,
 ) -> list[Any]:
-    """What the guard answers to a request."""
+    """Return the answer of the request filter."""
     answers: list[Any] = []
     incoming = [{"type": "websocket.receive", "text": text} for text in texts]
     incoming.append({"type": "websocket.disconnect", "text": ""})

@@ -1,4 +1,4 @@
-"""Plots of the panel: times of the stages, and the profile."""
+"""Plots of the panel: stage times and the profile."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PANEL = np.s_[:, :190]
 
 
 def count_of(image: NDArray[np.uint8], colour: tuple[float, float, float]) -> int:
-    """Pixels of the panel that have nearly a colour."""
+    """Return the number of pixels of the panel with nearly the given colour."""
     off = np.abs(image[PANEL].astype(float) - 255.0 * np.array(colour)).max(axis=-1)
     return int((off < 12.0).sum())
 

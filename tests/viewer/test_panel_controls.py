@@ -1,4 +1,4 @@
-"""Every control of the panel, moved by a pointer: it is one step, which undo takes back and redo repeats."""
+"""Every control of the panel, moved by a pointer: it is one step that can be undone and redone."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ EXPECTED = {
 
 @pytest.fixture(scope="module")
 def tall(make_driver: Callable[[], InputDriver]) -> InputDriver:
-    """A window that holds the whole panel, whose picture is not drawn again: the panel alone is looked at."""
+    """Yield a window that shows the whole panel; its picture is not rendered again."""
     driver = make_driver()
     driver.settled()
     view_renderer: Any = driver.viewer.session.view_renderer
@@ -62,12 +62,12 @@ def tall(make_driver: Callable[[], InputDriver]) -> InputDriver:
 
 
 def names_of(driver: InputDriver, label: str) -> list[str]:
-    """What an open list offers."""
+    """Return the entries of an open list."""
     return [place for place in driver.viewer.session.positions if place.startswith(f"{label}/")]
 
 
 def move(driver: InputDriver, label: str) -> None:
-    """Drag a slider, press a button, tick a box, or take another entry of a list."""
+    """Drag a slider, press a button, tick a box, or choose another entry of a list."""
     session = driver.viewer.session
     session.controls.light = 0
     driver.frame()

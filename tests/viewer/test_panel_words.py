@@ -1,4 +1,4 @@
-"""What the panel calls things: words that are in use, for all that is there, and short enough to be read."""
+"""Labels of the panel: common terms for all fields and values, short enough to be read."""
 
 from __future__ import annotations
 

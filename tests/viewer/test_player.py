@@ -1,4 +1,4 @@
-"""Motions that play, pause and are scrubbed, by a clock that only the test moves."""
+"""Motions that are played, paused and scrubbed, with a clock that only the test advances."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def take(tmp_path: Path) -> MotionFile:
-    """Half a second in which the jaw opens."""
+    """Return the path of a motion of half a second in which the jaw opens."""
     return MotionFile(write_take(tmp_path / "take.csv", *JAW), fps=10.0)
 
 
@@ -55,7 +55,7 @@ def after(player: MotionPlayer, clock: Clock, seconds: float) -> float:
 
 
 def start(player: MotionPlayer, clock: Clock) -> None:
-    """Play, up to the picture from which the clock counts."""
+    """Play up to the first frame, from which the clock counts."""
     player.play()
     player.advance()
     after(player, clock, 0.0)

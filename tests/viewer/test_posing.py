@@ -1,4 +1,4 @@
-"""Poses made of others, and the surface that follows them."""
+"""Edits of poses, and the posed surface."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dermis.apps.viewer.posing import (
 )
 from dermis.apps.viewer.state import UndoHistory, ViewerState, load_state, save_state, states_equal
 from dermis.mesh.head import Head
-from dermis.mesh.pose import Pose, laid_over
+from dermis.mesh.pose import Pose, merge_poses
 from dermis.mesh.rig import Rig
 from dermis.mesh.rotations import angles_matrix
 from dermis.scene import Scene
@@ -71,7 +71,7 @@ def test_angles_of_a_matrix_are_its_turn(rigged_head: Head) -> None:
 
 def test_moves_leave_what_they_do_not_name(rigged_head: Head) -> None:
     before = Pose({"jawOpen": 0.1, "browInnerUp": 0.4}, {"neck": (1.0, 0.0, 0.0)})
-    found = laid_over(Pose({"jawOpen": 0.9}, {"head": (0.0, 5.0, 0.0)}), before)
+    found = merge_poses(Pose({"jawOpen": 0.9}, {"head": (0.0, 5.0, 0.0)}), before)
     assert dict(found.weights) == {"jawOpen": 0.9, "browInnerUp": 0.4}
     assert set(found.bones) == {"neck", "head"} and found.positions_mm is None
 

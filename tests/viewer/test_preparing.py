@@ -1,4 +1,4 @@
-"""Another head is prepared in a thread: the last picture stays, and everything but the picture goes on."""
+"""Preparation of another head in a thread: the last picture stays while everything else continues."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ PICTURE = np.s_[:380, 205:]  # neither the panel nor the messages
 
 @pytest.fixture
 def other(tmp_path: Path) -> Any:
-    """Another head each time, of which nothing is kept."""
+    """Return a new head, so that nothing of it is cached."""
     return load_head(write_rigged_head(tmp_path / "rigged.glb"))
 
 
 @pytest.fixture
 def gate(driver: InputDriver, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
-    """Heads are prepared when it is set."""
+    """Return an event that lets the preparation of heads continue."""
     one, usual = threading.Event(), ViewRenderer.prepare
 
     def slowly(view_renderer: ViewRenderer, *given: Any) -> None:

@@ -1,4 +1,4 @@
-"""The effort of frames in motion."""
+"""Adaptive quality of frames in motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drags that are quicker than frames: what a control is let go at is what it says."""
+"""Drags faster than frames: a control takes the value at the position of the release."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dermis.apps.viewer.state import ViewerState
 
 
 def in_one_frame(driver: InputDriver, *path: tuple[float, float]) -> None:
-    """A whole drag between two frames; the last place is told by the release alone."""
+    """Send a complete drag between two frames; only the release has the last position."""
     (x, y), *rest, (end_x, end_y) = path
     driver.event("pointer_move", x=x, y=y, button=0, buttons=())
     driver.event("pointer_down", x=x, y=y, button=1, buttons=(1,))

@@ -1,4 +1,4 @@
-"""A scene saved in the viewer and rendered by the command: the same picture, whatever was set."""
+"""A scene saved by the viewer and rendered by `dermis render` gives the same picture."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Change = Callable[[ViewerState, Path], ViewerState]
 
 
 def with_regions(state: ViewerState, folder: Path) -> ViewerState:
-    """A table whose lower half is another region, and what the regions leave to the skin."""
+    """Return a state with a table of two regions, and with the roughness that the regions do not replace."""
     labels = np.zeros((16, 16), np.uint8)
     labels[8:] = 3
     Image.fromarray(labels).save(folder / "labels.png")

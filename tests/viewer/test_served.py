@@ -1,4 +1,4 @@
-"""The page's socket as a slow, a hostile and a second client meet it, and a device that is lost meanwhile."""
+"""The socket of the page with a slow, a hostile and a second client, and with a lost device."""
 
 from __future__ import annotations
 

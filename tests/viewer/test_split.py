@@ -1,4 +1,4 @@
-"""Before and after: a frozen state left of a divider that is dragged."""
+"""The before/after comparison: a frozen state left of a divider that can be dragged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ROWS = slice(40, 230)  # neither labels, nor the divider's handle, nor text
 
 
 def sides(image: NDArray[np.uint8], edge: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """What is left and right of the divider, without its line."""
+    """Return the pictures left and right of the divider, without its line."""
     return image[ROWS, LEFT : edge - 2], image[ROWS, edge + 2 : RIGHT]
 
 
@@ -24,7 +24,7 @@ def assert_halves(
 
 
 def frozen(driver: InputDriver) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """The pictures of two states, of which the first is frozen and the second is live."""
+    """Return the pictures of two states, the first frozen and the second live."""
     before = driver.settled()
     driver.press("Before and after")
     driver.press("freeze")

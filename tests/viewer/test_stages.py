@@ -1,4 +1,4 @@
-"""What each kind of change has the device do, counted in stages; whatever it does not touch stays."""
+"""Stages that the device runs for each kind of change; unaffected results are reused."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ WEIGHED = {"pairs"}
 
 @pytest.fixture(scope="module")
 def view_renderer() -> ViewRenderer:
-    """Whose pictures in motion are alike on quick and on busy machines."""
+    """Return a renderer without adaptive quality, so that pictures in motion are equal on all machines."""
     view_renderer = ViewRenderer(ADAPTER)
     view_renderer.quality_controller.record_frame_time = lambda _: None  # type: ignore[method-assign]
     return view_renderer
 
 
 def stages(view_renderer: ViewRenderer, state: ViewerState, moving: bool = False) -> set[str]:
-    """What ran to show a state."""
+    """Return the stages that ran to show a state."""
     view_renderer.render_image(state, state.scene.camera, SIZE, moving)
     assert view_renderer.rendered is not None and view_renderer.rendered.gpu_ms is not None
     return set(view_renderer.rendered.gpu_ms) - {"total"}
@@ -123,7 +123,7 @@ def test_the_atlas_view_follows_the_pose(view_renderer: ViewRenderer, rigged: Vi
 def test_light_all_around_is_told_the_profile_and_lights_anew(
     view_renderer: ViewRenderer, state: ViewerState
 ) -> None:
-    """Skin around a place throws light back, the more the paler its profile."""
+    """Surrounding skin reflects light, and more so with a pale profile."""
     around = state.with_environment(Environment(name="uniform"))
     stages(view_renderer, around)
     assert "irradiance" in stages(view_renderer, around.with_skin(profile="skin1"))
@@ -132,7 +132,7 @@ def test_light_all_around_is_told_the_profile_and_lights_anew(
 
 @pytest.fixture
 def made(view_renderer: ViewRenderer, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """Textures and buffers that are made on the device, and what is written into them."""
+    """Yield a log of textures and buffers created on the device, and of the data written to them."""
     handle, log = view_renderer.renderer.device.handle, list[str]()
     for owner, name in (
         (handle, "create_texture"),
@@ -177,7 +177,7 @@ def test_pigments_load_no_texture(view_renderer: ViewRenderer, state: ViewerStat
 def both(
     view_renderer: ViewRenderer, state: ViewerState, before: ViewerState, moving: bool = True
 ) -> list[set[str]]:
-    """What ran for the frozen state and for the live one."""
+    """Return the stages that ran for the frozen state and for the live one."""
     ran: list[set[str]] = []
     draw = view_renderer.renderer.draw
 
@@ -199,7 +199,7 @@ def both(
 def test_a_camera_lights_neither_side_of_the_divider(
     name: str, view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Seen from the same place the second side needs no visibility either."""
+    """With the same camera the second side needs no visibility either."""
     recorded: list[int] = []
     begin = Recording.__init__
 
@@ -218,7 +218,7 @@ def test_a_camera_lights_neither_side_of_the_divider(
 def test_shadows_of_another_size_have_light_of_their_own(
     view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where frames in motion differ from still ones in nothing else."""
+    """Frames in motion differ from still ones only in this size."""
     coarse = replace(QUALITY_LEVELS[2], shadow_size=64)
     monkeypatch.setattr(
         "dermis.apps.viewer.view_renderer.QUALITY_LEVELS", (QUALITY_LEVELS[0], coarse, coarse, coarse)
@@ -266,7 +266,7 @@ def test_states_in_motion_and_still_are_recorded_once(
 def test_views_of_levels_show_the_live_state_s_light(
     view: str, view_renderer: ViewRenderer, state: ViewerState
 ) -> None:
-    """Also after another state's light has been spread in between, and after its profile came back."""
+    """Also after the light of another state was blurred in between, and after its profile is restored."""
     plain = view_renderer.read(
         view_renderer.render_image(state.with_view(view), state.scene.camera, SIZE, False)
     ).astype(int)

@@ -1,4 +1,4 @@
-"""States: changes, files, and steps back and forth."""
+"""Viewer states: changes, files, undo and redo."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dermis.scene.skin import Pigments
 
 
 def full_state(state: ViewerState) -> ViewerState:
-    """One that differs from the defaults in every part."""
+    """Return a state that differs from the defaults in every part."""
     state = state.with_skin(profile="light", roughness=0.21, specular="two-lobe").with_pigments(melanin=0.031)
     state = state.with_lights(preset_lights("rembrandt")).with_environment(Environment(name="uniform"))
     state = state.with_settings(tone="filmic", size=(64, 48), seam_colour=(0.25, 0.5, 1e-7))

@@ -1,4 +1,4 @@
-"""What a page may send: heads and scenes, from the page that has control, of bounded size."""
+"""Uploads of a page: heads and scenes from the page that has control, of limited size."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Server:
         then: Any = None,
         **headers: str,
     ) -> tuple[int, str]:
-        """Status and text of the answer."""
+        """Return status and text of the answer."""
         count = len(pieces)
         coming: list[Any] = [
             {"type": "http.request", "body": piece, "more_body": k + 1 < count or not whole}

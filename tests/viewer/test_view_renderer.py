@@ -1,4 +1,4 @@
-"""States to images: nothing is computed twice, and what is kept gives the picture of a new renderer."""
+"""Rendering of states: nothing is computed twice, and cached results equal those of a new renderer."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LIT = {"irradiance", "diffuse", "combine"}
 
 @pytest.fixture(scope="module")
 def view_renderer() -> ViewRenderer:
-    """Whose pictures in motion are alike on quick and on busy machines."""
+    """Return a renderer without adaptive quality, so that pictures in motion are equal on all machines."""
     view_renderer = ViewRenderer(ADAPTER)
     view_renderer.quality_controller.record_frame_time = lambda _: None  # type: ignore[method-assign]
     return view_renderer
@@ -33,7 +33,7 @@ def view_renderer() -> ViewRenderer:
 
 @pytest.fixture(scope="module")
 def fresh() -> Renderer:
-    """Draws everything anew each time."""
+    """Return a renderer that computes everything for each image."""
     return Renderer(ADAPTER)
 
 
@@ -129,7 +129,7 @@ def prepared(view_renderer: ViewRenderer, state: ViewerState) -> Any:
 
 
 def assert_same_textures(a: Any, b: Any) -> None:
-    """The maps, the mesh and the atlas are the same objects on the device."""
+    """Assert that maps, mesh and atlas are the same objects on the device."""
     for name in ("colour_map", "slope_map", "relief_map", "vertex_table", "albedo_table"):
         assert a.bindings[name] is b.bindings[name], name
     for name in ("atlas", "stretch_map", "reach_map"):
@@ -179,7 +179,7 @@ def test_each_view_shows_the_head_and_another_picture(
 
 
 def test_a_level_of_light_is_what_the_atlas_holds(view_renderer: ViewRenderer, state: ViewerState) -> None:
-    """With no blur to tell them apart, a wider blur is a smoother picture."""
+    """A wider blur gives a smoother picture."""
     rough = [
         np.abs(np.diff(image(view_renderer, state.with_view(f"blur {k}")), axis=1)).sum() for k in (1, 5)
     ]

@@ -1,4 +1,4 @@
-"""The viewer on an offscreen canvas, moved by the events of a pointer and of keys."""
+"""The viewer on an offscreen canvas with events of pointer and keys."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ ON_HEAD, TO_THE_LEFT = (300.0, 240.0), (230.0, 240.0)
 
 
 def difference(a: NDArray[np.uint8], b: NDArray[np.uint8], rows: int = 440) -> float:
-    """Mean over the part that neither the panel nor the text at the lower edge covers."""
+    """Return the mean difference over the part that neither the panel nor the text covers."""
     return float(np.abs(a[:rows, 205:].astype(int) - b[:rows, 205:].astype(int)).mean())
 
 
 def middle(image: NDArray[np.uint8]) -> float:
-    """Column in the middle of what is not black, in the rows that no text covers."""
+    """Return the middle column of the pixels that are not black, in the rows without text."""
     columns = np.flatnonzero(image[60:400].max(axis=(0, 2)) > 20)
     return 0.5 * float(columns[0] + columns[-1])
 
@@ -124,7 +124,7 @@ def test_a_drag_that_begins_on_the_panel_stays_there(driver: InputDriver) -> Non
 
 
 def test_a_touch_on_the_head_right_after_one_on_the_panel_turns_it(driver: InputDriver) -> None:
-    """No frame is drawn between the two in which the panel could notice that the pointer went away."""
+    """No frame is drawn in between in which the panel could notice that the pointer left."""
     camera = driver.viewer.session.state.scene.camera
     driver.click((150.0, 243.0))  # a label
     driver.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
@@ -190,7 +190,7 @@ def test_a_lost_device_is_opened_again(make_driver: Callable[[], InputDriver]) -
 
 
 def test_changes_leave_no_memory_behind(driver: InputDriver) -> None:
-    """Of the process, where what each frame left behind would add up."""
+    """Memory of the process, in which leaks of every frame would add up."""
     session = driver.viewer.session
     start = session.state
     for k in range(30):

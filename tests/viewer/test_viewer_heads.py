@@ -1,4 +1,4 @@
-"""Other heads: chosen, drawn by a number or opened from a file while the picture goes on."""
+"""Other heads: built-in, random or opened from a file while the picture stays interactive."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ from dermis.mesh.head import Head
 
 @pytest.fixture
 def gate(head: Head, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """Heads are opened when it is set: the small one in the place of each; `gate.asked` has their names."""
+    """Return an event that lets heads be opened, each replaced by the small one.
+
+    The attribute `asked` has their names.
+    """
     one: Any = threading.Event()
     one.asked = []
 

@@ -1,4 +1,4 @@
-"""Regions of the face as a choice."""
+"""Choice of a table of face regions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dermis.scene.skin import Skin
 
 @pytest.fixture
 def table(tmp_path: Path) -> str:
-    """A table of regions with a picture of labels: the lower half is another region."""
+    """Return the path of a table of regions with a label picture whose lower half is another region."""
     labels = np.zeros((16, 16), np.uint8)
     labels[8:] = 3
     Image.fromarray(labels).save(tmp_path / "labels.png")

@@ -1,4 +1,4 @@
-"""The desktop window: it shows the head, turns it, and follows its size."""
+"""The desktop window: it shows the head, rotates it, and follows the size of the window."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(bool(_NEEDED), reason=f"there is no {' and no '.
 
 @pytest.fixture(scope="module")
 def display() -> Iterator[str]:
-    """A screen in memory."""
+    """Yield a virtual screen in memory."""
     read, write = os.pipe()
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
     server = child_process.start(command, pass_fds=(write,), stderr=subprocess.DEVNULL)
@@ -63,7 +63,7 @@ def screen(display: str) -> NDArray[np.int64]:
 
 
 def still(display: str, judge: Callable[[NDArray[np.int64]], bool]) -> NDArray[np.int64]:
-    """The first picture that satisfies `judge` and does not change any more."""
+    """Return the first picture that satisfies `judge` and does not change any more."""
     last, end = screen(display), time.monotonic() + _PATIENCE_S
     while time.monotonic() < end:
         time.sleep(0.4)

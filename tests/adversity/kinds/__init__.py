@@ -44,7 +44,7 @@ _WARMED = 24  # sound inputs of each kind: all that it can begin with
 
 
 def prepare(kinds: dict[str, Kind] = KINDS) -> None:
-    """Take sound inputs here: what they import and build once is there for the processes that follow."""
+    """Process valid inputs here, so that forked processes share what they import and build."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for kind in (one for one in kinds.values() if not one.opens_device):

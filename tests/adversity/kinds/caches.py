@@ -1,4 +1,4 @@
-"""What is kept on disk, damaged there: it is made again, to the bit."""
+"""Damaged cache files: they are rebuilt bit for bit."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _made() -> dict[str, Any]:
 
 
 def _fill() -> None:
-    """All caches, as they are filled on a first run."""
+    """Fill all caches, as a first run does."""
     from dermis.base.disk import cached_arrays
     from dermis.scene.heads import load_head
 
@@ -37,7 +37,7 @@ def _fill() -> None:
 
 @cache
 def _stored() -> dict[str, bytes]:
-    """What lies in the caches then, and the head."""
+    """Return the files of the filled caches, and the head."""
     with TemporaryDirectory() as folder, caches(Path(folder) / _FOLDER), chdir(folder):
         _fill()
         found = [one for one in Path(folder).rglob("*") if one.is_file()]
@@ -60,7 +60,7 @@ def _sound(rng: Random) -> Input:
 
 
 def _take(plan: Plan) -> None:
-    """Everything as it was, whatever lies there, twice: what was made again is stored again."""
+    """Check twice that results are unchanged with a damaged cache, and that it is repaired."""
     with caches(Path.cwd() / _FOLDER):
         for _ in range(2):
             _check_arrays()

@@ -1,4 +1,4 @@
-"""What moves a head: captures, clips of glTF files, sequences of meshes."""
+"""Motions: captures, clips of glTF files, sequences of meshes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _mediapipe() -> bytes:
 
 @cache
 def files_of_motions() -> dict[str, dict[str, bytes]]:
-    """Files by the name of the motion; those of a sequence lie in a folder."""
+    """Return files by the name of the motion; those of a sequence are in a folder."""
     angles = "\n".join(
         line + rest
         for line, rest in zip(
@@ -58,7 +58,7 @@ def _clip(rng: Random) -> Input:
 
 @cache
 def _head(name: str) -> Any:
-    """The head that moves, which is never damaged."""
+    """Return the moving head, which is never damaged."""
     from pathlib import Path
 
     from dermis.scene.heads import load_head

@@ -1,4 +1,4 @@
-"""Whole commands: options of all of them, and damaged files drawn."""
+"""Complete commands: options of all of them, and rendering of damaged files."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _LONG_WORK = (
     *(
         "dermis.apps.viewer.windows.serve",
         "dermis.apps.viewer.windows.show_window",
-        "dermis.apps.validation.benchmarks.run.run",
+        "dermis.apps.validation.benchmarks.run.run_benchmark",
     ),
     *("dermis.apps.gallery.script.draw_pictures", "dermis.apps.validation.comparisons.compare.compare"),
 )
@@ -52,7 +52,7 @@ _WANTED = 2  # the exit status of a refusal
 
 
 class _BegunError(BaseException):
-    """A command has begun what takes long."""
+    """Exception raised when a command starts its long work."""
 
 
 def _sound_options(rng: Random) -> Input:
@@ -63,7 +63,7 @@ def _sound_options(rng: Random) -> Input:
 
 
 def _with_options(sound: Input, rng: Random) -> Input:
-    """One to four options more, or in place of those that are there."""
+    """Return the arguments with one to four options added or replaced."""
     command, *words = sound.plan["command"]
     for _ in range(rng.choice((1, 1, 2, 3, 4))):
         option = rng.choice(options_of_commands()[command])
@@ -78,7 +78,7 @@ def _with_options(sound: Input, rng: Random) -> Input:
 
 
 def _sound_drawn(rng: Random) -> Input:
-    """A head whose file, or one that comes with it, will be damaged."""
+    """Return a head of which one file will be damaged."""
     kinds = [one for part in (meshes, pictures, scenes, clips) for one in part.KINDS]
     found = rng.choice(kinds).sound(rng)
     while "words" not in found.plan or found.plan["file"] == "person.json":  # a human takes longer
@@ -91,7 +91,7 @@ def _sound_drawn(rng: Random) -> Input:
 
 
 def _take(plan: Plan) -> None:
-    """Run a command up to where its long work begins; its pictures are sound."""
+    """Run a command up to its long work, and check its pictures."""
     from dermis.cli import main
 
     with contextlib.ExitStack() as stack:
@@ -111,7 +111,7 @@ def _begin(*_: Any, **__: Any) -> NoReturn:
 
 
 def _judge(code: Any) -> None:
-    """By the exit status, what was printed and written."""
+    """Check exit status, output and written files."""
     sys.stderr.flush()
     printed = Path(".printed").read_text("utf-8", "replace")
     if code == _WANTED and "dermis: " in printed:  # doctor tells of a machine that cannot draw in its report

@@ -1,4 +1,4 @@
-"""Shards of data sets, as tar files and as folders, and shards that a run would leave as they are."""
+"""Shards of data sets, as tar files and as folders, and shards that a run would reuse."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SHARD = "shard-00000"
 
 @cache
 def _shard(form: str, encoding: str) -> Mapping[str, bytes]:
-    """Files of a data set of two images."""
+    """Return the files of a data set of two images."""
     with TemporaryDirectory() as folder:
         write_all(Path(folder), small_spec(count=2, format=form, encoding=encoding))
         files = (path for path in sorted(Path(folder).rglob("*")) if path.is_file())
@@ -39,7 +39,7 @@ def _sound_folder(rng: Random) -> Input:
 
 
 def _damaged_inside(sound: Input, rng: Random) -> Input:
-    """A tar file with one of its files damaged, sound around it; now and then its own bytes."""
+    """Return a valid tar file with one damaged member, or sometimes with damaged bytes."""
     if rng.random() < 0.2:
         return damaged(sound, rng)
     ((name, data),) = sound.files.items()
@@ -55,7 +55,7 @@ def _damaged_inside(sound: Input, rng: Random) -> Input:
 
 
 def _take(plan: Plan) -> None:
-    """Read all of it."""
+    """Read the whole data set."""
     import dermis
 
     for found in dermis.read_dataset(plan["file"]):
@@ -67,11 +67,11 @@ def _take(plan: Plan) -> None:
 
 
 def _take_whole(plan: Plan) -> None:
-    """Go on where it was: a shard that counts as whole is as it was written."""
-    from dermis.apps.batch.shards import is_whole, shards_of
+    """Resume a run: a shard that counts as complete is unchanged."""
+    from dermis.apps.batch.shards import is_intact, list_shards
 
     spec = small_spec(count=2, format=plan["form"], encoding="png")
-    if is_whole(Path(), shards_of(spec)[0], spec):
+    if is_intact(Path(), list_shards(spec)[0], spec):
         for name, data in _shard(plan["form"], "png").items():
             if Path(name).read_bytes() != data:
                 raise FoundError(WRONG, f"{name} counts as whole and is not")

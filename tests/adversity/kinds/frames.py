@@ -1,4 +1,4 @@
-"""Numbered pictures that an interrupted command left, and the record of what they are made of."""
+"""Numbered pictures left by an interrupted command, and the record of their digest."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _sound(rng: Random) -> Input:
 
 
 def _take(plan: Plan) -> None:
-    """Go on where it was: what is kept is whole, and the record is as it must be."""
+    """Resume a run: reused pictures are complete, and the record is correct."""
     from dermis.base.errors import DermisError
     from dermis.images.io import read_image
     from dermis.images.writer import FrameFiles

@@ -1,4 +1,4 @@
-"""Sound files of the largest sizes: read, or refused, within the same time and memory as small ones."""
+"""Valid files of the largest sizes: read or refused within the time and memory of small ones."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _ROWS = 1_000_000
 
 
 def _png(channels: int) -> bytes:
-    """Black, a thousandth of its size when compressed."""
+    """Return a black PNG, compressed to a thousandth of its size."""
     packer, row = zlib.compressobj(1), bytes(1 + _SIDE * channels)
     packed = b"".join([*(packer.compress(row) for _ in range(_SIDE)), packer.flush()])
     head = struct.pack(">IIBBBBB", _SIDE, _SIDE, 8, {1: 0, 3: 2}[channels], 0, 0, 0)
@@ -34,7 +34,7 @@ def _png(channels: int) -> bytes:
 
 
 def _exr() -> bytes:
-    """Grey of halves in runs."""
+    """Return a grey EXR of halves with run-length coding."""
     import OpenEXR
 
     side = _SIDE // 2
@@ -68,7 +68,7 @@ def _instances() -> bytes:
 
 
 def _chain() -> bytes:
-    """Nodes each below the one before."""
+    """Return a glTF file with a chain of nodes."""
     tree, binary = split_glb(meshes.moving_files()[0])
     first = len(tree["nodes"])
     tree["nodes"] += [{"children": [first + k + 1]} for k in range(_MANY)] + [{}]
@@ -77,7 +77,7 @@ def _chain() -> bytes:
 
 
 def _zeros() -> bytes:
-    """Targets that the file counts and does not hold."""
+    """Return a glTF file that declares targets without data."""
     tree, binary = split_glb(meshes.moving_files()[0])
     count = tree["accessors"][0]["count"]
     primitive = next(mesh for mesh in tree["meshes"])["primitives"][0]
@@ -91,7 +91,7 @@ def _dotted() -> bytes:
 
 
 def _lines(name: str) -> bytes:
-    """A capture whose last line comes again and again."""
+    """Return a capture whose last line is repeated."""
     rows = clips.files_of_motions()[name][name].strip().split(b"\n")
     return b"\n".join(rows + rows[-1:] * (60_000_000 // len(rows[-1])))
 
@@ -137,7 +137,7 @@ def _made(which: str) -> bytes:
 
 
 def _sound(rng: Random) -> Input:
-    """A small one of that kind, to be replaced."""
+    """Return a small file of the kind, to be replaced."""
     which = rng.choice(tuple(_LARGE))
     name = _LARGE[which][0]
     kind, more = _TAKEN_AS[name]

@@ -1,4 +1,4 @@
-"""Machine code that is kept on disk, damaged there: it is not run, and made again."""
+"""Damaged cached machine code: it is not run, and compiled again."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _harmonic(count: int) -> float:
 
 
 def _computed() -> float:
-    """What its machine code gives, found on disk or made, as in a new process."""
+    """Return the result of cached or compiled machine code, as in a new process."""
     from dermis.base.compiled import compiled
 
     return float(compiled(FunctionType(_harmonic.__code__, globals()))(_COUNT))

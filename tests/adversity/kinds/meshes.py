@@ -45,7 +45,7 @@ _INSTANCES, _APART_M = 30, 0.2
 
 @cache
 def head_files() -> Mapping[str, bytes]:
-    """An OBJ head with its materials and maps, by name."""
+    """Return an OBJ head with its materials and maps, by name."""
     before, sign, faces = obj_text().partition("usemtl skin\n")
     lines = faces.splitlines()
     parts = [
@@ -92,7 +92,7 @@ def _ply(rng: Random) -> Input:
 
 @cache
 def moving_files() -> tuple[bytes, bytes]:
-    """Two .glb heads: with clips, targets and a bone; with sparse targets and two bones."""
+    """Return two .glb heads: with clips, targets and a bone; with sparse targets and two bones."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "head.glb"
         return write_moving_head(path, clips=2).read_bytes(), write_rigged_head(path).read_bytes()
@@ -100,7 +100,7 @@ def moving_files() -> tuple[bytes, bytes]:
 
 @cache
 def _gltf_heads() -> tuple[bytes, ...]:
-    """.glb files: those that move, one with pictures, and one whose mesh is shown many times."""
+    """Return .glb files: moving ones, one with pictures, and one with many instances of its mesh."""
     with TemporaryDirectory() as folder:
         Input(head_files(), {}).write(Path(folder))
         pictured = _with_pictures(Path(folder) / "head.obj")
@@ -113,7 +113,7 @@ def _gltf_heads() -> tuple[bytes, ...]:
 
 
 def _with_pictures(path: Path) -> bytes:
-    from dermis.formats.load import load_mesh
+    from loaded_mesh import load_mesh
 
     pictures = {name: picture_bytes(kind) for name, kind in _MAPS.items()}
     surface = {"baseColorTexture": {"index": "skin.png"}, "baseColorFactor": [1, 1, 1, 1]}
@@ -140,7 +140,7 @@ def _plan(name: str) -> Plan:
 
 
 def take_head(plan: Plan) -> Any:
-    """The head of a file, with its maps and what moves it."""
+    """Load the head of a file with its maps and motions."""
     from dermis.mesh.pose import Pose
     from dermis.scene.heads import load_head
 

@@ -1,4 +1,4 @@
-"""What pages send to the viewer's server: requests, events and files."""
+"""Messages of pages to the viewer's server: requests, events and files."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _message(rng: Random) -> Input:
 
 
 def _take_message(plan: Plan) -> None:
-    """A damaged message does not keep the guard from letting the next sound one through."""
+    """Check that the request filter accepts a valid message after a damaged one."""
     sound = {"timestamp": 1.0, **_EVENTS[1], "x": 321.0}
     passed = _passed([*_damaged(), json.dumps(sound)])
     if not passed or passed[-1].get("x") != sound["x"]:
@@ -60,8 +60,8 @@ def _damaged() -> list[str]:
 
 
 def _passed(texts: list[str]) -> list[dict[str, Any]]:
-    """The events that a server's guard lets through of what a page sends."""
-    from dermis.apps.viewer.browser.guard import Guard
+    """Return the events that the request filter accepts."""
+    from dermis.apps.viewer.browser.request_filter import RequestFilter
 
     got = list[dict[str, Any]]()
     coming = [{"type": "websocket.receive", "text": text} for text in texts]
@@ -73,7 +73,7 @@ def _passed(texts: list[str]) -> list[dict[str, Any]]:
 
     headers = [(b"host", b"127.0.0.1:8765")]
     scope = {"type": "websocket", "scheme": "ws", "path": "/", "headers": headers}
-    asyncio.run(Guard(app, "")(scope, _receiver(coming), _ignore))
+    asyncio.run(RequestFilter(app, "")(scope, _receiver(coming), _ignore))
     return got
 
 
@@ -82,7 +82,7 @@ def _events(rng: Random) -> Input:
 
 
 def _take_events(plan: Plan) -> None:
-    """A viewer that gets such events tells of no error, and shows the same as before when they are over."""
+    """Check that a viewer reports no error for the events and shows the same picture afterwards."""
     from rendercanvas.http import HttpRenderCanvas
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
@@ -110,14 +110,14 @@ def _take_events(plan: Plan) -> None:
 
 
 class _Errors(logging.Handler):
-    """What is logged as an error."""
+    """Log handler that collects errors."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
         self.told: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep it."""
+        """Store an error."""
         self.told.append(record.getMessage())
 
 
@@ -132,8 +132,8 @@ def _upload(rng: Random) -> Input:
 
 
 def _take_upload(plan: Plan) -> None:
-    """A file that is taken lies in the server's folder and nowhere else."""
-    from dermis.apps.viewer.browser.guard import Guard
+    """Check that an accepted file is stored in the server's folder only."""
+    from dermis.apps.viewer.browser.request_filter import RequestFilter
     from dermis.apps.viewer.browser.uploads import Uploads
 
     folder, got, answers = Path("files"), list[Path](), list[Any]()
@@ -151,14 +151,14 @@ def _take_upload(plan: Plan) -> None:
 
     canvas = SimpleNamespace(ticket=_TICKET, on_file=lambda path, *_: got.append(path))
     coming = [{"type": "http.request", "body": Path("head.obj").read_bytes()}]
-    asyncio.run(Guard(Uploads(app, canvas, folder), "")(scope, _receiver(coming), send))
+    asyncio.run(RequestFilter(Uploads(app, canvas, folder), "")(scope, _receiver(coming), send))
     outside = [path for path in got if not path.resolve().is_relative_to(folder.resolve())]
     if outside or not answers:
         raise FoundError(WRONG, f"files outside: {outside}" if outside else "no answer")
 
 
 def _scope(request: Any) -> dict[str, Any]:
-    """A request as a server tells it: bytes for headers, text for the rest."""
+    """Return a request as ASGI scope: bytes for headers, text for the rest."""
     headers = [(str(key).encode(), str(value).encode()) for key, value in request["headers"].items()]
     return {
         "type": "http",
@@ -177,7 +177,7 @@ def _receiver(coming: list[Any]) -> Any:
 
 
 async def _ignore(message: Any) -> None:
-    """What a page would be sent."""
+    """Ignore messages to the page."""
 
 
 KINDS = (

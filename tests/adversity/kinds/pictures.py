@@ -36,7 +36,7 @@ def _with_pillow(pixels: Any, form: str, mode: str | None = None, **how: Any) ->
 
 
 def exr_bytes(channels: int, rows: int = _SIDE, columns: int = _SIDE) -> bytes:
-    """A picture of one grey."""
+    """Return an EXR picture of constant grey."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "picture.exr"
         write_exr(path, np.full((rows, columns, channels), 0.5, np.float32))
@@ -44,7 +44,7 @@ def exr_bytes(channels: int, rows: int = _SIDE, columns: int = _SIDE) -> bytes:
 
 
 def hdr_bytes(rows: int, columns: int, *, coded: bool) -> bytes:
-    """A Radiance picture, in run-length code where its rows are long enough."""
+    """Return a Radiance picture, with run-length coding if its rows are long enough."""
     head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=1.0\n\n-Y {rows} +X {columns}\n".encode()
     if not coded:
         return head + bytes((90, 80, 70, 128)) * rows * columns
@@ -89,7 +89,7 @@ _SKIES: Mapping[str, Callable[[], bytes]] = {
 
 @cache
 def picture_bytes(name: str) -> bytes:
-    """A sound picture file of one of the kinds."""
+    """Return a valid picture file of one of the formats."""
     return (_MADE | _SKIES)[name]()
 
 
@@ -102,7 +102,7 @@ def _map(rng: Random) -> Input:
 
 
 def _roles(name: str) -> tuple[str, ...]:
-    """What a picture can be a map of."""
+    """Return the maps that a picture can be used for."""
     if name == "normal.png":
         return "colour", "normal"
     grey = name.startswith(("grey", "float", "la", "bits"))

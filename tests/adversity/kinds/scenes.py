@@ -36,7 +36,7 @@ def _toml(tree: Mapping[str, Any]) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """The tree without what TOML does not have."""
+    """Return the tree without values that TOML does not support."""
     if isinstance(value, dict):
         return {key: _plain(one) for key, one in value.items() if one is not None}
     return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
@@ -50,7 +50,7 @@ def _lights_tree() -> list[dict[str, Any]]:
 
 
 def _dump(model: Any) -> dict[str, Any]:
-    """A model's defaults, and numbers where it has none."""
+    """Return the defaults of a model, with numbers for fields without default."""
     needed = {
         "irradiance": (1.0, 1.0, 1.0),
         "position": (100.0, 200.0, 900.0),
@@ -62,7 +62,7 @@ def _dump(model: Any) -> dict[str, Any]:
 
 @cache
 def _scene_trees() -> tuple[dict[str, Any], ...]:
-    """One with all parts and files, one with what moves, one with the package's own human."""
+    """Return a scene with all parts and files, one with motion, and one with the human."""
     from dermis.scene.camera import Camera
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
@@ -100,7 +100,7 @@ def _scene_trees() -> tuple[dict[str, Any], ...]:
 
 @cache
 def files_of_scenes() -> Mapping[str, bytes]:
-    """Files that the scenes name."""
+    """Return the files that the scenes refer to."""
     own = {
         "sky.hdr": picture_bytes("sky.hdr"),
         "profile.csv": _PROFILE.encode(),
@@ -112,7 +112,7 @@ def files_of_scenes() -> Mapping[str, bytes]:
 
 @cache
 def scene_files() -> tuple[bytes, ...]:
-    """Scenes that name them."""
+    """Return the scene files that refer to them."""
     return tuple(map(_toml, _scene_trees()))
 
 
@@ -156,9 +156,9 @@ def _take_camera(plan: Plan) -> None:
 
 def _person(rng: Random) -> Input:
     from dermis.human.person import Human
-    from dermis.human.person_file import numbers_of
+    from dermis.human.person_file import person_numbers
 
-    numbers = json.dumps({"person": numbers_of(Human.drawn(rng.randrange(100)))}, default=float)
+    numbers = json.dumps({"person": person_numbers(Human.drawn(rng.randrange(100)))}, default=float)
     return Input({"person.json": numbers.encode()}, {"file": "person.json", "words": ["person.json"]})
 
 
@@ -185,12 +185,12 @@ def _regions(rng: Random) -> Input:
 
 
 def _take_regions(plan: Plan) -> None:
-    """The table and the files that it names; painting a head by them takes seconds."""
+    """Load the table and its files; painting a head with them would take seconds."""
     from dermis.formats.maps import load_labels
     from dermis.human.regions.labels import load_landmarks
-    from dermis.human.regions.zones import load_table
+    from dermis.human.regions.region_table import load_region_table
 
-    table = load_table(plan["file"])
+    table = load_region_table(plan["file"])
     check_finite(table.values, "regions")
     if table.labels is not None:
         load_labels(table.labels)

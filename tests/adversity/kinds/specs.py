@@ -1,4 +1,4 @@
-"""Specs of data sets, with the files that they name."""
+"""Specs of data sets, with the files that they refer to."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ _IMAGES = 8
 
 @cache
 def _texts() -> tuple[str, ...]:
-    """The package's example, one with what that leaves out, and its whole text."""
-    from dermis.apps.batch.spec import example_text, spec_of
+    """Return the example spec, one with the remaining options, and its complete text."""
+    from dermis.apps.batch.spec import example_toml, parse_spec
 
-    return example_text(), _MORE, spec_of({"seed": 3}).text()
+    return example_toml(), _MORE, parse_spec({"seed": 3}).to_toml()
 
 
 def _spec(rng: Random) -> Input:
@@ -47,16 +47,16 @@ def _spec(rng: Random) -> Input:
 
 
 def _take_spec(plan: Plan) -> None:
-    """Whatever is taken is drawn, and reads as the same from its own text."""
+    """Check that an accepted spec can be rendered and survives a round trip through its text."""
     import tomllib
     from pathlib import Path
 
-    from dermis.apps.batch.spec import load_spec, spec_of
+    from dermis.apps.batch.spec import load_spec, parse_spec
 
     spec = load_spec(plan["file"])
     for k in range(min(spec.count, _IMAGES)):
         check_finite(spec.parameters(k), "parameters")
-    if spec_of(tomllib.loads(spec.text()), Path(plan["file"]).parent) != spec:
+    if parse_spec(tomllib.loads(spec.to_toml()), Path(plan["file"]).parent) != spec:
         raise FoundError(WRONG, "the text of a spec reads as another one")
 
 
