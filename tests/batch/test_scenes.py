@@ -71,7 +71,7 @@ def test_the_whole_face_is_in_the_picture_whatever_is_drawn(wild: Any) -> None:
         rig = scene.head.control
         around = rig.positions_mm - np.array(scene.head.centre_mm)
         face = np.flatnonzero((np.abs(around[:, 0]) < 80) & (abs(around[:, 1]) < 90) & (around[:, 2] > 10))
-        pixels = seen(scene, rig.some_posed(face.astype(np.int32), scene.motion), drawn.size)
+        pixels = seen(scene, rig.pose_points(face.astype(np.int32), scene.motion), drawn.size)
         assert pixels.min() > -0.5 and (pixels < np.array(drawn.size) - 0.5).all()
 
 
@@ -79,7 +79,7 @@ def test_cameras_are_as_drawn_where_the_face_fits() -> None:
     drawn = spec("[camera]\nyaw_deg = 90\npitch_deg = 30\ndistance_mm = 1000\nframe_mm = 500\noffset_x = 0.2")
     scene, settings = SceneBuilder(drawn).build(drawn.parameters(0))
     camera, head = scene.camera, scene.head
-    face = head.control.some_posed(face_points(head), scene.motion) - np.array(head.centre_mm)
+    face = head.control.pose_points(face_points(head), scene.motion) - np.array(head.centre_mm)
     middle = 0.5 * (face.min(axis=0) + face.max(axis=0))
     away = np.array(camera.position) - middle
     assert np.linalg.norm(away) == pytest.approx(1000)

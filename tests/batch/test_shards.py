@@ -217,5 +217,5 @@ def test_files_that_others_remove_meanwhile_are_written_again(tmp_path: Path) ->
 
     atomic_write(tmp_path / "index.parquet", write)
     assert len(tries) == 3 and contents(tmp_path) == {"index.parquet": b"whole"}
-    with pytest.raises(DermisError, match=r"no/README\.md: expected a place"):
+    with pytest.raises(DermisError, match=r"no/README\.md: expected a writable path"):
         atomic_write(tmp_path / "no" / "README.md", lambda path: path.write_bytes(b""))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.subject import Subject, load_subject
 
 
 @pytest.fixture(scope="session")
 def skin1() -> Subject:
-    return subject_of("skin1")
+    return load_subject("skin1")
 
 
 @pytest.fixture(scope="session")
 def dj3() -> Subject:
-    return subject_of("dj3")
+    return load_subject("dj3")

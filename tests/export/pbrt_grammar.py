@@ -60,7 +60,7 @@ def read(text: str) -> list[Directive]:
     found, at, depth = [], 0, 0
     while at < len(tokens):
         word = tokens[at][2]
-        assert word is not None, f"a directive is expected, {tokens[at]} came"
+        assert word is not None, f"expected a directive, but got {tokens[at]}"
         one, at = _directive(word, tokens, at + 1)
         depth += (word == "AttributeBegin") - (word == "AttributeEnd")
         assert depth >= 0

@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from small_head import write_head
 
-from dermis.apps.export.fitting import deviation, fit_d
+from dermis.apps.export.fitting import curve_error, fit_burley_width
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.subject import Subject, subject_of
-from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.blender.files import script_text, surroundings
+from dermis.apps.export.subject import Subject, load_subject
+from dermis.apps.export.target import get_numbers
+from dermis.apps.export.targets.blender.files import describe_scene, script_text
 from dermis.apps.export.targets.blender.target import (
     TARGET,
-    albedo,
-    burley_stretch,
-    burley_within,
+    burley_cdf,
+    burley_shape_factor,
+    hulst_albedo,
     legacy_albedo,
-    skin_stretch,
-    walk_within,
+    skin_path_ratio,
+    walk_cdf,
 )
 from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
 from dermis.base.errors import DermisError
@@ -41,18 +41,18 @@ HOSTILE = "x'; import os; os.system('true') #\n\"\"\"'''"
 
 @pytest.fixture(scope="module")
 def skin1() -> Subject:
-    return subject_of("skin1")
+    return load_subject("skin1")
 
 
 def test_walks_return_what_half_spaces_do() -> None:
     for alpha in (0.2, 0.41, 0.7, 0.9, 0.98):
-        total = float(walk_within(np.array([1e6]), alpha, "straight")[0])
+        total = float(walk_cdf(np.array([1e6]), alpha, "straight")[0])
         assert total == pytest.approx(float(directional_albedo(1.0, alpha)), abs=2e-3)
-    below = float(walk_within(np.array([1e6]), 0.1, "straight")[0])
-    assert below == pytest.approx(0.5 * float(walk_within(np.array([1e6]), 0.2, "straight")[0]))
+    below = float(walk_cdf(np.array([1e6]), 0.1, "straight")[0])
+    assert below == pytest.approx(0.5 * float(walk_cdf(np.array([1e6]), 0.2, "straight")[0]))
 
 
-@pytest.mark.parametrize(("formula", "apart"), [(albedo, 0.003), (legacy_albedo, 0.03)])
+@pytest.mark.parametrize(("formula", "apart"), [(hulst_albedo, 0.003), (legacy_albedo, 0.03)])
 def test_albedos_of_walks_return_the_colour(formula: Any, apart: float) -> None:
     for colour in (0.1, 0.3, 0.5, 0.8):
         assert diffuse_albedo(float(formula(colour))) == pytest.approx(colour, abs=apart)
@@ -61,27 +61,27 @@ def test_albedos_of_walks_return_the_colour(formula: Any, apart: float) -> None:
 def test_published_diffuse_paths_are_the_radius_of_the_skin_walk() -> None:
     """The table of [Jensen2001] gives skin1's total and diffuse path; its coefficients give the mean path."""
     (layer,) = media()["skin1"].layers
-    path = np.array([3.67, 1.37, 0.68]) * skin_stretch(np.array([0.44, 0.22, 0.13]), 1.3)
+    path = np.array([3.67, 1.37, 0.68]) * skin_path_ratio(np.array([0.44, 0.22, 0.13]), 1.3)
     assert path == pytest.approx(layer.mean_free_path_mm, rel=0.06)
 
 
 def test_burley_is_cut_at_16_lengths_and_stretched_in_eevee() -> None:
-    assert burley_within([0.0, 16.0, 40.0]) == pytest.approx([0.0, 1.0, 1.0])
-    assert burley_within([1.0])[0] == pytest.approx(
+    assert burley_cdf([0.0, 16.0, 40.0]) == pytest.approx([0.0, 1.0, 1.0])
+    assert burley_cdf([1.0])[0] == pytest.approx(
         (1 - 0.25 / np.e - 0.75 * np.exp(-1 / 3)) / 0.99638, rel=1e-4
     )
-    assert burley_stretch([0.8, 0.8, 0.24]) == pytest.approx([1.04, 1.04, 2.475])
+    assert burley_shape_factor([0.8, 0.8, 0.24]) == pytest.approx([1.04, 1.04, 2.475])
 
 
 def test_radii_are_those_of_the_method(skin1: Subject) -> None:
-    d = fit_d(skin1.curve)
+    d = fit_burley_width(skin1.curve)
 
     def radius(variant: str, version: str) -> np.ndarray[Any, Any]:
-        return np.array(numbers_of(TARGET.with_variant(variant).parameters(skin1, version), RADIUS))
+        return np.array(get_numbers(TARGET.with_variant(variant).parameters(skin1, version), RADIUS))
 
     assert radius("burley", "5.2") == pytest.approx(4 * np.pi * d, rel=0.03)
     assert radius("eevee", "5.2") / radius("burley", "5.2") == pytest.approx(
-        burley_stretch(skin1.albedo), rel=1e-3
+        burley_shape_factor(skin1.albedo), rel=1e-3
     )
     assert radius("random-walk", "5.1") / radius("random-walk", "5.2") == pytest.approx(4 * np.pi, rel=0.02)
     assert (radius("random-walk", "4.5") == radius("random-walk", "5.1")).all()
@@ -92,8 +92,8 @@ def test_radii_are_those_of_the_method(skin1: Subject) -> None:
 def test_parameters_are_better_than_what_is_typed_in(skin1: Subject, variant: str) -> None:
     target = TARGET.with_variant(variant)
     errors = [
-        deviation(skin1.curve, target.shown(rows(skin1, "5.2"), skin1, "5.2"))
-        for rows in (target.parameters, target.naive)
+        curve_error(skin1.curve, target.predicted_curve(rows(skin1, "5.2"), skin1, "5.2"))
+        for rows in (target.parameters, target.naive_parameters)
     ]
     assert errors[0].edge.max() < 0.016 < errors[1].edge.max()
     assert errors[0].cdf.max() < 0.04 < errors[1].cdf.max()
@@ -121,7 +121,7 @@ def test_ball_is_one_script_without_this_machine(tmp_path: Path) -> None:
     compile(text, "skin.py", "exec")
     assert str(Path.home()) not in text and str(tmp_path) not in text and "import dermis" not in text
     told = described_in(text)
-    assert told["inputs"][RADIUS] == list(numbers_of(report.rows, RADIUS))
+    assert told["inputs"][RADIUS] == list(get_numbers(report.parameters, RADIUS))
     assert (told["method"], told["versions"], told["head"]) == ("RANDOM_WALK", [[5, 2], None], None)
 
 
@@ -166,7 +166,7 @@ def test_scene_stands_upright_in_metres() -> None:
     head = Head("ball", uv_sphere(100.0, 16, 8), Maps())
     lamp = PointLight(position=(0, 300, 400), target=(0, 0, 0), irradiance=(2, 1, 1))
     scene = Scene(head, lights=[lamp], camera=Camera(position=(100, 0, 1000), target=(100, 0, 0)))
-    told, panorama = surroundings(scene, (0.0, 10.0, 0.0))
+    told, panorama = describe_scene(scene, (0.0, 10.0, 0.0))
     light, camera = np.array(told["lights"][0]["to_world"]), np.array(told["camera"]["to_world"])
     assert light[:3, 3] == pytest.approx([0.0, -0.4, 0.31])
     assert camera[:3, 3] == pytest.approx([0.1, -1.0, 0.01])

@@ -13,7 +13,7 @@ import pytest
 from small_head import write_head
 
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.subject import subject_of
+from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import PYTHON_VARIABLE
 from dermis.apps.validation.engines import blender
@@ -73,7 +73,7 @@ def test_head_is_saved_upright_with_its_skin(tmp_path: Path, version: str) -> No
 def test_numbers_of_another_version_are_not_made(tmp_path: Path, version: str) -> None:
     other = "4.5" if version == "5.2" else "5.2"
     with pytest.raises(
-        DermisError, match=r"to make the scene, but it failed \(this file: expected Blender from"
+        DermisError, match=r"to create the scene, but it failed \(this file: expected Blender from"
     ):
         export_skin("skin1", "blender", tmp_path / "a.blend", version=other, variant="random-walk")
     assert not (tmp_path / "a.blend").exists()
@@ -82,7 +82,7 @@ def test_numbers_of_another_version_are_not_made(tmp_path: Path, version: str) -
 @pytest.mark.parametrize("variant", ["random-walk-skin", "random-walk", "burley"])
 def test_cycles_shows_the_edge_that_was_predicted(tmp_path: Path, version: str, variant: str) -> None:
     """Red of a half-lit plane within 4 mm; the benchmark has all colours with less noise."""
-    subject, target = subject_of("skin1"), TARGET.with_variant(variant)
+    subject, target = load_subject("skin1"), TARGET.with_variant(variant)
     rows = target.parameters(subject, version)
     target.write(subject, rows, tmp_path, version)
     one = {"channel": 0, "width_m": 8e-3, "size": [8, 32], "samples": 128, "seed": 1}
@@ -90,7 +90,7 @@ def test_cycles_shows_the_edge_that_was_predicted(tmp_path: Path, version: str, 
     words = [PYTHON, "-I", str(MEASURING), str(tmp_path)]
     subprocess.run(words, check=True, capture_output=True, timeout=300)
     (columns,) = json.loads((tmp_path / "done.json").read_text())["columns"]
-    shown = target.shown(rows, subject, version)
-    fine = shown.edge(np.linspace(-4.0, 4.0, 8 * 32, endpoint=False) + 1 / 64)[:, 0]
+    shown = target.predicted_curve(rows, subject, version)
+    fine = shown.edge_response(np.linspace(-4.0, 4.0, 8 * 32, endpoint=False) + 1 / 64)[:, 0]
     expected = fine.reshape(8, 32).mean(axis=1)
     assert np.pi * np.array(columns)[:, 0] == pytest.approx(expected * shown.energy[0], abs=0.025)

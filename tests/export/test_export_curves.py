@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.export.fitting import deviation, fit_d, homogeneous, lobe
-from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.fitting import burley_curve, curve_error, fit_burley_width, fit_homogeneous_medium
+from dermis.apps.export.subject import Subject, load_subject
 from dermis.base.errors import DermisError
-from dermis.optics.curve import Curve
-from dermis.optics.half_space import albedo_of, half_space
+from dermis.optics.cumulative_profile import CumulativeProfile
+from dermis.optics.half_space import half_space, tabulated_albedo
 
 WHITE = np.ones(3)
 
@@ -18,30 +18,30 @@ def test_edge_of_a_gaussian_is_its_error_function() -> None:
     from scipy.special import erf
 
     sigma = np.array([0.2, 0.5, 1.3])
-    curve = Curve.of(lambda r: -np.expm1(-(r[:, None] ** 2) / (2.0 * sigma**2)), WHITE)
+    curve = CumulativeProfile.from_function(lambda r: -np.expm1(-(r[:, None] ** 2) / (2.0 * sigma**2)), WHITE)
     x = np.linspace(-3.0, 3.0, 61)
     expected = 0.5 + 0.5 * erf(x[:, None] / (sigma * np.sqrt(2.0)))
-    np.testing.assert_allclose(curve.edge(x), expected, atol=2e-4)
+    np.testing.assert_allclose(curve.edge_response(x), expected, atol=2e-4)
 
 
 def test_fit_of_a_lobe_finds_its_width() -> None:
     d = np.array([1.173, 0.461, 0.05])
-    np.testing.assert_allclose(fit_d(lobe(d, WHITE)), d, rtol=1e-5)
+    np.testing.assert_allclose(fit_burley_width(burley_curve(d, WHITE)), d, rtol=1e-5)
 
 
 def test_a_fit_is_the_best_there_is(dj3: Subject) -> None:
-    d = fit_d(dj3.curve)
-    best = deviation(dj3.curve, lobe(d, WHITE)).cdf
+    d = fit_burley_width(dj3.curve)
+    best = curve_error(dj3.curve, burley_curve(d, WHITE)).cdf
     for factor in (0.97, 1.03):
-        assert (deviation(dj3.curve, lobe(factor * d, WHITE)).cdf > best).all()
+        assert (curve_error(dj3.curve, burley_curve(factor * d, WHITE)).cdf > best).all()
 
 
 def test_deviation_from_itself_is_none_and_grows_with_the_width() -> None:
-    one = lobe([1.0, 0.5, 0.2], [0.5, 0.4, 0.3])
-    none = deviation(one, one)
+    one = burley_curve([1.0, 0.5, 0.2], [0.5, 0.4, 0.3])
+    none = curve_error(one, one)
     assert not none.cdf.any() and not none.edge.any() and not none.energy.any()
-    wider = deviation(one, lobe([1.2, 0.6, 0.24], [0.55, 0.4, 0.3]))
-    much = deviation(one, lobe([2.0, 1.0, 0.4], [0.5, 0.4, 0.3]))
+    wider = curve_error(one, burley_curve([1.2, 0.6, 0.24], [0.55, 0.4, 0.3]))
+    much = curve_error(one, burley_curve([2.0, 1.0, 0.4], [0.5, 0.4, 0.3]))
     assert (wider.cdf > 0.03).all() and (much.cdf > wider.cdf).all() and (much.edge > wider.edge).all()
     np.testing.assert_allclose(wider.energy, [0.1, 0.0, 0.0], atol=1e-12)
 
@@ -53,7 +53,7 @@ def test_deviation_from_itself_is_none_and_grows_with_the_width() -> None:
 def test_half_spaces_have_the_totals_of_independent_monte_carlo(albedo: float, total: float) -> None:
     curve = half_space("skin", np.full(3, albedo), WHITE)
     np.testing.assert_allclose(curve.energy, total, rtol=0.006)
-    np.testing.assert_allclose(albedo_of("skin", curve.energy), albedo, atol=1e-3)
+    np.testing.assert_allclose(tabulated_albedo("skin", curve.energy), albedo, atol=1e-3)
 
 
 def test_matched_half_space_has_the_total_of_chandrasekhar() -> None:
@@ -65,15 +65,15 @@ def test_matched_half_space_has_the_total_of_chandrasekhar() -> None:
 def test_tissue_of_one_layer_is_by_monte_carlo_and_of_several_by_its_model(
     skin1: Subject, dj3: Subject
 ) -> None:
-    assert (skin1.model, dj3.model, subject_of("gpu-gems-3").model) == ("montecarlo", "layered", "table")
-    layered = subject_of("skin1", model="layered")
+    assert (skin1.model, dj3.model, load_subject("gpu-gems-3").model) == ("montecarlo", "layered", "table")
+    layered = load_subject("skin1", model="layered")
     assert layered.model == "layered"
-    assert np.abs(layered.curve.share - skin1.curve.share).max() > 0.05
+    assert np.abs(layered.curve.fraction - skin1.curve.fraction).max() > 0.05
     np.testing.assert_allclose(layered.curve.energy, skin1.curve.energy, rtol=0.3)
 
 
 def test_homogeneous_medium_of_a_homogeneous_skin_is_itself(skin1: Subject) -> None:
-    found = homogeneous(skin1.curve)
+    found = fit_homogeneous_medium(skin1.curve)
     assert skin1.tissue is not None
     layer = skin1.tissue.medium.layers[0]
     np.testing.assert_allclose(found.albedo, layer.alpha_prime, atol=1e-4)
@@ -81,13 +81,13 @@ def test_homogeneous_medium_of_a_homogeneous_skin_is_itself(skin1: Subject) -> N
 
 
 def test_homogeneous_medium_of_layers_has_their_energy_and_tells_its_error(dj3: Subject) -> None:
-    error = deviation(dj3.curve, homogeneous(dj3.curve).curve)
+    error = curve_error(dj3.curve, fit_homogeneous_medium(dj3.curve).curve)
     assert np.abs(error.energy).max() < 1e-3
     assert 0.05 < error.cdf[0] < 0.2
 
 
 def test_spectral_skin_is_per_light_that_enters() -> None:
-    skin = subject_of("medium")
+    skin = load_subject("medium")
     assert skin.tissue is not None
     given = skin.tissue.profile().total
     np.testing.assert_allclose(skin.curve.energy * (1.0 - (0.4 / 2.4) ** 2), given, rtol=1e-9)
@@ -95,10 +95,10 @@ def test_spectral_skin_is_per_light_that_enters() -> None:
 
 def test_words_that_stand_for_nothing_are_refused() -> None:
     with pytest.raises(DermisError, match="profile nosuch"):
-        subject_of("nosuch")
+        load_subject("nosuch")
     with pytest.raises(DermisError, match="model: expected one of montecarlo"):
-        subject_of("skin1", model="guess")  # type: ignore[arg-type]
+        load_subject("skin1", model="guess")  # type: ignore[arg-type]
     with pytest.raises(DermisError, match="table of Gaussians"):
-        subject_of("gpu-gems-3", model="layered")
+        load_subject("gpu-gems-3", model="layered")
     with pytest.raises(DermisError, match="profile: expected a head"):
-        subject_of("skin1", profile="dj3")
+        load_subject("skin1", profile="dj3")

@@ -13,10 +13,10 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.subject import subject_of
-from dermis.apps.export.targets.maps import check_side, resampled, with_green
+from dermis.apps.export.subject import load_subject
+from dermis.apps.export.targets.maps import check_side, orient_green, resample
 from dermis.base.errors import DermisError
-from dermis.frame.baking import Baked, bake
+from dermis.frame.baking import BakedMaps, bake
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import decode_srgb_levels
 from dermis.images.io import read_image
@@ -43,7 +43,7 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def baked(renderer: Renderer, scene: Scene) -> Baked:
+def baked(renderer: Renderer, scene: Scene) -> BakedMaps:
     return bake(renderer, scene, SETTINGS, SIDE)
 
 
@@ -61,7 +61,7 @@ def apart(found: NDArray[Any], wanted: NDArray[Any]) -> float:
     return float(np.sqrt(((found - wanted) ** 2).mean() / (wanted**2).mean()))
 
 
-def test_the_maps_hold_what_the_frame_shows(renderer: Renderer, scene: Scene, baked: Baked) -> None:
+def test_the_maps_hold_what_the_frame_shows(renderer: Renderer, scene: Scene, baked: BakedMaps) -> None:
     drawn = renderer.draw(scene, SETTINGS, outputs=SEEN)
     seen = {name: drawn.output(name) for name in SEEN}
     skin = seen["thickness"] > 0
@@ -77,7 +77,9 @@ def test_the_maps_hold_what_the_frame_shows(renderer: Renderer, scene: Scene, ba
         assert apart(found / factor, seen[of][skin]) < most, name
 
 
-def test_a_head_drawn_with_the_maps_looks_the_same(renderer: Renderer, scene: Scene, baked: Baked) -> None:
+def test_a_head_drawn_with_the_maps_looks_the_same(
+    renderer: Renderer, scene: Scene, baked: BakedMaps
+) -> None:
     before = renderer.draw(scene, SETTINGS).linear()
     normal, area = baked.maps["normal"], baked.maps["stretch"][..., :2].prod(axis=-1)
     slopes = np.ascontiguousarray(-normal[..., :2] / normal[..., 2:], np.float32)
@@ -89,7 +91,7 @@ def test_a_head_drawn_with_the_maps_looks_the_same(renderer: Renderer, scene: Sc
     assert apart(after, before) < DRAWN
 
 
-def test_nothing_beside_the_skin_is_black(baked: Baked) -> None:
+def test_nothing_beside_the_skin_is_black(baked: BakedMaps) -> None:
     assert 0.4 < baked.covered.mean() < 0.95
     albedo = baked.maps["albedo"]
     assert albedo.min() > 0.0
@@ -136,14 +138,14 @@ def _numbers(levels: NDArray[Any], about: dict[str, Any]) -> NDArray[Any]:
 
 def test_green_turns_for_directx() -> None:
     normal = np.array([[[0.1, 0.2, 0.97]]], np.float32)
-    np.testing.assert_array_equal(with_green(normal, "up"), normal)
-    np.testing.assert_allclose(with_green(normal, "down"), [[[0.1, -0.2, 0.97]]])
+    np.testing.assert_array_equal(orient_green(normal, "up"), normal)
+    np.testing.assert_allclose(orient_green(normal, "down"), [[[0.1, -0.2, 0.97]]])
 
 
 def test_resampling_keeps_ramps() -> None:
     ramp = np.tile((np.arange(64, dtype=np.float32) + 0.5) / 64, (64, 1))
-    np.testing.assert_allclose(resampled(ramp, 16)[0], (np.arange(16) + 0.5) / 16, atol=1e-6)
-    np.testing.assert_allclose(resampled(ramp, 128)[0, 8:-8], ((np.arange(128) + 0.5) / 128)[8:-8], atol=1e-6)
+    np.testing.assert_allclose(resample(ramp, 16)[0], (np.arange(16) + 0.5) / 16, atol=1e-6)
+    np.testing.assert_allclose(resample(ramp, 128)[0, 8:-8], ((np.arange(128) + 0.5) / 128)[8:-8], atol=1e-6)
 
 
 def test_odd_sizes_and_skins_without_a_head_are_refused(tmp_path: Path) -> None:
@@ -151,5 +153,5 @@ def test_odd_sizes_and_skins_without_a_head_are_refused(tmp_path: Path) -> None:
         with pytest.raises(DermisError, match="power of two"):
             check_side(side)
     with pytest.raises(DermisError, match="a head"):
-        export_skin(subject_of("skin1"), "maps", tmp_path / "maps")
+        export_skin(load_subject("skin1"), "maps", tmp_path / "maps")
     assert not (tmp_path / "maps").exists()

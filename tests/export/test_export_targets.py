@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import yaml
 
-from dermis.apps.export.fitting import fit_d
+from dermis.apps.export.fitting import fit_burley_width
 from dermis.apps.export.registry import TARGETS
-from dermis.apps.export.run import assess, export_skin
-from dermis.apps.export.subject import Subject, subject_of
-from dermis.apps.export.target import numbers_of
+from dermis.apps.export.run import evaluate_export, export_skin
+from dermis.apps.export.subject import Subject, load_subject
+from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.unity.target import Unity, asset_text
 from dermis.base.errors import DermisError
 
@@ -33,17 +33,17 @@ EVIL = '"; import os; os._exit(3) # \n'
 def test_parameters_show_the_fitted_lobe_in_all_versions(name: str, skin1: Subject) -> None:
     target = TARGETS[name].with_variant(None)
     for version in target.versions:
-        shown = target.shown(target.parameters(skin1, version), skin1, version)
-        np.testing.assert_allclose(fit_d(shown), fit_d(skin1.curve), rtol=1e-4)
+        shown = target.predicted_curve(target.parameters(skin1, version), skin1, version)
+        np.testing.assert_allclose(fit_burley_width(shown), fit_burley_width(skin1.curve), rtol=1e-4)
 
 
 @pytest.mark.parametrize("name", [*LOBES, "arnold"])
 def test_what_is_written_is_better_than_what_is_typed(name: str, dj3: Subject) -> None:
     target = TARGETS[name].with_variant(None)
-    report = assess(dj3, target, target.versions[-1])
+    report = evaluate_export(dj3, target, target.versions[-1])
     assert (report.error.cdf < report.naive_error.cdf).all()
     assert (report.error.edge < report.naive_error.edge).all()
-    assert "red light" in report.words()[0]
+    assert "red light" in report.limitation_texts()[0]
 
 
 def test_unity_reads_its_asset_back(skin1: Subject, tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_unity_before_14_has_the_width_in_the_colour_alone(skin1: Subject) -> No
     rows = TARGETS["unity"].parameters(skin1, "12")
     text = asset_text("skin", rows, "12")
     assert "scatteringDistanceMultiplier" not in text and "m_Version: 1\n" in text
-    np.testing.assert_allclose(numbers_of(rows, "scatteringDistance"), fit_d(skin1.curve))
+    np.testing.assert_allclose(get_numbers(rows, "scatteringDistance"), fit_burley_width(skin1.curve))
 
 
 class _Settings:
@@ -165,8 +165,8 @@ def test_what_is_unknown_is_told_with_what_is_known(skin1: Subject, tmp_path: Pa
 def test_what_is_written_names_the_file_and_not_its_folder(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("variances_mm2 = [0.1, 2.0]\nweights = [[0.3, 0.2, 0.1], [0.3, 0.1, 0.1]]\n")
-    files = export_skin(subject_of(file), "unity", tmp_path / "out").files
-    assert subject_of(file).name == "mine.toml"
+    files = export_skin(load_subject(file), "unity", tmp_path / "out").files
+    assert load_subject(file).name == "mine.toml"
     assert all(str(tmp_path).encode() not in path.read_bytes() for path in files)
 
 
@@ -178,5 +178,5 @@ def test_a_target_of_another_package(tmp_path: Path) -> None:
     with TARGETS.including("toy", Toy()):
         report = export_skin("skin1", "toy", tmp_path / "skin.asset")
     assert report.files[0].name == "skin.asset" and report.files[0].exists()
-    with pytest.raises(DermisError, match=r"target: expected one of arnold, .*'toy' came"):
+    with pytest.raises(DermisError, match=r"target: expected one of arnold, .*got 'toy'"):
         export_skin("skin1", "toy", tmp_path / "again.asset")

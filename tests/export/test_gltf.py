@@ -12,20 +12,20 @@ import pytest
 from gltf_rules import check_rules, khronos_issues
 
 from dermis import Human, load_head
-from dermis.apps.export.fitting import deviation
+from dermis.apps.export.fitting import curve_error
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARGET
 from dermis.apps.export.targets.gltf.volume import (
     Volume,
-    colour_for,
     fit_volume,
-    multiscatter_of,
+    multiscatter_colour,
+    multiscatter_for_reflectance,
     single_scattering,
     volume_curve,
-    volume_of,
+    volume_from_paths,
 )
-from dermis.human.person_file import write_person
+from dermis.human.person_file import write_person_glb
 from dermis.optics.tissue import load_tissue
 
 NEW = {"KHR_materials_scatter", "KHR_materials_transmission", "KHR_materials_volume"}
@@ -38,8 +38,8 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("glb")
     source = folder / 'x"; import os; <script>.glb'
     human = Human.drawn(7)
-    write_person(source, human, human.head(subdivide=0), roughness=0.3)
-    subject = subject_of(source, colour=brown(folder), subdivide=0)
+    write_person_glb(source, human, human.head(subdivide=0), roughness=0.3)
+    subject = load_subject(source, colour=brown(folder), subdivide=0)
     files = {variant: folder / f"{variant}.glb" for variant in (SCATTER, DIFFUSE)}
     for variant, file in files.items():
         export_skin(subject, "gltf", file, variant=variant)
@@ -65,16 +65,16 @@ def skin_of(file: Path) -> dict[str, Any]:
 def test_the_inversion_is_van_de_hulsts() -> None:
     """The draft prints one way, the other is the printed approximation's inverse."""
     albedo = np.array([0.3, 0.7, 0.9, 0.99, 0.999])
-    np.testing.assert_allclose(single_scattering(multiscatter_of(albedo)), albedo, atol=2e-5)
+    np.testing.assert_allclose(single_scattering(multiscatter_colour(albedo)), albedo, atol=2e-5)
     s = np.sqrt(1 - 0.9)
-    assert multiscatter_of(0.9) == pytest.approx((1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
+    assert multiscatter_colour(0.9) == pytest.approx((1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
     assert single_scattering(0.5, 0.8) > single_scattering(0.5)
 
 
 def test_a_volume_keeps_its_paths() -> None:
     """Whatever the ratio of the channels; colours stay within 0 and 1."""
     paths = np.array([1.3, 0.9, 0.05])
-    volume = volume_of(paths, (0.6, 0.4, 0.2))
+    volume = volume_from_paths(paths, (0.6, 0.4, 0.2))
     assert volume.distance_m == pytest.approx(1.3e-3) and ((volume.colour > 0) & (volume.colour < 1)).all()
     np.testing.assert_allclose(volume.mean_free_path_mm, paths, rtol=1e-6)
 
@@ -82,41 +82,43 @@ def test_a_volume_keeps_its_paths() -> None:
 @pytest.mark.parametrize("name", ["skin1", "skin2", "marble"])
 def test_a_homogeneous_skin_is_shown_as_it_is(name: str) -> None:
     """The fit finds the tissue's own mean free path and albedo again."""
-    tissue, subject = load_tissue(name), subject_of(name)
+    tissue, subject = load_tissue(name), load_subject(name)
     volume, layer = fit_volume(subject.curve), tissue.medium.layers[0]
     np.testing.assert_allclose(volume.mean_free_path_mm, layer.mean_free_path_mm, rtol=0.01)
     np.testing.assert_allclose(single_scattering(volume.multiscatter), layer.alpha_prime, atol=0.003)
-    found = deviation(subject.curve, volume_curve(volume))
+    found = curve_error(subject.curve, volume_curve(volume))
     assert found.cdf.max() < 0.003 and found.edge.max() < 0.001 and np.abs(found.energy).max() < 0.005
 
 
 def test_the_colour_itself_would_lose_light() -> None:
     """Under a surface that refracts, half of the red of skin1: the finding in the documentation."""
-    subject = subject_of("skin1")
+    subject = load_subject("skin1")
     volume = fit_volume(subject.curve)
-    found = deviation(
+    found = curve_error(
         subject.curve, volume_curve(Volume(volume.distance_m, volume.colour, subject.curve.energy))
     )
     np.testing.assert_allclose(found.energy, [-0.50, -0.61, -0.64], atol=0.03)
-    np.testing.assert_allclose(colour_for(subject.curve.energy), volume.multiscatter, atol=1e-6)
+    np.testing.assert_allclose(
+        multiscatter_for_reflectance(subject.curve.energy), volume.multiscatter, atol=1e-6
+    )
 
 
 @pytest.mark.parametrize("name", ["skin1", "dj3"])
 def test_what_one_would_type_is_worse(name: str) -> None:
-    subject = subject_of(name)
+    subject = load_subject(name)
     target = TARGET.with_variant(None)
     best, typed = (
-        deviation(subject.curve, target.shown(rows, subject, "2.0"))
-        for rows in (target.parameters(subject, "2.0"), target.naive(subject, "2.0"))
+        curve_error(subject.curve, target.predicted_curve(rows, subject, "2.0"))
+        for rows in (target.parameters(subject, "2.0"), target.naive_parameters(subject, "2.0"))
     )
     assert np.abs(best.energy).max() < 0.005 < 0.3 < np.abs(typed.energy).min()
     assert best.cdf.max() < (0.005 if name == "skin1" else 0.2) and best.cdf.sum() < typed.cdf.sum()
 
 
 def test_nothing_spreads_without_scattering() -> None:
-    subject, target = subject_of("skin1"), TARGET.with_variant(DIFFUSE)
+    subject, target = load_subject("skin1"), TARGET.with_variant(DIFFUSE)
     rows = target.parameters(subject, "2.0")
-    found = deviation(subject.curve, target.shown(rows, subject, "2.0"))
+    found = curve_error(subject.curve, target.predicted_curve(rows, subject, "2.0"))
     assert found.cdf.min() > 0.9 and found.edge.min() > 0.4
     values = {row.name.rpartition(".")[2]: row.value for row in rows}
     assert 0.0 < values["diffuseTransmissionFactor"] < 0.3
@@ -128,12 +130,14 @@ def test_a_skin_alone_is_a_ball(tmp_path: Path) -> None:
     report = export_skin("skin1", "gltf", tmp_path / "ball.glb")
     document = check_rules(tmp_path / "ball.glb")
     tree, skin = document.tree, skin_of(tmp_path / "ball.glb")
-    places = document.real(tree["meshes"][0]["primitives"][0]["attributes"]["POSITION"])
+    places = document.read_floats(tree["meshes"][0]["primitives"][0]["attributes"]["POSITION"])
     np.testing.assert_allclose(np.linalg.norm(places, axis=1), 0.05, rtol=1e-5)
     assert set(tree["extensionsUsed"]) >= NEW and "extensionsRequired" not in tree
-    assert tree["asset"]["extras"]["draft"] == DRAFT == skin["extras"]["draft"] and DRAFT in report.wrong
+    assert (
+        tree["asset"]["extras"]["draft"] == DRAFT == skin["extras"]["draft"] and DRAFT in report.limitations
+    )
     assert skin["pbrMetallicRoughness"]["baseColorFactor"] == [1.0, 1.0, 1.0, 1.0]
-    for row in report.rows:
+    for row in report.parameters:
         extension, _, member = row.name.partition(".")
         written = skin["extensions"][extension][member]
         assert (tuple(written) if isinstance(written, list) else written) == row.value
@@ -150,10 +154,10 @@ def test_a_heads_colours_are_those_of_the_map(person: dict[str, Path]) -> None:
     scatter = skin["extensions"]["KHR_materials_scatter"]
     assert scatter["multiscatterColorFactor"] == [1.0, 1.0, 1.0]
     image = document.tree["images"][scatter["multiscatterColorTexture"]["index"]]
-    shown = np.asarray(Image.open(BytesIO(document.view(image["bufferView"]))).convert("RGB"))
+    shown = np.asarray(Image.open(BytesIO(document.read_view(image["bufferView"]))).convert("RGB"))
     linear = lambda levels: ((np.asarray(levels) / 255 + 0.055) / 1.055) ** 2.4  # noqa: E731
     for texel, levels in ((shown[10, 10], (188, 137, 113)), (shown[10, 50], (120, 80, 60))):
-        np.testing.assert_allclose(linear(texel), colour_for(linear(levels)), atol=0.01)
+        np.testing.assert_allclose(linear(texel), multiscatter_for_reflectance(linear(levels)), atol=0.01)
     assert document.tree["meshes"][0]["extras"]["targetNames"][:1] and document.tree["skins"]
     assert {"left eye", "right eye"} <= {one["name"] for one in document.tree["materials"]}
 
@@ -191,7 +195,7 @@ def test_names_stay_words(person: dict[str, Path]) -> None:
 
 
 def test_the_same_export_is_the_same_file(tmp_path: Path) -> None:
-    subject: Subject = subject_of("dj3")
+    subject: Subject = load_subject("dj3")
     for name in ("a.glb", "b.glb"):
         export_skin(subject, "gltf", tmp_path / name)
     assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()

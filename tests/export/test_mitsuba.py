@@ -9,15 +9,15 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from dermis.apps.export.fitting import deviation
+from dermis.apps.export.fitting import curve_error
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.subject import Subject, subject_of
-from dermis.apps.export.target import numbers_of
-from dermis.apps.export.targets.mitsuba.meshes import divided
-from dermis.apps.export.targets.mitsuba.target import TARGET, Colours, medium_for
-from dermis.apps.export.targets.mitsuba.xml import Bitmap, Transform, Words, element
-from dermis.apps.truths.mitsuba_scene import variant_of
-from dermis.optics.curve import Curve
+from dermis.apps.export.subject import Subject, load_subject
+from dermis.apps.export.target import get_numbers
+from dermis.apps.export.targets.mitsuba.meshes import subdivide_triangles
+from dermis.apps.export.targets.mitsuba.target import TARGET, SkinColours, fit_medium
+from dermis.apps.export.targets.mitsuba.xml import Bitmap, Transform, XmlBackend, element
+from dermis.apps.truths.mitsuba_scene import mitsuba_variant
+from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import media
 
 EDGE_NOISE = 0.05
@@ -33,40 +33,42 @@ def mi() -> Any:
 def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A ball of skin2, whose name would like to be more than a name."""
     place = tmp_path_factory.mktemp("mitsuba") / "ball"
-    export_skin(subject_of("skin2"), "mitsuba", place)
+    export_skin(load_subject("skin2"), "mitsuba", place)
     return place
 
 
 def test_a_homogeneous_skin_gets_its_own_medium_back() -> None:
-    subject = subject_of("skin1")
+    subject = load_subject("skin1")
     rows = TARGET.with_variant("smooth").parameters(subject, "3")
     layer = media()["skin1"].layers[0]
-    np.testing.assert_allclose(numbers_of(rows, "sigma_t"), layer.sigma_t_prime, rtol=0.02)
-    np.testing.assert_allclose(numbers_of(rows, "albedo"), layer.alpha_prime, rtol=0.005)
+    np.testing.assert_allclose(get_numbers(rows, "sigma_t"), layer.sigma_t_prime, rtol=0.02)
+    np.testing.assert_allclose(get_numbers(rows, "albedo"), layer.alpha_prime, rtol=0.005)
 
 
 @pytest.mark.parametrize("boundary", TARGET.variants)
 def test_fitted_media_are_near_and_typed_ones_far(boundary: str) -> None:
-    subject, target = subject_of("skin1"), TARGET.with_variant(boundary)
-    fit, typed = target.parameters(subject, "3"), target.naive(subject, "3")
-    near, far = (deviation(subject.curve, target.shown(rows, subject, "3")) for rows in (fit, typed))
+    subject, target = load_subject("skin1"), TARGET.with_variant(boundary)
+    fit, typed = target.parameters(subject, "3"), target.naive_parameters(subject, "3")
+    near, far = (
+        curve_error(subject.curve, target.predicted_curve(rows, subject, "3")) for rows in (fit, typed)
+    )
     assert near.edge.max() < 0.015
     assert np.abs(near.energy).max() < 1e-3
     assert far.edge.min() > 0.1
 
 
 def test_dimmed_skin_has_a_brighter_medium() -> None:
-    curve = subject_of("skin1").curve
+    curve = load_subject("skin1").curve
     mean = np.array([0.3, 0.2, 0.1])
-    plain, dimmed = Colours(mean, mean, 1.0), Colours(mean, 1.3 * mean, 1.3)
+    plain, dimmed = SkinColours(mean, mean, 1.0), SkinColours(mean, 1.3 * mean, 1.3)
     for boundary in TARGET.variants:
-        before, after = (medium_for(curve, one, boundary) for one in (plain, dimmed))  # type: ignore[arg-type]
+        before, after = (fit_medium(curve, one, boundary) for one in (plain, dimmed))  # type: ignore[arg-type]
         assert np.all(np.array(after.albedo) > np.array(before.albedo))
         np.testing.assert_allclose(dimmed.passing(boundary), 1 / 1.3, rtol=1e-12)  # type: ignore[arg-type]
 
 
 def test_words_are_escaped_and_pictures_numbered() -> None:
-    words = Words()
+    words = XmlBackend()
     made = element({"type": "ply", "filename": '"/><x a="&'}, "", words)
     assert ET.fromstring(ET.tostring(made))[0].attrib["value"] == '"/><x a="&'
     slide = {"type": "bitmap", "bitmap": Bitmap(np.zeros((1, 1, 3), np.float32)), "raw": True}
@@ -77,14 +79,14 @@ def test_words_are_escaped_and_pictures_numbered() -> None:
 def test_transforms_are_those_of_mitsuba(mi: Any) -> None:
     given = [1.0, 2.0, 3.0], [-4.0, 0.5, 1.0], [0.0, 1.0, 0.2]
     own = Transform().look_at(*given).scale([2.0, 3.0, 1.0]).matrix
-    with variant_of(mi, "scalar_rgb"):
+    with mitsuba_variant(mi, "scalar_rgb"):
         theirs = np.array(mi.ScalarTransform4f().look_at(*given).scale([2.0, 3.0, 1.0]).matrix)
-        assert Words.math.RayEpsilon == pytest.approx(mi.math.RayEpsilon, rel=1e-6)
+        assert XmlBackend.math.RayEpsilon == pytest.approx(mi.math.RayEpsilon, rel=1e-6)
     np.testing.assert_allclose(own, theirs, atol=1e-5)
 
 
 def test_divided_triangles_cover_the_whole() -> None:
-    found = divided(np.array([4, 7]), 3)
+    found = subdivide_triangles(np.array([4, 7]), 3)
     assert len(found.corners) == 2 * 9
     np.testing.assert_allclose(found.weights.sum(axis=1), 1.0)
     corners = found.weights[found.corners][:, :, 1:]
@@ -106,7 +108,7 @@ def test_the_scene_says_which_files_it_has(ball: Path) -> None:
 
 @pytest.mark.parametrize("boundary", TARGET.variants)
 def test_mitsuba_renders_the_scene(mi: Any, ball: Path, boundary: str) -> None:
-    with variant_of(mi, "scalar_rgb"):
+    with mitsuba_variant(mi, "scalar_rgb"):
         given = {"boundary": boundary, "width": "24", "height": "24", "samples": "8"}
         picture = np.array(mi.render(mi.load_file(str(ball / "scene.xml"), **given)))
     assert picture.shape == (24, 24, 3)
@@ -120,11 +122,11 @@ def test_mitsuba_renders_the_scene(mi: Any, ball: Path, boundary: str) -> None:
 def test_an_edge_of_light_is_as_predicted(mi: Any) -> None:
     from dermis.apps.validation.engines import mitsuba as bench
 
-    subject = subject_of("skin2")
-    with variant_of(mi, "scalar_rgb"):
+    subject = load_subject("skin2")
+    with mitsuba_variant(mi, "scalar_rgb"):
         found = _edge(mi, bench, subject, "smooth", 0)
-        wrong = _typed(mi, bench, subject)
-    assert found < EDGE_NOISE < wrong
+        limitations = _typed(mi, bench, subject)
+    assert found < EDGE_NOISE < limitations
 
 
 def _edge(mi: Any, bench: Any, subject: Subject, boundary: str, channel: int) -> float:
@@ -133,14 +135,16 @@ def _edge(mi: Any, bench: Any, subject: Subject, boundary: str, channel: int) ->
 
 
 def _typed(mi: Any, bench: Any, subject: Subject) -> float:
-    return _apart(mi, bench, subject, TARGET.with_variant("smooth").naive(subject, "3"), "smooth", 0)
+    return _apart(
+        mi, bench, subject, TARGET.with_variant("smooth").naive_parameters(subject, "3"), "smooth", 0
+    )
 
 
 def _apart(mi: Any, bench: Any, subject: Subject, rows: Any, boundary: str, channel: int) -> float:
     """Largest difference from the true curve."""
-    sigma, albedo = (numbers_of(rows, name)[channel] for name in ("sigma_t", "albedo"))
-    medium = bench.Walked((sigma,) * 3, (albedo,) * 3)
-    d = float(bench.fit_d(subject.curve)[channel])
-    seen, _, _ = bench.measured(mi, medium, boundary, d, 768)
-    curve: Curve = subject.curve
-    return float(np.abs(seen - bench.over_pixels(curve, channel, d)).max())
+    sigma, albedo = (get_numbers(rows, name)[channel] for name in ("sigma_t", "albedo"))
+    medium = bench.IsotropicMedium((sigma,) * 3, (albedo,) * 3)
+    d = float(bench.fit_burley_width(subject.curve)[channel])
+    seen, _, _ = bench.measured_edge(mi, medium, boundary, d, 768)
+    curve: CumulativeProfile = subject.curve
+    return float(np.abs(seen - bench.pixel_averages(curve, channel, d)).max())

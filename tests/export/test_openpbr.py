@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.apps.export.fitting import deviation
-from dermis.apps.export.run import assess, export_skin
-from dermis.apps.export.subject import subject_of
-from dermis.apps.export.target import numbers_of
+from dermis.apps.export.fitting import curve_error
+from dermis.apps.export.run import evaluate_export, export_skin
+from dermis.apps.export.subject import load_subject
+from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.openpbr.materials import OPEN_PBR
-from dermis.apps.export.targets.openpbr.target import TARGET, fitted_mm, radii_mm
+from dermis.apps.export.targets.openpbr.target import TARGET, fitted_path_mm, get_radii_mm
 from dermis.apps.truths.half_space import diffuse_albedo
-from dermis.optics.media import albedo_of_colour
+from dermis.optics.media import albedo_from_colour
 
 pytest.importorskip("MaterialX")
 import MaterialX
@@ -23,39 +23,39 @@ EDGE = 0.015  # a matched walk against photons under a surface of index 1.4
 
 
 def test_a_walk_holds_homogeneous_skin_and_published_numbers_do_not() -> None:
-    subject = subject_of("skin1")
-    report = assess(subject, TARGET, "1.1.1")
+    subject = load_subject("skin1")
+    report = evaluate_export(subject, TARGET, "1.1.1")
     assert report.error.edge.max() < EDGE and report.error.cdf.max() < 0.04
     assert report.naive_error.edge[0] > 0.04
-    typed = radii_mm(report.naive_rows, OPEN_PBR)
+    typed = get_radii_mm(report.naive_parameters, OPEN_PBR)
     np.testing.assert_allclose(typed, [3.67, 1.37, 0.68], rtol=0.01)  # [Jensen2001], printed
 
 
 def test_all_light_is_what_the_formula_returns() -> None:
-    subject = subject_of("skin1")
-    rows = TARGET.parameters(subject, "1.1.1")
-    shown = TARGET.shown(rows, subject, "1.1.1")
-    exact = [diffuse_albedo(float(one)) for one in albedo_of_colour(subject.albedo)]
+    subject = load_subject("skin1")
+    parameters = TARGET.parameters(subject, "1.1.1")
+    shown = TARGET.predicted_curve(parameters, subject, "1.1.1")
+    exact = [diffuse_albedo(float(one)) for one in albedo_from_colour(subject.albedo)]
     np.testing.assert_allclose(shown.energy, exact, atol=0.003)
 
 
 def test_radii_grow_with_the_skin() -> None:
-    subject = subject_of("skin1")
+    subject = load_subject("skin1")
     np.testing.assert_allclose(
-        radii_mm(TARGET.parameters(subject, "1.1.1"), OPEN_PBR), fitted_mm(subject), rtol=1e-9
+        get_radii_mm(TARGET.parameters(subject, "1.1.1"), OPEN_PBR), fitted_path_mm(subject), rtol=1e-9
     )
-    d = assess(subject, TARGET, "1.1.1").d_mm
-    ratio = fitted_mm(subject) / d
+    d = evaluate_export(subject, TARGET, "1.1.1").d_mm
+    ratio = fitted_path_mm(subject) / d
     # Walks counted elsewhere: d over the mean free path is 0.434 at a colour of 0.43 and 0.34 at 0.2.
     assert 1.9 < ratio[0] < 2.4 and 2.7 < ratio[1] < 3.2 and ratio[2] > ratio[1]
 
 
 def test_a_profile_is_fitted_where_the_renderer_has_one() -> None:
-    subject = subject_of("skin1")
+    subject = load_subject("skin1")
     profile, walk = (TARGET.with_variant(one) for one in ("open-pbr-profile", "open-pbr"))
-    assert assess(subject, profile, "1.1.1").error.edge.max() < EDGE
+    assert evaluate_export(subject, profile, "1.1.1").error.edge.max() < EDGE
     radii = walk.parameters(subject, "1.1.1")
-    assert deviation(subject.curve, profile.shown(radii, subject, "1.1.1")).edge.max() > 0.08
+    assert curve_error(subject.curve, profile.predicted_curve(radii, subject, "1.1.1")).edge.max() > 0.08
 
 
 @pytest.mark.parametrize("variant", TARGET.variants)
@@ -64,7 +64,7 @@ def test_the_document_has_what_was_told(variant: str, tmp_path: Path) -> None:
     document = MaterialX.createDocument()
     MaterialX.readFromXmlFile(document, str(tmp_path / "skin.mtlx"))
     (node,) = [one for one in document.getNodes() if one.getType() == "surfaceshader"]
-    for row in report.rows:
-        told = numbers_of(report.rows, row.name)
+    for row in report.parameters:
+        told = get_numbers(report.parameters, row.name)
         value = node.getInput(row.name).getValue()
         assert np.allclose(value if len(told) == 1 else value.asTuple(), told, rtol=1e-5)

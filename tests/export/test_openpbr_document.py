@@ -10,8 +10,14 @@ pytest.importorskip("MaterialX")
 import MaterialX
 from MaterialX import PyMaterialXGenGlsl, PyMaterialXGenMdl, PyMaterialXGenOsl, PyMaterialXGenShader
 
-from dermis.apps.export.targets.openpbr.document import document_of, library
-from dermis.apps.export.targets.openpbr.materials import OPEN_PBR, STANDARD, Look, plain_look, skin_look
+from dermis.apps.export.targets.openpbr.document import build_document, library
+from dermis.apps.export.targets.openpbr.materials import (
+    OPEN_PBR,
+    STANDARD,
+    OpenPbrMaterial,
+    opaque_material,
+    skin_material,
+)
 from dermis.mesh.mesh import Material
 from dermis.scene.skin import Skin
 
@@ -24,9 +30,11 @@ GENERATORS = {
 HOSTILE = '"/><input name="x" /><!-- \n ; import os'
 
 
-def looks(name: str = "skin") -> list[Look]:
-    skin = skin_look(name, Skin(), RADIUS_M, (0.4, 0.2, 0.1), ["colour", "roughness", "specular", "normal"])
-    return [skin, plain_look(Material("left eye", "opaque"))]
+def looks(name: str = "skin") -> list[OpenPbrMaterial]:
+    skin = skin_material(
+        name, Skin(), RADIUS_M, (0.4, 0.2, 0.1), ["colour", "roughness", "specular", "normal"]
+    )
+    return [skin, opaque_material(Material("left eye", "opaque"))]
 
 
 def read_back(made: Any) -> Any:
@@ -39,7 +47,7 @@ def read_back(made: Any) -> Any:
 
 @pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
 def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
-    again = read_back(document_of(looks(), shader, "a_"))
+    again = read_back(build_document(looks(), shader, "a_"))
     nodes = {node.getName(): node for node in again.getNodes(shader)}
     assert set(nodes) == {"skin_surface", "left_eye_surface"}
     for node in nodes.values():
@@ -50,7 +58,7 @@ def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
 
 
 def test_pictures_have_their_colour_spaces() -> None:
-    graph = read_back(document_of(looks(), OPEN_PBR, "a_")).getNodeGraph("skin_maps")
+    graph = read_back(build_document(looks(), OPEN_PBR, "a_")).getNodeGraph("skin_maps")
     files = {one.getName(): one.getInput("file") for one in graph.getNodes("image")}
     assert files["colour_image"].getColorSpace() == "srgb_texture"
     assert not any(one.getColorSpace() for name, one in files.items() if name != "colour_image")
@@ -60,13 +68,13 @@ def test_pictures_have_their_colour_spaces() -> None:
 @pytest.mark.parametrize("language", GENERATORS)
 @pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
 def test_code_is_generated_that_reads_lengths_in_other_units(shader: str, language: str) -> None:
-    code = generated(document_of(looks(), shader, "a_"), GENERATORS[language].create())
+    code = generated(build_document(looks(), shader, "a_"), GENERATORS[language].create())
     assert "0.00123" in code and "100.0" in code  # metres, and centimetres in one
     assert "srgb_texture_to_lin_rec709" in code
 
 
 def test_a_hostile_name_is_text() -> None:
-    again = read_back(document_of(looks(HOSTILE), OPEN_PBR, "a_"))
+    again = read_back(build_document(looks(HOSTILE), OPEN_PBR, "a_"))
     named = [one for one in again.getMaterialNodes() if one.getAttribute("uiname")]
     assert HOSTILE in [one.getAttribute("uiname") for one in named]
     assert [node.getCategory() for node in again.getNodes()] == [OPEN_PBR, "surfacematerial"] * 2

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loaded_mesh import load_mesh
 from pbrt_grammar import Directive, read
 from rigged_head import write_rigged_head
 
-from dermis.apps.export.run import assess, export_skin
-from dermis.apps.export.subject import Subject, subject_of
+from dermis.apps.export.run import evaluate_export, export_skin
+from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.targets.pbrt.target import TARGET
 from dermis.base.errors import DermisWarning
-from dermis.formats.load import load_mesh
 from dermis.optics.tissue import load_tissue
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight, PointLight, RectangleLight, SphereLight, StripeLight
@@ -29,10 +29,10 @@ def one_of(found: list[Directive], word: str, name: str) -> Directive:
 
 @pytest.mark.parametrize("name", ["skin1", "skin2"])
 def test_homogeneous_skin_is_nearly_its_own_medium(name: str) -> None:
-    subject = subject_of(name)
-    report = assess(subject, TARGET, "4")
+    subject = load_subject(name)
+    report = evaluate_export(subject, TARGET, "4")
     assert report.error.edge.max() < DIFFUSION < report.naive_error.edge.max()
-    paths = next(row.value for row in report.rows if row.name == "mfp")
+    paths = next(row.value for row in report.parameters if row.name == "mfp")
     layer = load_tissue(name).medium.layers[0]
     np.testing.assert_allclose(paths, 1.0 / layer.sigma_t_prime, rtol=PATHS)
 
@@ -45,7 +45,7 @@ def test_a_skin_comes_on_a_ball(tmp_path: Path) -> None:
         material["remaproughness"] == ["false"] and material["scale"] == ["1"] and material["eta"] == ["1.4"]
     )
     assert [float(one) for one in material["mfp"]] == pytest.approx(
-        next(row.value for row in report.rows if row.name == "mfp"), rel=1e-5
+        next(row.value for row in report.parameters if row.name == "mfp"), rel=1e-5
     )
     (shape,) = [one.parameters["filename"][0] for one in found if one.word == "Shape"]
     ball = load_mesh(tmp_path / shape, unit_mm=1.0)
@@ -55,7 +55,7 @@ def test_a_skin_comes_on_a_ball(tmp_path: Path) -> None:
 
 
 def test_a_head_comes_with_lights_and_camera(tmp_path: Path) -> None:
-    made = subject_of(write_rigged_head(tmp_path / "face.glb"))
+    made = load_subject(write_rigged_head(tmp_path / "face.glb"))
     assert made.scene is not None
     lights = [
         PointLight(position=(0.0, 300.0, 900.0)),

@@ -14,7 +14,7 @@ pytest.importorskip("MaterialX")
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.target import numbers_of
+from dermis.apps.export.target import get_numbers
 
 
 def surface(stage: Any, name: str = "skin") -> Any:
@@ -33,7 +33,7 @@ def test_a_skin_comes_on_a_ball(suffix: str, tmp_path: Path) -> None:
     shader = surface(stage)
     for name in ("subsurface_radius", "subsurface_radius_scale"):
         value = shader.GetInput(name).Get()
-        told = numbers_of(report.rows, name)
+        told = get_numbers(report.parameters, name)
         assert ((value,) if len(told) == 1 else tuple(value)) == pytest.approx(told)
 
 

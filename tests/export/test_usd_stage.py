@@ -15,9 +15,9 @@ pytest.importorskip("MaterialX")
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 
 from dermis.apps.export.targets.openpbr.document import library
-from dermis.apps.export.targets.openpbr.materials import Look, skin_look
+from dermis.apps.export.targets.openpbr.materials import OpenPbrMaterial, skin_material
 from dermis.apps.export.targets.usd.geometry import valid_names
-from dermis.apps.export.targets.usd.stage import stage_of
+from dermis.apps.export.targets.usd.stage import build_stage
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
@@ -33,13 +33,13 @@ def rigged(tmp_path_factory: pytest.TempPathFactory) -> Head:
     return load_head(write_rigged_head(tmp_path_factory.mktemp("usd") / "face.glb"), subdivide=0)
 
 
-def looks_of(head: Head, name: str = "skin") -> Mapping[int, Look]:
-    look = skin_look(name, Skin(), (1e-3, 4e-4, 2e-4), (0.4, 0.2, 0.1), ["colour", "roughness", "normal"])
+def mesh_materials(head: Head, name: str = "skin") -> Mapping[int, OpenPbrMaterial]:
+    look = skin_material(name, Skin(), (1e-3, 4e-4, 2e-4), (0.4, 0.2, 0.1), ["colour", "roughness", "normal"])
     return dict.fromkeys(range(len(head.mesh.materials)), look)
 
 
 def written(head: Head, path: Path, name: str = "head") -> Any:
-    made = stage_of(head, name, looks_of(head, name), "a_")
+    made = build_stage(head, name, mesh_materials(head, name), "a_")
     made.GetRootLayer().Export(str(path))
     return Usd.Stage.Open(str(path))
 
@@ -66,7 +66,7 @@ def places_of(points: Any, uv: Any) -> set[tuple[float, ...]]:
 
 def test_quads_are_whole_again() -> None:
     head = Human().head(subdivide=1)
-    stage = stage_of(head, "head", looks_of(head), "a_")
+    stage = build_stage(head, "head", mesh_materials(head), "a_")
     counts = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/head/mesh")).GetFaceVertexCountsAttr().Get())
     assert (counts == 4).sum() == len(head.mesh.quads) and counts.sum() == 4 * len(head.mesh.quads)
 

@@ -15,14 +15,14 @@ from chromium_input import CHROMIUM
 from numpy.typing import NDArray
 from PIL import Image
 
-from dermis.apps.export.fitting import fit_d, lobe
+from dermis.apps.export.fitting import burley_curve, fit_burley_width
 from dermis.apps.export.registry import TARGETS
-from dermis.apps.export.run import assess, export_skin
-from dermis.apps.export.subject import Subject, subject_of
-from dermis.apps.export.target import numbers_of
+from dermis.apps.export.run import evaluate_export, export_skin
+from dermis.apps.export.subject import Subject, load_subject
+from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.babylon.target import spiral_curve
-from dermis.apps.export.targets.pages.engine_page import camera_of
-from dermis.apps.export.targets.pages.html import hash_of, inline
+from dermis.apps.export.targets.pages.engine_page import page_camera
+from dermis.apps.export.targets.pages.html import csp_hash, escape_script
 from dermis.base.errors import DermisError
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -32,7 +32,7 @@ NODE = {"babylon": "DERMIS_BABYLON", "three": "DERMIS_THREE"}
 
 @pytest.fixture(scope="module")
 def skin() -> Subject:
-    return subject_of("skin1")
+    return load_subject("skin1")
 
 
 @pytest.fixture(params=["babylon", "three"])
@@ -51,17 +51,17 @@ def test_scripts_are_those_that_the_policy_names(skin: Subject, target: str, tmp
     assert policy is not None
     allowed = policy[1].replace("&#x27;", "'")
     inside = re.findall(r'<script type="(?:module|importmap)">(.*?)</script>', text, re.DOTALL)
-    assert inside and all(hash_of(one) in allowed for one in inside)
+    assert inside and all(csp_hash(one) in allowed for one in inside)
     assert "unsafe" not in allowed and allowed.startswith("default-src 'none'")
     known = TARGETS[target].with_variant(None)
-    urls = [one.url for one in known.scripts[known.versions[-1]]]  # type: ignore[attr-defined]
+    urls = [one.url for one in known.library_files[known.versions[-1]]]  # type: ignore[attr-defined]
     assert all(url in allowed for url in urls)
     assert text.count("sha384-") == len(urls) == len(set(re.findall(r"sha384-[\w+/]{64}", text)))
     assert set(re.findall(r"https?://[^/\"' ]+", text)) == {"https://cdn.jsdelivr.net"}
 
 
 def test_words_of_users_stay_words(target: str, tmp_path: Path) -> None:
-    plain = subject_of("skin1")
+    plain = load_subject("skin1")
     named = Subject(WICKED, plain.curve, plain.albedo, plain.model, plain.tissue)
     text = text_of(named, target, tmp_path)
     assert "<script>alert" not in text and "alert(1)" in text
@@ -79,9 +79,9 @@ def test_the_page_holds_the_head_in_metres_and_the_parameters(
     assert head is not None and told is not None
     assert base64.b64decode(head[1]).startswith(b"glTF")
     settings = json.loads(told[1])
-    report = assess(skin, TARGETS[target].with_variant(None), TARGETS[target].versions[-1])
+    report = evaluate_export(skin, TARGETS[target].with_variant(None), TARGETS[target].versions[-1])
     assert settings["skin"] == json.loads(
-        json.dumps({r.name.rpartition(".")[2]: r.value for r in report.rows})
+        json.dumps({r.name.rpartition(".")[2]: r.value for r in report.parameters})
     )
     assert 0.3 < np.linalg.norm(settings["camera"]["position"]) < 3.0
     assert all(abs(np.linalg.norm(light["direction"]) - 1.0) < 1e-9 for light in settings["lights"])
@@ -89,15 +89,15 @@ def test_the_page_holds_the_head_in_metres_and_the_parameters(
 
 @pytest.mark.parametrize("name", ["skin1", "skin2", "dj3"])
 def test_babylons_two_parameters_undo_both_of_its_slips(name: str) -> None:
-    subject, babylon = subject_of(name), TARGETS["babylon"].with_variant(None)
+    subject, babylon = load_subject(name), TARGETS["babylon"].with_variant(None)
     rows = babylon.parameters(subject, babylon.versions[-1])
-    colour, (metres,) = (numbers_of(rows, row.name) for row in rows[:2])
-    d = fit_d(subject.curve)
+    colour, (metres,) = (get_numbers(rows, row.name) for row in rows[:2])
+    d = fit_burley_width(subject.curve)
     np.testing.assert_allclose(2.0 / (metres * np.array(colour)), d)  # each channel's own width
     np.testing.assert_allclose(2.0 * max(colour) / metres, d.max())  # and the widest is drawn from
-    report = assess(subject, babylon, babylon.versions[-1])
+    report = evaluate_export(subject, babylon, babylon.versions[-1])
     # the lobes' own error, and half a step of the fortieth that samples make
-    own = np.abs(lobe(d, subject.curve.energy).share - subject.curve.share).max(axis=0)
+    own = np.abs(burley_curve(d, subject.curve.energy).fraction - subject.curve.fraction).max(axis=0)
     assert (report.error.edge <= 0.5 * own + 0.025).all()
     assert (report.naive_error.edge > 2.0 * report.error.edge).all()
 
@@ -105,19 +105,19 @@ def test_babylons_two_parameters_undo_both_of_its_slips(name: str) -> None:
 def test_a_white_profile_is_a_lobe_and_a_grey_one_is_wider_not_narrower() -> None:
     x = np.linspace(-6.0, 6.0, 49)
     white = spiral_curve([1.0, 1.0, 1.0], 2.0, np.ones(3))
-    assert np.abs(white.edge(x) - lobe(np.ones(3), np.ones(3)).edge(x)).max() < 0.01
+    assert np.abs(white.edge_response(x) - burley_curve(np.ones(3), np.ones(3)).edge_response(x)).max() < 0.01
     grey = spiral_curve([0.5, 0.5, 0.5], 2.0, np.ones(3))
-    assert (grey.radius_of(0.5) > white.radius_of(0.5)).all()
+    assert (grey.radius_at_fraction(0.5) > white.radius_at_fraction(0.5)).all()
 
 
 def test_three_spreads_nothing_and_says_so(skin: Subject) -> None:
-    report = assess(skin, TARGETS["three"].with_variant(None), "0.187.0")
-    assert (report.error.edge > 0.45).all() and "Nothing spreads" in report.wrong
+    report = evaluate_export(skin, TARGETS["three"].with_variant(None), "0.187.0")
+    assert (report.error.edge > 0.45).all() and "Nothing spreads" in report.limitations
 
 
 def test_a_library_of_another_version_is_refused_and_nothing_is_written(target: str, tmp_path: Path) -> None:
     known = TARGETS[target].with_variant(None)
-    first = known.scripts[known.versions[-1]][0]  # type: ignore[attr-defined]
+    first = known.library_files[known.versions[-1]][0]  # type: ignore[attr-defined]
     file = tmp_path / first.package / first.path
     file.parent.mkdir(parents=True)
     file.write_text("alert(1)")
@@ -132,7 +132,7 @@ def test_other_targets_have_no_library(tmp_path: Path) -> None:
 
 
 def test_an_embedded_script_does_not_end_early() -> None:
-    assert "</script" not in inline('x = "</script><!--"').lower()
+    assert "</script" not in escape_script('x = "</script><!--"').lower()
 
 
 def drawn(page: Path) -> NDArray[np.float64]:
@@ -167,9 +167,9 @@ def test_a_browser_draws_the_ball_without_network(skin: Subject, target: str, tm
 
 def test_heads_are_seen_from_where_the_scene_is() -> None:
     """Cameras are placed around the head's middle, which is not the origin of the file."""
-    human = subject_of("human")
+    human = load_subject("human")
     assert human.scene is not None
-    where = camera_of(human.scene, human.scene.head.centre_mm)
+    where = page_camera(human.scene, human.scene.head.centre_mm)
     centre = 1e-3 * np.array(human.scene.head.centre_mm)
     assert np.linalg.norm(centre) > 0.03
     np.testing.assert_allclose(np.array(where["target"]) - centre, 1e-3 * np.array(human.scene.camera.target))

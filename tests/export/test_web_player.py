@@ -22,10 +22,10 @@ from small_head import write_head
 
 import dermis
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.targets.pages.html import hash_of
-from dermis.apps.export.targets.web.build import PageContent, PageRequest, page_content
-from dermis.apps.export.targets.web.dials import Dial, dials_of
-from dermis.apps.export.targets.web.target import MODULES, player, web_page
+from dermis.apps.export.targets.pages.html import csp_hash
+from dermis.apps.export.targets.web.build import PageContent, PageRequest, build_content
+from dermis.apps.export.targets.web.sliders import Slider, scene_sliders
+from dermis.apps.export.targets.web.target import MODULES, page_html, player_script
 from dermis.frame.renderer import Renderer
 
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]
@@ -54,7 +54,7 @@ class Shown(NamedTuple):
     page: Any
     scene: dermis.Scene
     renderer: Renderer
-    dials: tuple[Dial, ...]
+    sliders: tuple[Slider, ...]
 
     def linear(self) -> NDArray[np.float32]:
         """(h, w, 3) what the page has drawn."""
@@ -90,32 +90,34 @@ class Taken(NamedTuple):
     made: PageContent
     scene: dermis.Scene
     renderer: Renderer
-    dials: tuple[Dial, ...]
+    sliders: tuple[Slider, ...]
 
 
-def taken(scene: dermis.Scene, form: str, dials: tuple[Dial, ...]) -> Taken:
+def taken(scene: dermis.Scene, form: str, sliders: tuple[Slider, ...]) -> Taken:
     renderers: list[Renderer] = []
-    asked = PageRequest(scene, dials, SETTINGS, {form: (SIDE,)}, os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
-    made = page_content(asked, lambda renderer, *_: renderers.append(renderer))
-    return Taken(made, scene, renderers[0], dials)
+    asked = PageRequest(
+        scene, sliders, SETTINGS, {form: (SIDE,)}, os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
+    )
+    made = build_content(asked, lambda renderer, *_: renderers.append(renderer))
+    return Taken(made, scene, renderers[0], sliders)
 
 
 def shown(browser: Any, one: Taken, folder: Path) -> Shown:
     """A page, drawn once."""
     file = folder / "head.html"
-    file.write_text(web_page(one.made, one.dials, "head", ""), encoding="utf-8")
+    file.write_text(page_html(one.made, one.sliders, "head", ""), encoding="utf-8")
     page = browser.new_page(viewport={"width": SIDE, "height": SIDE}, offline=True)
     page.goto(file.as_uri())
     page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=120_000)
     assert page.evaluate(f"{STATE} + document.getElementById('told').textContent") == "drawn"
-    return Shown(page, one.scene, one.renderer, one.dials)
+    return Shown(page, one.scene, one.renderer, one.sliders)
 
 
 @pytest.fixture(scope="module")
 def rigged_taken(tmp_path_factory: pytest.TempPathFactory) -> Taken:
     file = write_rigged_head(tmp_path_factory.mktemp("rigged") / "rigged.glb")
     scene = dermis.Scene(dermis.load_head(file, subdivide=0))
-    return taken(scene, "gpu", dials_of(scene))
+    return taken(scene, "gpu", scene_sliders(scene))
 
 
 @pytest.fixture(scope="module")
@@ -167,12 +169,12 @@ def test_a_light_is_dragged_with_its_shadows(rigged: Shown) -> None:
 
 
 def test_a_dial_is_exact_at_its_nodes(rigged: Shown) -> None:
-    rough = next(one for one in rigged.dials if one.name == "roughness")
+    rough = next(one for one in rigged.sliders if one.name == "roughness")
     ran = rigged.turn(f"dermis.state.dials.roughness = {rough.values[-1]}; dermis.touch()")
     assert "shade" in ran and "stretch" not in ran
     scene = rough.scenes[-1]
     assert scene is not None and rigged.error(scene) < LIMIT < rigged.error(rigged.scene)
-    assert rigged.turn(f"dermis.state.dials.roughness = {rough.rest}; dermis.touch()")
+    assert rigged.turn(f"dermis.state.dials.roughness = {rough.default_value}; dermis.touch()")
     assert rigged.turn("dermis.touch()") == []
 
 
@@ -192,13 +194,13 @@ def test_a_lost_device_is_opened_again(rigged: Shown) -> None:
 
 
 def test_the_page_loads_nothing_and_words_of_users_stay_words(rigged_taken: Taken) -> None:
-    text = web_page(rigged_taken.made, rigged_taken.dials, WICKED, WICKED)
+    text = page_html(rigged_taken.made, rigged_taken.sliders, WICKED, WICKED)
     policy = html.unescape(re.search(r'Security-Policy" content="([^"]*)"', text)[1])  # type: ignore[index]
     script, style = (
         re.search(rf"<{tag}>(.*?)</", text, re.DOTALL)[1] for tag in ('script type="module"', "style")
     )  # type: ignore[index]
     assert policy.startswith("default-src 'none'") and "unsafe" not in policy and "connect" not in policy
-    assert hash_of(script) in policy and hash_of(style) in policy
+    assert csp_hash(script) in policy and csp_hash(style) in policy
     assert re.findall(r"https?://", text) == [] and "<script>alert" not in text
     assert text.count("<script") == text.count("</script>") == 4
 
@@ -211,8 +213,8 @@ def test_a_skin_by_itself_is_refused(tmp_path: Path) -> None:
 
 def test_modules_are_joined_in_order() -> None:
     assert {f"{name}.js" for name in MODULES} == {file.name for file in MODULES_FOLDER.glob("*.js")}
-    assert not re.search(r"^(import|export) ", player(), re.MULTILINE)
-    names = re.findall(r"^(?:async function|function|class|const|let) (\w+)", player(), re.MULTILINE)
+    assert not re.search(r"^(import|export) ", player_script(), re.MULTILINE)
+    names = re.findall(r"^(?:async function|function|class|const|let) (\w+)", player_script(), re.MULTILINE)
     assert len(names) > 40 and len(names) == len(set(names))
 
 

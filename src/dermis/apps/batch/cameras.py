@@ -44,7 +44,7 @@ def sampled_camera(
     points : control points of the face, from `face_points`
     aspect : width of the picture over its height [-]
     """
-    face = head.control.some_posed(points, motion) - np.array(head.centre_mm)
+    face = head.control.pose_points(points, motion) - np.array(head.centre_mm)
     values = table_numbers(parameters, "camera")
     distance = values["distance_mm"]
     frame = values.get("frame_mm") or distance * _SENSOR_MM / values["focal_mm"]

@@ -19,7 +19,7 @@ from dermis.apps.batch.shards import list_shards, read_manifest, shard_exists, s
 from dermis.apps.batch.spec import Spec
 from dermis.base.tables import read_rows
 from dermis.formats.samples import SAMPLES
-from dermis.human.labels.label_names import label_classes
+from dermis.human.labels.classes import label_classes
 from dermis.human.landmarks.points import read_landmark_table
 from dermis.human.landmarks.sets import SETS
 from dermis.human.model import CREDIT

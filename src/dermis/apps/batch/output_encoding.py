@@ -55,7 +55,7 @@ def encode_output(name: str, values: Array, encoding: Encoding) -> bytes:
         refuse(f"output {name}", "finite numbers", "some are not", "Report this with the spec, please")
     kind, dtype = file_format(name, encoding), _stored_dtype(OUTPUTS[name], encoding)
     if kind == "png":
-        return encode_png(np.atleast_3d(quantise(name, values)), quick=True)
+        return encode_png(np.atleast_3d(quantise(name, values)), use_isal=True)
     limited = np.clip(values, -_MAX_HALF, _MAX_HALF) if dtype.itemsize == 2 else values
     if kind == "npy":
         file = io.BytesIO()

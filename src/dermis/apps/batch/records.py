@@ -60,7 +60,7 @@ def encode_record(
     The suffixes are "png" for the picture, with alpha if it has no background; "NAME.png", "NAME.exr" or
     "NAME.npy" for each output, see `output_encoding.storage_description`; and "json" for the `Record`.
     """
-    files = {PICTURE_SUFFIX: encode_png(observation.picture, quick=True)}
+    files = {PICTURE_SUFFIX: encode_png(observation.picture, use_isal=True)}
     for name in spec.outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
         files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)

@@ -122,14 +122,9 @@ class ShardWriter:
         if self._written + len(self._left_out) != shard.stop - shard.first:
             raise ValueError(f"{self._written} images and {len(self._left_out)} left out do not fill {shard}")
         left_out = tuple(sorted(self._left_out.items()))
-        manifest = ShardManifest(
-            spec.digest(),
-            *astuple(shard),
-            left_out=left_out,
-            sha256=self._files.sha256(),
-            made_with=software_versions(self._adapter),
-        )
-        data = manifest.to_bytes()
+        sha256, versions = self._files.sha256(), software_versions(self._adapter)
+        images = shard.index, shard.first, shard.stop
+        data = ShardManifest(spec.digest(), *images, left_out, sha256, versions).to_bytes()
         if len(data) > MAX_MANIFEST_BYTES:
             actual = f"{len(left_out)} failed, for example: {left_out[0][1]}"
             advice = "Correct the spec"

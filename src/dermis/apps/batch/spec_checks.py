@@ -20,7 +20,7 @@ from dermis.human.makehuman import human_targets
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.pose import MOST_WEIGHT
+from dermis.mesh.pose import MAX_WEIGHT
 from dermis.scene.heads import HUMAN
 from dermis.scene.lights import NO_LIGHTS
 from dermis.scene.skin import Skin
@@ -129,8 +129,8 @@ def _check_looks(sampled: Mapping[str, Distribution]) -> None:
     known = [name for name in Skin.model_fields if name not in _NOT_SAMPLED]
     _check_table("skin", sampled, known, Skin)
     for name, distribution in table_values(sampled, "pose").items():
-        if any(isinstance(bound, str) or abs(bound) > MOST_WEIGHT for bound in distribution.support):
-            expected = f"numbers from {-MOST_WEIGHT:g} to {MOST_WEIGHT:g}"
+        if any(isinstance(bound, str) or abs(bound) > MAX_WEIGHT for bound in distribution.support):
+            expected = f"numbers from {-MAX_WEIGHT:g} to {MAX_WEIGHT:g}"
             refuse(f"pose: {name}", expected, f"got {distribution.spec_value()}", "Correct it")
 
 

@@ -191,9 +191,7 @@ class ExpressionTable(FrozenModel):
     movement in each part of the face, so that movements do not oppose each other."""
     intensity: Annotated[Distribution, NumberField(0, 1.5, "larger weights distort faces")] = Constant(1.0)
     """Factor of all weights."""
-    asymmetry: Annotated[Distribution, NumberField(-1, 1, "1 stills the right side")] = Constant(
-        0.0
-    )
+    asymmetry: Annotated[Distribution, NumberField(-1, 1, "1 stills the right side")] = Constant(0.0)
     """Relative increase of the left side's weights and decrease of the right side's [-]."""
     variation: Annotated[Distribution, _FRACTION] = Constant(0.0)
     """Random variation of each movement: standard deviation of the logarithm of its weight [-]."""

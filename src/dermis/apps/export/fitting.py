@@ -151,7 +151,9 @@ def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[
         return float(((unit_cdf(r / np.exp(log_length)) - reference) ** 2).sum())
 
     bounds = middle - _LOG_BOUND, middle + _LOG_BOUND
-    result = minimize_scalar(squared_error, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE})
+    result = minimize_scalar(
+        squared_error, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE}
+    )
     return float(np.exp(result.x))
 
 

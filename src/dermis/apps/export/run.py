@@ -93,7 +93,9 @@ class ExportReport:
         lines.append(f"{'d [mm]':12}{_numbers(self.d_mm)}  width of the fitted Burley profile")
         for name, meaning in _ERRORS.items():
             lines.append(f"{name:12}{_numbers(getattr(self.error, name))}  {meaning}")
-            lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  with the naive parameters")
+            lines.append(
+                f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  with the naive parameters"
+            )
         return [*lines, "", *self.limitation_texts()]
 
     def limitation_texts(self) -> list[str]:
@@ -185,7 +187,10 @@ def export_skin(
 def evaluate_export(subject: Subject, target: Target, version: str) -> ExportReport:
     """Return the report of an export, before anything is written."""
     parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
-    errors = [curve_error(subject.curve, target.predicted_curve(one, subject, version)) for one in (parameters, naive)]
+    errors = [
+        curve_error(subject.curve, target.predicted_curve(one, subject, version))
+        for one in (parameters, naive)
+    ]
     return ExportReport(
         target=target.name,
         title=target.title,

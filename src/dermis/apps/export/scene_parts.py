@@ -16,7 +16,9 @@ def supported_lights(lights: Iterable[Light], supported: Container[str], program
 
     known : kinds that the program has, points and parallel light among them
     """
-    return [_nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, start=1)]
+    return [
+        _nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, start=1)
+    ]
 
 
 def _nearest_kind(light: Light, supported: Container[str], culprit: str) -> Light:

@@ -16,7 +16,7 @@ from dermis.base.reading import checked_path
 from dermis.formats.gltf.materials import skin_pictures
 from dermis.formats.samples import SAMPLES
 from dermis.human.person_file import relief_slopes
-from dermis.mesh.eyeball import EyePictures
+from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
@@ -94,7 +94,7 @@ class Subject:
         """Return a curve with the subject's energy, times the ratio of the curve's energy to the albedo."""
         return curve.with_energy(self.curve.energy * curve.energy / np.maximum(self.albedo, _MIN_ALBEDO))
 
-    def eye_pictures(self) -> EyePictures | None:
+    def eye_pictures(self) -> EyeTextures | None:
         """Return what the eyes of the shape look like, painted on a device; None for a shape without eyes."""
         from dermis.frame.features.surface.painting.painted_head import eye_pictures
         from dermis.gpu.failures import run_on_device
@@ -109,7 +109,7 @@ class Subject:
         adapter : on which they are painted
         """
         head = self.head
-        if self.scene is None or head is None or not head.maps.painted:
+        if self.scene is None or head is None or not head.maps.is_painted:
             return self
         from dermis.frame.features.surface.painting.painted_head import with_painted_maps
         from dermis.gpu.failures import run_on_device
@@ -156,14 +156,18 @@ def load_subject(
     return Subject(path.name, curve, albedo, used, tissue, Scene(loaded, skin=skin))
 
 
-def _load_skin(name: str, profile: str | Path | None, model: ModelName | None, head: Iterable[str]) -> Subject:
+def _load_skin(
+    name: str, profile: str | Path | None, model: ModelName | None, head: Iterable[str]
+) -> Subject:
     for option in ("profile",) if profile is not None else tuple(head):
         refuse(option, "a head", f"got the skin {name}", "Omit this option, or name a head")
     curve, used, tissue = reference_curve(Skin(profile=name), model)
     return Subject(Path(name).name, curve, curve.energy, used, tissue)
 
 
-def reference_curve(skin: Skin, model: ModelName | None = None) -> tuple[CumulativeProfile, str, Tissue | None]:
+def reference_curve(
+    skin: Skin, model: ModelName | None = None
+) -> tuple[CumulativeProfile, str, Tissue | None]:
     """Return the curve of a skin's profile, the model that it is by, and its tissue.
 
     model : by default Monte Carlo for homogeneous media by name, which the package has tables of, layered
@@ -179,7 +183,9 @@ def reference_curve(skin: Skin, model: ModelName | None = None) -> tuple[Cumulat
             refuse("model", "a tissue", f"{skin.profile} is a table of Gaussians", "Omit this option")
         return CumulativeProfile.from_radial_profile(gaussian_radial_profile(table)), "table", None
     tissue = skin_tissue(skin)
-    tabulated = tabulated_curve(tissue.medium) if tissue.rgb is None and model in (None, "montecarlo") else None
+    tabulated = (
+        tabulated_curve(tissue.medium) if tissue.rgb is None and model in (None, "montecarlo") else None
+    )
     if tabulated is not None:
         return tabulated, "montecarlo", tissue
     used: ModelName = model or "layered"

@@ -127,7 +127,12 @@ class Target(ABC):
             return self.versions[-1]
         if version not in self.versions:
             expected = f"a supported version of {self.title}: {', '.join(self.versions)}"
-            refuse("version", expected, f"got {format_value(version)}", "Choose the nearest, and check the result")
+            refuse(
+                "version",
+                expected,
+                f"got {format_value(version)}",
+                "Choose the nearest, and check the result",
+            )
         return version
 
     def main_file(self, output: Path, subject: Subject, suffix: str = "") -> Path:

@@ -26,8 +26,8 @@ class Arnold(JsonTarget):
     title = "Arnold"
     versions = ("7",)
     limitations = (
-        "How the renderer converts a colour to a scattering albedo is not published; tabulated random walks of "
-        "this package are used instead. A single medium cannot represent layers."
+        "How the renderer converts a colour to a scattering albedo is not published; tabulated random walks "
+        "of this package are used instead. A single medium cannot represent layers."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:

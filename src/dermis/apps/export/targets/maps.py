@@ -39,8 +39,8 @@ _MAX_LEVEL, _WHITE_PERCENTILE = 65535, 99.9
 _LOGGER = logging.getLogger("dermis")
 PngEncoding = Literal["colour", "light", "normal", "share", "range", "root", "none"]
 """Encoding of a map as PNG: 8-bit sRGB; 8-bit sRGB of light divided by its 99.9th percentile; a normal n as
-(n + 1) / 2 in 16 bits; a fraction in 16 bits; the range from minimum to maximum in 16 bits; the square root in
-16 bits; no PNG."""
+(n + 1) / 2 in 16 bits; a fraction in 16 bits; the range from minimum to maximum in 16 bits; the square root
+in 16 bits; no PNG."""
 _SCATTERED = "scattered"
 _MAX_ATLAS_SIDE = 2048  # of the map in which light is diffused [texel]
 
@@ -69,11 +69,15 @@ MAP_INFOS: Mapping[str, MapInfo] = MappingProxyType(
         "reflected": MapInfo("", "share", "mean albedo of the specular reflection over all directions"),
         "melanin": MapInfo("", "share", "volume fraction of melanosomes in the epidermis"),
         "blood": MapInfo("", "share", "volume fraction of blood in the dermis"),
-        "thickness": MapInfo("mm", "range", "thickness of the tissue below, up to the depth that light reaches"),
+        "thickness": MapInfo(
+            "mm", "range", "thickness of the tissue below, up to the depth that light reaches"
+        ),
         "curvature": MapInfo("1/mm", "range", "root mean square of the principal curvatures, smoothed"),
         "stretch": MapInfo("mm", "none", "length on the skin of the maps' width (R) and height (G)"),
         "irradiance": MapInfo("irradiance", "light", "irradiance that enters the skin, before diffusion"),
-        "scattered": MapInfo("irradiance", "light", "pi times the radiance along the normal, after diffusion"),
+        "scattered": MapInfo(
+            "irradiance", "light", "pi times the radiance along the normal, after diffusion"
+        ),
     }
 )
 """Properties of the maps by name, which is also the name of their files."""
@@ -88,8 +92,8 @@ class MapFolder(Target):
     versions = ("1",)
     variants = ("opengl", "directx")
     limitations = (
-        "Light is baked for one pose and the lights of one scene, in the direction of the normal. The profile "
-        "is the sum of Gaussians of the renderer. Specular reflection depends on the viewer and is not included."
+        "Light is baked for one pose and one scene, in the direction of the normal. The profile is the sum "
+        "of Gaussians of the renderer. Specular reflection is not included, as it depends on the viewer."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
@@ -108,7 +112,9 @@ class MapFolder(Target):
         """Return the sum of Gaussians by which the frame spreads light, or none."""
         energy = subject.curve.energy
         if not get_value(parameters, _SCATTERED) or subject.scene is None:
-            return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3).astype(float), energy)
+            return CumulativeProfile.from_function(
+                lambda r: np.tile(r[:, None] > 0.0, 3).astype(float), energy
+            )
         profile = SkinProfiles().profile(subject.scene.skin)
         return gaussian_curve(profile.variance_mm2, profile.weight, energy)
 
@@ -120,7 +126,7 @@ class MapFolder(Target):
         scene, side = subject.scene, check_side(self.side)
         settings = Settings(atlas=min(max(side, SIDES[0]), _MAX_ATLAS_SIDE))
         baked = bake_maps(Renderer(self.adapter), scene, settings, side)
-        return write_files(output,  map_files(baked, scene, self._green))
+        return write_files(output, map_files(baked, scene, self._green))
 
     @property
     def _green(self) -> NormalY:
@@ -131,7 +137,7 @@ def encode_map_exr(name: str, values: Floats) -> bytes:
     """Return a map as OpenEXR: channels R, G, B of colours and vectors, Y of one number."""
     letters = "Y" if values.ndim == 2 else "RGB"
     channels = [values] if values.ndim == 2 else list(np.moveaxis(values, -1, 0))
-    return encode_exr_parts({name: dict(zip(letters, channels, strict=True))}, swift=True)
+    return encode_exr_parts({name: dict(zip(letters, channels, strict=True))}, fast=True)
 
 
 def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:
@@ -217,7 +223,7 @@ def _description(
         "format": "dermis maps 1",
         "made_by": f"dermis {version()}",
         "size": len(baked.covered),
-        "layout": "uv of the head, sampled at texel centres; row 0 is the top, where v = 1 if v points upwards",
+        "layout": "uv of the head, sampled at texel centres; row 0 is the top, v = 1 if v points upwards",
         "covered": float(baked.covered.mean()),
         "beyond_the_skin": "the nearest texel of the skin, so that filters never read black",
         "normal_green": "up (OpenGL)" if normal_y == "up" else "down (DirectX)",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.apps.export.fitting import fit_burley_width, burley_curve
+from dermis.apps.export.fitting import burley_curve, fit_burley_width
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import JsonTarget, Parameter, Parameters, floats, get_numbers
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -27,8 +27,8 @@ class RenderMan(JsonTarget):
     title = "RenderMan"
     versions = ("26",)
     limitations = (
-        "The model has no published closed form; the profile of its authors' paper is used. The path-traced and "
-        "multiple models differ."
+        "The model has no published closed form; the profile of its authors' paper is used. The path-traced "
+        "and multiple models differ."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:

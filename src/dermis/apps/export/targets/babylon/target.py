@@ -22,9 +22,9 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import Floats
 
 SAMPLE_COUNT = 40
-"""Of a pixel, where the lobe covers 160 pixels or more."""
+"""Samples of a pixel if the profile covers at least 160 pixels."""
 WIDTH_ERROR = 2.0
-"""Width on the screen over the one that metersPerUnit stands for."""
+"""Ratio of the rendered width of the profile to the width given by metersPerUnit [-]."""
 _GOLDEN = 1.618033988749895
 _PROFILE = "subSurface.scatteringDiffusionProfile"
 _SCALE = "subSurfaceConfiguration.metersPerUnit"
@@ -41,10 +41,10 @@ class Babylon(EnginePage):
     licence = "Apache-2.0"
     drawing_script = Path(__file__).with_name("babylon.js")
     limitations = (
-        "Forty samples of one lobe a channel, the same in every pixel: shadows' edges show steps of a "
-        "fortieth, and the narrower channels have fewer of them. Light spreads on the "
-        "screen only, not through thin parts; slopes count twice in depth; diffuse light above 1 is "
-        "cut off. Lights are parallel here."
+        "Every pixel uses the same 40 samples of one profile per channel, so shadow edges have steps of "
+        "1/40, and narrow channels have fewer samples. Light is diffused in screen space, not through thin "
+        "parts. Depth differences on slopes count twice, diffuse light above 1 is clipped, and all lights "
+        "are parallel."
     )
     library_files: ClassVar = {
         "9.28.0": (
@@ -69,21 +69,22 @@ class Babylon(EnginePage):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve of its samples."""
-        return spiral_curve(get_numbers(parameters, _PROFILE), get_numbers(parameters, _SCALE)[0], subject.curve.energy)
+        profile, (metres,) = get_numbers(parameters, _PROFILE), get_numbers(parameters, _SCALE)
+        return spiral_curve(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
         """Return two scripts."""
-        library_files = self.library_files[version]
+        files = self.library_files[version]
         if self.library_folder is None:
-            return "\n".join(script.element for script in library_files), [script.url for script in library_files]
-        texts = [escape_script(script.read(self.library_folder)) for script in library_files]
+            return "\n".join(file.element for file in files), [file.url for file in files]
+        texts = [escape_script(file.read(self.library_folder)) for file in files]
         return "\n".join(f"<script>{text}</script>" for text in texts), [csp_hash(text) for text in texts]
 
 
 def _parameters(subject: Subject, profile: Floats, metres: float) -> Parameters:
     return (
-        Parameter(_PROFILE, floats(profile), "-", "1/width: a smaller number spreads farther"),
-        Parameter(_SCALE, metres, "m", "widths are 2 mm by this and by the colour; no length of the scene's"),
+        Parameter(_PROFILE, floats(profile), "-", "inverse widths: smaller numbers diffuse farther"),
+        Parameter(_SCALE, metres, "m", "widths are 2 mm / (metersPerUnit colour), not a length of the scene"),
         *material_parameters(subject),
     )
 
@@ -102,9 +103,9 @@ def spiral_samples(colour: ArrayLike, samples: int = SAMPLE_COUNT) -> tuple[Floa
     return r[:, 0], 2.0 * np.pi * ((i / _GOLDEN) % 1.0), weight / weight.sum(axis=0)
 
 
-def burley_radii(share: ArrayLike) -> tuple[Floats, Floats]:
+def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
     """Return radii within which shares of a lobe of width 1 lie, and their weights 1 / (r pdf(r))."""
-    u = 1.0 - np.asarray(share, np.float64)
+    u = 1.0 - np.asarray(fraction, np.float64)
     g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
     n = g ** (-1.0 / 3.0)
     c = 1.0 + g * n * n + n
@@ -117,9 +118,9 @@ def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> Cumulat
     metres : metersPerUnit
     """
     r, _, weight = spiral_samples(colour)
-    true_mm = WIDTH_ERROR * r / metres
+    rendered_mm = WIDTH_ERROR * r / metres
     return CumulativeProfile.from_function(
-        lambda at: (at[:, None, None] >= true_mm[:, None]).astype(float)[..., 0] @ weight, energy
+        lambda radius: (radius[:, None] >= rendered_mm).astype(float) @ weight, energy
     )
 
 

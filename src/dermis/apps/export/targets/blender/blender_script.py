@@ -18,11 +18,12 @@ import numpy as np
 
 from dermis.apps.truths.cycles_script import add_light, add_object, set_camera, set_world
 
-DESCRIBED: dict[str, Any] = {}
+EXPORT: dict[str, Any] = {}
 
 
-def main(words: list[str]) -> None:
-    asked = options(words)
+def main(arguments: list[str]) -> None:
+    """Build the scene of this export, then save and render it as requested."""
+    options = parse_options(arguments)
     check_version()
     if bpy.app.background:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -30,67 +31,70 @@ def main(words: list[str]) -> None:
         bpy.ops.scene.new(type="EMPTY")
     set_units(bpy.context.scene)
     place_head()
-    for light in DESCRIBED["lights"]:
+    for light in EXPORT["lights"]:
         add_light(light)
-    panorama = DESCRIBED["world"].get("panorama")
-    set_world(DESCRIBED["world"], panorama and np.load(folder() / panorama, allow_pickle=False))
-    set_camera(DESCRIBED["camera"])
+    panorama = EXPORT["world"].get("panorama")
+    set_world(EXPORT["world"], panorama and np.load(data_folder() / panorama, allow_pickle=False))
+    set_camera(EXPORT["camera"])
     set_render(bpy.context.scene)
-    finish(asked)
+    finish(options)
 
 
-def options(words: list[str]) -> argparse.Namespace:
-    """What stands after -- in the command."""
+def parse_options(arguments: list[str]) -> argparse.Namespace:
+    """Return the options after -- on the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--render", type=Path, help="picture to render: .png or .exr")
-    parser.add_argument("--samples", type=int, default=128, help="paths through each pixel")
-    parser.add_argument("--seed", type=int, default=0, help="of the random numbers")
-    parser.add_argument("--save", type=Path, help="Blender file to save, with all it needs packed into it")
-    return parser.parse_args(words[words.index("--") + 1 :] if "--" in words else [])
+    parser.add_argument("--samples", type=int, default=128, help="samples per pixel")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the random numbers")
+    parser.add_argument("--save", type=Path, help="Blender file to save, with all data packed into it")
+    return parser.parse_args(arguments[arguments.index("--") + 1 :] if "--" in arguments else [])
 
 
 def check_version() -> None:
-    """Refuse a Blender in which the numbers mean something else."""
-    (least, below), now = DESCRIBED["versions"], bpy.app.version[:2]
-    if now < tuple(least) or (below is not None and now >= tuple(below)):
-        until = "" if below is None else f" and before {below[0]}.{below[1]}"
+    """Refuse a version of Blender in which the parameters have another meaning."""
+    (first, end), version = EXPORT["versions"], bpy.app.version[:2]
+    if version < tuple(first) or (end is not None and version >= tuple(end)):
+        until = "" if end is None else f" and before {end[0]}.{end[1]}"
+        major, minor = version
         raise SystemExit(
-            f"this file: expected Blender from {least[0]}.{least[1]}{until}, but {now[0]}.{now[1]} runs it. "
-            f"Export it again with --version {now[0]}.{now[1]}: the radius means something else there."
+            f"this file: expected Blender from {first[0]}.{first[1]}{until}, but {major}.{minor} runs it. "
+            f"Export it again with --version {major}.{minor}: the radius has another meaning there."
         )
 
 
-def folder() -> Path:
-    """Where the files beside this one are; the text editor runs a copy without a place."""
-    opened = [Path(bpy.path.abspath(text.filepath)) for text in bpy.data.texts if text.filepath]
-    places = [Path(__file__).resolve().parent, *(file.parent for file in opened)]
-    wanted = DESCRIBED["head"] or DESCRIBED["world"].get("panorama")
-    return next((place for place in places if wanted and (place / wanted).is_file()), places[0])
+def data_folder() -> Path:
+    """Return the folder of the files beside this one; Blender's text editor runs a copy without a path."""
+    texts = [Path(bpy.path.abspath(text.filepath)) for text in bpy.data.texts if text.filepath]
+    folders = [Path(__file__).resolve().parent, *(file.parent for file in texts)]
+    name = EXPORT["head"] or EXPORT["world"].get("panorama")
+    return next((folder for folder in folders if name and (folder / name).is_file()), folders[0])
 
 
 def set_units(scene: Any) -> None:
-    scene.name = DESCRIBED["name"]
+    """Set the scene's name and its unit, the metre."""
+    scene.name = EXPORT["name"]
     scene.unit_settings.system = "METRIC"
     scene.unit_settings.scale_length = 1.0
 
 
 def place_head() -> None:
-    """The head of the file beside this one, its skin with the numbers above, or a ball."""
-    if DESCRIBED["head"] is None:
-        add_ball(DESCRIBED["ball_m"])
+    """Import the head from the file beside this one and set its skin, or add a ball."""
+    if EXPORT["head"] is None:
+        add_ball(EXPORT["ball_m"])
         return
     bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
     before = set(bpy.data.objects)
-    bpy.ops.import_scene.gltf(filepath=str(folder() / DESCRIBED["head"]))
-    added = [one for one in bpy.data.objects if one not in before and one.type == "MESH"]
-    head = max((one for one in added if one.users_scene), key=lambda one: len(one.data.vertices))
-    for slot in DESCRIBED["skin_slots"]:
+    bpy.ops.import_scene.gltf(filepath=str(data_folder() / EXPORT["head"]))
+    meshes = [added for added in bpy.data.objects if added not in before and added.type == "MESH"]
+    head = max((mesh for mesh in meshes if mesh.users_scene), key=lambda mesh: len(mesh.data.vertices))
+    for slot in EXPORT["skin_slots"]:
         material = head.material_slots[slot].material
         set_skin(next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"))
 
 
 def add_ball(diameter: float) -> None:
-    import bmesh  # type: ignore[import-not-found,unused-ignore]  # which is there once bpy is
+    """Add a ball with the skin."""
+    import bmesh  # type: ignore[import-not-found,unused-ignore]  # exists after bpy is imported
 
     mesh, shape = bpy.data.meshes.new("ball"), bmesh.new()
     bmesh.ops.create_uvsphere(shape, u_segments=192, v_segments=96, radius=0.5 * diameter)
@@ -102,61 +106,62 @@ def add_ball(diameter: float) -> None:
 
 
 def make_skin() -> Any:
-    """Skin of one colour."""
+    """Return a skin material of one colour."""
     material = bpy.data.materials.new("skin")
     material.use_nodes = True
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = (*DESCRIBED["colour"], 1.0)
-    shader.inputs["Roughness"].default_value = DESCRIBED["roughness"]
+    shader.inputs["Base Color"].default_value = (*EXPORT["colour"], 1.0)
+    shader.inputs["Roughness"].default_value = EXPORT["roughness"]
     set_skin(shader)
     return material
 
 
 def set_skin(shader: Any) -> None:
-    """Subsurface scattering and the surface's strength; maps stay, the roughness for Blender's facets."""
-    if DESCRIBED["method"] != "EEVEE":
-        shader.subsurface_method = DESCRIBED["method"]
-    for name, value in DESCRIBED["inputs"].items():
+    """Set subsurface scattering and specular strength, and convert the roughness to GGX; maps are kept."""
+    if EXPORT["method"] != "EEVEE":
+        shader.subsurface_method = EXPORT["method"]
+    for name, value in EXPORT["inputs"].items():
         shader.inputs[name].default_value = value
     rough = shader.inputs["Roughness"]
-    rough.default_value *= DESCRIBED["smoother"]
+    rough.default_value *= EXPORT["smoother"]
     if rough.links:
         tree = shader.id_data
         factor = tree.nodes.new("ShaderNodeMath")
-        factor.operation, factor.inputs[1].default_value = "MULTIPLY", DESCRIBED["smoother"]
+        factor.operation, factor.inputs[1].default_value = "MULTIPLY", EXPORT["smoother"]
         tree.links.new(rough.links[0].from_socket, factor.inputs[0])
         tree.links.new(factor.outputs[0], rough)
 
 
 def set_render(scene: Any) -> None:
+    """Set the render engine, the size of the picture and its colours."""
     known = {item.identifier for item in scene.render.bl_rna.properties["engine"].enum_items}
     eevee = "BLENDER_EEVEE_NEXT" if "BLENDER_EEVEE_NEXT" in known else "BLENDER_EEVEE"
-    scene.render.engine = eevee if DESCRIBED["method"] == "EEVEE" else "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = DESCRIBED["size"]
+    scene.render.engine = eevee if EXPORT["method"] == "EEVEE" else "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = EXPORT["size"]
     scene.render.resolution_percentage = 100
     scene.render.film_transparent = True
     scene.view_settings.view_transform = "Standard"
 
 
-def finish(asked: argparse.Namespace) -> None:
-    """Save and render what was asked for."""
+def finish(options: argparse.Namespace) -> None:
+    """Save and render the scene as requested."""
     scene = bpy.context.scene
     if scene.render.engine == "CYCLES":
         cycles = scene.cycles
-        cycles.samples, cycles.seed, cycles.use_adaptive_sampling = asked.samples, asked.seed, False
+        cycles.samples, cycles.seed, cycles.use_adaptive_sampling = options.samples, options.seed, False
         cycles.pixel_filter_type = "BOX"
-        # Its defaults trade a biased, darker picture for less noise.
+        # The defaults reduce noise at the cost of a biased, darker picture.
         cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.light_sampling_threshold = 0.0
         cycles.use_denoising = False
-    if asked.save is not None:
+    if options.save is not None:
         bpy.ops.file.pack_all()
-        bpy.ops.wm.save_as_mainfile(filepath=str(asked.save.resolve()))
-    if asked.render is not None:
-        linear = asked.render.suffix.lower() == ".exr"
+        bpy.ops.wm.save_as_mainfile(filepath=str(options.save.resolve()))
+    if options.render is not None:
+        linear = options.render.suffix.lower() == ".exr"
         scene.render.image_settings.file_format = "OPEN_EXR" if linear else "PNG"
         scene.render.image_settings.color_mode = "RGBA"
         scene.render.image_settings.color_depth = "32" if linear else "8"
-        scene.render.filepath = str(asked.render.resolve())
+        scene.render.filepath = str(options.render.resolve())
         bpy.ops.render.render(write_still=True)
 
 

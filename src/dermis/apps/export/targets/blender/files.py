@@ -6,6 +6,7 @@ Scenes are in metres with Z upwards.
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from pprint import pformat
@@ -20,8 +21,8 @@ from dermis.apps.export.subject import BALL_MM, Subject
 from dermis.apps.export.target import Parameters, floats
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
 from dermis.apps.truths.cycles import cycles_camera
-from dermis.apps.truths.scene_description import UNIT_MM, SceneDict, cycles_world
 from dermis.apps.truths.lights import CYCLES, cycles_lamp
+from dermis.apps.truths.scene_description import UNIT_MM, SceneDict, cycles_world
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -31,63 +32,53 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
 Versions = tuple[list[int], list[int] | None]
-"""First version that numbers hold for, and the first that they no longer hold for, or None."""
+"""First version for which the parameters are valid, and the first for which they are not, or None."""
 SCRIPT, HEAD, PANORAMA = "skin.py", "head.glb", "panorama.npy"
-"""Names of the files in a folder."""
-M = 1e-3
-"""Of a millimetre."""
-_UNIT_M = UNIT_MM * M
+"""Names of the files in an output folder."""
+METRES_PER_MM = 1e-3
+_UNIT_M = UNIT_MM * METRES_PER_MM
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-_BALL_DISTANCE_MM, _BALL_FRAME_MM = 1100.0, 140.0  # of the camera before a ball
+_BALL_DISTANCE_MM, _BALL_FRAME_MM = 1100.0, 140.0  # camera in front of a ball
 _LENGTH_FIELDS = ("shadow_soft_size", "size", "size_y")
-_PROCESS_PURPOSE = BlenderTask(
+_TASK = BlenderTask(
     "Blender",
-    "to make the scene",
-    "Name a Python whose bpy is of the version asked for, or write a folder and run its script in Blender",
+    "to create the scene",
+    "Set it to a Python whose bpy has the requested version, or export a folder and run the script in it",
 )
 _TIMEOUT_S = 600.0
 _GGX_RATIO = 0.5
-"""Roughness of GGX's facets over that of our two lobes, by least squares of the roots of the lobes."""
-_MAX_NAME_LENGTH = 60  # characters of a name, of which Blender keeps 63
-_DATA_LINE = "DESCRIBED: dict[str, Any] = {}\n"
-_COPIED_IMPORT = "from dermis.apps.truths.cycles_script import add_light, add_object, set_camera, set_world\n"
-_IMPORT_REPLACEMENT = "from mathutils import Matrix\n"
+"""GGX roughness over the renderer's Beckmann roughness, by least squares of the square roots of the lobes."""
+_MAX_NAME_LENGTH = 60  # characters; Blender keeps 63
+_DATA_LINE = "EXPORT: dict[str, Any] = {}\n"
+_IMPORT = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
 _TYPE_COMMENT = "  # type: ignore[import-not-found,unused-ignore]"
 _MAIN_GUARD = 'if __name__ == "__main__":'
-_COPIED_FUNCTIONS = [
-    "set_camera",
-    "set_world",
-    "packed_image",
-    "add_light",
-    "paint_stripe",
-    "connected",
-    "add_object",
-]
-"""Functions of the script by which Cycles renders scenes for comparison, and those that they call."""
 
 
-def write_scene(subject: Subject, parameters: Parameters, output: Path, method: str, versions: Versions) -> list[Path]:
+def write_scene(
+    subject: Subject, parameters: Parameters, output: Path, method: str, versions: Versions
+) -> list[Path]:
     """Write the files of a subject to the place that `Target.write` gets; return their paths.
 
     method : of Principled BSDF, or EEVEE
     """
-    description = _describe_skin(subject, parameters, method, versions)
-    if place.suffix == ".blend":
+    skin = _describe_skin(subject, parameters, method, versions)
+    if output.suffix == ".blend":
         python = blender_python()
         with TemporaryDirectory(prefix="dermis-blender-") as name:
-            script = _write(subject, description, Path(name) / SCRIPT, HEAD)[0]
-            run_blender(python, script, ["--", "--save", str(place)], _TIMEOUT_S, _PROCESS_PURPOSE)
+            script = _write(subject, skin, Path(name) / SCRIPT, HEAD)[0]
+            run_blender(python, script, ["--", "--save", str(output)], _TIMEOUT_S, _TASK)
         return [output]
-    if place.suffix == ".py":
-        return _write(subject, description, place, f"{place.stem}.glb")
-    return _write(subject, description, place / SCRIPT, HEAD)
+    if output.suffix == ".py":
+        return _write(subject, skin, output, f"{output.stem}.glb")
+    return _write(subject, skin, output / SCRIPT, HEAD)
 
 
 def _describe_skin(subject: Subject, parameters: Parameters, method: str, versions: Versions) -> SceneDict:
     skin = subject.skin
-    values = {row.name: row.value for row in parameters if row.name != "Subsurface Method"}
-    inputs = {name: list(one) if isinstance(one, tuple) else one for name, one in values.items()}
-    name = "".join(one if one.isprintable() else " " for one in Path(subject.name).name)
+    values = {one.name: one.value for one in parameters if one.name != "Subsurface Method"}
+    inputs = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+    name = "".join(letter if letter.isprintable() else " " for letter in Path(subject.name).name)
     return {
         "name": name[:_MAX_NAME_LENGTH] or "skin",
         "versions": list(versions),
@@ -96,37 +87,36 @@ def _describe_skin(subject: Subject, parameters: Parameters, method: str, versio
         "colour": list(floats(subject.clipped_albedo())),
         "roughness": float(np.sqrt(skin.roughness)),
         "smoother": float(np.sqrt(skin.smoothing * _GGX_RATIO)),
-        "ball_m": BALL_MM * M,
+        "ball_m": BALL_MM * METRES_PER_MM,
         "head": None,
         "skin_slots": skin_slots(subject.head_or_ball),
         "size": list(Settings().size),
     }
 
 
-def _write(subject: Subject, description: SceneDict, script: Path, head: str) -> list[Path]:
+def _write(subject: Subject, skin: SceneDict, script: Path, head: str) -> list[Path]:
     """Write the script and the files that it reads beside it."""
     files, scene = [script], subject.scene
     if scene is None:
-        world_settings, panorama = describe_scene(_ball_scene(subject.head_or_ball), np.zeros(3))
+        surroundings, panorama = describe_scene(_ball_scene(subject.head_or_ball), np.zeros(3))
     else:
-        world_settings, panorama = describe_scene(scene, scene.head.centre_mm)
-        world_settings["head"] = head
+        surroundings, panorama = describe_scene(scene, scene.head.centre_mm)
+        surroundings["head"] = head
         files.append(script.with_name(head))
-        files[-1].write_bytes(_glb(subject, scene))
+        files[-1].write_bytes(_encode_head(subject, scene))
     if panorama is not None:
         files.append(script.with_name(PANORAMA))
         np.save(files[-1], panorama)
-    script.write_text(script_text(description | world_settings), encoding="utf-8")
+    script.write_text(script_text(skin | surroundings), encoding="utf-8")
     return files
 
 
-def _glb(subject: Subject, scene: Scene) -> bytes:
+def _encode_head(subject: Subject, scene: Scene) -> bytes:
     """Return the head with all that moves it, its eyes and its hairs."""
-    pose = scene.pose
     return encode_head(
         scene.head,
         roughness=scene.skin.roughness,
-        weights={} if pose is None else dict(pose.weights),
+        weights={} if scene.pose is None else dict(scene.pose.weights),
         slopes=relief_slopes(scene.head),
         eyes=subject.eye_pictures(),
     )
@@ -138,18 +128,25 @@ def skin_slots(head: Head) -> list[int]:
     return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
 
 
-def script_text(description: Mapping[str, object]) -> str:
+def script_text(export: Mapping[str, object]) -> str:
     """Return the script for what is described: plain numbers, words, lists and tables of them.
 
     Words become literals as Python writes them, so that no name can be code.
     """
     text = Path(__file__).with_name("blender_script.py").read_text(encoding="utf-8")
     source = (Path(*truths.__path__) / "cycles_script.py").read_text(encoding="utf-8")
-    known = {one.name: one for one in ast.parse(source).body if isinstance(one, ast.FunctionDef)}
-    borrowed = "\n\n\n".join(str(ast.get_source_segment(source, known[name])) for name in _COPIED_FUNCTIONS)
-    literal = pformat(dict(description), width=110, sort_dicts=False)
-    text = text.replace(_COPIED_IMPORT, _IMPORT_REPLACEMENT).replace(_MAIN_GUARD, f"{borrowed}\n\n\n{_MAIN_GUARD}").replace(_TYPE_COMMENT, "")
-    return text.replace(_DATA_LINE, f"DESCRIBED: dict[str, Any] = {literal}\n")
+    functions = {node.name: node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
+    imported = _IMPORT.search(text)
+    assert imported is not None
+    names = imported[1].split(", ")
+    for name in names:  # grows by the functions that are called
+        called = {node.id for node in ast.walk(functions[name]) if isinstance(node, ast.Name)}
+        names += sorted(called & functions.keys() - {*names})
+    copied = "\n\n\n".join(str(ast.get_source_segment(source, functions[name])) for name in names)
+    literal = pformat(dict(export), width=110, sort_dicts=False)
+    text = _IMPORT.sub("from mathutils import Matrix\n", text).replace(_TYPE_COMMENT, "")
+    text = text.replace(_MAIN_GUARD, f"{copied}\n\n\n{_MAIN_GUARD}")
+    return text.replace(_DATA_LINE, f"EXPORT: dict[str, Any] = {literal}\n")
 
 
 def _ball_scene(ball: Head) -> Scene:
@@ -164,20 +161,16 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
 
     Raises DermisError for lights and cameras that Blender has not.
     """
-    centre = np.array(centre_mm) * M
-    known = supported_lights(scene.lights, CYCLES, "Blender")
-    lights = [_light(cycles_lamp(light, number), centre) for number, light in enumerate(known, start=1)]
+    centre = np.array(centre_mm) * METRES_PER_MM
+    supported = supported_lights(scene.lights, CYCLES, "Blender")
+    lights = [_convert_lamp(cycles_lamp(light, k), centre) for k, light in enumerate(supported, start=1)]
     camera = cycles_camera(scene)
-    world_settings, panorama = cycles_world(scene.environment)
-    if "turn" in world_settings:
-        world_settings["turn"] = (np.array(world_settings["turn"]) @ _UPRIGHT[:3, :3].T).tolist()
-        world_settings["panorama"] = PANORAMA
-    description = {
-        "lights": lights,
-        "camera": camera | {"to_world": _upright_transform(camera["to_world"], centre)},
-        "world": world_settings,
-    }
-    return description, panorama.get("panorama")
+    world, panorama = cycles_world(scene.environment)
+    if "turn" in world:
+        world["turn"] = (np.array(world["turn"]) @ _UPRIGHT[:3, :3].T).tolist()
+        world["panorama"] = PANORAMA
+    camera |= {"to_world": _upright_transform(camera["to_world"], centre)}
+    return {"lights": lights, "camera": camera, "world": world}, panorama.get("panorama")
 
 
 def _upright_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]:
@@ -187,14 +180,15 @@ def _upright_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]
     return [[float(value) for value in row] for row in _UPRIGHT @ matrix]
 
 
-def _light(description: SceneDict, centre: Floats) -> SceneDict:
-    fields = dict(description["set"])
+def _convert_lamp(lamp: SceneDict, centre: Floats) -> SceneDict:
+    """Return a lamp of Cycles' scenes for the upright head in metres."""
+    fields = dict(lamp["set"])
     fields |= {name: fields[name] * _UNIT_M for name in _LENGTH_FIELDS if name in fields}
-    if description["type"] != "SUN":
-        fields["energy"] *= _UNIT_M**2  # power, which spreads over squares of lengths
-    made = description | {"set": fields, "to_world": _upright_transform(description["to_world"], centre)}
-    if "stripe" in description:
-        stripe = description["stripe"]
+    if lamp["type"] != "SUN":
+        fields["energy"] *= _UNIT_M**2  # radiant power is irradiance times area
+    converted = lamp | {"set": fields, "to_world": _upright_transform(lamp["to_world"], centre)}
+    if "stripe" in lamp:
+        stripe = lamp["stripe"]
         axes = {name: _UPRIGHT[:3, :3] @ np.array(stripe[name]) for name in ("forward", "across", "along")}
-        made["stripe"] = stripe | {name: axis.tolist() for name, axis in axes.items()}
-    return made
+        converted["stripe"] = stripe | {name: axis.tolist() for name, axis in axes.items()}
+    return converted

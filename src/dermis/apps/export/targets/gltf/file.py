@@ -38,15 +38,15 @@ def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
         slopes=relief_slopes(head),
         notes=notes,
         eyes=subject.eye_pictures(),
-        added=_added(subject, head, extensions, draft),
+        additions=_skin_additions(subject, head, extensions, draft),
     )
 
 
-def _added(subject: Subject, head: Head, extensions: Extensions, draft: str) -> SkinAdditions:
+def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft: str) -> SkinAdditions:
     """Return additions to the skin's material; a colour map gives a map of scattered colours too."""
     if not draft:
-        plain = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
-        return SkinAdditions({} if head.maps.colour is not None else plain, extensions)
+        colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
+        return SkinAdditions({} if head.maps.colour is not None else colour, extensions)
     white, extras = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, {"draft": draft}
     if head.maps.colour is None:
         return SkinAdditions(white, extensions, extras)
@@ -54,5 +54,5 @@ def _added(subject: Subject, head: Head, extensions: Extensions, draft: str) -> 
     scattered = np.interp(head.maps.colour, steps, multiscatter_for_reflectance(steps)).astype(np.float32)
     scatter = {**extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
     scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER}
-    made = {**extensions, "KHR_materials_scatter": scatter}
-    return SkinAdditions(white, made, extras, {_MULTISCATTER: colours_png(scattered)})
+    extensions = {**extensions, "KHR_materials_scatter": scatter}
+    return SkinAdditions(white, extensions, extras, {_MULTISCATTER: colours_png(scattered)})

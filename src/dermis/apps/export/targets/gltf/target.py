@@ -22,10 +22,10 @@ _MULTISCATTER = "KHR_materials_scatter.multiscatterColorFactor"
 _FACTOR = "KHR_materials_diffuse_transmission.diffuseTransmissionFactor"
 _TRANSMISSION_COLOUR = "KHR_materials_diffuse_transmission.diffuseTransmissionColorFactor"
 _BASE = "pbrMetallicRoughness.baseColorFactor"
-_IOR = Parameter("KHR_materials_ior.ior", SKIN_ETA, "-", "of the surface, which reflects 0.028 straight ahead")
-_THICKNESS_M = 0.1  # a ball, and about a head: programs that trace no rays take it for the way through
-_EAR_MM = 4.0  # where light comes through a head
-_NAIVE_FACTOR = 0.5  # share of the light that a user lets through who sees the slider
+_IOR = Parameter("KHR_materials_ior.ior", SKIN_ETA, "-", "reflectance 0.028 at normal incidence")
+_THICKNESS_M = 0.1  # of a head; used as path length by programs that trace no rays
+_EAR_MM = 4.0  # thickness at which the transmitted light is computed
+_NAIVE_FACTOR = 0.5  # middle of the slider
 
 
 class Gltf(Target):
@@ -38,10 +38,10 @@ class Gltf(Target):
     variants = (SCATTER, DIFFUSE)
     needs_maps = True
     limitations = (
-        f"{DRAFT}. Programs that trace rays and know it show this table's numbers; those that know"
-        " transmission and volume alone show dark glass; those that rasterise take the multiscatter colour"
-        f" for the one that is seen, and show skin too light. The variant {DIFFUSE} looks like skin"
-        " everywhere, but light does not spread in it: edges of shadows stay sharp."
+        f"{DRAFT}. Ray tracers that support it show the errors of this table. Programs that support only"
+        " transmission and volume show dark glass. Rasterisers use the multiscatter colour as base colour, so"
+        f" the skin is too light. The variant {DIFFUSE} looks like skin in all programs, but light is not"
+        " diffused: shadow edges stay sharp."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
@@ -61,41 +61,43 @@ class Gltf(Target):
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """A walk under a refracting surface; for diffuse transmission all light where it falls."""
         if self.variant == DIFFUSE:
-            back = (1.0 - get_numbers(parameters, _FACTOR)[0]) * subject.curve.energy
-            return CumulativeProfile.from_function(lambda r: np.repeat((r > 0.0)[:, None], 3, axis=1), back)
+            reflected = (1.0 - get_numbers(parameters, _FACTOR)[0]) * subject.curve.energy
+            return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), reflected)
         return subject.rescale_energy(volume_curve(_parameter_volume(parameters)))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """One .glb file; the skin's material has the extensions, none of which is required."""
         extensions: dict[str, dict[str, Value | list[float]]] = {"KHR_materials_ior": {"ior": SKIN_ETA}}
-        for row in parameters:
-            extension, _, member = row.name.partition(".")
+        for one in parameters:
+            extension, _, member = one.name.partition(".")
             if extension.startswith("KHR_"):
-                value = list(row.value) if isinstance(row.value, tuple) else row.value
+                value = list(one.value) if isinstance(one.value, tuple) else one.value
                 extensions.setdefault(extension, {})[member] = value
         output.write_bytes(encode_glb(subject, extensions, DRAFT if self.variant != DIFFUSE else ""))
         return [output]
 
 
 def _scatter_parameters(volume: Volume) -> Parameters:
-    strength, multiscatter = "KHR_materials_scatter.scatterStrengthFactor", floats(volume.multiscatter)
+    multiscatter = floats(volume.multiscatter)
     return (
-        Parameter("KHR_materials_transmission.transmissionFactor", 1.0, "-", "all light goes into the volume"),
-        Parameter("KHR_materials_volume.thicknessFactor", _THICKNESS_M, "m", "above 0 for a volume"),
-        Parameter(_DISTANCE, volume.distance_m, "m", "the longest mean free path"),
-        Parameter(_COLOUR, floats(volume.colour), "-", "of light without an event on that way"),
-        Parameter(strength, 1.0, "-", "all of the colour below"),
-        Parameter(_MULTISCATTER, multiscatter, "-", "by van de Hulst, of all light; a head has a map"),
-        Parameter("KHR_materials_scatter.scatterAnisotropy", 0.0, "-", "mean cosine: the paths are reduced ones"),
+        Parameter("KHR_materials_transmission.transmissionFactor", 1.0, "-", "all light enters the volume"),
+        Parameter("KHR_materials_volume.thicknessFactor", _THICKNESS_M, "m", "above 0 enables the volume"),
+        Parameter(_DISTANCE, volume.distance_m, "m", "the largest mean free path"),
+        Parameter(_COLOUR, floats(volume.colour), "-", "fraction of the light without an event on that path"),
+        Parameter("KHR_materials_scatter.scatterStrengthFactor", 1.0, "-", "factor of the colour below"),
+        Parameter(_MULTISCATTER, multiscatter, "-", "by van de Hulst's formula, or a map"),
+        Parameter(
+            "KHR_materials_scatter.scatterAnisotropy", 0.0, "-", "the mean free paths are reduced ones"
+        ),
         _IOR,
     )
 
 
 def _diffuse_parameters(subject: Subject, factor: float, colour: Floats) -> Parameters:
     return (
-        Parameter(_BASE, floats(subject.albedo), "-", "diffuse reflectance; the mean where it is a map"),
-        Parameter(_FACTOR, float(factor), "-", f"share that comes through: of {_EAR_MM:g} mm, as of an ear"),
-        Parameter(_TRANSMISSION_COLOUR, floats(colour), "-", "colour of what comes through"),
+        Parameter(_BASE, floats(subject.albedo), "-", "diffuse reflectance; the mean of a colour map"),
+        Parameter(_FACTOR, float(factor), "-", f"transmitted fraction at {_EAR_MM:g} mm, as of an ear"),
+        Parameter(_TRANSMISSION_COLOUR, floats(colour), "-", "colour of the transmitted light"),
         _IOR,
     )
 
@@ -106,10 +108,10 @@ def _transmission(subject: Subject) -> tuple[float, Floats]:
     Source: [ChristensenBurley2015], integrated over a plane at a depth.
     """
     d = fit_burley_width(subject.curve)
-    through = 0.25 * subject.albedo * (np.exp(-_EAR_MM / d) + 3.0 * np.exp(-_EAR_MM / (3.0 * d)))
-    most = float(through.max())
-    back = float(subject.albedo[int(through.argmax())])
-    return most / max(most + back, 1e-9), through / max(most, 1e-9)
+    transmitted = 0.25 * subject.albedo * (np.exp(-_EAR_MM / d) + 3.0 * np.exp(-_EAR_MM / (3.0 * d)))
+    largest = float(transmitted.max())
+    reflected = float(subject.albedo[int(transmitted.argmax())])
+    return largest / max(largest + reflected, 1e-9), transmitted / max(largest, 1e-9)
 
 
 def _parameter_volume(parameters: Parameters) -> Volume:

@@ -12,7 +12,7 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.half_space import half_space, tabulated_albedo
 from dermis.optics.media import Floats
 
-_MIN_COLOUR = 1e-300  # share of the light without an event
+_MIN_COLOUR = 1e-300
 _MAX_COLOUR = 1.0 - 1e-12
 
 
@@ -71,5 +71,5 @@ def fit_volume(curve: CumulativeProfile, energy: Floats | None = None) -> Volume
 
     energy : (3,) that it gives back instead, a colour map's [-]
     """
-    found = fit_homogeneous_medium(curve, energy)
-    return volume_from_paths(found.mfp_mm, multiscatter_colour(found.albedo))
+    medium = fit_homogeneous_medium(curve, energy)
+    return volume_from_paths(medium.mfp_mm, multiscatter_colour(medium.albedo))

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from dermis.apps.export.scene_parts import encode_ply
 from dermis.apps.export.targets.mitsuba.xml import XmlBackend
 from dermis.apps.truths.mitsuba_scene import interface_gap_mm
-from dermis.apps.truths.mitsuba_solid import offset_inwards, closed_skin
+from dermis.apps.truths.mitsuba_solid import closed_skin, offset_inwards
 from dermis.frame.baking import bake_albedo
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 
-_SUBDIVISIONS = 4  # times, along a side
+_SUBDIVISIONS = 4  # parts of each edge
 
 
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
@@ -34,15 +34,15 @@ def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     outer, _ = offset_inwards(solid, -interface_gap_mm(backend, solid), head.name)
     used, corners = np.unique(mesh.triangles[skin], return_inverse=True)
-    of_solid = np.unique(mesh.point[used], return_inverse=True)[1]  # as the solid's points are numbered
-    given = mesh.normals[used], mesh.uv[used]
+    solid_vertex = np.unique(mesh.point[used], return_inverse=True)[1]
+    attributes = mesh.normals[used], mesh.uv[used]
     count = int(skin.sum())
     files = {}
-    for name, one, caps in (("skin", solid, "caps"), ("upper", outer, "upper_caps")):
-        files[name] = encode_ply(corners.reshape(-1, 3), one.positions[of_solid], *given)
-        if len(one.triangles) > count:
-            shut, ends = np.unique(one.triangles[count:], return_inverse=True)
-            files[caps] = encode_ply(ends.reshape(-1, 3), one.positions[shut])
+    for name, surface, caps in (("skin", solid, "caps"), ("upper", outer, "upper_caps")):
+        files[name] = encode_ply(corners.reshape(-1, 3), surface.positions[solid_vertex], *attributes)
+        if len(surface.triangles) > count:
+            cap_vertices, cap_corners = np.unique(surface.triangles[count:], return_inverse=True)
+            files[caps] = encode_ply(cap_corners.reshape(-1, 3), surface.positions[cap_vertices])
     return files
 
 
@@ -59,22 +59,22 @@ class SubdividedTriangles(NamedTuple):
     corners: NDArray[np.int64]
 
 
-def subdivide_triangles(triangles: NDArray[np.integer], subdivisions: int = _SUBDIVISIONS) -> SubdividedTriangles:
+def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) -> SubdividedTriangles:
     """Divide each of some triangles into finer^2 smaller ones, which share no corners with those of others.
 
     triangles : (t,) numbers
     """
-    places = [(i, j) for i in range(subdivisions + 1) for j in range(subdivisions + 1 - i)]
-    at = {place: index for index, place in enumerate(places)}
-    upright = [(at[i, j], at[i + 1, j], at[i, j + 1]) for i in range(subdivisions) for j in range(subdivisions - i)]
-    turned = [
-        (at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]) for i in range(subdivisions) for j in range(subdivisions - i - 1)
-    ]
-    second, third = np.array(places, np.float64).T / subdivisions
+    grid = [(i, j) for i in range(n + 1) for j in range(n + 1 - i)]
+    at = {point: index for index, point in enumerate(grid)}
+    upward = [(at[i, j], at[i + 1, j], at[i, j + 1]) for i in range(n) for j in range(n - i)]
+    downward = [(at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]) for i in range(n) for j in range(n - i - 1)]
+    second, third = np.array(grid, np.float64).T / n
     weights = np.stack([1.0 - second - third, second, third], axis=1)
-    first = len(places) * np.arange(len(triangles))[:, None, None]
-    corners = (first + np.array(upright + turned)).reshape(-1, 3)
-    return SubdividedTriangles(np.repeat(triangles, len(places)), np.tile(weights, (len(triangles), 1)), corners)
+    first = len(grid) * np.arange(len(triangles))[:, None, None]
+    corners = (first + np.array(upward + downward)).reshape(-1, 3)
+    return SubdividedTriangles(
+        np.repeat(triangles, len(grid)), np.tile(weights, (len(triangles), 1)), corners
+    )
 
 
 def coloured_meshes(renderer: Renderer, scene: Scene) -> dict[int, bytes]:
@@ -83,21 +83,22 @@ def coloured_meshes(renderer: Renderer, scene: Scene) -> dict[int, bytes]:
     They have no maps: fine triangles have a colour at each corner.
     """
     mesh = scene.head.mesh
-    opaque = [k for k, material in enumerate(mesh.materials) if material.kind != "skin"]
-    parts = {k: subdivide_triangles(np.flatnonzero(mesh.material == k)) for k in opaque if (mesh.material == k).any()}
+    used = np.unique(mesh.material).tolist()
+    opaque = [k for k in used if mesh.materials[k].kind != "skin"]
+    parts = {k: subdivide_triangles(np.flatnonzero(mesh.material == k)) for k in opaque}
     if not parts:
         return {}
-    triangle, weights = (np.concatenate([one[i] for one in parts.values()]) for i in (0, 1))
+    triangle, weights = (np.concatenate([part[i] for part in parts.values()]) for i in (0, 1))
     colours = bake_albedo(renderer, scene, triangle, weights[:, 1:])
-    ends = np.cumsum([len(one.triangle) for one in parts.values()])[:-1]
-    each = zip(parts.items(), np.split(colours, ends), strict=True)
-    return {k: _file(scene.head, part, colour) for (k, part), colour in each}
+    ends = np.cumsum([len(part.triangle) for part in parts.values()])[:-1]
+    coloured = zip(parts.items(), np.split(colours, ends), strict=True)
+    return {k: _encode_part(scene.head, part, colour) for (k, part), colour in coloured}
 
 
-def _file(head: Head, part: SubdividedTriangles, colours: NDArray[np.float32]) -> bytes:
+def _encode_part(head: Head, part: SubdividedTriangles, colours: NDArray[np.float32]) -> bytes:
     mesh, corners = head.mesh, head.mesh.triangles[part.triangle]
-    between = part.weights[:, :, None]
-    places = (between * mesh.positions[corners]).sum(axis=1) - np.array(head.centre_mm)
-    normals = (between * mesh.normals[corners]).sum(axis=1)
+    weights = part.weights[:, :, None]
+    positions = (weights * mesh.positions[corners]).sum(axis=1) - np.array(head.centre_mm)
+    normals = (weights * mesh.normals[corners]).sum(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return encode_ply(part.corners, places, normals, None, np.clip(colours, 0.0, 1.0))
+    return encode_ply(part.corners, positions, normals, None, np.clip(colours, 0.0, 1.0))

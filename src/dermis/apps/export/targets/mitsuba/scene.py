@@ -14,28 +14,28 @@ from dermis.apps.export.scene_parts import supported_lights
 from dermis.apps.export.targets.maps import encode_map_exr
 from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
 from dermis.apps.export.targets.mitsuba.xml import (
-    CommandLineParameter,
+    Override,
     Ref,
     XmlBackend,
+    bitmap_path,
     default_element,
+    include_element,
     xml_document,
     xml_element,
-    include_element,
-    bitmap_path,
 )
-from dermis.apps.truths.scene_description import SceneDict, rgb, mitsuba_environment
 from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
 from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, mitsuba_sensor
+from dermis.apps.truths.scene_description import SceneDict, mitsuba_environment, rgb
 from dermis.scene.model import Scene
 from dermis.specular.fresnel import SKIN_ETA
 
 Floats = NDArray[np.float32]
 Boundary = Literal["matched", "smooth", "rough"]
 BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rough": SKIN_ETA}
-"""Surfaces of the skin and their index of refraction."""
+"""Kinds of skin surface, with their index of refraction."""
 MATCHED_REFLECTANCE = 0.03
-"""Share of the light that a matched surface reflects, from all directions alike: that of rough skin."""
-_EYE_ROUGHNESS = 0.3  # the square root of Beckmann's m
+"""Reflectance of an index-matched surface in all directions, equal to the mean of rough skin [-]."""
+_OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m
 
 
 class IsotropicMedium(NamedTuple):
@@ -76,11 +76,11 @@ def scene_files(
     skin that encloses no volume.
     """
     backend = XmlBackend()
-    made = skin_meshes(backend, scene.head)
+    meshes = skin_meshes(backend, scene.head)
     yield "scene.xml", xml_document(_scene_elements(backend, scene, appearance, boundary, (*size, samples)))
     for each in BOUNDARIES:
-        yield f"boundary_{each}.xml", xml_document(_skin_elements(backend, each, appearance, made))
-    yield from ((f"meshes/{name}.ply", content) for name, content in made.items())
+        yield f"boundary_{each}.xml", xml_document(_skin_elements(backend, each, appearance, meshes))
+    yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
     for index, content in appearance.opaque.items():
         yield _opaque_file(index), content
     if appearance.transmittance is not None and appearance.dimming is not None:
@@ -113,16 +113,16 @@ def surface_description(
     passing : share that a refracting surface lets pass each way, a texture; None for all
     roughness : Beckmann m, a number or a texture
     """
-    rough = {"distribution": "beckmann", "alpha": roughness}
+    facets = {"distribution": "beckmann", "alpha": roughness}
     if boundary == "matched":
-        mirror = {"type": "roughconductor", "material": "none", **rough}
+        mirror = {"type": "roughconductor", "material": "none", **facets}
         return {"type": "mask", "opacity": MATCHED_REFLECTANCE, "bsdf": mirror, "id": "skin_surface"}
-    index: SceneDict = {"int_ior": SKIN_ETA, "ext_ior": 1.0}
+    refraction: SceneDict = {"int_ior": SKIN_ETA, "ext_ior": 1.0}
     if transmittance is not None:
-        index["specular_transmittance"] = transmittance
+        refraction["specular_transmittance"] = transmittance
     if boundary == "smooth":
-        return {"type": "dielectric", "id": "skin_surface", **index}
-    return {"type": "roughdielectric", "id": "skin_surface", **rough, **index}
+        return {"type": "dielectric", "id": "skin_surface", **refraction}
+    return {"type": "roughdielectric", "id": "skin_surface", **facets, **refraction}
 
 
 def _lower_surface(dimmed: bool) -> SceneDict:
@@ -134,7 +134,11 @@ def _lower_surface(dimmed: bool) -> SceneDict:
 
 
 def _scene_elements(
-    backend: XmlBackend, scene: Scene, appearance: SkinAppearance, boundary: Boundary, picture: tuple[int, int, int]
+    backend: XmlBackend,
+    scene: Scene,
+    appearance: SkinAppearance,
+    boundary: Boundary,
+    picture: tuple[int, int, int],
 ) -> list[ET.Element]:
     """Return all parts but the skin.
 
@@ -142,9 +146,12 @@ def _scene_elements(
     """
     sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
     sensor = mitsuba_sensor(backend, scene.camera, picture[:2])
-    sensor["film"] |= {"width": CommandLineParameter("integer", "width"), "height": CommandLineParameter("integer", "height")}
-    sensor["sampler"]["sample_count"] = CommandLineParameter("integer", "samples")
-    # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
+    sensor["film"] |= {
+        "width": Override("integer", "width"),
+        "height": Override("integer", "height"),
+    }
+    sensor["sampler"]["sample_count"] = Override("integer", "samples")
+    # Spectral multiple importance sampling, as extinction differs between channels.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
     parts: list[SceneDict] = [integrator, sensor]
     lights = supported_lights(scene.lights, MITSUBA, "Mitsuba")
@@ -152,26 +159,31 @@ def _scene_elements(
     if scene.environment is not None:
         parts.append(mitsuba_environment(backend, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
-    plain = {"type": "principled", "roughness": _EYE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
+    opaque = {"type": "principled", "roughness": _OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
     for index in appearance.opaque:
-        parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": plain})
-    described = [xml_element(part, "", backend) for part in parts]
-    skin = include_element("boundary_$boundary.xml")
-    return [*(default_element(*one) for one in (("boundary", boundary), *sizes)), *described, skin]
+        parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": opaque})
+    defaults = [default_element(*one) for one in (("boundary", boundary), *sizes)]
+    elements = [xml_element(part, "", backend) for part in parts]
+    return [*defaults, *elements, include_element("boundary_$boundary.xml")]
 
 
-def _skin_elements(backend: XmlBackend, boundary: Boundary, appearance: SkinAppearance, made: Mapping[str, bytes]) -> list[ET.Element]:
+def _skin_elements(
+    backend: XmlBackend, boundary: Boundary, appearance: SkinAppearance, meshes: Mapping[str, bytes]
+) -> list[ET.Element]:
     """Return the skin under a surface."""
     roughness = appearance.roughness if isinstance(appearance.roughness, float) else _texture("roughness")
     transmittance = None if appearance.transmittance is None else _texture("passing")
-    parts = [medium_description(appearance.media[boundary]), surface_description(boundary, transmittance, roughness)]
+    parts = [
+        medium_description(appearance.media[boundary]),
+        surface_description(boundary, transmittance, roughness),
+    ]
     shapes = dict.fromkeys(("skin", "caps"), "skin_surface")
     if boundary == "matched":
-        # Rays inwards meet the upper one and step over the lower one, rays outwards the other way round.
+        # Inward rays hit the upper surface and skip the lower one, outward rays the reverse.
         parts.append(_lower_surface(transmittance is not None))
         shapes = dict.fromkeys(("upper", "upper_caps"), "skin_surface")
         shapes |= dict.fromkeys(("skin", "caps"), "skin_below")
-    for name in (one for one in shapes if one in made):
+    for name in (name for name in shapes if name in meshes):
         shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": Ref(shapes[name])}
         parts.append({**shape, "interior": Ref("skin_medium")})
     return [xml_element(part, "", backend) for part in parts]

@@ -14,13 +14,21 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.fitting import fit_burley_width, fit_homogeneous_medium
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, floats, get_numbers, replace_values, write_files
+from dermis.apps.export.target import (
+    Parameter,
+    Parameters,
+    Target,
+    floats,
+    get_numbers,
+    replace_values,
+    write_files,
+)
 from dermis.apps.export.targets.mitsuba.scene import (
     BOUNDARIES,
     MATCHED_REFLECTANCE,
     Boundary,
-    SkinAppearance,
     IsotropicMedium,
+    SkinAppearance,
     scene_files,
 )
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -30,8 +38,8 @@ from dermis.scene.model import Scene
 from dermis.scene.skin import DEFAULT_ROUGHNESS
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-_BRIGHT_PERCENTILE = 99.0  # percentile; what is brighter is shown as that
-_MAX_SAMPLED_SIDE = 512  # texels of a map's side that the percentile is taken on
+_BRIGHT_PERCENTILE = 99.0  # of the colour map; brighter texels are clipped
+_MAX_SAMPLED_SIDE = 512  # of the map from which the percentile is computed [texel]
 Map = NDArray[np.float32]
 _SIGMA, _ALBEDO, _PASSING, _INDEX, _ALPHA = "sigma_t", "albedo", "passing", "int_ior", "alpha"
 _SIZE, _SAMPLES = (512, 512), 256
@@ -47,48 +55,52 @@ class Mitsuba(Target):
     variants = ("matched", "rough", "smooth")
     needs_maps = True
     limitations = (
-        "One medium a channel cannot hold layers: their red light leaves nearer and farther than shown. "
-        "Under rough and smooth surfaces points, spots and parallel light are black, for no ray finds them; "
-        "the matched surface mirrors alike from all sides and dims by lightness, without hues. Hairs are "
-        "left out."
+        "One medium per channel cannot represent layers, whose red light spreads differently. Through rough "
+        "and smooth surfaces, point, spot and parallel lights cannot be sampled and are black. The matched "
+        "surface has a constant reflectance, and colour maps change its lightness only. Hairs are omitted."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the medium whose curve is nearest, for the map's brightest skin; textures dim the rest."""
         boundary, colours = self._boundary, skin_colours(subject)
-        found = fit_medium(subject.curve, colours, boundary)
+        medium = fit_medium(subject.curve, colours, boundary)
+        transmittance = colours.transmittance(boundary)
         return (
-            Parameter(_SIGMA, found.sigma_t, "1/mm", "extinction; in the file by its largest channel and scale"),
-            Parameter(_ALBEDO, found.albedo, "-", "of one scattering, isotropic: not the skin's colour"),
-            Parameter(_PASSING, colours.transmittance(boundary), "-", "mean share that textures let pass, both ways"),
+            Parameter(_SIGMA, medium.sigma_t, "1/mm", "extinction; divided by its maximum in the file"),
+            Parameter(_ALBEDO, medium.albedo, "-", "of single scattering: not the skin's colour"),
+            Parameter(_PASSING, transmittance, "-", "mean transmittance of the textures, both ways"),
             Parameter(_INDEX, BOUNDARIES[boundary], "-", "of the surface; 1 for none"),
-            Parameter(_ALPHA, mean_roughness(subject), "-", "Beckmann roughness, where no texture has it"),
+            Parameter(_ALPHA, mean_roughness(subject), "-", "Beckmann roughness, without a texture of it"),
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the skin's colour as albedo, and 1/d as extinction."""
-        typed = {_SIGMA: floats(1.0 / fit_burley_width(subject.curve)), _ALBEDO: floats(subject.clipped_albedo())}
-        return replace_values(self.parameters(subject, version), {**typed, _PASSING: (1.0,) * 3})
+        extinction, albedo = floats(1.0 / fit_burley_width(subject.curve)), floats(subject.clipped_albedo())
+        values = {_SIGMA: extinction, _ALBEDO: albedo, _PASSING: (1.0,) * 3}
+        return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve of walks through the medium, of light along the normal."""
         boundary = self._boundary
-        sigma, albedo, transmittance = (np.array(get_numbers(parameters, name)) for name in (_SIGMA, _ALBEDO, _PASSING))
+        names = _SIGMA, _ALBEDO, _PASSING
+        sigma, albedo, transmittance = (np.array(get_numbers(parameters, name)) for name in names)
         curve = half_space(_half_space_kind(boundary), albedo, 1.0 / sigma)
-        energy = curve.energy if boundary != "matched" else _diffuse_energy(albedo)
-        wanted = np.maximum(skin_colours(subject).mean, 1e-9)
-        return curve.with_energy(subject.curve.energy * _boundary_factor(boundary) * energy * transmittance / wanted)
+        matched = boundary == "matched"
+        energy = half_space("walk", albedo, np.ones(3)).energy if matched else curve.energy
+        factor = subject.curve.energy * _boundary_factor(boundary)
+        mean = np.maximum(skin_colours(subject).mean, 1e-9)
+        return curve.with_energy(factor * energy * transmittance / mean)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the scene with a file for each surface, meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
         appearance = SkinAppearance(media, *textures(subject, colours), _opaque_meshes(scene, self.adapter))
-        return write_files(output,  scene_files(scene, appearance, self._boundary, _SIZE, _SAMPLES))
+        return write_files(output, scene_files(scene, appearance, self._boundary, _SIZE, _SAMPLES))
 
     @property
     def _boundary(self) -> Boundary:
-        return next(each for each in BOUNDARIES if each == (self.variant or self.variants[0]))
+        return next(one for one in BOUNDARIES if one == (self.variant or self.variants[0]))
 
 
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
@@ -100,16 +112,12 @@ def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundar
     energy = colours.medium_colour(boundary) / _boundary_factor(boundary)
     if boundary == "matched":
         energy = half_space("matched", tabulated_albedo("walk", energy), np.ones(3)).energy
-    found = fit_homogeneous_medium(curve, energy, _half_space_kind(boundary))
-    return IsotropicMedium(floats(1.0 / found.mfp_mm), floats(found.albedo))
+    medium = fit_homogeneous_medium(curve, energy, _half_space_kind(boundary))
+    return IsotropicMedium(floats(1.0 / medium.mfp_mm), floats(medium.albedo))
 
 
 def _half_space_kind(boundary: Boundary) -> HalfSpaceKind:
     return "matched" if boundary == "matched" else "skin"
-
-
-def _diffuse_energy(albedo: Floats) -> Floats:
-    return half_space("walk", albedo, np.ones(3)).energy
 
 
 def _boundary_factor(boundary: Boundary) -> float:
@@ -154,12 +162,12 @@ def skin_colours(subject: Subject) -> SkinColours:
     if texels is None:
         colour = np.asarray(subject.albedo, np.float64)
         return SkinColours(colour, colour, 1.0)
-    apart = max(min(texels.shape[:2]) // _MAX_SAMPLED_SIDE, 1)
-    found = texels[::apart, ::apart].reshape(-1, 3).astype(np.float64)
-    found = found[found.sum(axis=1) > 0.0]
-    mean = found.mean(axis=0)
-    lightness_ratio = float(np.percentile(found @ _LUMINANCE, _BRIGHT_PERCENTILE) / (mean @ _LUMINANCE))
-    return SkinColours(mean, np.maximum(np.percentile(found, _BRIGHT_PERCENTILE, axis=0), mean), max(lightness_ratio, 1.0))
+    stride = max(min(texels.shape[:2]) // _MAX_SAMPLED_SIDE, 1)
+    samples = texels[::stride, ::stride].reshape(-1, 3).astype(np.float64)
+    samples = samples[samples.sum(axis=1) > 0.0]
+    mean, peak = samples.mean(axis=0), np.percentile(samples, _BRIGHT_PERCENTILE, axis=0)
+    ratio = float(np.percentile(samples @ _LUMINANCE, _BRIGHT_PERCENTILE) / (mean @ _LUMINANCE))
+    return SkinColours(mean, np.maximum(peak, mean), max(ratio, 1.0))
 
 
 def mean_roughness(subject: Subject) -> float:

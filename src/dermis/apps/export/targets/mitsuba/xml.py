@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 VERSION = "3.0.0"
-_POINTS, _VECTORS = ("position", "center"), ("direction",)
+_POINT_KEYS, _VECTOR_KEYS = ("position", "center"), ("direction",)
 _KINDS = {
     "emitter": ("point", "projector", "directional", "area", "constant", "envmap", "spot"),
     "shape": ("rectangle", "sphere", "disk", "ply"),
@@ -26,7 +26,7 @@ _KINDS = {
     "film": ("hdrfilm",),
     "rfilter": ("box", "gaussian"),
 }
-_KIND = {plugin: kind for kind, plugins in _KINDS.items() for plugin in plugins}
+_PLUGIN_KINDS = {plugin: kind for kind, plugins in _KINDS.items() for plugin in plugins}
 
 
 class Transform:
@@ -37,10 +37,10 @@ class Transform:
 
     def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
         """From +Z towards the target, Y upwards."""
-        ahead = _unit(np.subtract(target, origin))
-        left = _unit(np.cross(np.asarray(up, np.float64), ahead))
+        forward = _unit(np.subtract(target, origin))
+        left = _unit(np.cross(np.asarray(up, np.float64), forward))
         matrix = np.eye(4)
-        matrix[:3] = np.column_stack([left, np.cross(ahead, left), ahead, origin])
+        matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, origin])
         return Transform(self.matrix @ matrix)
 
     def scale(self, factors: ArrayLike) -> Transform:
@@ -76,24 +76,24 @@ class Ref:
 
 
 @dataclass(frozen=True)
-class CommandLineParameter:
+class Override:
     """A value that `mitsuba -D NAME=...` replaces, and its kind."""
 
     kind: str
     name: str
 
 
-def xml_element(described: Mapping[str, object], name: str, backend: XmlBackend) -> ET.Element:
+def xml_element(description: Mapping[str, object], name: str, backend: XmlBackend) -> ET.Element:
     """Return the element of a description, under a name.
 
     words : takes the pictures
     """
-    plugin = str(described["type"])
-    made = ET.Element(_KIND[plugin], {"type": plugin, **_named(name, described)})
-    for key, value in described.items():
+    plugin = str(description["type"])
+    element = ET.Element(_PLUGIN_KINDS[plugin], {"type": plugin, **_name_attributes(name, description)})
+    for key, value in description.items():
         if key not in ("type", "id"):
-            made.append(_property(key, value, backend))
-    return made
+            element.append(_property_element(key, value, backend))
+    return element
 
 
 def bitmap_path(index: int) -> str:
@@ -120,32 +120,32 @@ def include_element(filename: str) -> ET.Element:
     return ET.Element("include", {"filename": filename})
 
 
-def _named(name: str, described: Mapping[str, object]) -> dict[str, str]:
-    return {"id": str(described["id"])} if "id" in described else ({"name": name} if name else {})
+def _name_attributes(name: str, description: Mapping[str, object]) -> dict[str, str]:
+    return {"id": str(description["id"])} if "id" in description else ({"name": name} if name else {})
 
 
-def _property(key: str, value: object, backend: XmlBackend) -> ET.Element:
+def _property_element(key: str, value: object, backend: XmlBackend) -> ET.Element:
     if isinstance(value, Ref):
         return ET.Element("ref", {"name": key, "id": value.name})
-    if isinstance(value, CommandLineParameter):
+    if isinstance(value, Override):
         return ET.Element(value.kind, {"name": key, "value": f"${value.name}"})
     if isinstance(value, Transform):
-        made = ET.Element("transform", {"name": key})
-        ET.SubElement(made, "matrix", {"value": _numbers(value.matrix)})
-        return made
+        element = ET.Element("transform", {"name": key})
+        ET.SubElement(element, "matrix", {"value": _numbers(value.matrix)})
+        return element
     if isinstance(value, Bitmap):
         backend.bitmaps.append(value.values)
-        return _plain("filename", bitmap_path(len(backend.bitmaps) - 1))
+        return _value_element("filename", bitmap_path(len(backend.bitmaps) - 1))
     if isinstance(value, Mapping):
         if value["type"] == "rgb":
             return ET.Element("rgb", {"name": key, "value": _numbers(value["value"])})
         return xml_element(value, key, backend)
-    return _plain(key, value)
+    return _value_element(key, value)
 
 
-def _plain(key: str, value: object) -> ET.Element:
-    if key in _POINTS or key in _VECTORS:
-        kind, xyz = "point" if key in _POINTS else "vector", map(_number, np.asarray(value, np.float64))
+def _value_element(key: str, value: object) -> ET.Element:
+    if key in _POINT_KEYS or key in _VECTOR_KEYS:
+        kind, xyz = "point" if key in _POINT_KEYS else "vector", map(_number, np.asarray(value, np.float64))
         return ET.Element(kind, {"name": key, **dict(zip("xyz", xyz, strict=True))})
     if isinstance(value, bool):
         return ET.Element("boolean", {"name": key, "value": str(value).lower()})

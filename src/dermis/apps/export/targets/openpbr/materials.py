@@ -42,7 +42,7 @@ _STANDARD_NAMES: Mapping[str, str] = {
 _METRES_PER_MM = 1e-3
 _MAX_NAME_LENGTH = 40
 _EYE_IOR = 1.376
-_ROUGHNESS = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a word in the name
+_ROUGHNESS = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a part of the material's name
 _DEFAULT_ROUGHNESS = 0.8
 INPUTS: Mapping[str, str] = {
     "colour": "subsurface_color",
@@ -50,9 +50,9 @@ INPUTS: Mapping[str, str] = {
     "specular": "specular_weight",
     "normal": "geometry_normal",
 }
-"""Input that each map drives."""
+"""Input of OpenPBR that each map sets."""
 DISTANCES = ("subsurface_radius",)
-"""Inputs with a length [m]."""
+"""Inputs that are lengths [m]."""
 
 
 def input_name(shader: str, name: str) -> str:
@@ -116,24 +116,27 @@ def skin_material(
         "specular_ior": SKIN_ETA,
         "specular_roughness": float(np.sqrt(skin.roughness * skin.smoothing)),
     }
-    driven = {INPUTS[role]: role for role in roles}
-    return OpenPbrMaterial(name, {key: value for key, value in values.items() if key not in driven}, driven)
+    mapped = {INPUTS[role]: role for role in roles}
+    return OpenPbrMaterial(name, {key: value for key, value in values.items() if key not in mapped}, mapped)
 
 
-def opaque_material(one: Material) -> OpenPbrMaterial:
+def opaque_material(material: Material) -> OpenPbrMaterial:
     """Return the material of what is not skin."""
-    rough = next((value for word, value in _ROUGHNESS.items() if word in one.name.casefold()), _DEFAULT_ROUGHNESS)
-    ior = _EYE_IOR if "eye" in one.name.casefold() else SKIN_ETA
-    red, green, blue = (float(part) for part in one.colour)
-    return OpenPbrMaterial(
-        one.name, {"base_color": (red, green, blue), "specular_roughness": rough, "specular_ior": ior}, {}
-    )
+    name = material.name.casefold()
+    values: dict[str, Value] = {
+        "base_color": floats(material.colour),
+        "specular_roughness": next(
+            (_ROUGHNESS[part] for part in _ROUGHNESS if part in name), _DEFAULT_ROUGHNESS
+        ),
+        "specular_ior": _EYE_IOR if "eye" in name else SKIN_ETA,
+    }
+    return OpenPbrMaterial(material.name, values, {})
 
 
 def eye_material(name: str) -> OpenPbrMaterial:
     """Return the material of an eyeball with a map of its colour."""
-    wet: dict[str, Value] = {"specular_roughness": _ROUGHNESS["eye"], "specular_ior": _EYE_IOR}
-    return OpenPbrMaterial(name, wet, {"base_color": "eye"})
+    values: dict[str, Value] = {"specular_roughness": _ROUGHNESS["eye"], "specular_ior": _EYE_IOR}
+    return OpenPbrMaterial(name, values, {"base_color": "eye"})
 
 
 def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
@@ -143,11 +146,9 @@ def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
 
     Source: [Chiang2016] eq. 9 for the colour, at a roughness of 0.3.
     """
-    depth = np.sqrt(np.maximum(absorption.mean(axis=0), 0.0) * radius_mm)
-    red, green, blue = (float(part) for part in np.exp(-5.888 * depth))
-    return OpenPbrMaterial(
-        "hair", {"base_color": (red, green, blue), "specular_roughness": 0.4, "specular_ior": 1.55}, {}
-    )
+    colour = floats(np.exp(-5.888 * np.sqrt(np.maximum(absorption.mean(axis=0), 0.0) * radius_mm)))
+    values: dict[str, Value] = {"base_color": colour, "specular_roughness": 0.4, "specular_ior": 1.55}
+    return OpenPbrMaterial("hair", values, {})
 
 
 def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
@@ -155,25 +156,25 @@ def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
 
     slopes : (n, n, 2) of the relief, where `maps` has no normals
     """
-    found: dict[str, Floats] = {}
+    arrays: dict[str, Floats] = {}
     if maps.colour is not None and skin.albedo == "map":
-        found["colour"] = maps.colour
+        arrays["colour"] = maps.colour
     if maps.roughness is not None:
-        rough = maps.roughness * np.float32(skin.roughness / DEFAULT_ROUGHNESS * skin.smoothing)
-        found["roughness"] = np.sqrt(np.clip(rough, 0.0, 1.0))
+        roughness = maps.roughness * np.float32(skin.roughness / DEFAULT_ROUGHNESS * skin.smoothing)
+        arrays["roughness"] = np.sqrt(np.clip(roughness, 0.0, 1.0))
     if maps.specular is not None and (mean := float(maps.specular.mean())) > 0:
-        found["specular"] = np.clip(maps.specular * np.float32(skin.strength / mean), 0.0, 1.0)
-    shown = slopes if maps.normal is None else maps.normal
-    if shown is not None:
-        normal = np.concatenate([-shown, np.ones_like(shown[..., :1])], axis=-1)
-        found["normal"] = 0.5 + 0.5 * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    return found
+        arrays["specular"] = np.clip(maps.specular * np.float32(skin.strength / mean), 0.0, 1.0)
+    gradient = slopes if maps.normal is None else maps.normal
+    if gradient is not None:
+        normal = np.concatenate([-gradient, np.ones_like(gradient[..., :1])], axis=-1)
+        arrays["normal"] = 0.5 + 0.5 * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    return arrays
 
 
-def encode_map_files(found: Mapping[str, Floats]) -> dict[str, bytes]:
+def encode_map_files(arrays: Mapping[str, Floats]) -> dict[str, bytes]:
     """Return PNG files of 8 bits by role."""
-    with ThreadPoolExecutor() as pool:  # zlib does not hold other threads up
-        return dict(zip(found, pool.map(_png, found, found.values()), strict=True))
+    with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
+        return dict(zip(arrays, pool.map(_png, arrays, arrays.values()), strict=True))
 
 
 def _png(role: str, values: Floats) -> bytes:
@@ -185,17 +186,17 @@ def _png(role: str, values: Floats) -> bytes:
 
 def file_prefix(file: Path, subject: Subject) -> str:
     """Return the prefix of the names of the files beside a target's main file."""
-    plain = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_MAX_NAME_LENGTH]
-    return f"{plain or subject.identifier}_"
+    identifier = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_MAX_NAME_LENGTH]
+    return f"{identifier or subject.identifier}_"
 
 
 def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
     """Write the maps of the skin; return their paths by role, none for a skin by itself."""
     if subject.head is None:
         return {}
-    found = encode_map_files(map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head)))
-    written = write_files(folder, ((f"{prefix}{role}.png", data) for role, data in found.items()))
-    return dict(zip(found, written, strict=True))
+    files = encode_map_files(map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head)))
+    written = write_files(folder, ((f"{prefix}{role}.png", data) for role, data in files.items()))
+    return dict(zip(files, written, strict=True))
 
 
 def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
@@ -204,14 +205,13 @@ def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> d
     mfp_mm : (3,) mean free paths of the skin
     roles : of the maps that there are
     """
-    red, green, blue = (_METRES_PER_MM * float(one) for one in mfp_mm)
-    colour = floats(subject.clipped_albedo())
-    mesh, known = subject.head_or_ball.mesh, list(roles)
-    looks = {}
-    for kind in sorted(set(mesh.material.tolist())):
-        one = mesh.materials[kind]
-        if one.kind == "skin":
-            looks[kind] = skin_material(one.name, subject.skin, (red, green, blue), colour, known)
-        else:
-            looks[kind] = opaque_material(one)
-    return looks
+    red, green, blue = (_METRES_PER_MM * float(path) for path in mfp_mm)
+    colour, known_roles = floats(subject.clipped_albedo()), list(roles)
+    mesh = subject.head_or_ball.mesh
+
+    def definition(material: Material) -> OpenPbrMaterial:
+        if material.kind != "skin":
+            return opaque_material(material)
+        return skin_material(material.name, subject.skin, (red, green, blue), colour, known_roles)
+
+    return {number: definition(mesh.materials[number]) for number in np.unique(mesh.material).tolist()}

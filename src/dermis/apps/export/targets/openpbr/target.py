@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.apps.export.fitting import curve_error, fit_burley_width, fit_homogeneous_medium, burley_curve
+from dermis.apps.export.fitting import burley_curve, curve_error, fit_burley_width, fit_homogeneous_medium
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, floats, get_numbers
 from dermis.apps.export.targets.openpbr.materials import (
     OPEN_PBR,
     STANDARD,
+    file_prefix,
     input_name,
     mesh_materials,
-    file_prefix,
     write_maps,
 )
 from dermis.base.extras import import_extra
@@ -50,10 +50,11 @@ class OpenPbr(Target):
     variants = tuple(_SHADERS)
     needs_maps = True
     limitations = (
-        "Right in renderers that walk as OpenPBR says, or in the variants for a profile in those that take "
-        "MaterialX's, whose d is the radius: it would spread a walk's radii up to 3.6 times as far, most in "
-        "dark skin. MaterialX's GLSL only bends the shading by curvature. With a map of the colour the "
-        "spread is right at its mean, and smaller where the skin is darker."
+        "Correct in renderers with random walks as OpenPBR specifies, and, in the variants for a profile, in "
+        "renderers with MaterialX's profile, whose d is the radius. Interpreted as d, the radii of random "
+        "walks diffuse light up to 3.6 times too far, most in dark skin. MaterialX's GLSL only modifies "
+        "shading by curvature. With a colour map, the diffusion is correct for the mean colour, and smaller "
+        "in darker skin."
     )
 
     @property
@@ -69,9 +70,11 @@ class OpenPbr(Target):
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the walk, or the profile, whose curve is nearest."""
         if self.is_profile:
-            return surface_parameters(subject, self.shader, fit_burley_width(subject.curve), "d of the profile, the widest")
+            d = fit_burley_width(subject.curve)
+            return surface_parameters(subject, self.shader, d, "largest d of the profiles")
         path = fitted_path_mm(subject)
-        return surface_parameters(subject, self.shader, path, f"longest mean free path; {profile_error_text(path, subject)}")
+        meaning = f"largest mean free path; {profile_error_text(path, subject)}"
+        return surface_parameters(subject, self.shader, path, meaning)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the diffuse mean free paths of published tables, typed in."""
@@ -79,52 +82,53 @@ class OpenPbr(Target):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve of the walk of these rows, or of the profile."""
-        radius = parameter_radii_mm(parameters, self.shader)
+        radius = get_radii_mm(parameters, self.shader)
         if self.is_profile:
             return materialx_profile(radius, subject)
-        return walk_curve(np.array(get_numbers(parameters, input_name(self.shader, "subsurface_color"))), radius, subject)
+        colour = np.array(get_numbers(parameters, input_name(self.shader, "subsurface_color")))
+        return walk_curve(colour, radius, subject)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the document, and the maps beside it."""
         mx = import_extra("MaterialX", "writing MaterialX")
         from dermis.apps.export.targets.openpbr.document import build_document
 
-        file = self.main_file(output,  subject)
+        file = self.main_file(output, subject)
         prefix = file_prefix(file, subject)
-        pictures = write_maps(subject, file.parent, prefix)
-        looks = mesh_materials(subject, parameter_radii_mm(parameters, self.shader), pictures)
-        document = build_document([*looks.values()], self.shader, prefix)
+        maps = write_maps(subject, file.parent, prefix)
+        definitions = mesh_materials(subject, get_radii_mm(parameters, self.shader), maps)
+        document = build_document([*definitions.values()], self.shader, prefix)
         mx.writeToXmlFile(document, str(file))
-        return [file, *pictures.values()]
+        return [file, *maps.values()]
 
 
 def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning: str) -> Parameters:
     """Return the parameters of a shader with radii (3,); meaning is that of the longest."""
     longest, skin, colour = float(radius_mm.max()), subject.skin, floats(subject.clipped_albedo())
-    rough = float(np.sqrt(skin.roughness * skin.smoothing))
+    roughness = float(np.sqrt(skin.roughness * skin.smoothing))
     inputs = (
-        ("subsurface_weight", 1.0, "-", "all that is not reflected goes into the skin"),
-        ("subsurface_color", colour, "-", "colour that is seen; the mean of the map where there is one"),
+        ("subsurface_weight", 1.0, "-", "all light that is not reflected enters the skin"),
+        ("subsurface_color", colour, "-", "diffuse reflectance; the mean of a colour map"),
         ("subsurface_radius", _METRES_PER_MM * longest, "m", meaning),
-        ("subsurface_radius_scale", floats(radius_mm / longest), "-", "each channel's over that"),
-        ("subsurface_scatter_anisotropy", 0.0, "-", "lengths are those of isotropic scattering"),
-        ("specular_ior", SKIN_ETA, "-", "index of the surface, which reflects 0.028 straight ahead"),
-        ("specular_weight", skin.strength, "-", "share of that; the map's mean"),
-        ("specular_roughness", rough, "-", "root of Beckmann's m, or its map"),
+        ("subsurface_radius_scale", floats(radius_mm / longest), "-", "each channel's relative to that"),
+        ("subsurface_scatter_anisotropy", 0.0, "-", "the lengths are reduced ones"),
+        ("specular_ior", SKIN_ETA, "-", "of the surface; reflectance 0.028 at normal incidence"),
+        ("specular_weight", skin.strength, "-", "factor of the specular reflection; the mean of a map"),
+        ("specular_roughness", roughness, "-", "square root of Beckmann's m, or its map"),
     )
-    return tuple(Parameter(input_name(shader, name), value, unit, meaning) for name, value, unit, meaning in inputs)
+    return tuple(Parameter(input_name(shader, name), *values) for name, *values in inputs)
 
 
 def profile_error_text(mfp_mm: Floats, subject: Subject) -> str:
     """Return how wrong renderers are that take the radius for the d of a profile."""
-    off = curve_error(subject.curve, materialx_profile(mfp_mm, subject)).edge
-    return f"taken for a profile's d, edges of shadows are off by {', '.join(f'{one:.3f}' for one in off)}"
+    errors = curve_error(subject.curve, materialx_profile(mfp_mm, subject)).edge
+    return f"interpreted as d, errors at shadow edges are {', '.join(f'{error:.3f}' for error in errors)}"
 
 
-def parameter_radii_mm(parameters: Parameters, shader: str) -> Floats:
+def get_radii_mm(parameters: Parameters, shader: str) -> Floats:
     """Return the radii (3,) of rows [mm]."""
     longest = get_numbers(parameters, input_name(shader, "subsurface_radius"))[0] / _METRES_PER_MM
-    return np.asarray(longest * np.array(get_numbers(parameters, input_name(shader, "subsurface_radius_scale"))))
+    return longest * np.array(get_numbers(parameters, input_name(shader, "subsurface_radius_scale")))
 
 
 def fitted_path_mm(subject: Subject) -> Floats:

@@ -27,12 +27,12 @@ from dermis.scene.model import Scene
 
 Json = dict[str, object]
 _CDN_URL = "https://cdn.jsdelivr.net/npm"
-_MAX_SCRIPT_BYTES = 32 << 20  # bytes of a script
-_M = 1e-3  # of a millimetre
+_MAX_SCRIPT_BYTES = 32 << 20
+_METRES_PER_MM = 1e-3
 _SHADOW_SIDE = 2048
-_WARM_FRAMES = 4  # until all passes' programs are compiled
-_LOAD_ERROR = "{} could not be loaded from {}. Is there no network? Export again with --library."
-_TEXTURE_POLICY = "img-src blob: data:; connect-src blob: data:"  # textures of the head's file
+_WARM_FRAMES = 4  # frames until all shaders are compiled
+_LOAD_ERROR = "{} could not be loaded from {}. Check the network, or export again with --library."
+_TEXTURE_POLICY = "img-src blob: data:; connect-src blob: data:"  # for textures in the head's file
 _HERE = Path(__file__).parent
 
 
@@ -75,7 +75,7 @@ class LibraryFile:
         data = read_file(file, expected, _MAX_SCRIPT_BYTES)
         if base64.b64encode(hashlib.sha384(data).digest()).decode() != self.sha384:
             advice = f"Install it: npm install {self.package}@{self.version}"
-            refuse(file, expected, "got other bytes", advice)
+            refuse(file, expected, "its SHA-384 differs", advice)
         return data.decode("utf-8")
 
 
@@ -92,9 +92,9 @@ class EnginePage(Target):
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
     needs_maps: ClassVar[bool] = True
     licence: ClassVar[str]
-    """Of the library."""
+    """Licence of the library."""
     drawing_script: ClassVar[Path]
-    """Script that draws."""
+    """Script that draws the head."""
     library_files: ClassVar[Mapping[str, tuple[LibraryFile, ...]]]
     """Files of the library, by version."""
 
@@ -105,11 +105,12 @@ class EnginePage(Target):
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the page."""
         libraries, sources = self.library_elements(version)
+        script = (_HERE / "panel.js").read_text("utf-8") + self.drawing_script.read_text("utf-8")
         text = render_page(
             _HERE,
             title=f"{subject.name} in {self.title}",
             note=f"{self.title} {version} ({self.licence}). {self.limitations}",
-            script=escape_script((_HERE / "panel.js").read_text("utf-8") + self.drawing_script.read_text("utf-8")),
+            script=escape_script(script),
             policy=_TEXTURE_POLICY,
             sources=sources,
             settings=html_safe_json(self._settings(subject, parameters, version)),
@@ -125,16 +126,15 @@ class EnginePage(Target):
 
     def _settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)
-        where = self.library_files[version][0].url
-        middle = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # a ball's own
+        centre_mm = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # of the ball
         return {
-            "camera": page_camera(scene, middle),
+            "camera": page_camera(scene, centre_mm),
             "lights": [page_light(light) for light in scene.lights],
-            "skin": {row.name.rpartition(".")[2]: row.value for row in parameters},
+            "skin": {one.name.rpartition(".")[2]: one.value for one in parameters},
             "shadow_side": _SHADOW_SIDE,
             "warm_frames": _WARM_FRAMES,
             "smooth": True,
-            "no_library": _LOAD_ERROR.format(self.title, where),
+            "no_library": _LOAD_ERROR.format(self.title, self.library_files[version][0].url),
         }
 
 
@@ -157,18 +157,18 @@ def module_url(text: str, names: Mapping[str, str]) -> str:
 def material_parameters(subject: Subject) -> Parameters:
     """Return the parameters of the surface in both libraries."""
     return (
-        Parameter("albedo", floats(subject.albedo), "-", "diffuse; the mean where it is a map"),
-        Parameter("ior", SKIN_ETA, "-", "of the surface, which reflects 0.028 straight ahead"),
+        Parameter("albedo", floats(subject.albedo), "-", "diffuse reflectance; the mean of a colour map"),
+        Parameter("ior", SKIN_ETA, "-", "of the surface; reflectance 0.028 at normal incidence"),
     )
 
 
-def page_camera(scene: Scene, middle_mm: Sequence[float]) -> Json:
+def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
     """Return the scene's camera in the head's file: places [m], vertical angle of view [rad].
 
     middle_mm : about which cameras are placed
     """
-    camera = scene.camera
-    position, target = (_M * (np.array(middle_mm) + each) for each in (camera.position, camera.target))
+    camera, centre = scene.camera, np.array(centre_mm)
+    position, target = (_METRES_PER_MM * (centre + one) for one in (camera.position, camera.target))
     fov = 2.0 * math.atan(camera.half_tangent)
     return {"position": floats(position), "target": floats(target), "up": floats(camera.up), "fov": fov}
 
@@ -176,7 +176,8 @@ def page_camera(scene: Scene, middle_mm: Sequence[float]) -> Json:
 def page_light(light: Light) -> Json:
     """Return a light as parallel light with its irradiance at the head."""
     if isinstance(light, DirectionalLight):
-        way = np.asarray(light.direction, np.float64)
+        direction = np.asarray(light.direction, np.float64)
     else:
-        way = np.subtract(light.target, light.position)
-    return {"direction": floats(way / np.linalg.norm(way)), "irradiance": floats(light.irradiance)}
+        direction = np.subtract(light.target, light.position)
+    direction = direction / np.linalg.norm(direction)
+    return {"direction": floats(direction), "irradiance": floats(light.irradiance)}

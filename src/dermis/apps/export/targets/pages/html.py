@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-_NONE = "default-src 'none'; base-uri 'none'; form-action 'none'"
-_END = re.compile("</(?=script)", re.IGNORECASE)
+_BASE_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'"
+_SCRIPT_END = re.compile("</(?=script)", re.IGNORECASE)
 
 
 def render_page(
@@ -34,7 +34,7 @@ def render_page(
     style = (folder / "page.css").read_text("utf-8")
     allowed = " ".join([csp_hash(script), *sources])
     return Template((folder / "page.html").read_text("utf-8")).substitute(
-        policy=html.escape(f"{_NONE}; {policy}; style-src {csp_hash(style)}; script-src {allowed}"),
+        policy=html.escape(f"{_BASE_POLICY}; {policy}; style-src {csp_hash(style)}; script-src {allowed}"),
         title=html.escape(title),
         note=html.escape(note),
         style=style,
@@ -45,7 +45,7 @@ def render_page(
 
 def escape_script(text: str) -> str:
     """Return a script so that it may be between <script> and </script>: strings keep their meaning."""
-    return _END.sub(r"<\\/", text).replace("<!--", r"<\!--")
+    return _SCRIPT_END.sub(r"<\\/", text).replace("<!--", r"<\!--")
 
 
 def csp_hash(text: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.export.scene_parts import supported_lights, encode_ply
+from dermis.apps.export.scene_parts import encode_ply, supported_lights
 from dermis.apps.truths.lights import facing_irradiance
 from dermis.base.errors import notify
 from dermis.base.registry import Registry
@@ -54,28 +54,31 @@ def camera_lines(camera: Camera, file: str) -> Lines:
     vectors = np.concatenate([camera.position, camera.target, camera.up])
     half, shift = camera.window(1.0)
     screen = [(end + shift[axis]) * half[axis] for axis in (0, 1) for end in (-1.0, 1.0)]
+    film: DirectiveParameters = {
+        "string filename": file,
+        "integer xresolution": SIDE,
+        "integer yresolution": SIDE,
+    }
     return [
         "Scale -1 1 1  # pbrt's coordinates are left-handed",
         f"LookAt {_text(vectors)}",
         directive("Camera", "perspective", {"float fov": 90.0, "float screenwindow": screen}),
         directive("Sampler", "zsobol", {"integer pixelsamples": SAMPLES}),
         directive("Integrator", "volpath", {"integer maxdepth": _MAX_BOUNCES}),
-        directive(
-            "Film", "rgb", {"string filename": file, "integer xresolution": SIDE, "integer yresolution": SIDE}
-        ),
+        directive("Film", "rgb", film),
     ]
 
 
 def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
     """Return the lights; those that pbrt has not are left out with a note."""
-    lines: Lines = []
+    lines = Lines()
     for number, light in enumerate(supported_lights(lights, PBRT, "pbrt"), start=1):
         if PBRT[light.kind] is _unsupported:
-            notify(f"pbrt has no {light.kind} light: light {number} is left out")
+            notify(f"pbrt has no {light.kind} light, so light {number} is omitted")
             continue
         lines += ["AttributeBegin", *PBRT[light.kind](light), "AttributeEnd"]
     if environment is not None and environment.name != UNIFORM:
-        notify(f"the panorama {environment.name} is left out: pbrt wants another projection")
+        notify(f"the panorama {environment.name} is omitted, as pbrt uses another projection")
     elif environment is not None:
         lines.append(directive("LightSource", "infinite", {"rgb L": [environment.exposure] * 3}))
     return lines
@@ -85,8 +88,8 @@ def mesh_ply(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float]) -
     """Return a binary PLY file of some triangles, with normals and uv whose v is upwards."""
     vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
     uv = np.column_stack([mesh.uv[vertex, 0], 1.0 - mesh.uv[vertex, 1].astype("<f4")])
-    vectors = mesh.positions[vertex] - np.asarray(centre_mm)
-    return encode_ply(corner.reshape(-1, 3), vectors, mesh.normals[vertex], uv)
+    positions = mesh.positions[vertex] - np.asarray(centre_mm)
+    return encode_ply(corner.reshape(-1, 3), positions, mesh.normals[vertex], uv)
 
 
 def _distance(light: PointLight) -> float:
@@ -104,8 +107,8 @@ def _point(light: PointLight) -> Lines:
 def _spot(light: SpotLight) -> Lines:
     cone = {"float coneangle": light.outer_degrees}
     cone["float conedeltaangle"] = light.outer_degrees - light.inner_degrees
-    vectors = {"point3 from": light.position, "point3 to": light.target}
-    return [directive("LightSource", "spot", {**vectors, "rgb I": _intensity(light), **cone})]
+    axis = {"point3 from": light.position, "point3 to": light.target}
+    return [directive("LightSource", "spot", {**axis, "rgb I": _intensity(light), **cone})]
 
 
 def _rectangle(light: RectangleLight) -> Lines:
@@ -115,21 +118,23 @@ def _rectangle(light: RectangleLight) -> Lines:
         across = np.array([1.0, 0.0, 0.0])
     across = across / np.linalg.norm(across)
     above = np.cross(across, forward)
-    # Seen along the light the second side lies left of the first: the normal then points to the target.
+    # The order of the sides makes the normal point to the target.
     first, second = -0.5 * light.width_mm * across, 0.5 * light.height_mm * above
     corners = [np.add(light.position, a * first + b * second) for b in (-1, 1) for a in (-1, 1)]
-    irradiance_per_radiance = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
+    radiance = np.divide(
+        light.irradiance, facing_irradiance(light.width_mm, light.height_mm, _distance(light))
+    )
     return [
-        directive("AreaLightSource", "diffuse", {"rgb L": np.divide(light.irradiance, irradiance_per_radiance)}),
+        directive("AreaLightSource", "diffuse", {"rgb L": radiance}),
         directive("Shape", "bilinearmesh", {"point3 P": corners}),
     ]
 
 
 def _sphere(light: SphereLight) -> Lines:
-    irradiance_per_radiance = np.pi * (light.radius_mm / _distance(light)) ** 2
+    radiance = np.divide(light.irradiance, np.pi * (light.radius_mm / _distance(light)) ** 2)
     return [
         f"Translate {_text(light.position)}",
-        directive("AreaLightSource", "diffuse", {"rgb L": np.divide(light.irradiance, irradiance_per_radiance)}),
+        directive("AreaLightSource", "diffuse", {"rgb L": radiance}),
         directive("Shape", "sphere", {"float radius": light.radius_mm}),
     ]
 

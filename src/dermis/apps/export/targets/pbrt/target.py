@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.export.fitting import fit_scale, scale_lengths
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, floats, person_numbers, write_files
-from dermis.apps.export.targets.openpbr.materials import map_arrays, encode_map_files, file_prefix
+from dermis.apps.export.target import Parameter, Parameters, Target, floats, get_numbers, write_files
+from dermis.apps.export.targets.openpbr.materials import encode_map_files, file_prefix, map_arrays
 from dermis.apps.export.targets.openpbr.target import published_path_mm
-from dermis.apps.export.targets.pbrt.scene import Lines, directive, light_lines, mesh_ply, camera_lines
+from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, directive, light_lines, mesh_ply
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -26,12 +26,12 @@ from dermis.scene.model import Scene
 Floats = NDArray[np.float64]
 
 _ALBEDO_COUNT, _RADIUS_COUNT, _DEPTH_COUNT = 100, 64, 100
-_FIRST_RADIUS, _GROWTH = 2.5e-3, 1.2  # of the radii [mean free paths]
-_DENSE = 8.0
+_FIRST_RADIUS, _GROWTH = 2.5e-3, 1.2  # first radius [mean free paths] and ratio of successive radii
+_ALBEDO_DENSITY = 8.0
 _TEXTURES = {"colour": ("spectrum", "sRGB", "reflectance"), "roughness": ("float", "linear", "roughness")}
 _REFLECTANCE, _PATH = "reflectance", "mfp"
-_OPAQUE_ROUGHNESS = 0.3  # of what is not skin
-_BALL_DISTANCE, _BALL_FRAME = 10.0, 1.4  # of a ball's picture, by its size
+_OPAQUE_ROUGHNESS = 0.3  # materials other than skin
+_BALL_DISTANCE, _BALL_FRAME = 10.0, 1.4  # camera distance and visible height, relative to the ball
 
 
 class DiffusionTable(NamedTuple):
@@ -46,18 +46,15 @@ class DiffusionTable(NamedTuple):
     albedo: Floats
     radius: Floats
     reflectance: Floats
-    within: Floats
+    reflectance_within: Floats
 
-    def reflectance_of(self, albedo: float) -> float:
-        """All that leaves a medium of an albedo of single scattering, per light that enters [-]."""
-        return float(np.interp(albedo, self.albedo, self.reflectance))
-
-    def curve(self, radius: ArrayLike, reflectance: float) -> Floats:
+    def interpolate(self, radius: ArrayLike, reflectance: float) -> Floats:
         """Share of what enters that leaves within radii, for the albedo that pbrt finds for a reflectance."""
-        at = np.interp(reflectance, self.reflectance, np.arange(_ALBEDO_COUNT))
-        low = int(min(at, _ALBEDO_COUNT - 2))
-        share = self.within[low] + (at - low) * (self.within[low + 1] - self.within[low])
-        return np.asarray(np.interp(np.asarray(radius, np.float64), self.radius, share))
+        row = np.interp(reflectance, self.reflectance, np.arange(_ALBEDO_COUNT))
+        low = int(min(row, _ALBEDO_COUNT - 2))
+        first, second = self.reflectance_within[low : low + 2]
+        within = first + (row - low) * (second - first)
+        return np.asarray(np.interp(np.asarray(radius, np.float64), self.radius, within))
 
 
 @cache
@@ -67,9 +64,10 @@ def diffusion_table(eta: float) -> DiffusionTable:
     Source: [Habel2013] in the form of [Pharr2023]; the moments of the reflectance are exact here.
     """
     radius = np.concatenate([[0.0], _FIRST_RADIUS * _GROWTH ** np.arange(_RADIUS_COUNT - 1)])
-    albedo = np.expm1(-_DENSE * np.arange(_ALBEDO_COUNT) / (_ALBEDO_COUNT - 1)) / np.expm1(-_DENSE)
-    several = np.stack([_multiple_scattering(radius, one, eta) for one in albedo])
-    profile = 2.0 * np.pi * radius * (several + albedo[:, None] * _single_scattering(radius, eta))
+    steps = np.arange(_ALBEDO_COUNT) / (_ALBEDO_COUNT - 1)
+    albedo = np.expm1(-_ALBEDO_DENSITY * steps) / np.expm1(-_ALBEDO_DENSITY)
+    multiple = np.stack([_multiple_scattering(radius, one, eta) for one in albedo])
+    profile = 2.0 * np.pi * radius * (multiple + albedo[:, None] * _single_scattering(radius, eta))
     within = _integrate_spline(radius, profile)
     return DiffusionTable(albedo, radius, within[:, -1], within)
 
@@ -79,9 +77,9 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
     D = (2.0 - albedo) / 3.0
     decay = np.sqrt((1.0 - albedo) / D)
     first, second = internal_moment(1, eta), internal_moment(2, eta)
-    mirror = -2.0 * D * (1.0 + 3.0 * second) / (1.0 - 2.0 * first)
+    boundary = -2.0 * D * (1.0 + 3.0 * second) / (1.0 - 2.0 * first)
     real = _depths()[:, None]
-    image = 2.0 * mirror - real
+    image = 2.0 * boundary - real
     near, far = np.hypot(radius, real), np.hypot(radius, image)
     fluence = (np.exp(-decay * near) / near - np.exp(-decay * far) / far) / D
     flux = sum(
@@ -95,12 +93,13 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
 
 def _single_scattering(radius: Floats, eta: float) -> Floats:
     """(m,) radiant exitance of light scattered once, over the albedo, at an extinction of 1."""
-    least = radius * np.sqrt(eta**2 - 1.0)  # under which all is reflected back inside
-    depth = least + _depths()[:, None]
-    way = np.hypot(radius, depth)
-    cosine = depth / way
-    leaves = 1.0 - fresnel(cosine, 1.0 / eta)
-    return np.asarray((np.exp(-way - least) / way**2 * leaves * cosine).mean(axis=0) / (4.0 * np.pi))
+    critical_depth = radius * np.sqrt(eta**2 - 1.0)  # total internal reflection above
+    depth = critical_depth + _depths()[:, None]
+    path = np.hypot(radius, depth)
+    cosine = depth / path
+    transmitted = 1.0 - fresnel(cosine, 1.0 / eta)
+    exitance = np.exp(-path - critical_depth) / path**2 * transmitted * cosine
+    return np.asarray(exitance.mean(axis=0) / (4.0 * np.pi))
 
 
 def _depths() -> Floats:
@@ -114,8 +113,8 @@ def _integrate_spline(x: Floats, values: Floats) -> Floats:
     slope[:, 0] = (values[:, 1] - values[:, 0]) / (x[1] - x[0])
     slope[:, -1] = (values[:, -1] - values[:, -2]) / (x[-1] - x[-2])
     width = np.diff(x)
-    part = width * (0.5 * (values[:, 1:] + values[:, :-1]) + width * (slope[:, :-1] - slope[:, 1:]) / 12.0)
-    return np.concatenate([np.zeros((len(values), 1)), np.cumsum(part, axis=1)], axis=1)
+    areas = width * (0.5 * (values[:, 1:] + values[:, :-1]) + width * (slope[:, :-1] - slope[:, 1:]) / 12.0)
+    return np.concatenate([np.zeros((len(values), 1)), np.cumsum(areas, axis=1)], axis=1)
 
 
 class Pbrt(Target):
@@ -128,10 +127,10 @@ class Pbrt(Target):
     needs_maps = True
     untested = True
     limitations = (
-        "Diffusion as on a plane, at every point: thin parts and folds are not like skin. The surface "
-        "reflects all that Fresnel says, for the material has no strength of reflection; hairs and the eyes' "
-        "colours are left out; colours become smooth spectra. The scene must stay in millimetres: scale "
-        "multiplies mfp here, but sigma, which is its inverse, where a medium is stated by that."
+        "Diffusion assumes a plane at every point, so thin parts and folds are wrong. Specular reflection "
+        "cannot be reduced, as the material has no such parameter. Hairs and colours of eyes are omitted. "
+        "Colours become smooth spectra. The scene must stay in millimetres: the parameter scale multiplies "
+        "mfp here, but in media given by sigma it multiplies sigma."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
@@ -145,26 +144,27 @@ class Pbrt(Target):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return pbrt's table at these numbers."""
-        reflectance = np.array(person_numbers(parameters, _REFLECTANCE))
-        return subject.rescale_energy(scale_lengths(_unit_curve(reflectance), person_numbers(parameters, _PATH)))
+        reflectance = np.array(get_numbers(parameters, _REFLECTANCE))
+        curve = scale_lengths(_unit_curve(reflectance), get_numbers(parameters, _PATH))
+        return subject.rescale_energy(curve)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the scene, a mesh for each material, and the maps."""
-        file = self.main_file(output,  subject)
+        file = self.main_file(output, subject)
         prefix = file_prefix(file, subject)
         scene = subject.scene or _ball_scene(subject.head_or_ball)
-        text, files = _scene_lines(subject, parameters, scene, prefix)
-        file.write_text("\n".join([*text, ""]), encoding="ascii")
+        lines, files = _scene_lines(subject, parameters, scene, prefix)
+        file.write_text("\n".join([*lines, ""]), encoding="ascii")
         return [file, *write_files(file.parent, files.items())]
 
 
 def _unit_curve(reflectance: Floats) -> CumulativeProfile:
     """Return the curve of media of these reflectances, in mean free paths."""
     table = diffusion_table(SKIN_ETA)
-    total = np.array([table.curve(table.radius[-1], float(one)) for one in reflectance], np.float64)
+    total = np.array([table.interpolate(table.radius[-1], float(one)) for one in reflectance], np.float64)
 
     def within(radius: Floats) -> Floats:
-        columns = [table.curve(radius, float(one)) for one in reflectance]
+        columns = [table.interpolate(radius, float(one)) for one in reflectance]
         return np.asarray(np.clip(np.stack(columns, axis=-1) / np.maximum(total, 1e-9), 0.0, 1.0))
 
     return CumulativeProfile.from_function(within, total)
@@ -173,12 +173,12 @@ def _unit_curve(reflectance: Floats) -> CumulativeProfile:
 def _parameters(subject: Subject, path_mm: Floats, meaning: str) -> Parameters:
     skin, colour = subject.skin, floats(subject.clipped_albedo())
     return (
-        Parameter(_REFLECTANCE, colour, "-", "of light that enters; a texture where there is a map"),
+        Parameter(_REFLECTANCE, colour, "-", "of the light that enters, or a texture"),
         Parameter(_PATH, floats(path_mm), "mm", meaning),
-        Parameter("scale", 1.0, "-", "of mfp; not to be changed"),
-        Parameter("g", 0.0, "-", "the paths are those of isotropic scattering"),
-        Parameter("eta", SKIN_ETA, "-", "index of the skin"),
-        Parameter("roughness", skin.roughness * skin.smoothing, "-", "GGX's alpha, as Beckmann's m, or its map"),
+        Parameter("scale", 1.0, "-", "factor of mfp; must not be changed"),
+        Parameter("g", 0.0, "-", "the mean free paths are reduced ones"),
+        Parameter("eta", SKIN_ETA, "-", "index of refraction of the skin"),
+        Parameter("roughness", skin.roughness * skin.smoothing, "-", "GGX's alpha: Beckmann's m, or its map"),
         Parameter("remaproughness", False, "-", "the roughness is alpha itself"),
     )
 
@@ -191,44 +191,41 @@ def _ball_scene(ball: Head) -> Scene:
     return Scene(ball, camera=camera)
 
 
-def _scene_lines(subject: Subject, parameters: Parameters, scene: Scene, prefix: str) -> tuple[Lines, dict[str, bytes]]:
+def _scene_lines(
+    subject: Subject, parameters: Parameters, scene: Scene, prefix: str
+) -> tuple[Lines, dict[str, bytes]]:
     """Return the scene's lines, and the files beside it by name."""
     head = scene.head
     textures = skin_textures(subject, prefix)
-    lines = [
-        "# Millimetres from the head's centre, by dermis",
-        *camera_lines(scene.camera, f"{prefix}picture.exr"),
-    ]
-    lines += ["WorldBegin", *light_lines(scene.lights, scene.environment), *textures.lines]
+    lines = ["# Written by dermis; lengths in mm relative to the head's centre"]
+    lines += [*camera_lines(scene.camera, f"{prefix}picture.exr"), "WorldBegin"]
+    lines += [*light_lines(scene.lights, scene.environment), *textures.lines]
     files = dict(textures.files)
-    for kind in np.unique(head.mesh.material).tolist():
-        one = head.mesh.materials[kind]
-        name = f"{prefix}part_{kind}.ply"
-        files[name] = mesh_ply(head.mesh, head.mesh.material == kind, head.centre_mm)
-        material = _skin_material(parameters, textures.bindings) if one.kind == "skin" else _opaque_material(one.colour)
-        lines += ["AttributeBegin", material, directive("Shape", "plymesh", {"string filename": name})]
-        lines.append("AttributeEnd")
+    for number in np.unique(head.mesh.material).tolist():
+        material, name = head.mesh.materials[number], f"{prefix}part_{number}.ply"
+        files[name] = mesh_ply(head.mesh, head.mesh.material == number, head.centre_mm)
+        is_skin = material.kind == "skin"
+        text = _skin_material(parameters, textures.bindings) if is_skin else _opaque_material(material.colour)
+        shape = directive("Shape", "plymesh", {"string filename": name})
+        lines += ["AttributeBegin", text, shape, "AttributeEnd"]
     return lines, files
 
 
 def _skin_material(parameters: Parameters, bindings: dict[str, tuple[str, str]]) -> str:
     """Return the skin's material; an input with a map has its texture's name."""
-    kinds = {_REFLECTANCE: "rgb", _PATH: "rgb", "remaproughness": "bool"}
+    types = {_REFLECTANCE: "rgb", _PATH: "rgb", "remaproughness": "bool"}
     values: dict[str, ArrayLike] = {}
-    for row in parameters:
-        if row.name in bindings:
-            kind, name = bindings[row.name]
-            values[f"{kind} {row.name}"] = name
-        else:
-            values[f"{kinds.get(row.name, 'float')} {row.name}"] = row.value
+    for one in parameters:
+        binding_type, value = bindings.get(one.name, (types.get(one.name, "float"), one.value))
+        values[f"{binding_type} {one.name}"] = value
     if "normalmap" in bindings:
         values["string normalmap"] = bindings["normalmap"][1]
     return directive("Material", "subsurface", values)
 
 
 def _opaque_material(colour: tuple[float, float, float]) -> str:
-    rough = {"float roughness": _OPAQUE_ROUGHNESS, "bool remaproughness": False}
-    return directive("Material", "coateddiffuse", {"rgb reflectance": colour, **rough})
+    roughness = {"float roughness": _OPAQUE_ROUGHNESS, "bool remaproughness": False}
+    return directive("Material", "coateddiffuse", {"rgb reflectance": colour, **roughness})
 
 
 class Textures(NamedTuple):
@@ -249,23 +246,24 @@ def skin_textures(subject: Subject, prefix: str) -> Textures:
 
     prefix : of the files' names
     """
-    made = Textures([], {}, {})
+    textures = Textures([], {}, {})
     if subject.head is None:
-        return made
-    found = map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head))
-    if "roughness" in found:
-        found["roughness"] = found["roughness"] ** 2  # pbrt takes alpha itself, OpenPBR its root
-    for role, data in encode_map_files({role: found[role] for role in found if role != "specular"}).items():
+        return textures
+    arrays = map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head))
+    arrays.pop("specular", None)
+    if "roughness" in arrays:
+        arrays["roughness"] = arrays["roughness"] ** 2  # pbrt expects alpha, OpenPBR its square root
+    for role, data in encode_map_files(arrays).items():
         file = f"{prefix}{role}.png"
-        made.files[file] = data
+        textures.files[file] = data
         if role == "normal":
-            made.bindings["normalmap"] = "string", file
+            textures.bindings["normalmap"] = "string", file
             continue
-        kind, encoding, parameter = _TEXTURES[role]
-        given = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
-        made.lines.append(directive(f'Texture "{role}" "{kind}"', "imagemap", given))
-        made.bindings[parameter] = "texture", role
-    return made
+        texture_type, encoding, parameter = _TEXTURES[role]
+        options = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
+        textures.lines.append(directive(f'Texture "{role}" "{texture_type}"', "imagemap", options))
+        textures.bindings[parameter] = "texture", role
+    return textures
 
 
 TARGET = Pbrt()

@@ -10,7 +10,12 @@ import numpy as np
 
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, replace_values
-from dermis.apps.export.targets.pages.engine_page import EnginePage, LibraryFile, module_url, material_parameters
+from dermis.apps.export.targets.pages.engine_page import (
+    EnginePage,
+    LibraryFile,
+    material_parameters,
+    module_url,
+)
 from dermis.apps.export.targets.pages.html import csp_hash
 from dermis.base.tables import read_rows
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -32,9 +37,9 @@ class Three(EnginePage):
     licence = "MIT"
     drawing_script = Path(__file__).with_name("three.js")
     limitations = (
-        "Nothing spreads: its materials send all light back from where it falls, so shadows' edges are sharp "
-        "and have no red fringe, and nothing shines through an ear. Transmission would make glass of the "
-        "skin and is left at 0. Lights are parallel here."
+        "There is no subsurface scattering: light leaves where it arrives, so shadow edges are sharp without "
+        "a red fringe, and ears are opaque. Transmission, which would turn the skin into glass, is 0. All "
+        "lights are parallel."
     )
     library_files: ClassVar = {
         "0.187.0": tuple(LibraryFile("three", "0.187.0", **row) for row in read_rows(__package__, "scripts"))
@@ -44,8 +49,8 @@ class Three(EnginePage):
         """Return the surface; there is nothing for what is below."""
         return (
             *material_parameters(subject),
-            Parameter("specularIntensity", 1.0, "-", "all that the index of refraction gives"),
-            Parameter("transmission", 0.0, "-", "of clear glass, which skin is not"),
+            Parameter("specularIntensity", 1.0, "-", "reflectance given by the index of refraction"),
+            Parameter("transmission", 0.0, "-", "of clear glass, which does not apply to skin"),
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
@@ -58,15 +63,13 @@ class Three(EnginePage):
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
         """Return six modules and the map of their names."""
-        library_files = self.library_files[version]
+        files = self.library_files[version]
         if self.library_folder is None:
-            places = {script.name: script.url for script in library_files}
-            checks = {script.url: script.integrity for script in library_files}
-            return _import_map({"imports": places, "integrity": checks}, [script.url for script in library_files])
-        texts = {script.name: script.read(self.library_folder) for script in library_files}
-        return _import_map(
-            {"imports": {name: module_url(text, _MODULE_NAMES) for name, text in texts.items()}}, ["data:"]
-        )
+            imports = {file.name: file.url for file in files}
+            integrity = {file.url: file.integrity for file in files}
+            return _import_map({"imports": imports, "integrity": integrity}, [*integrity])
+        modules = {file.name: module_url(file.read(self.library_folder), _MODULE_NAMES) for file in files}
+        return _import_map({"imports": modules}, ["data:"])
 
 
 def _import_map(entries: dict[str, dict[str, str]], sources: list[str]) -> tuple[str, list[str]]:

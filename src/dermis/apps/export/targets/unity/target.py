@@ -12,19 +12,28 @@ from string import Template
 
 import numpy as np
 
-from dermis.apps.export.fitting import fit_burley_width, burley_curve
+from dermis.apps.export.fitting import burley_curve, fit_burley_width
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, Value, floats, get_numbers, replace_values, write_files
+from dermis.apps.export.target import (
+    Parameter,
+    Parameters,
+    Target,
+    Value,
+    floats,
+    get_numbers,
+    replace_values,
+    write_files,
+)
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
 
 _COLOUR, _MULTIPLIER, _SCALE, _IOR = "scatteringDistance", "scatteringDistanceMultiplier", "worldScale", "ior"
 _TINT, _DEPTHS = "transmissionTint", "thicknessRemap"
-_SKIN_IOR, _THICKEST = 1.4, 10.0  # thickness by the widest d
-_TYPED_MM = 1.0
+_SKIN_IOR, _MAX_THICKNESS = 1.4, 10.0  # thickness relative to the largest d
+_NAIVE_MULTIPLIER_MM = 1.0
 _BEFORE_14 = "12"
-_FORMS = {_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version: 1 has no multiplier yet
+_FILE_VERSIONS = {_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version; 1 has no multiplier
 
 
 class Unity(Target):
@@ -33,11 +42,11 @@ class Unity(Target):
     name = "unity"
     title = "Unity HDRP"
     suffixes = (".asset", "")
-    versions = tuple(_FORMS)
+    versions = tuple(_FILE_VERSIONS)
     needs_maps = True
     limitations = (
-        "The filter is cut at 99.7 % of the widest channel, and worldScale has to tell the scale of a scene "
-        "that is not in metres."
+        "The filter is truncated at 99.7 % of the widest channel. In a scene that is not in metres, "
+        "worldScale must be set to the length of a unit."
     )
     untested = True
 
@@ -46,16 +55,17 @@ class Unity(Target):
         d = fit_burley_width(subject.curve)
         return (
             *_distances(d, version),
-            Parameter(_SCALE, 1.0, "m", "metres of a unit of the scene"),
-            Parameter(_IOR, _SKIN_IOR, "-", "of the surface reflection"),
-            Parameter(_TINT, (1.0, 1.0, 1.0), "-", "of light through thin parts, times the base colour"),
-            Parameter(_DEPTHS, (0.0, _THICKEST * float(d.max())), "mm", "black and white of a thickness map"),
+            Parameter(_SCALE, 1.0, "m", "metres per scene unit"),
+            Parameter(_IOR, _SKIN_IOR, "-", "of the specular reflection"),
+            Parameter(_TINT, (1.0, 1.0, 1.0), "-", "factor of light through thin parts"),
+            Parameter(_DEPTHS, (0.0, _MAX_THICKNESS * float(d.max())), "mm", "range of a thickness map"),
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the skin's colour as the scattering colour, as the inspector advises, and multiplier 1."""
-        typed: dict[str, Value] = {_COLOUR: floats(subject.clipped_albedo()), _MULTIPLIER: _TYPED_MM}
-        return replace_values(self.parameters(subject, version), typed)
+        colour = floats(subject.clipped_albedo())
+        values: dict[str, Value] = {_COLOUR: colour, _MULTIPLIER: _NAIVE_MULTIPLIER_MM}
+        return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the lobe that the engine computes from its parameters."""
@@ -65,7 +75,7 @@ class Unity(Target):
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the asset, and beside it the maps."""
-        asset = self.main_file(output,  subject)
+        asset = self.main_file(output, subject)
         asset.write_text(asset_text(asset.stem, parameters, version), encoding="utf-8")
         maps = ((f"{asset.stem}_{role}.png", data) for role, data in subject.encode_maps().items())
         return [asset, *write_files(asset.parent, maps)]
@@ -74,20 +84,20 @@ class Unity(Target):
 def _distances(d_mm: Floats, version: str) -> Parameters:
     """Return the lobes' widths, as one colour before HDRP 14 and as colour and multiplier since."""
     if version == _BEFORE_14:
-        return (Parameter(_COLOUR, floats(d_mm), "mm", "d, plain numbers in an HDR colour, no gamma"),)
-    typed = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
+        return (Parameter(_COLOUR, floats(d_mm), "mm", "d as a linear HDR colour"),)
+    profile = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
     return (
-        Parameter(_COLOUR, typed.scattering_colour, "-", "d by its largest channel, plain numbers, no gamma"),
-        Parameter(_MULTIPLIER, typed.multiplier_mm, "mm", "d of the widest channel"),
+        Parameter(_COLOUR, profile.scattering_colour, "-", "d relative to its largest channel, linear"),
+        Parameter(_MULTIPLIER, profile.multiplier_mm, "mm", "largest d of the channels"),
     )
 
 
 def asset_text(name: str, parameters: Parameters, version: str) -> str:
     """Return the asset as the editor writes one; the editor gives it a hash when it is first opened."""
-    known = {row.name: row.value for row in parameters}
+    values = {one.name: one.value for one in parameters}
     colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR, _TINT))
     low, high = get_numbers(parameters, _DEPTHS)
-    multiplier = f"    {_MULTIPLIER}: {known[_MULTIPLIER]:.6g}\n" if _MULTIPLIER in known else ""
+    multiplier = f"    {_MULTIPLIER}: {values[_MULTIPLIER]:.6g}\n" if _MULTIPLIER in values else ""
     template = Template(Path(__file__).with_name("profile.asset").read_text("utf-8"))
     return template.substitute(
         name=json.dumps(name),
@@ -96,9 +106,9 @@ def asset_text(name: str, parameters: Parameters, version: str) -> str:
         tint=tint,
         low=f"{low:.6g}",
         high=f"{high:.6g}",
-        scale=f"{known[_SCALE]:.6g}",
-        ior=f"{known[_IOR]:.6g}",
-        form=_FORMS[version],
+        scale=f"{values[_SCALE]:.6g}",
+        ior=f"{values[_IOR]:.6g}",
+        form=_FILE_VERSIONS[version],
     )
 
 

@@ -23,7 +23,6 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
 METRES_PER_MM = 1e-3
-"""Of a millimetre."""
 
 
 class Polygons(NamedTuple):
@@ -42,12 +41,12 @@ class Polygons(NamedTuple):
 def mesh_polygons(mesh: Mesh) -> Polygons:
     """Return the polygons of a mesh whose quads are in halves."""
     halves, triangles = mesh.quads, mesh.triangles
-    alone = np.delete(np.arange(len(triangles)), halves.ravel())
+    single = np.delete(np.arange(len(triangles)), halves.ravel())
     quads = np.column_stack([triangles[halves[:, 0]], triangles[halves[:, 1]][:, 1]])
     return Polygons(
-        np.concatenate([np.full(len(halves), 4), np.full(len(alone), 3)]).astype(np.int32),
-        np.concatenate([quads.ravel(), triangles[alone].ravel()]).astype(np.int32),
-        np.concatenate([mesh.material[halves[:, 0]], mesh.material[alone]]),
+        np.concatenate([np.full(len(halves), 4), np.full(len(single), 3)]).astype(np.int32),
+        np.concatenate([quads.ravel(), triangles[single].ravel()]).astype(np.int32),
+        np.concatenate([mesh.material[halves[:, 0]], mesh.material[single]]),
     )
 
 
@@ -57,165 +56,161 @@ def point_vertices(mesh: Mesh) -> NDArray[np.intp]:
 
 
 def add_mesh(
-    stage: Usd.Stage, path: Sdf.Path, head: Head, moved: DeformableMesh
+    stage: Usd.Stage, path: Sdf.Path, head: Head, deformable: DeformableMesh
 ) -> dict[int, UsdGeom.Subset]:
     """Write the mesh at rest; return the subset of each material that is used.
 
     moved : the head's vertices with all morph targets at 0
     """
-    mesh, faces = head.mesh, mesh_polygons(head.mesh)
-    one = point_vertices(mesh)
-    made = UsdGeom.Mesh.Define(stage, path)
-    points = Vt.Vec3fArray.FromNumpy(to_metres(moved.positions_mm[one]))
-    made.CreatePointsAttr(points)
-    made.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
-    made.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(faces.corner_counts))
-    made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.point[faces.vertices].astype(np.int32)))
-    made.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(moved.normals[one])))
-    made.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-    made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    _add_uv(made, texture_coordinates(head), faces)
+    mesh, polygons = head.mesh, mesh_polygons(head.mesh)
+    vertex = point_vertices(mesh)
+    prim = UsdGeom.Mesh.Define(stage, path)
+    points = Vt.Vec3fArray.FromNumpy(to_metres(deformable.positions_mm[vertex]))
+    prim.CreatePointsAttr(points)
+    prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(polygons.vertex_counts))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.point[polygons.vertices].astype(np.int32)))
+    prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(deformable.normals[vertex])))
+    prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    _add_uv(prim, texture_coordinates(head), polygons)
     subsets = {}
-    for kind in np.unique(faces.material).tolist():
-        own = Vt.IntArray.FromNumpy(np.flatnonzero(faces.material == kind).astype(np.int32))
-        subsets[kind] = UsdGeom.Subset.CreateGeomSubset(
-            made, f"part_{kind}", UsdGeom.Tokens.face, own, "materialBind"
+    for material in np.unique(polygons.material).tolist():
+        faces = Vt.IntArray.FromNumpy(np.flatnonzero(polygons.material == material).astype(np.int32))
+        subsets[material] = UsdGeom.Subset.CreateGeomSubset(
+            prim, f"part_{material}", UsdGeom.Tokens.face, faces, "materialBind"
         )
-    UsdGeom.Subset.SetFamilyType(made, "materialBind", UsdGeom.Tokens.partition)
+    UsdGeom.Subset.SetFamilyType(prim, "materialBind", UsdGeom.Tokens.partition)
     return subsets
 
 
 def texture_coordinates(head: Head) -> Floats:
     """Return texture coordinates (v, 2) with v downwards, those of eyes by the layout of their picture."""
-    mesh, found = head.mesh, head.mesh.uv.copy()
+    mesh, uv = head.mesh, head.mesh.uv.copy()
     if head.eyes is not None:
         frames = head.eyes.frames(head.control, head.control.rest)
         for material, frame in zip(head.eyes.material, frames, strict=True):
-            own = np.unique(mesh.triangles[mesh.material == material])
-            found[own] = eye_uv(mesh.positions[own] @ frame[:3, :3].T + frame[:3, 3])
-    return found
+            eye = np.unique(mesh.triangles[mesh.material == material])
+            uv[eye] = eye_uv(mesh.positions[eye] @ frame[:3, :3].T + frame[:3, 3])
+    return uv
 
 
-def _add_uv(made: UsdGeom.Mesh, uv: Floats, faces: Polygons) -> None:
+def _add_uv(prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
     """Write texture coordinates (v, 2) with v upwards, one for each vertex of ours."""
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
-    primvar = UsdGeom.PrimvarsAPI(made).CreatePrimvar(
-        "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
-    )
+    types, tokens = Sdf.ValueTypeNames, UsdGeom.Tokens
+    primvar = UsdGeom.PrimvarsAPI(prim).CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying)
     primvar.Set(Vt.Vec2fArray.FromNumpy(upwards))
-    primvar.SetIndices(Vt.IntArray.FromNumpy(faces.vertices))
+    primvar.SetIndices(Vt.IntArray.FromNumpy(polygons.vertices))
 
 
 def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) -> UsdGeom.BasisCurves:
     """Write hairs at rest as lines with a width at each knot."""
-    places = strands.places_mm(head.mesh, head.mesh.points_mm)
-    made = UsdGeom.BasisCurves.Define(stage, path)
-    count = np.full(len(places), places.shape[1], np.int32)
-    points = Vt.Vec3fArray.FromNumpy(to_metres(places.reshape(-1, 3)))
+    knots = strands.knot_positions_mm(head.mesh, head.mesh.points_mm)
+    prim = UsdGeom.BasisCurves.Define(stage, path)
+    count = np.full(len(knots), knots.shape[1], np.int32)
+    points = Vt.Vec3fArray.FromNumpy(to_metres(knots.reshape(-1, 3)))
     widths = Vt.FloatArray.FromNumpy((2.0 * METRES_PER_MM * strands.radius_mm.ravel()).astype(np.float32))
-    made.CreateTypeAttr(UsdGeom.Tokens.linear)
-    made.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(count))
-    made.CreatePointsAttr(points)
-    made.CreateWidthsAttr(widths)
-    made.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
-    made.CreateExtentAttr(UsdGeom.Curves.ComputeExtent(points, widths))
-    return made
+    prim.CreateTypeAttr(UsdGeom.Tokens.linear)
+    prim.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(count))
+    prim.CreatePointsAttr(points)
+    prim.CreateWidthsAttr(widths)
+    prim.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+    prim.CreateExtentAttr(UsdGeom.Curves.ComputeExtent(points, widths))
+    return prim
 
 
-def to_metres(places_mm: NDArray[np.floating]) -> Floats:
+def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
     """Return places in metres."""
-    return np.ascontiguousarray(METRES_PER_MM * places_mm.astype(np.float64), np.float32)
+    return np.ascontiguousarray(METRES_PER_MM * positions_mm.astype(np.float64), np.float32)
 
 
-def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, moved: DeformableMesh) -> None:
+def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
     """Write blend shapes and bones beside a mesh, and how both rest.
 
     root : path of the UsdSkelRoot
     mesh : the prim that they move
     """
     path = root.AppendChild("skeleton")
-    made = UsdSkel.Skeleton.Define(stage, path)
-    skeleton = moved.rig.skeleton
-    joints = _add_joints(made, skeleton)
+    skeleton = UsdSkel.Skeleton.Define(stage, path)
+    joints = _add_joints(skeleton, deformable.rig.skeleton)
     rest = UsdSkel.Animation.Define(stage, path.AppendChild("rest"))
     binding = UsdSkel.BindingAPI.Apply(mesh)
     binding.CreateSkeletonRel().SetTargets([path])
-    UsdSkel.BindingAPI.Apply(made.GetPrim()).CreateAnimationSourceRel().SetTargets([rest.GetPath()])
-    _bind_joints(binding, moved)
+    UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([rest.GetPath()])
+    _bind_joints(binding, deformable)
     rest.CreateJointsAttr(joints)
-    rest.SetTransforms(made.GetRestTransformsAttr().Get())
-    names = valid_names(moved.rig.targets.names)
+    rest.SetTransforms(skeleton.GetRestTransformsAttr().Get())
+    names = valid_names(deformable.rig.targets.names)
     if names:
-        _add_shapes(stage, mesh, moved, names)
+        _add_blend_shapes(stage, mesh, deformable, names)
         binding.CreateBlendShapesAttr(names)
         shapes = [mesh.GetPath().AppendChild(name) for name in names]
         binding.CreateBlendShapeTargetsRel().SetTargets([Sdf.Path(str(shape)) for shape in shapes])
-        weights = moved.rig.targets.rest
+        weights = deformable.rig.targets.rest
         rest.CreateBlendShapesAttr(names)
         rest.CreateBlendShapeWeightsAttr([0.0] * len(names) if weights is None else weights.tolist())
 
 
 def valid_names(names: Sequence[str]) -> list[str]:
     """Return names that a stage can have, each once: letters, digits and underscores."""
-    found: list[str] = []
+    valid: list[str] = []
     for name in names:
-        plain = Tf.MakeValidIdentifier(name)
-        number = sum(one == plain or one.startswith(f"{plain}_again") for one in found)
-        found.append(f"{plain}_again{number}" if number else plain)
-    return found
+        identifier = Tf.MakeValidIdentifier(name)
+        number = sum(one == identifier or one.startswith(f"{identifier}_again") for one in valid)
+        valid.append(f"{identifier}_again{number}" if number else identifier)
+    return valid
 
 
-def _add_joints(made: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
+def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
     """Write bones and return their paths; a head without bones has one, as blend shapes need a skeleton."""
-    joints, local, bound = ["root"], np.eye(4)[None], np.eye(4)[None]
+    joints, rest, bind = ["root"], np.eye(4)[None], np.eye(4)[None]
     if skeleton is not None:
         joints = []
         for name, parent in zip(valid_names(skeleton.names), skeleton.parent.tolist(), strict=True):
             joints.append(f"{joints[parent]}/{name}" if parent >= 0 else name)
-        local, bound = _bone_transforms(skeleton)
-    made.CreateJointsAttr(joints)
-    for attribute, matrices in (
-        (made.CreateRestTransformsAttr, local),
-        (made.CreateBindTransformsAttr, bound),
-    ):
-        attribute(Vt.Matrix4dArray([Gf.Matrix4d(matrix.T) for matrix in matrices]))
+        rest, bind = _bone_transforms(skeleton)
+    prim.CreateJointsAttr(joints)
+    for create, matrices in ((prim.CreateRestTransformsAttr, rest), (prim.CreateBindTransformsAttr, bind)):
+        create(Vt.Matrix4dArray([Gf.Matrix4d(matrix.T) for matrix in matrices]))
     return joints
 
 
 def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
     """Return matrices (b, 4, 4) from bones to their parents at rest, and to the head when bound [m]."""
     to_file = np.diag([METRES_PER_MM, METRES_PER_MM, METRES_PER_MM, 1.0]) @ skeleton.to_head
-    size = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
-    grown, shrunk = (np.diag([one, one, one, 1.0]) for one in (size, 1.0 / size))
-    above = np.where((skeleton.parent < 0)[:, None, None], to_file, grown)
-    bound = np.linalg.inv(grown @ skeleton.inverse_bind @ np.linalg.inv(to_file))
-    return np.asarray(above @ skeleton.local @ shrunk), np.asarray(bound)
+    scale = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
+    enlarge, reduce = (np.diag([factor, factor, factor, 1.0]) for factor in (scale, 1.0 / scale))
+    parent = np.where((skeleton.parent < 0)[:, None, None], to_file, enlarge)
+    bind = np.linalg.inv(enlarge @ skeleton.inverse_bind @ np.linalg.inv(to_file))
+    return np.asarray(parent @ skeleton.local @ reduce), np.asarray(bind)
 
 
-def _bind_joints(binding: UsdSkel.BindingAPI, moved: DeformableMesh) -> None:
-    count = int(moved.head.mesh.point.max()) + 1
-    still = np.zeros((count, 1), np.int64), np.ones((count, 1))
-    bone, share = still if moved.rig.skeleton is None else influences(moved.rig, moved.refinement)
-    bones = Vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
-    shares = Vt.FloatArray.FromNumpy(np.ascontiguousarray(share, np.float32).ravel())
-    binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(bones)
-    binding.CreateJointWeightsPrimvar(False, bone.shape[1]).Set(shares)
+def _bind_joints(binding: UsdSkel.BindingAPI, deformable: DeformableMesh) -> None:
+    rig, count = deformable.rig, int(deformable.head.mesh.point.max()) + 1
+    rigid = np.zeros((count, 1), np.int64), np.ones((count, 1))
+    bone, weight = rigid if rig.skeleton is None else influences(rig, deformable.refinement)
+    indices = Vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
+    weights = Vt.FloatArray.FromNumpy(np.ascontiguousarray(weight, np.float32).ravel())
+    binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(indices)
+    binding.CreateJointWeightsPrimvar(False, bone.shape[1]).Set(weights)
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
 
 
-def _add_shapes(stage: Usd.Stage, mesh: Usd.Prim, moved: DeformableMesh, names: Sequence[str]) -> None:
-    one = point_vertices(moved.head.mesh)
-    point = np.full(len(moved.head.mesh.positions), -1, np.int32)
-    point[one] = np.arange(len(one))
-    own_names = moved.rig.targets.names
-    for name, own_name, target in zip(names, own_names, moved.targets(), strict=True):
+def _add_blend_shapes(
+    stage: Usd.Stage, mesh: Usd.Prim, deformable: DeformableMesh, names: Sequence[str]
+) -> None:
+    vertex = point_vertices(deformable.head.mesh)
+    point = np.full(len(deformable.head.mesh.positions), -1, np.int32)
+    point[vertex] = np.arange(len(vertex))
+    titles = deformable.rig.targets.names
+    for name, title, target in zip(names, titles, deformable.targets(), strict=True):
         shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(name))
-        kept = point[target.vertex] >= 0
-        order = np.argsort(point[target.vertex][kept])
-        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(to_metres(target.delta_mm[kept][order])))
-        shape.CreateNormalOffsetsAttr(
-            Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(target.normal[kept][order]))
-        )
-        shape.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(point[target.vertex][kept][order]))
-        if name != own_name:
-            shape.GetPrim().SetDisplayName(own_name)
+        points = point[target.vertex]
+        order = np.flatnonzero(points >= 0)
+        order = order[np.argsort(points[order])]
+        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(to_metres(target.delta_mm[order])))
+        shape.CreateNormalOffsetsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(target.normal[order])))
+        shape.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(points[order]))
+        if name != title:
+            shape.GetPrim().SetDisplayName(title)

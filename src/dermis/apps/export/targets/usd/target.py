@@ -13,17 +13,17 @@ from dermis.apps.export.targets.openpbr.materials import (
     OPEN_PBR,
     encode_map_files,
     eye_material,
-    mesh_materials,
     file_prefix,
+    mesh_materials,
     write_maps,
 )
 from dermis.apps.export.targets.openpbr.target import (
     PUBLISHED_MEANING,
     fitted_path_mm,
+    get_radii_mm,
     profile_error_text,
-    parameter_radii_mm,
-    surface_parameters,
     published_path_mm,
+    surface_parameters,
     walk_curve,
 )
 from dermis.base.errors import refuse
@@ -31,7 +31,7 @@ from dermis.base.extras import import_extra
 from dermis.optics.cumulative_profile import CumulativeProfile
 
 _PACKAGE, _BINARY = ".usdz", ".usdc"
-_UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "lengths of the stage are metres, those of materials too")
+_UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "unit of all lengths, also in materials")
 
 
 class Usd(Target):
@@ -43,9 +43,9 @@ class Usd(Target):
     versions = ("1.1.1",)
     needs_maps = True
     limitations = (
-        "True for renderers that read the MaterialX nodes and walk as OpenPBR says; UsdPreviewSurface, which "
-        "the others read, has no light below the surface at all. Hairs stay where they are when the head "
-        "moves, and programs that scale a stage to their own unit must scale radii too."
+        "Correct in renderers that support the MaterialX nodes and random walks as OpenPBR specifies. Others "
+        "use UsdPreviewSurface, which has no subsurface scattering. Hairs do not follow the head's motion. "
+        "Programs that convert the unit of a stage must also scale the radii."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
@@ -56,16 +56,18 @@ class Usd(Target):
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the diffuse mean free paths of published tables, typed in as mean free paths."""
-        return (*surface_parameters(subject, OPEN_PBR, published_path_mm(subject), PUBLISHED_MEANING), _UNIT_PARAMETER)
+        path = published_path_mm(subject)
+        return (*surface_parameters(subject, OPEN_PBR, path, PUBLISHED_MEANING), _UNIT_PARAMETER)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve of the walk of these rows."""
-        return walk_curve(np.array(get_numbers(parameters, "subsurface_color")), parameter_radii_mm(parameters, OPEN_PBR), subject)
+        colour = np.array(get_numbers(parameters, "subsurface_color"))
+        return walk_curve(colour, get_radii_mm(parameters, OPEN_PBR), subject)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the stage, and the maps beside it or in the package."""
         import_extra("pxr", "writing USD")
-        file = self.main_file(output,  subject, _BINARY)
+        file = self.main_file(output, subject, _BINARY)
         prefix = file_prefix(file, subject)
         if file.suffix.lower() != _PACKAGE:
             return [file, *_write(subject, parameters, file, prefix)]
@@ -75,7 +77,7 @@ class Usd(Target):
             stage = Path(folder) / f"{prefix}stage{_BINARY}"
             _write(subject, parameters, stage, prefix)
             if not UsdUtils.CreateNewUsdzPackage(str(stage), str(file)):
-                refuse(output.name, "a package that USD can write", "it could not", "Write a .usdc instead")
+                refuse(output.name, "a package that USD can write", "it failed", "Write a .usdc instead")
         return [file]
 
 
@@ -83,18 +85,18 @@ def _write(subject: Subject, parameters: Parameters, file: Path, prefix: str) ->
     """Write the stage and the maps beside it; return the paths of the maps."""
     from dermis.apps.export.targets.usd.stage import build_stage
 
-    pictures = write_maps(subject, file.parent, prefix)
-    looks = mesh_materials(subject, parameter_radii_mm(parameters, OPEN_PBR), pictures)
-    eyes, painted = subject.head_or_ball.eyes, subject.eye_pictures()
-    if eyes is not None and painted is not None:
-        pictures["eye"] = file.parent / f"{prefix}eye.png"
-        pictures["eye"].write_bytes(encode_map_files({"eye": painted.colour})["eye"])
-        names = subject.head_or_ball.mesh.materials
-        looks |= {kind: eye_material(names[kind].name) for kind in eyes.material.tolist() if kind in looks}
-    stage = build_stage(subject.head_or_ball, Path(subject.name).stem or subject.name, looks, prefix)
+    maps, head = write_maps(subject, file.parent, prefix), subject.head_or_ball
+    definitions = mesh_materials(subject, get_radii_mm(parameters, OPEN_PBR), maps)
+    eye_pictures = subject.eye_pictures()
+    if head.eyes is not None and eye_pictures is not None:
+        maps["eye"] = file.parent / f"{prefix}eye.png"
+        maps["eye"].write_bytes(encode_map_files({"eye": eye_pictures.colour})["eye"])
+        for material in definitions.keys() & set(head.eyes.material.tolist()):
+            definitions[material] = eye_material(head.mesh.materials[material].name)
+    stage = build_stage(head, Path(subject.name).stem or subject.name, definitions, prefix)
     if not stage.GetRootLayer().Export(str(file)):
-        refuse(file.name, "a stage that USD can write", "it could not", "Choose another name")
-    return [*pictures.values()]
+        refuse(file.name, "a stage that USD can write", "it failed", "Choose another name")
+    return [*maps.values()]
 
 
 TARGET = Usd()

@@ -9,11 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.target import floats
-from dermis.apps.export.targets.web.describe_frames import Json, PictureMap, PictureMaps, NamedFrame, describe_frames
-from dermis.apps.export.targets.web.dials import Slider, slider_changes, node_inputs
-from dermis.apps.export.targets.web.maps import MapPictures, PictureKey, encode_picture, quantise_hairs, read_texels
+from dermis.apps.export.targets.web.frame_json import (
+    Json,
+    NamedFrame,
+    PictureMap,
+    PictureMaps,
+    describe_frames,
+)
+from dermis.apps.export.targets.web.maps import (
+    MapPictures,
+    PictureKey,
+    encode_picture,
+    quantise_hairs,
+    read_texels,
+)
 from dermis.apps.export.targets.web.packing import Packer
-from dermis.frame.capture import ADAPTER_KINDS, capture_renderer, reduce_hair, capture_frame
+from dermis.apps.export.targets.web.sliders import Slider, node_changes, node_inputs
+from dermis.frame.capture import ADAPTER_KINDS, capture_frame, capture_renderer, reduce_hair
 from dermis.frame.features.shading.view import pinhole
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.renderer import Renderer
@@ -24,9 +36,9 @@ from dermis.scene.settings import Settings
 
 TECHNIQUES = ("texture-space", "none")
 PICTURE_SIDES = {"gpu": (512, 1024, 1600), "software": (512,)}
-"""Sides of the square pictures of each form [pixel]."""
+"""Sides of the square pictures for each kind of adapter [pixel]."""
 INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
-"""Of forms that draw less while hands move: side [pixel], samples, and how many coarse hairs become one."""
+"""Reduced quality during interaction: side [pixel], samples per pixel, and hairs merged into one."""
 
 
 @dataclass
@@ -49,10 +61,10 @@ class PageContent:
     def add_picture(self, key: PictureKey) -> tuple[int, int, int]:
         """Add a picture and its curves once; return its entry of `picture_entries`."""
         if key not in self.picture_entries:
-            one = self.maps.pictures[key]
-            curves = self.packer.add(np.ascontiguousarray(one.curves).view(np.uint8).reshape(-1))
+            picture = self.maps.pictures[key]
+            curves = self.packer.add(np.ascontiguousarray(picture.curves).view(np.uint8).reshape(-1))
             self.picture_entries[key] = len(self.pictures), curves, 3 if key[0] == "colour_map" else 0
-            self.pictures.append(one.data)
+            self.pictures.append(picture.data)
         return self.picture_entries[key]
 
 
@@ -66,7 +78,7 @@ class PageRequest:
     """
 
     scene: Scene
-    dials: tuple[Slider, ...]
+    sliders: tuple[Slider, ...]
     settings: Settings
     sizes: dict[str, tuple[int, ...]]
     adapter: str = "auto"
@@ -86,8 +98,8 @@ class PageRequest:
 
         Every layout has links of its own: those of a second one would be 0.6 MB of the page.
         """
-        spreads = {"technique": technique, "interreflection": technique == TECHNIQUES[0]}
-        return self.settings.model_copy(update={"size": (side, side), **spreads})
+        diffusion = {"technique": technique, "interreflection": technique == TECHNIQUES[0]}
+        return self.settings.model_copy(update={"size": (side, side), **diffusion})
 
 
 def build_content(
@@ -110,63 +122,71 @@ def build_content(
 
 
 def _build_form(content: PageContent, renderer: Renderer, request: PageRequest, form: str) -> Json:
-    tape, frames, changed = FrameCapture(renderer.device), list[NamedFrame](), list[Json]()
+    capture, frames, slider_changes = FrameCapture(renderer.device), list[NamedFrame](), list[Json]()
     base: FrameInputs | None = None
     for settings, merged_hairs in request.frames(form):
         inputs = renderer.prepare(request.scene, settings)
         base, picture = base or inputs, inputs.resources.post.picture
-        captured = reduce_hair(capture_frame(tape, inputs), merged_hairs)
+        captured = reduce_hair(capture_frame(capture, inputs), merged_hairs)
         frames.append(NamedFrame(settings.technique, captured, picture, settings.size, merged_hairs))
-        changed.append(_slider_changes(content.packer, renderer, request, settings, inputs, frames[-1]))
-    captured_frames = [one.captured for one in frames]
-    picture_maps, steps = content.maps.replace_textures(renderer, tape, captured_frames), quantise_hairs(renderer, tape, captured_frames)
-    found = describe_frames(tape, frames, picture_maps, steps, content.packer)
-    for one, dials in zip(found["frames"], changed, strict=True):
-        one["dials"] = dials
-    found["maps"] = {str(number): _mip_entries(content, one) for number, one in picture_maps.items()}
+        changes = _frame_changes(content.packer, renderer, request, settings, inputs, frames[-1])
+        slider_changes.append(changes)
+    captured_frames = [frame.captured for frame in frames]
+    picture_maps = content.maps.replace_textures(renderer, capture, captured_frames)
+    steps = quantise_hairs(renderer, capture, captured_frames)
+    form_json = describe_frames(capture, frames, picture_maps, steps, content.packer)
+    for frame_json, changes in zip(form_json["frames"], slider_changes, strict=True):
+        frame_json["dials"] = changes
+    form_json["maps"] = {str(number): _mip_entries(content, one) for number, one in picture_maps.items()}
     assert base is not None
-    found["hands"] = _controls(request.scene, base)
-    found["colours"] = _colour_maps(content, renderer, request, picture_maps)
-    return found
+    form_json["hands"] = _interaction(request.scene, base)
+    form_json["colours"] = _colour_maps(content, renderer, request, picture_maps)
+    return form_json
 
 
-def _slider_changes(
+def _frame_changes(
     packer: Packer,
     renderer: Renderer,
     request: PageRequest,
     settings: Settings,
     base: FrameInputs,
-    one: NamedFrame,
+    frame: NamedFrame,
 ) -> Json:
     """Return the changes of a frame at each dial's nodes."""
-    found, beside = {}, FrameCapture(renderer.device)
-    for dial in request.dials:
-        nodes = node_inputs(dial, lambda scene: renderer.prepare(scene, settings), base)
-        found[dial.name] = [
-            None if inputs is None else slider_changes(one.captured, reduce_hair(capture_frame(beside, inputs), one.merged_hairs), packer)
-            for inputs in nodes
-        ]
-    return found
+    capture = FrameCapture(renderer.device)
+
+    def changes(inputs: FrameInputs | None) -> Json | None:
+        if inputs is None:
+            return None
+        node = reduce_hair(capture_frame(capture, inputs), frame.merged_hairs)
+        return node_changes(frame.captured, node, packer)
+
+    return {
+        slider.name: [*map(changes, node_inputs(slider, lambda one: renderer.prepare(one, settings), base))]
+        for slider in request.sliders
+    }
 
 
-def _mip_entries(content: PageContent, one: PictureMap) -> list[list[tuple[int, int, int]]]:
+def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int, int, int]]]:
     """Return the pictures and curves of the layers of a map's mips."""
-    layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == one.role)
-    return [[content.add_picture((one.role, mip, k)) for k in range(layers)] for mip in range(one.mips)]
+    layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == map_.role)
+    return [[content.add_picture((map_.role, mip, k)) for k in range(layers)] for mip in range(map_.mips)]
 
 
-def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, picture_maps: PictureMaps) -> Json:
+def _colour_maps(
+    content: PageContent, renderer: Renderer, request: PageRequest, picture_maps: PictureMaps
+) -> Json:
     """Return the number of the colour map, and its picture and curves at nodes of dials that change it."""
     number = next((k for k, one in picture_maps.items() if one.role == "colour_map"), None)
     if number is None:
         return {}
-    settings, found = request.settings_for(min(map(min, request.sizes.values()))), {}
-    for dial in (one for one in request.dials if not one.changes_pose_only):
-        scenes = enumerate(dial.scenes)
-        nodes = [_colour_entry(content, renderer, one, settings, f"{dial.name} {k}") for k, one in scenes]
+    settings, entries = request.settings_for(min(map(min, request.sizes.values()))), {}
+    for slider in (one for one in request.sliders if not one.changes_pose_only):
+        scenes = enumerate(slider.scenes)
+        nodes = [_colour_entry(content, renderer, one, settings, f"{slider.name} {k}") for k, one in scenes]
         if any(nodes):
-            found[dial.name] = nodes
-    return {"map": number, "dials": found} if found else {}
+            entries[slider.name] = nodes
+    return {"map": number, "dials": entries} if entries else {}
 
 
 def _colour_entry(
@@ -176,37 +196,38 @@ def _colour_entry(
     if scene is None:
         return None
     if (name, 0, 0) not in content.maps.pictures:
-        tape, texture = FrameCapture(renderer.device), renderer.prepare(scene, settings).bindings["colour_map"]
-        texels = read_texels(tape, tape.resource(texture), 0)[0]
+        capture = FrameCapture(renderer.device)
+        texture = renderer.prepare(scene, settings).bindings["colour_map"]
+        texels = read_texels(capture, capture.resource(texture), 0)[0]
         if content.maps.matches_picture("colour_map", texels):
             return None
         content.maps.pictures[name, 0, 0] = encode_picture(texels, True)
     return *content.add_picture((name, 0, 0))[:2], 3
 
 
-def _controls(scene: Scene, inputs: FrameInputs) -> Json:
+def _interaction(scene: Scene, inputs: FrameInputs) -> Json:
     """Return the camera, the lights that can be dragged, and the outline that shadow maps are fitted to."""
     camera, settings = scene.camera, inputs.settings
-    seen, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
+    projection, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
     return {
         "centre": [*floats(scene.head.centre_mm)],
         "camera": {
             "position": list(camera.position),
             "target": list(camera.target),
             "up": list(camera.up),
-            "half": list(seen.window.half),
-            "shift": list(seen.window.shift),
+            "half": list(projection.window.half),
+            "shift": list(projection.window.shift),
         },
         "samples": inputs.camera_views.places.tolist(),
-        "outline": np.asarray(outline.places_mm, np.float32).round(3).ravel().tolist(),
-        "slack": outline.slack_mm,
-        "middle": list(outline.middle_mm),
+        "outline": np.asarray(outline.points_mm, np.float32).round(3).ravel().tolist(),
+        "slack": outline.margin_mm,
+        "middle": list(outline.centre_mm),
         "shadow_size": settings.shadow_size,
-        "lights": [_light(one) for one in scene.lights],
+        "lights": [_movable_light(light) for light in scene.lights],
     }
 
 
-def _light(light: Light) -> Json | None:
+def _movable_light(light: Light) -> Json | None:
     """Return a light that has a position and one shadow map; None for others, which cannot be moved."""
     if not isinstance(light, SpotLight) or not light.shadows:
         return None

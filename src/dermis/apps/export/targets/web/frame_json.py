@@ -48,29 +48,35 @@ QuantisedBuffers = dict[int, tuple[float, ...]]
 
 
 def describe_frames(
-    tape: FrameCapture, frames: list[NamedFrame], picture_maps: PictureMaps, steps: QuantisedBuffers, packer: Packer
+    capture: FrameCapture,
+    frames: list[NamedFrame],
+    picture_maps: PictureMaps,
+    steps: QuantisedBuffers,
+    packer: Packer,
 ) -> Json:
     """Return the description of frames; the bytes that it names by number are in the packer.
 
     Resources of zeros, which new ones are, have no content.
     """
-    pictures = [[tape.resource(one.picture.bytes), tape.resource(one.picture.exposed)] for one in frames]
-    contents, tables = {}, set(resources_bound_as(tape, [one.captured for one in frames], _TABLES))
-    for number in read_before_written(tape, [one.captured for one in frames]):
+    pictures = [
+        [capture.resource(one.picture.bytes), capture.resource(one.picture.exposed)] for one in frames
+    ]
+    contents, tables = {}, set(resources_bound_as(capture, [one.captured for one in frames], _TABLES))
+    for number in read_before_written(capture, [one.captured for one in frames]):
         if number in steps:
-            floats = tape.read_content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
+            floats = capture.read_content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
             contents[number] = [packer.add_floats(floats, steps[number])]
             continue
         _, pictured, mip_passes = picture_maps.get(number, PictureMap("", 0, None))
-        mips = [] if mip_passes else _mips(tape, number)[pictured:]
+        mips = [] if mip_passes else _mips(capture, number)[pictured:]
         if any(one.any() for one in mips):
             add = packer.add if number not in tables else _in_parts(packer)
             contents[number] = [-1] * pictured + [add(one) for one in mips]
     return {
-        "shaders": tape.shaders,
-        "programs": [_program(one) for one in tape.programs],
-        "resources": [_camel(one) for one in tape.resources],
-        "structs": {name: _struct(dtype) for name, dtype in tape.structs.items()},
+        "shaders": capture.shaders,
+        "programs": [_program(one) for one in capture.programs],
+        "resources": [_camel(one) for one in capture.resources],
+        "structs": {name: _struct(dtype) for name, dtype in capture.structs.items()},
         "contents": contents,
         "frames": [_frame(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
         "halved": {k: _passes(one.mip_passes, packer) for k, one in picture_maps.items() if one.mip_passes},
@@ -82,9 +88,9 @@ def _in_parts(packer: Packer) -> Callable[[Bytes], int]:
     return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mips(tape: FrameCapture, number: int) -> list[Bytes]:
+def _mips(capture: FrameCapture, number: int) -> list[Bytes]:
     """Return a buffer's bytes, or a texture's mip by mip, each with all its layers."""
-    parts, layers = tape.read_content(number), tape.resources[number].get("size")
+    parts, layers = capture.read_content(number), capture.resources[number].get("size")
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
@@ -145,51 +151,57 @@ def _spelt(name: str) -> str:
     return first + "".join(word.title() for word in others)
 
 
-def read_before_written(tape: FrameCapture, captured_frames: list[CapturedFrame]) -> list[int]:
+def read_before_written(capture: FrameCapture, captured_frames: list[CapturedFrame]) -> list[int]:
     """Return the numbers of textures and buffers that some pass reads before any writes it, in order."""
     found: set[int] = set()
     for captured in captured_frames:
         written: set[int] = set()
         for one in captured.passes:
-            found |= {base_resource(tape, k) for k in read_resources(tape, one) if not _is_written(tape, k, written)}
-            written |= set(written_resources(tape, one))
+            found |= {
+                base_resource(capture, k)
+                for k in read_resources(capture, one)
+                if not _is_written(capture, k, written)
+            }
+            written |= set(written_resources(capture, one))
     return sorted(found)
 
 
-def resources_bound_as(tape: FrameCapture, captured_frames: list[CapturedFrame], names: tuple[str, ...]) -> dict[int, str]:
+def resources_bound_as(
+    capture: FrameCapture, captured_frames: list[CapturedFrame], names: tuple[str, ...]
+) -> dict[int, str]:
     """Return the resources that are bound by some names."""
     found: dict[int, str] = {}
     for captured in captured_frames:
         for one in (each for each in captured.passes if each.program is not None):
-            known = [name for _, name, _ in tape.programs[one.program or 0]["bindings"]]
+            known = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
             found |= {k: name for k, name in zip(one.bound, known, strict=True) if name in names and k >= 0}
     return found
 
 
-def base_resource(tape: FrameCapture, number: int) -> int:
+def base_resource(capture: FrameCapture, number: int) -> int:
     """Return the texture of a view; other resources themselves."""
-    return int(tape.resources[number].get("of", number))
+    return int(capture.resources[number].get("of", number))
 
 
-def read_resources(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def read_resources(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
     """Yield the resources that a pass may read."""
-    yield from (k for k, entry in _entries(tape, one) if _reads(entry))
+    yield from (k for k, entry in _entries(capture, one) if _reads(entry))
     if one.raster and one.raster["indices"] >= 0:
         yield int(one.raster["indices"])
 
 
-def written_resources(tape: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def written_resources(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
     """Yield the resources that a pass writes."""
     if one.written:
         yield one.written[0]
-    yield from (k for k, entry in _entries(tape, one) if _writes(entry))
+    yield from (k for k, entry in _entries(capture, one) if _writes(entry))
     if one.raster:
         yield from (int(one.raster[name]) for name in ("depth", "target") if one.raster[name] >= 0)
 
 
-def _entries(tape: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, Json]]:
+def _entries(capture: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, Json]]:
     if one.program is not None:
-        bindings = tape.programs[one.program]["bindings"]
+        bindings = capture.programs[one.program]["bindings"]
         yield from ((k, entry) for k, (_, _, entry) in zip(one.bound, bindings, strict=True) if k >= 0)
 
 
@@ -201,6 +213,6 @@ def _writes(entry: Json) -> bool:
     return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}
 
 
-def _is_written(tape: FrameCapture, number: int, written: set[int]) -> bool:
+def _is_written(capture: FrameCapture, number: int, written: set[int]) -> bool:
     """Return whether a pass has written a resource, or any part of it."""
-    return any(base_resource(tape, k) == base_resource(tape, number) for k in written)
+    return any(base_resource(capture, k) == base_resource(capture, number) for k in written)

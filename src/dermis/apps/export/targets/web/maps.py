@@ -9,7 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.targets.web.describe_frames import PictureMap, PictureMaps, resources_bound_as
+from dermis.apps.export.targets.web.frame_json import (
+    PictureMap,
+    PictureMaps,
+    QuantisedBuffers,
+    resources_bound_as,
+)
 from dermis.apps.export.targets.web.packing import quantise
 from dermis.frame.capture import capture_mips, update_map
 from dermis.frame.renderer import Renderer
@@ -23,9 +28,9 @@ PictureKey = tuple[str, int, int]
 """Role, mip and layer."""
 MIN_SIDE = 64
 """Side of the smallest map that becomes a picture [texels]."""
-_QUALITY = 88  # of WebP
+_WEBP_QUALITY = 88
 _STEPS = 256
-_COLOURS = 3
+_COLOUR_CHANNELS = 3
 
 
 @dataclass(frozen=True)
@@ -50,49 +55,49 @@ def encode_picture(texels: Halves, colours: bool) -> Picture:
     """
     curves = np.stack([_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
     steps = np.stack([_steps(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
-    image = steps[..., :_COLOURS] if colours else steps.transpose(2, 0, 1).reshape(-1, steps.shape[1])
-    data = _encoded(image)
-    found = _decoded(data)
+    image = steps[..., :_COLOUR_CHANNELS] if colours else steps.transpose(2, 0, 1).reshape(-1, steps.shape[1])
+    data = _encode_webp(image)
+    levels = _decode_webp(data)
     if colours:
-        found = np.concatenate([found, steps[..., _COLOURS:]], axis=-1)
-        found[..., _COLOURS:] = steps[:1, :1, _COLOURS:]  # one number each
+        levels = np.concatenate([levels, steps[..., _COLOUR_CHANNELS:]], axis=-1)
+        levels[..., _COLOUR_CHANNELS:] = steps[:1, :1, _COLOUR_CHANNELS:]  # constant channels
     else:
-        found = found[..., 0].reshape(len(curves), *texels.shape[:2]).transpose(1, 2, 0)
-    decoded = np.stack([curves[k][found[..., k]] for k in range(len(curves))], axis=-1)
+        levels = levels[..., 0].reshape(len(curves), *texels.shape[:2]).transpose(1, 2, 0)
+    decoded = np.stack([curves[k][levels[..., k]] for k in range(len(curves))], axis=-1)
     return Picture(data, curves.astype(np.float16), decoded.astype(np.float16))
 
 
 def _curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return values (256,) from the least to the largest, closer together near 0."""
-    ends = np.array([values.min(), values.max()])
-    first, last = np.sign(ends) * np.sqrt(np.abs(ends))
+    limits = np.array([values.min(), values.max()])
+    first, last = np.sign(limits) * np.sqrt(np.abs(limits))
     root = np.linspace(first, last, _STEPS)
     return np.asarray(np.sign(root) * root * root)
 
 
 def _steps(values: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return the nearest step of the curve to each value."""
-    middles = 0.5 * (curve[1:] + curve[:-1])
-    return np.searchsorted(middles, values.astype(np.float64)).astype(np.uint8)
+    midpoints = 0.5 * (curve[1:] + curve[:-1])
+    return np.searchsorted(midpoints, values.astype(np.float64)).astype(np.uint8)
 
 
-def _encoded(image: NDArray[np.uint8]) -> bytes:
+def _encode_webp(image: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
-    into = io.BytesIO()
-    Image.fromarray(image).save(into, "WEBP", quality=_QUALITY, method=4)
-    return into.getvalue()
+    file = io.BytesIO()
+    Image.fromarray(image).save(file, "WEBP", quality=_WEBP_QUALITY, method=4)
+    return file.getvalue()
 
 
-def _decoded(data: bytes) -> NDArray[np.uint8]:
+def _decode_webp(data: bytes) -> NDArray[np.uint8]:
     """(h, w, 3)"""
     from PIL import Image
 
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
 
 
-_STORABLE = 8  # WebGPU's number of STORAGE_BINDING
-_KNOT_MM = 2.0**-8, 2.0**-8, 2.0**-8, 2.0**-14  # steps of hairs' places and of their radius
+_STORAGE_BINDING = 8  # WebGPU's texture usage flag
+_KNOT_STEPS_MM = 2.0**-8, 2.0**-8, 2.0**-8, 2.0**-14  # steps of a knot's position and radius
 _COLOUR_ROLE = "colour_map"
 _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughness_map", "detail_map")
 
@@ -105,76 +110,79 @@ class MapPictures:
     """
 
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
-    _given: dict[str, NDArray[np.float16]] = field(default_factory=dict)
+    _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
         """Return whether a map is the one of its picture."""
-        return bool(np.array_equal(self._given[role], texels))
+        return bool(np.array_equal(self._encoded_texels[role], texels))
 
-    def replace_textures(self, renderer: Renderer, tape: FrameCapture, captured_frames: list[CapturedFrame]) -> PictureMaps:
+    def replace_textures(
+        self, renderer: Renderer, capture: FrameCapture, captured_frames: list[CapturedFrame]
+    ) -> PictureMaps:
         """Encode new maps and decode them into the captured textures; return these by number."""
-        found = {}
-        for number, role in _picture_textures(tape, captured_frames).items():
-            texture, described = tape.resource_at(number), tape.resources[number]
-            side, storable = min(described["size"][:2]), described["usage"] & _STORABLE
-            mips = 1 if storable else sum(side >> mip >= MIN_SIDE for mip in range(described["mips"]))
-            levels = [self._layers(tape, number, role, mip) for mip in range(mips)]
-            rest = range(mips, described["mips"] if mips > 1 else 0)
-            update_map(renderer, texture, levels + [read_texels(tape, number, mip) for mip in rest])
-            fills = capture_mips(tape, texture) if storable else None
-            found[number] = PictureMap(role, mips, fills)
-        return found
+        maps = {}
+        for number, role in _picture_textures(capture, captured_frames).items():
+            texture, description = capture.resource_at(number), capture.resources[number]
+            side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING
+            mips = 1 if storable else sum(side >> mip >= MIN_SIDE for mip in range(description["mips"]))
+            levels = [self._layers(capture, number, role, mip) for mip in range(mips)]
+            small_mips = range(mips, description["mips"] if mips > 1 else 0)
+            levels += [read_texels(capture, number, mip) for mip in small_mips]
+            update_map(renderer, texture, levels)
+            maps[number] = PictureMap(role, mips, capture_mips(capture, texture) if storable else None)
+        return maps
 
-    def _layers(self, tape: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
+    def _layers(self, capture: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
         """Return a mip (l, h, w, c) as it is decoded."""
-        layers = read_texels(tape, number, mip)
+        layers = read_texels(capture, number, mip)
         for layer, texels in enumerate(layers):
             if (role, mip, layer) not in self.pictures:
                 self.pictures[role, mip, layer] = encode_picture(texels, role == _COLOUR_ROLE)
-                self._given.setdefault(role, texels)
+                self._encoded_texels.setdefault(role, texels)
         return np.stack([self.pictures[role, mip, layer].texels for layer in range(len(layers))])
 
 
-def with_reduced_maps(head: Head, most: int) -> Head:
+def with_reduced_maps(head: Head, max_side: int) -> Head:
     """Return the head with its maps of files halved until none has a longer side [texels]."""
     maps = head.maps
     if not isinstance(maps, Maps):
         return head
-    given = {name: getattr(maps, name) for name in ("colour", "normal", "height", "specular", "roughness")}
-    halved: Any = {name: _reduce_map(one, most) for name, one in given.items() if one is not None}
-    return replace(head, maps=replace(maps, **halved))
+    names = "colour", "normal", "height", "specular", "roughness"
+    arrays = {name: getattr(maps, name) for name in names}
+    reduced: Any = {name: _reduce_map(one, max_side) for name, one in arrays.items() if one is not None}
+    return replace(head, maps=replace(maps, **reduced))
 
 
-def _reduce_map(values: NDArray[np.float32], most: int) -> NDArray[np.float32]:
-    times = max(0, (max(values.shape[:2]) - 1).bit_length() - (most - 1).bit_length())
-    return np.asarray(mip_chain(values)[times], np.float32)
+def _reduce_map(values: NDArray[np.float32], max_side: int) -> NDArray[np.float32]:
+    mip = max(0, (max(values.shape[:2]) - 1).bit_length() - (max_side - 1).bit_length())
+    return np.asarray(mip_chain(values)[mip], np.float32)
 
 
 def quantise_hairs(
-    renderer: Renderer, tape: FrameCapture, captured_frames: list[CapturedFrame]
-) -> dict[int, tuple[float, ...]]:
+    renderer: Renderer, capture: FrameCapture, captured_frames: list[CapturedFrame]
+) -> QuantisedBuffers:
     """Round the places of hairs on a device; of each buffer of them the steps of its columns."""
-    found: dict[int, tuple[float, ...]] = {}
-    for number in resources_bound_as(tape, captured_frames, ("knots",)):
-        data = quantise(tape.read_content(number)[0].view(np.float32).reshape(-1, len(_KNOT_MM)), _KNOT_MM)
-        renderer.device.write(tape.resource_at(number), data.tobytes(), data.nbytes)
-        found[number] = _KNOT_MM
-    return found
+    buffers = resources_bound_as(capture, captured_frames, ("knots",))
+    for number in buffers:
+        knots = capture.read_content(number)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
+        data = quantise(knots, _KNOT_STEPS_MM)
+        renderer.device.write(capture.resource_at(number), data.tobytes(), data.nbytes)
+    return dict.fromkeys(buffers, _KNOT_STEPS_MM)
 
 
-def read_texels(tape: FrameCapture, number: int, mip: int) -> NDArray[np.float16]:
+def read_texels(capture: FrameCapture, number: int, mip: int) -> NDArray[np.float16]:
     """Return the texels (l, h, w, c) of a texture of halves."""
-    width, height, layers = tape.resources[number]["size"]
+    width, height, layers = capture.resources[number]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
-    parts = tape.read_content(number)[mip * layers : (mip + 1) * layers]
+    parts = capture.read_content(number)[mip * layers : (mip + 1) * layers]
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 
-def _picture_textures(tape: FrameCapture, captured_frames: list[CapturedFrame]) -> dict[int, str]:
+def _picture_textures(capture: FrameCapture, captured_frames: list[CapturedFrame]) -> dict[int, str]:
     """Return textures of halves bound as maps, large enough for pictures, with their roles."""
     return {
         number: role
-        for number, role in resources_bound_as(tape, captured_frames, _MAP_ROLES).items()
-        if tape.resources[number].get("format", "").endswith("16float")
-        and min(tape.resources[number]["size"][:2]) >= MIN_SIDE
+        for number, role in resources_bound_as(capture, captured_frames, _MAP_ROLES).items()
+        if capture.resources[number].get("format", "").endswith("16float")
+        and min(capture.resources[number]["size"][:2]) >= MIN_SIDE
     }

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
-Run = tuple[int, int, int, int, int, tuple[float, ...]]
-"""Where a run of bytes begins, how many it has, bytes of a word, words of a row, how often rows are
-subtracted, and of floats the step of each word of a row. Words of no bytes: numbers of runs to join."""
-_ESCAPED = frozenset({0, 13, ord("<")})  # letters that a script element would change, or end at
+ByteRun = tuple[int, int, int, int, int, tuple[float, ...]]
+"""Offset and size of a run of bytes, bytes per word, words per row, order of the differences between rows,
+and the step of each float in a row. With 0 bytes per word, the steps are numbers of runs to concatenate."""
+_ESCAPED = frozenset({0, 13, ord("<")})  # characters that a script element would change or end at
 _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 _ORDERS = (0, 1, 2)
-_SAMPLE_BYTES, _SAMPLE_COUNT = 3 << 15, 3  # bytes by which a way is chosen, a multiple of all rows, and how often
-_SAMPLE_ALIGNMENT = 192  # bytes: a multiple of all rows of words
-_FAST_LEVEL = 4  # of zlib's levels, to compare ways
+_SAMPLE_BYTES, _SAMPLE_COUNT = 3 << 15, 3  # parts of a run on which layouts are compared
+_SAMPLE_ALIGNMENT = 192  # bytes; a multiple of the bytes of all rows
+_FAST_LEVEL = 4  # zlib level for the comparison of layouts
 _WORDS = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 
 
@@ -27,7 +27,7 @@ class Packer:
     """Gathers runs of bytes; the same bytes come once."""
 
     def __init__(self) -> None:
-        self.runs: list[Run] = []
+        self.runs: list[ByteRun] = []
         self._run_numbers: dict[bytes, int] = {}
         self._data: list[bytes] = []
         self._end = 0
@@ -57,13 +57,13 @@ class Packer:
         if key not in self._run_numbers:
             self._run_numbers[key] = len(self.runs)
             layout = _best_layout(raw, layouts)
-            compressed = byte_planes(raw, *layout)
-            self.runs.append((self._end, len(compressed), *layout, steps))
-            self._data.append(compressed)
-            self._end += len(compressed)
+            planes = byte_planes(raw, *layout)
+            self.runs.append((self._end, len(planes), *layout, steps))
+            self._data.append(planes)
+            self._end += len(planes)
         return self._run_numbers[key]
 
-    def compressed(self) -> bytes:
+    def compress(self) -> bytes:
         """All of it."""
         return gzip.compress(b"".join(self._data), 9, mtime=0)
 
@@ -77,8 +77,8 @@ def encode_seven_bits(data: bytes) -> str:
     """Bytes as letters of seven bits, those that cannot stand in a page 256 higher, see packed.js."""
     bits = np.unpackbits(np.frombuffer(data, np.uint8))
     bits = np.concatenate([bits, np.zeros(-len(bits) % 7, np.uint8)])
-    sevens = np.packbits(bits.reshape(-1, 7), axis=1)[:, 0] >> 1
-    return sevens.tobytes().decode("ascii").translate({one: one + 256 for one in _ESCAPED})
+    codes = np.packbits(bits.reshape(-1, 7), axis=1)[:, 0] >> 1
+    return codes.tobytes().decode("ascii").translate({code: code + 256 for code in _ESCAPED})
 
 
 def byte_planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
@@ -97,8 +97,9 @@ def _possible_layouts(size: int) -> Iterable[tuple[int, int, int]]:
 
 def _best_layout(raw: Bytes, layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
     """The way that packs some of the bytes best."""
-    tried = raw
+    sample = raw
     if len(raw) > _SAMPLE_COUNT * _SAMPLE_BYTES:
-        starts = [k * (len(raw) - _SAMPLE_BYTES) // (_SAMPLE_COUNT - 1) // _SAMPLE_ALIGNMENT * _SAMPLE_ALIGNMENT for k in range(_SAMPLE_COUNT)]
-        tried = np.concatenate([raw[start : start + _SAMPLE_BYTES] for start in starts])
-    return min(layouts, key=lambda layout: len(zlib.compress(byte_planes(tried, *layout), _FAST_LEVEL)))
+        starts = [k * (len(raw) - _SAMPLE_BYTES) // (_SAMPLE_COUNT - 1) for k in range(_SAMPLE_COUNT)]
+        aligned = [start // _SAMPLE_ALIGNMENT * _SAMPLE_ALIGNMENT for start in starts]
+        sample = np.concatenate([raw[start : start + _SAMPLE_BYTES] for start in aligned])
+    return min(layouts, key=lambda layout: len(zlib.compress(byte_planes(sample, *layout), _FAST_LEVEL)))

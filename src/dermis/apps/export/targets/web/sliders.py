@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.targets.web.describe_frames import Json
+from dermis.apps.export.targets.web.frame_json import Json
 from dermis.apps.export.targets.web.packing import Packer
 from dermis.base.errors import refuse
 from dermis.frame.inputs import FrameInputs
@@ -22,10 +22,10 @@ from dermis.scene.model import Scene
 
 Floats = NDArray[np.float32]
 _EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown": "full-frown"}
-"""Expressions at a dial's end, by the dial's name."""
+"""Expressions at the upper end of sliders, by the slider's name."""
 _ROUGHNESS_FACTORS = (0.5, 1.0, 1.7)
 PIGMENT_FACTORS = (0.4, 1.0, 3.0)
-"""Of a person's own melanin and blood."""
+"""Factors of the person's melanin and blood at the nodes of their sliders."""
 
 
 @dataclass(frozen=True)
@@ -44,19 +44,21 @@ class Slider:
     changes_pose_only: bool = False
 
 
-def node_inputs(dial: Slider, prepare: Callable[[Scene], FrameInputs], base: FrameInputs) -> Iterator[FrameInputs | None]:
+def node_inputs(
+    slider: Slider, prepare: Callable[[Scene], FrameInputs], base: FrameInputs
+) -> Iterator[FrameInputs | None]:
     """Yield what a frame reads at each node, None at rest."""
-    for scene in dial.scenes:
+    for scene in slider.scenes:
         if scene is None:
             yield None
-        elif dial.changes_pose_only:
+        elif slider.changes_pose_only:
             posed = prepare(scene)
             yield replace(base, motion=posed.motion, view=posed.view)
         else:
             yield prepare(scene)
 
 
-def slider_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
+def node_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
     """Return the changes of a node in records and buffers: first word, and differences as floats.
 
     Whole numbers stay those of the base, as do the pairs of places that light passes between.
@@ -65,88 +67,91 @@ def slider_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> 
     """
     stages = [[one.stage for one in captured.passes] for captured in (base, node)]
     if stages[0] != stages[1]:
-        refuse("dial", "the same passes at each of its nodes", "they differ", "Leave it out")
+        refuse("slider", "the same passes at each of its nodes", "they differ", "Remove the slider")
     pairs = enumerate(zip(base.records, node.records, strict=True))
     records = [(k, (_floats(one), _floats(other))) for k, ((_, one), (_, other)) in pairs]
-    hosts = enumerate(zip(base.passes, node.passes, strict=True))
-    written = [(k, (_written(one), _written(other))) for k, (one, other) in hosts if one.written]
-    return {"records": _parts(records, packer), "written": _parts(written, packer)}
+    passes = enumerate(zip(base.passes, node.passes, strict=True))
+    written = [(k, (_written(one), _written(other))) for k, (one, other) in passes if one.written]
+    return {"records": _differences(records, packer), "written": _differences(written, packer)}
 
 
 def _floats(record: UniformRecord) -> Floats:
     """Return a record as floats, 0 where it has whole numbers."""
-    found = np.frombuffer(record.tobytes(), "<f4").copy()
-    found[~_is_float(record.dtype)] = 0.0
-    return found
+    floats = np.frombuffer(record.tobytes(), "<f4").copy()
+    floats[~_is_float(record.dtype)] = 0.0
+    return floats
 
 
 def _is_float(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
     """Return which words of a record are floats."""
-    found = np.zeros(dtype.itemsize // 4, np.bool_)
-    for kind, offset, *_ in (dtype.fields or {}).values():
-        words = slice(offset // 4, (offset + kind.itemsize) // 4)
-        base, count = kind.base, int(np.prod(kind.shape, dtype=int))
-        found[words] = np.tile(_is_float(base), count) if base.fields else base.kind == "f"
-    return found
+    is_float = np.zeros(dtype.itemsize // 4, np.bool_)
+    for member, offset, *_ in (dtype.fields or {}).values():
+        words = slice(offset // 4, (offset + member.itemsize) // 4)
+        base, count = member.base, int(np.prod(member.shape, dtype=int))
+        is_float[words] = np.tile(_is_float(base), count) if base.fields else base.kind == "f"
+    return is_float
 
 
 def _written(one: CapturedPass) -> Floats:
     return np.frombuffer(one.written[1] if one.written else b"", "<f4")
 
 
-def _parts(pairs: list[tuple[int, tuple[Floats, Floats]]], packer: Packer) -> list[tuple[int, int, int]]:
-    found = []
+def _differences(
+    pairs: list[tuple[int, tuple[Floats, Floats]]], packer: Packer
+) -> list[tuple[int, int, int]]:
+    changes = []
     for number, (before, after) in pairs:
         if before.tobytes() == after.tobytes():
             continue
         if len(before) != len(after):
-            refuse("dial", "the same numbers at each of its nodes", "their count differs", "Leave it out")
+            actual = "their count differs"
+            refuse("slider", "the same numbers at each of its nodes", actual, "Remove the slider")
         with np.errstate(all="ignore"):
             difference = np.where(before == after, np.float32(0.0), after - before).astype("<f4")
-        apart = np.flatnonzero(difference)
-        if len(apart):
-            part = difference[apart[0] : apart[-1] + 1]
-            found.append((number, int(apart[0]), packer.add(part.view(np.uint8))))
-    return found
+        changed = np.flatnonzero(difference)
+        if len(changed):
+            part = difference[changed[0] : changed[-1] + 1]
+            changes.append((number, int(changed[0]), packer.add(part.view(np.uint8))))
+    return changes
 
 
 def scene_sliders(scene: Scene) -> tuple[Slider, ...]:
     """Return a scene's dials: expressions where the head has them, pigments where skin is painted."""
-    return (*_pigments(scene), _roughness(scene), *_expressions(scene))
+    return (*_pigment_sliders(scene), _roughness_slider(scene), *_expression_sliders(scene))
 
 
-def _roughness(scene: Scene) -> Slider:
-    default_value = scene.skin.roughness
-    values = tuple(default_value * factor for factor in _ROUGHNESS_FACTORS)
+def _roughness_slider(scene: Scene) -> Slider:
+    default = scene.skin.roughness
+    values = tuple(default * factor for factor in _ROUGHNESS_FACTORS)
     scenes = [replace(scene, skin=scene.skin.model_copy(update={"roughness": value})) for value in values]
-    return Slider("roughness", values, default_value, (scenes[0], None, scenes[2]))
+    return Slider("roughness", values, default, (scenes[0], None, scenes[2]))
 
 
-def _expressions(scene: Scene) -> list[Slider]:
-    known = set(scene.head.targets)
-    ends = {dial: expression(name) for dial, name in _EXPRESSIONS.items()}
+def _expression_sliders(scene: Scene) -> list[Slider]:
+    targets = set(scene.head.targets)
+    weights = {slider: expression(name) for slider, name in _EXPRESSIONS.items()}
     return [
-        Slider(name, (0.0, 1.0), 0.0, (None, replace(scene, pose=Pose(weights))), changes_pose_only=True)
-        for name, weights in ends.items()
-        if known >= set(weights)
+        Slider(name, (0.0, 1.0), 0.0, (None, replace(scene, pose=Pose(end))), changes_pose_only=True)
+        for name, end in weights.items()
+        if targets >= set(end)
     ]
 
 
-def _pigments(scene: Scene) -> list[Slider]:
+def _pigment_sliders(scene: Scene) -> list[Slider]:
     """Return the dials of melanin and blood, which change the spread of light and the painted colour."""
     pigments, maps = scene.skin.pigments, scene.head.maps
     if pigments is None or not isinstance(maps, PaintedMaps) or scene.skin.albedo != "map":
         return []
-    made = []
+    sliders = []
     for name in ("melanin", "blood"):
-        default_value = getattr(maps.look, name)
-        values = tuple(min(1.0, default_value * factor) for factor in PIGMENT_FACTORS)
-        changed = (None if value == default_value else _pigmented(scene, maps, name, value) for value in values)
-        made.append(Slider(name, values, default_value, tuple(changed)))
-    return made
+        default = getattr(maps.look, name)
+        values = tuple(min(1.0, default * factor) for factor in PIGMENT_FACTORS)
+        scenes = (None if value == default else _with_pigment(scene, maps, name, value) for value in values)
+        sliders.append(Slider(name, values, default, tuple(scenes)))
+    return sliders
 
 
-def _pigmented(scene: Scene, maps: PaintedMaps, name: str, value: float) -> Scene:
+def _with_pigment(scene: Scene, maps: PaintedMaps, name: str, value: float) -> Scene:
     assert scene.skin.pigments is not None
     pigments = scene.skin.pigments.model_copy(update={name: value})
     changed: Any = {name: value}

@@ -18,8 +18,8 @@ from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, floats, get_numbers
 from dermis.apps.export.targets.pages.html import escape_script, render_page
 from dermis.apps.export.targets.web.build import PageContent
-from dermis.apps.export.targets.web.dials import Slider
 from dermis.apps.export.targets.web.packing import encode_seven_bits
+from dermis.apps.export.targets.web.sliders import Slider
 from dermis.base.errors import refuse
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.gaussians import GaussianSum
@@ -37,36 +37,36 @@ MODULES = (
     "hands",
     "page",
 )
-"""Of the player, each after those that it imports."""
+"""Modules of the player, each after those that it imports."""
 _HERE = Path(__file__).parent
 _IMPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 _ATLAS_SIDE = 512
-_MAX_MAP_SIDE = 1024  # texels a side, most
+_MAX_MAP_SIDE = 1024
 
 
-def page_html(built: PageContent, dials: tuple[Slider, ...], title: str, note: str) -> str:
+def page_html(content: PageContent, sliders: tuple[Slider, ...], title: str, note: str) -> str:
     """Return the text of the page.
 
     title, note : any text, which is escaped
     """
     scene = {
-        "forms": built.forms,
-        "blobs": built.packer.runs,
-        "images": [len(one) for one in built.pictures],
-        "dials": [{"name": one.name, "values": one.values, "rest": one.default_value} for one in dials],
+        "forms": content.forms,
+        "blobs": content.packer.runs,
+        "images": [len(one) for one in content.pictures],
+        "dials": [{"name": one.name, "values": one.values, "rest": one.default_value} for one in sliders],
     }
-    assert built.poster is not None
+    assert content.poster is not None
     return render_page(
         _HERE,
         title=title,
         note=note,
         script=escape_script(player_script()),
         policy="img-src data:",
-        poster=f"data:image/webp;base64,{base64.b64encode(_webp(built.poster)).decode()}",
+        poster=f"data:image/webp;base64,{base64.b64encode(_webp(content.poster)).decode()}",
         scene=encode_seven_bits(gzip.compress(json.dumps(scene).encode(), 9, mtime=0)),
-        data=encode_seven_bits(built.packer.compressed()),
-        pictures=encode_seven_bits(b"".join(built.pictures)),
+        data=encode_seven_bits(content.packer.compress()),
+        pictures=encode_seven_bits(b"".join(content.pictures)),
     )
 
 
@@ -80,9 +80,9 @@ def player_script() -> str:
 def _webp(picture: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
-    into = io.BytesIO()
-    Image.fromarray(picture).save(into, "WEBP", quality=80)
-    return into.getvalue()
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "WEBP", quality=80)
+    return file.getvalue()
 
 
 class Web(Target):
@@ -93,21 +93,20 @@ class Web(Target):
     versions = ("1",)
     suffixes = (".html",)
     limitations = (
-        "The page draws square pictures with an atlas of 512 texels; maps have at most 1024 texels a side, "
-        "8 bits a channel, and lose what WebP loses. Expressions move the skin, but their folds and flushes "
-        "are not painted; between the nodes of a dial, numbers are interpolated. Hairs keep the thickness of "
-        "the first view."
+        "The page renders square pictures with an atlas of 512 texels. Maps have at most 1024 texels per "
+        "side, 8 bits per channel and WebP compression. Expressions move the skin without folds and flushing, "
+        "and sliders interpolate between a few values. Hairs keep the width of the first view."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the Gaussians that spread light."""
         profile = self._profile(subject)
         return (
-            Parameter("atlas", _ATLAS_SIDE, "texel", "side of the atlas that light spreads on"),
+            Parameter("atlas", _ATLAS_SIDE, "texel", "side of the map in which light is diffused"),
             Parameter("variance", floats(profile.variance_mm2), "mm2", "of each Gaussian"),
             *(
-                Parameter(f"weight.{colour}", floats(profile.weight[:, k]), "-", "of each Gaussian")
-                for k, colour in enumerate(("red", "green", "blue"))
+                Parameter(f"weight.{colour}", floats(weight), "-", "of each Gaussian")
+                for colour, weight in zip(("red", "green", "blue"), profile.weight.T, strict=True)
             ),
         )
 
@@ -117,14 +116,19 @@ class Web(Target):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the curve of the sum of Gaussians."""
-        _, variance, *weight = (np.array(get_numbers(parameters, row.name)) for row in parameters)
+        _, variance, *weight = (np.array(get_numbers(parameters, one.name)) for one in parameters)
         return gaussian_curve(variance, np.stack(weight, axis=1), subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the page."""
-        from dermis.apps.export.targets.web.build import INTERACTIVE_QUALITY, PICTURE_SIDES, PageRequest, build_content
-        from dermis.apps.export.targets.web.dials import scene_sliders
+        from dermis.apps.export.targets.web.build import (
+            INTERACTIVE_QUALITY,
+            PICTURE_SIDES,
+            PageRequest,
+            build_content,
+        )
         from dermis.apps.export.targets.web.maps import with_reduced_maps
+        from dermis.apps.export.targets.web.sliders import scene_sliders
         from dermis.apps.export.targets.web.target import page_html
         from dermis.scene.settings import Settings
 
@@ -133,9 +137,10 @@ class Web(Target):
             actual = f"got the skin {subject.name}"
             refuse("subject", "a head, which the page renders", actual, "Name a head")
         scene = replace(scene, head=with_reduced_maps(scene.head, min(self.side, _MAX_MAP_SIDE)))
-        dials = scene_sliders(scene)
-        made = build_content(PageRequest(scene, dials, Settings(atlas=_ATLAS_SIDE), PICTURE_SIDES, self.adapter, INTERACTIVE_QUALITY))
-        output.write_text(page_html(made, dials, subject.name, self.limitations), encoding="utf-8")
+        sliders, settings = scene_sliders(scene), Settings(atlas=_ATLAS_SIDE)
+        request = PageRequest(scene, sliders, settings, PICTURE_SIDES, self.adapter, INTERACTIVE_QUALITY)
+        text = page_html(build_content(request), sliders, subject.name, self.limitations)
+        output.write_text(text, encoding="utf-8")
         return [output]
 
     @staticmethod
