@@ -1,1 +1,1 @@
-"""Skin for other programs: what each of them needs to be told, and how wrong it will be."""
+"""Export of skins and heads to other programs, with an estimate of the remaining error."""

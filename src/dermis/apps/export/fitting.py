@@ -1,4 +1,4 @@
-"""Fits of what a target can show (a lobe, a medium, a curve of one shape) to a profile, and their errors."""
+"""Fits of the profiles that a target supports to a reference profile, and their errors."""
 
 from __future__ import annotations
 
@@ -25,19 +25,20 @@ _LOG_BOUND, _LOG_TOLERANCE = 2.0, 1e-4  # search range and tolerance of least sq
 
 
 def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
-    """Return the curve of Burley's lobe R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
+    """Return the cumulative profile of Burley's R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
 
-    d_mm : (3,) above 0 [mm]
-    energy : (3,) A [-]
+    d_mm : (3,) width d of each channel [mm]
+    energy : (3,) total energy A [-]
     """
     d = np.maximum(np.asarray(d_mm, np.float64), _MIN_WIDTH_MM)
     return CumulativeProfile.from_function(BurleyProfile(np.ones(3), 1.0 / d).energy_within, energy)
 
 
 def fit_burley_width(curve: CumulativeProfile) -> Floats:
-    """Return the widths d (3,) of the lobes with the least largest difference from a cumulative profile [mm].
+    """Return the widths d (3,) of the Burley profiles closest to a cumulative profile [mm].
 
-    Least squares would weigh radii as they are spaced.
+    The largest difference of the cumulative profiles is minimised; least squares would depend on the spacing
+    of the radii.
     """
     median = np.array([np.interp(0.5, curve.fraction[:, i], curve.radii_mm) for i in range(3)])
     middle = np.log(median / _BURLEY_MEDIAN_RADIUS)
@@ -49,9 +50,11 @@ def fit_burley_width(curve: CumulativeProfile) -> Floats:
 
 
 def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> CumulativeProfile:
-    """Return the curve of a sum of Gaussians.
+    """Return the cumulative profile of a sum of Gaussians.
 
-    variance_mm2, weight : (n,) [mm^2], (n, 3) [-]
+    variance_mm2 : (n,) variances [mm2]
+    weight : (n, 3) weights [-]
+    energy : (3,) total energy [-]
     """
     fraction = weight / weight.sum(axis=0)
 
@@ -63,7 +66,7 @@ def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Cumu
 
 
 def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
-    """Return a curve whose lengths are in a unit, with a unit (3,) for each channel."""
+    """Return a cumulative profile scaled by a length (3,) per channel [mm]."""
     scale = np.maximum(np.asarray(scale_mm, np.float64), _MIN_WIDTH_MM)
 
     def within(radius_mm: Floats) -> Floats:
@@ -73,18 +76,21 @@ def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativePro
 
 
 def fit_scale(curve: CumulativeProfile, unit: CumulativeProfile) -> Floats:
-    """Return the units (3,) with the least largest difference from a curve [mm]."""
+    """Return the lengths (3,) by which a profile is scaled to match another one [mm].
+
+    The largest difference of the cumulative profiles is minimised.
+    """
     middle = np.log(curve.radius_at_fraction(0.5) / unit.radius_at_fraction(0.5))
     return _fit_scale_near(curve, unit, middle, _LOG_RANGE, _BISECTIONS - 1)
 
 
 @dataclass(frozen=True)
 class HomogeneousMedium:
-    """A half-space of one medium with isotropic scattering.
+    """Half-space of one medium with isotropic scattering.
 
-    albedo : (3,) single-scattering albedo, reduced [-]
+    albedo : (3,) reduced single-scattering albedo [-]
     mfp_mm : (3,) reduced mean free path [mm]
-    curve : of the light that leaves it
+    curve : cumulative profile of the light that leaves it
     """
 
     albedo: Floats
@@ -95,10 +101,10 @@ class HomogeneousMedium:
 def fit_homogeneous_medium(
     curve: CumulativeProfile, energy: Floats | None = None, kind: HalfSpaceKind = "skin"
 ) -> HomogeneousMedium:
-    """Return the medium with a curve's energy whose cumulative profile is nearest to the curve.
+    """Return the medium whose cumulative profile is closest to a curve.
 
-    energy : (3,) total that it has instead, a colour's [-]
-    kind : surface and light of the half-space
+    energy : (3,) total energy of the medium, by default that of the curve [-]
+    kind : surface and illumination of the half-space
     """
     albedo = tabulated_albedo(kind, curve.energy if energy is None else energy)
     unit = half_space(kind, albedo, np.ones(3))
@@ -117,13 +123,13 @@ def _fit_scale_near(
 
 
 def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Floats, bisections: int) -> Floats:
-    """Return the sizes (3,) at which the largest surplus and the largest deficit of light are equal.
+    """Return the lengths (3,) that minimise the largest difference of two cumulative profiles.
 
-    A wider curve has less light within each radius, so that its largest surplus falls with the size and its
-    largest deficit grows: where they are equal, the largest difference is least.
+    A wider profile has less light within each radius, so its largest excess decreases and its largest deficit
+    increases with the length. The largest difference is smallest where both are equal.
 
-    surplus : (n, 3) of the light within some radii, by the logarithms of the sizes (3,)
-    low, high : logarithms of the sizes (3,)
+    excess : function that returns the excess (n, 3) of light within some radii for logarithmic lengths (3,)
+    low, high : bounds of the logarithmic lengths (3,)
     """
     for _ in range(bisections):
         middle = 0.5 * (low + high)
@@ -134,11 +140,11 @@ def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Float
 
 
 def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[[Floats], Floats]) -> float:
-    """Return the length at which a cumulative profile is nearest to one channel's [mm].
+    """Return the length by which a profile is scaled to match one channel of a curve [mm].
 
-    Least squares over log r.
+    Least squares with radii spaced evenly in log r.
 
-    within : share of what leaves anywhere, within radii (n,) of a length of 1
+    unit_cdf : cumulative profile at radii (n,), for a length of 1
     """
     from scipy.optimize import minimize_scalar
 
@@ -159,11 +165,11 @@ def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[
 
 @dataclass(frozen=True)
 class CurveError:
-    """Differences of a target's curve from the true one, in red, green and blue.
+    """Errors of a target's cumulative profile for red, green and blue.
 
-    cdf : (3,) largest difference of the share of light that leaves within a radius [-]
-    edge : (3,) largest difference beside a straight edge of light, such as a shadow's [-]
-    energy : (3,) relative error of all the light that leaves [-]
+    cdf : (3,) largest difference of the fraction of light within a radius [-]
+    edge : (3,) largest difference beside a straight edge of light, such as a shadow edge [-]
+    energy : (3,) relative error of the total energy [-]
     """
 
     cdf: Floats
@@ -171,12 +177,12 @@ class CurveError:
     energy: Floats
 
     def as_json(self) -> dict[str, list[float]]:
-        """Return plain lists of three by name."""
+        """Return lists of three numbers by name."""
         return {name: [round(float(x), 6) for x in getattr(self, name)] for name in ("cdf", "edge", "energy")}
 
 
 def curve_error(reference: CumulativeProfile, curve: CumulativeProfile) -> CurveError:
-    """Return the errors of a curve relative to a reference."""
+    """Return the errors of a cumulative profile relative to a reference."""
     steps = np.geomspace(1e-3, 1.0, _EDGE_SAMPLES)
     widest = _MAX_EDGE_DISTANCE * np.maximum(reference.radius_at_fraction(0.5), curve.radius_at_fraction(0.5))
     edge = np.zeros(3)

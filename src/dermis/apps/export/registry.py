@@ -1,4 +1,4 @@
-"""Programs that skin is exported to, by name; each has a module with a `TARGET`."""
+"""Registry of export targets; each has a module with a `TARGET`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Export of a skin or head to a program, with a report of what it becomes there."""
+"""Export of a skin or head to a program, with a report of its accuracy there."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ _MAP_SIDE = 2048
 
 @dataclass(frozen=True)
 class ExportReport:
-    """One export.
+    """Report of one export.
 
-    target, title, version, variant : of the program; the variant is "" where there is only one
-    subject, model : name, and where its profile comes from
-    rows : parameters that were written
-    naive_rows : parameters that a user would have typed
-    d_mm : (3,) of the one lobe that is nearest to the profile [mm]
-    error, naive_error : against the profile, by the target's own formulas
-    wrong : what stays wrong, in words
-    not_run : whether nobody has run the program with it
-    files : all that were written
+    target, title, version, variant : the program; the variant is "" if there is only one
+    subject, model : name of the skin or head, and the model of its profile
+    parameters : exported parameters
+    naive_parameters : parameters that a user might choose without knowing their meaning
+    d_mm : (3,) width of the closest Burley profile [mm]
+    error, naive_error : errors of the profile that the target renders, by the target's own formulas
+    limitations : what the target cannot reproduce
+    untested : whether the parameters were never used in the program
+    files : all written files
     """
 
     target: str
@@ -60,7 +60,7 @@ class ExportReport:
     files: tuple[Path, ...] = ()
 
     def as_json(self) -> dict[str, object]:
-        """Return everything in plain numbers, lists and words."""
+        """Return the report as numbers, lists and texts for JSON."""
         return {
             "target": self.target,
             "version": self.version,
@@ -79,9 +79,9 @@ class ExportReport:
         }
 
     def lines(self, naive: bool = False) -> list[str]:
-        """Return the lines of the report.
+        """Return the report as lines of text.
 
-        naive : also what a user would have typed
+        naive : include the naive parameters
         """
         target = " ".join(filter(None, (self.title, self.version, self.variant)))
         lines = [f"{self.subject}, profile by {self.model}, for {target}"]
@@ -99,7 +99,7 @@ class ExportReport:
         return [*lines, "", *self.limitation_texts()]
 
     def limitation_texts(self) -> list[str]:
-        """Return what stays wrong, of this skin and of the target."""
+        """Return sentences about the remaining error of this skin and the limitations of the target."""
         worst = int(self.error.cdf.argmax())
         error = float(self.error.cdf[worst])
         if error < _NOTABLE_ERROR:
@@ -121,7 +121,7 @@ def _table(parameters: Parameters) -> Sequence[str]:
 
 
 def format_parameter(value: Value) -> str:
-    """Return a parameter's value as it is printed."""
+    """Return a parameter's value as text."""
     if isinstance(value, tuple):
         return ", ".join(f"{x:.4g}" for x in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
@@ -150,21 +150,54 @@ def export_skin(
     adapter: str = "auto",
     **head: Any,
 ) -> ExportReport:
-    """Write a skin or a head for another program, and say how wrong it will be there.
+    """Write a skin or a head for another program, and report the remaining error.
 
-    subject : a profile by name or file, a head, or what `load_subject` has made
-    to : a target's name: "unity", "blender" ...
-    output : file, or a folder that is made where the name has no suffix; beside a file come a page and JSON
-    version : of the program, its newest known by default
-    variant : of what it can do, a method of scattering say, its first by default
-    model : of the profile, see `reference_curve`
-    profile : skin of a head
-    library : of a page, the folder that npm has installed its library into, which it then holds
-    side : of maps that are painted [texels]
-    adapter : that paints them
-    head : options of `load_head`
+    Parameters
+    ----------
+    subject : str, Path or Subject
+        A profile by name ("skin1", "light", ...) or file, a head by name or file, or a loaded `Subject`.
+    to : str
+        Name of the target, such as "unity" or "blender".
+    output : str or Path
+        File, or folder if the name has no suffix. The report is written as Markdown and JSON beside the file
+        or into the folder.
+    version : str, optional
+        Version of the program; the newest supported one by default.
+    variant : str, optional
+        Variant of the target, such as a scattering method; its first one by default.
+    model : {"montecarlo", "layered", "multipole", "dipole", "better-dipole"}, optional
+        Model of the diffusion profile. By default tabulated Monte Carlo for homogeneous media of the package,
+        layered diffusion for other tissue, and the Gaussians themselves for a table of Gaussians.
+    profile : str or Path, optional
+        Skin of a head; by default a person's own pigments, or the default skin.
+    library : str or Path, optional
+        The folder node_modules into which npm has installed the library of a page, which is then embedded.
+    side : int, default 2048
+        Side of painted maps [texel].
+    adapter : str, default "auto"
+        Adapter on which maps are painted.
+    **head
+        Options of `load_head`.
 
-    DermisError : an unknown target, version, variant or model, and what cannot be read or written
+    Returns
+    -------
+    ExportReport
+        Parameters, errors and written files.
+
+    Raises
+    ------
+    DermisError
+        For an unknown target, version, variant or model, and for files that cannot be read or written.
+
+    Examples
+    --------
+    >>> import tempfile, dermis
+    >>> folder = tempfile.mkdtemp()
+    >>> report = dermis.export_skin("skin1", "unity", f"{folder}/skin.asset")
+    >>> sorted(path.name for path in report.files)
+    ['skin.asset', 'skin.asset.json', 'skin.asset.md']
+    >>> bool(report.error.cdf.max() < report.naive_error.cdf.max())
+    True
     """
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     target = target if library is None else target.with_library(library)
@@ -185,7 +218,7 @@ def export_skin(
 
 
 def evaluate_export(subject: Subject, target: Target, version: str) -> ExportReport:
-    """Return the report of an export, before anything is written."""
+    """Return the report of an export without writing any file."""
     parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
     errors = [
         curve_error(subject.curve, target.predicted_curve(one, subject, version))
@@ -209,7 +242,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
 
 
 def _checked_output(target: Target, output: str | Path) -> Path:
-    """Return where to write, if the target can."""
+    """Return the output path if the target supports its suffix."""
     path = Path(output)
     if path.suffix.lower() not in target.suffixes:
         allowed = [suffix or "no suffix, for a folder" for suffix in target.suffixes]
@@ -242,7 +275,7 @@ def _move_into_place(source: Path, target: Path) -> None:
 
 
 def _write_report(report: ExportReport, output: Path) -> list[Path]:
-    """Write the page and the numbers into the folder or beside the file; return their paths."""
+    """Write the report into the folder or beside the file, and return its paths."""
     single = bool(output.suffix)
     page = output.with_name(f"{output.name}.md") if single else output / _PAGE_FILE
     numbers = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE

@@ -1,4 +1,4 @@
-"""Parts of scenes for other renderers: lights of the kinds that they have, and triangles as PLY files."""
+"""Parts of scenes for other renderers: supported lights, and triangles as PLY files."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dermis.scene.lights import Light
 
 
 def supported_lights(lights: Iterable[Light], supported: Container[str], program: str) -> list[Light]:
-    """Return the lights, one of an unknown kind as the nearest known kind that it derives from, with a note.
+    """Return the lights, replacing unsupported kinds by the closest supported base kind, with a note.
 
-    known : kinds that the program has, points and parallel light among them
+    supported : kinds of light that the program supports, including point and directional
     """
     return [
         _nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, start=1)
@@ -40,8 +40,10 @@ def encode_ply(
 ) -> bytes:
     """Return a binary PLY file of triangles.
 
-    triangles : (t, 3) vertices
-    positions, normals, uv, colour : (v, 3), (v, 3), (v, 2), (v, 3) linear, of each vertex
+    triangles : (t, 3) vertex indices
+    positions, normals : (v, 3) per vertex
+    uv : (v, 2) per vertex
+    colour : (v, 3) linear colour per vertex
     """
     attributes = {"x y z": positions, "nx ny nz": normals, "u v": uv, "r g b": colour}
     columns = {names: values for names, values in attributes.items() if values is not None}

@@ -1,4 +1,4 @@
-"""Skins and heads to export, with the true profile of the skin."""
+"""Skins and heads to export, with the reference profile of the skin."""
 
 from __future__ import annotations
 
@@ -47,15 +47,15 @@ _MAX_NAME_LENGTH = 40
 
 @dataclass(frozen=True)
 class Subject:
-    """A skin to export.
+    """Skin to export, optionally with a head.
 
-    name : as the user wrote it, to be escaped wherever it is written
-    curve : the true profile, and all the light that leaves, of that which enters
-    albedo : (3,) diffuse reflectance that the target's base colour should have: the mean of the head's
-        colour map, or the profile's own energy without one; linear Rec. 709 [-]
-    model : where the curve comes from: "montecarlo", "layered", "table" ...
-    tissue : None for a table of Gaussians
-    scene : the head with its skin, None for a skin by itself
+    name : name given by the user; must be escaped wherever it is written
+    curve : cumulative reference profile, per incident light
+    albedo : (3,) base colour: mean of the head's colour map, or the energy of the profile; linear Rec. 709
+        [-]
+    model : model of the profile: "montecarlo", "layered", "table" ...
+    tissue : tissue of the skin; None for a table of Gaussians
+    scene : scene with the head and its skin; None for a skin without a head
     """
 
     name: str
@@ -67,23 +67,23 @@ class Subject:
 
     @property
     def head(self) -> Head | None:
-        """The head that it is the skin of, None for a skin by itself."""
+        """Return the head of the skin, or None."""
         return None if self.scene is None else self.scene.head
 
     @cached_property
     def head_or_ball(self) -> Head:
-        """The head, or a ball of `BALL_MM` where a target needs geometry."""
+        """Return the head, or a ball of diameter `BALL_MM` if there is none."""
         return self.head or Head("ball", uv_sphere(0.5 * BALL_MM), Maps())
 
     @property
     def identifier(self) -> str:
-        """The name with nothing but letters, digits and underscores of ASCII in it, for names in files."""
+        """Return the name reduced to ASCII letters, digits and underscores."""
         name = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[:_MAX_NAME_LENGTH]
         return f"skin_{name}" if not name or name[0].isdigit() else name
 
     @property
     def skin(self) -> Skin:
-        """The scene's skin, or the default one."""
+        """Return the skin of the scene, or the default skin."""
         return Skin() if self.scene is None else self.scene.skin
 
     def clipped_albedo(self, low: float = 0.0) -> Floats:
@@ -95,7 +95,7 @@ class Subject:
         return curve.with_energy(self.curve.energy * curve.energy / np.maximum(self.albedo, _MIN_ALBEDO))
 
     def eye_pictures(self) -> EyeTextures | None:
-        """Return what the eyes of the shape look like, painted on a device; None for a shape without eyes."""
+        """Return the painted textures of the eyes, or None if there are no eyes."""
         from dermis.frame.features.surface.painting.painted_head import eye_pictures
         from dermis.gpu.failures import run_on_device
 
@@ -103,10 +103,10 @@ class Subject:
         return None if eyes is None else run_on_device("auto", lambda device: eye_pictures(device, eyes.look))
 
     def with_painted_maps(self, side: int, adapter: str) -> Subject:
-        """Return the subject with all maps of its head as arrays; itself where nothing has to be painted.
+        """Return the subject with all maps of its head as arrays; itself if no map has to be painted.
 
-        side : of the maps, a power of two from 256 to 4096 [texels]
-        adapter : on which they are painted
+        side : side of the maps, a power of two from 256 to 4096 [texel]
+        adapter : adapter that paints them
         """
         head = self.head
         if self.scene is None or head is None or not head.maps.is_painted:
@@ -118,10 +118,10 @@ class Subject:
         return replace(self, scene=replace(self.scene, head=painted))
 
     def encode_maps(self) -> dict[str, bytes]:
-        """Return the maps of the head as PNG files by role: colour (sRGB), normal (green up), and grey ones.
+        """Return the maps of the head as PNG files: colour, normal, roughness, specular and height.
 
-        Roughness is Beckmann's m, specular the strength of the reflection, both plain; height is from its
-        lowest to its highest in 16 bits.
+        Colour is sRGB, and green of the normal points up. Roughness is Beckmann's m and specular the specular
+        strength, both linear; height spans its range in 16 bits.
         """
         if self.head is None:
             return {}
@@ -134,13 +134,13 @@ def load_subject(
 ) -> Subject:
     """Return the subject of a name or file.
 
-    word : a profile by name ("skin1", "dj3", "light", "gpu-gems-3"), its file (.toml, .csv), or a head:
-        "human", "human:7", a person's .json, a sample, or a file (.glb, .gltf, .obj, .ply)
-    profile : skin of a head; by default a person's own pigments, or else the default skin
-    model : of the profile, see `reference_curve`
+    source : a profile by name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv), or a head: "human",
+        "human:7", a person's .json, a sample, or a mesh (.glb, .gltf, .obj, .ply)
+    profile : skin of a head; by default a person's own pigments, or the default skin
+    model : model of the profile, see `reference_curve`
     head : options of `load_head`
 
-    DermisError : there is no such thing, or an option that it has no use for
+    DermisError : for an unknown name, or an option that does not apply
     """
     path = checked_path(source, "a skin or a head")
     name = str(source)
@@ -168,12 +168,12 @@ def _load_skin(
 def reference_curve(
     skin: Skin, model: ModelName | None = None
 ) -> tuple[CumulativeProfile, str, Tissue | None]:
-    """Return the curve of a skin's profile, the model that it is by, and its tissue.
+    """Return the cumulative profile of a skin, the name of its model, and its tissue.
 
-    model : by default Monte Carlo for homogeneous media by name, which the package has tables of, layered
-        diffusion for other tissue, and for a table of Gaussians the table
+    model : by default tabulated Monte Carlo for homogeneous media of the package, layered diffusion for other
+        tissue, and the Gaussians themselves for a table of Gaussians
 
-    DermisError : an unknown model, or one for a table of Gaussians
+    DermisError : for an unknown model, or a model of a table of Gaussians
     """
     if model is not None and model not in MODELS:
         refuse("model", f"one of {', '.join(MODELS)}", f"got {format_value(model)}", "Choose one of them")

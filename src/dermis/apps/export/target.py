@@ -1,4 +1,4 @@
-"""Programs that skin is exported to, and the parameters that are typed into them."""
+"""Base classes of export targets, and the parameters that they export."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ T = TypeVar("T", bound="Target")
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter as it is typed into a target.
+    """Parameter of a target.
 
-    name : in the target
-    value : number, numbers of red, green and blue, switch or word
+    name : name in the program
+    value : number, (red, green, blue), switch or text
     unit : "mm", "m", "cm", "-" ...
-    meaning : what the target takes it for, in a few words
+    meaning : short description of its meaning in the program
     """
 
     name: str
@@ -40,28 +40,28 @@ Parameters = tuple[Parameter, ...]
 
 
 def get_value(parameters: Parameters, name: str) -> Value:
-    """Return the value of the row of a name."""
+    """Return the value of the parameter of a name."""
     return next(one.value for one in parameters if one.name == name)
 
 
 def get_numbers(parameters: Parameters, name: str) -> tuple[float, ...]:
-    """Return the value of the row of a name as numbers; one number is a tuple of one."""
+    """Return the value of the parameter of a name as a tuple of numbers."""
     value = get_value(parameters, name)
     return value if isinstance(value, tuple) else (float(value),)
 
 
 def replace_values(parameters: Parameters, values: Mapping[str, Value]) -> Parameters:
-    """Return the rows with other values by name."""
+    """Return the parameters with some values replaced by name."""
     return tuple(replace(one, value=values.get(one.name, one.value)) for one in parameters)
 
 
 def floats(values: ArrayLike) -> tuple[float, ...]:
-    """Return numbers as a tuple of plain floats."""
+    """Return an array as a flat tuple of Python floats."""
     return tuple(np.ravel(np.asarray(values, np.float64)).tolist())
 
 
 def write_files(folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Path]:
-    """Write files into a folder, by their names in it; return their paths."""
+    """Write files by name into a folder, and return their paths."""
     written = []
     for name, content in contents:
         written.append(folder / name)
@@ -72,11 +72,30 @@ def write_files(folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Pat
 
 @dataclass(frozen=True)
 class Target(ABC):
-    """A program that skin is exported to; what differs within one version is its variant.
+    """Export target: a program for which skins and heads are written.
 
-    variant : one of `variants`, "" where there are none
-    side : of maps that are made [texel]
-    adapter : that makes them
+    Subclasses are registered in `dermis.apps.export.registry.TARGETS`. They state the parameters of a skin,
+    the profile that the program renders with them, and write the files.
+
+    Parameters
+    ----------
+    variant : str
+        One of `variants`, or "" if there are none.
+    side : int
+        Side of generated maps [texel].
+    adapter : str
+        Adapter on which maps are generated.
+
+    Examples
+    --------
+    >>> from dermis.apps.export.registry import TARGETS
+    >>> unity = TARGETS["unity"]
+    >>> unity.title, unity.resolve_version(None)
+    ('Unity HDRP', '17')
+    >>> from dermis.apps.export.subject import load_subject
+    >>> parameters = unity.parameters(load_subject("skin1"), "17")
+    >>> [one.name for one in parameters][:2]
+    ['scatteringDistance', 'scatteringDistanceMultiplier']
     """
 
     variant: str = ""
@@ -100,9 +119,22 @@ class Target(ABC):
     """Whether nobody has run the program with what is written."""
 
     def with_variant(self: T, variant: str | None) -> T:
-        """Return this target in one of its variants, the first where None.
+        """Return the target with one of its variants; None selects the first.
 
-        DermisError : it has no such variant
+        Parameters
+        ----------
+        variant : str or None
+            Name of the variant.
+
+        Returns
+        -------
+        Target
+            A copy of the target.
+
+        Raises
+        ------
+        DermisError
+            If the target has no such variant.
         """
         if variant is None:
             return replace(self, variant=self.variants[0] if self.variants else "")
@@ -112,16 +144,42 @@ class Target(ABC):
         return replace(self, variant=variant)
 
     def with_library(self, folder: str | Path) -> Target:
-        """Return this target with the library that it draws with, to be written into its page.
+        """Return the target with an installed library to embed in its page.
 
-        DermisError : it draws with none
+        Parameters
+        ----------
+        folder : str or Path
+            The folder node_modules of npm.
+
+        Returns
+        -------
+        Target
+            A copy of the target.
+
+        Raises
+        ------
+        DermisError
+            If the target uses no library.
         """
         refuse("library", f"none for {self.name}", f"got {format_value(str(folder))}", "Omit this option")
 
     def resolve_version(self, version: str | None) -> str:
-        """Return the requested version, the newest where None.
+        """Return a supported version; None selects the newest.
 
-        DermisError : it is not known
+        Parameters
+        ----------
+        version : str or None
+            Requested version.
+
+        Returns
+        -------
+        str
+            The version.
+
+        Raises
+        ------
+        DermisError
+            If the version is not supported.
         """
         if version is None:
             return self.versions[-1]
@@ -136,42 +194,109 @@ class Target(ABC):
         return version
 
     def main_file(self, output: Path, subject: Subject, suffix: str = "") -> Path:
-        """Return the main file: the place itself, or one in it where it is a folder.
+        """Return the path of the main file: the output itself, or a file in it if it is a folder.
 
-        suffix : of the file in a folder, the usual one by default
+        Parameters
+        ----------
+        output : Path
+            Path that `write` receives.
+        subject : Subject
+            Skin to export, after which a file in a folder is named.
+        suffix : str
+            Suffix of a file in a folder; by default the first of `suffixes`.
+
+        Returns
+        -------
+        Path
+            The path.
         """
         suffix = suffix or next(filter(None, self.suffixes))
         return output if output.suffix else output / f"{subject.identifier}{suffix}"
 
     @abstractmethod
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters that show the subject best."""
+        """Return the parameters that reproduce the subject best.
+
+        Parameters
+        ----------
+        subject : Subject
+            Skin to export.
+        version : str
+            Version of the program.
+
+        Returns
+        -------
+        tuple of Parameter
+            The parameters.
+        """
 
     @abstractmethod
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return what a user would type who does not know what the numbers mean in this program."""
+        """Return the parameters that a user might choose without knowing their meaning.
+
+        Parameters
+        ----------
+        subject : Subject
+            Skin to export.
+        version : str
+            Version of the program.
+
+        Returns
+        -------
+        tuple of Parameter
+            The parameters, named as those of `parameters`.
+        """
 
     @abstractmethod
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the curve that the target shows with parameters, by its own formulas."""
+        """Return the cumulative profile that the program renders, by its own formulas.
+
+        Parameters
+        ----------
+        parameters : tuple of Parameter
+            Parameters from `parameters` or `naive_parameters`.
+        subject : Subject
+            Skin to export.
+        version : str
+            Version of the program.
+
+        Returns
+        -------
+        CumulativeProfile
+            The profile.
+        """
 
     @abstractmethod
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the files that the target reads; return their paths.
+        """Write the files that the program reads, and return their paths.
 
-        place : a folder that is empty, where the output's name has no suffix; else a file of that name in
-            such a folder, beside which others may be put. It is moved to where it belongs afterwards
+        Parameters
+        ----------
+        subject : Subject
+            Skin to export.
+        parameters : tuple of Parameter
+            Parameters from `parameters`.
+        output : Path
+            Empty folder if the name has no suffix; otherwise a file in an empty folder, beside which other files
+            may be written. All are moved to the final output afterwards.
+        version : str
+            Version of the program.
+
+        Returns
+        -------
+        list of Path
+            All written files.
         """
 
 
 class JsonTarget(Target):
-    """A program that nobody has run with the parameters: a JSON file of them with units and meanings."""
+    """Target for which only a JSON file of parameters is written, not tested in the program."""
 
     suffixes = (".json", "")
     untested = True
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the parameters, marked as not run."""
+        """Write the parameters with units and meanings as JSON, marked as not tested."""
         file = self.main_file(output, subject)
         content = {
             "for": f"{self.title} {version}",

@@ -1,1 +1,1 @@
-"""One module or folder for each program that skin is exported to."""
+"""Export targets: one module or folder per program."""

@@ -1,7 +1,7 @@
-"""Arnold's standard_surface, by its published meanings: a table of values, as nobody here has run it.
+"""Export to Arnold's standard_surface as a table of parameters, by published documentation.
 
-The radius is the mean free path for each channel in units of the scene, times the scale; the colour is
-turned into the albedo of a scattering, as in OpenPBR. Its walk is taken to be in an index-matched medium.
+The radius is the mean free path per channel in scene units, times the scale. The colour is converted to a
+single-scattering albedo, as in OpenPBR. The random walk is assumed to be in an index-matched medium.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _MM_PER_CM, _MIN_ALBEDO = 10.0, 1e-3
 
 
 class Arnold(JsonTarget):
-    """The random walk of standard_surface, for a scene in centimetres."""
+    """Random walk of standard_surface, for a scene in centimetres."""
 
     name = "arnold"
     title = "Arnold"
@@ -31,16 +31,16 @@ class Arnold(JsonTarget):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Mean free paths of the homogeneous medium that shows the colour and is nearest to the profile."""
+        """Return the mean free paths of the homogeneous medium closest to the profile."""
         colour = subject.clipped_albedo(_MIN_ALBEDO)
         return _parameters(colour, fit_homogeneous_medium(subject.curve, colour, "walk").mfp_mm)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """The width of a fitted lobe as the radius."""
+        """Return the width of a fitted Burley profile as the radius."""
         return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """The walk of the colour's albedo; a white curve is shown with the head's colours by its map."""
+        """Return the profile of a random walk with the albedo that belongs to the colour."""
         path = _MM_PER_CM * np.array(get_numbers(parameters, _RADIUS)) * get_numbers(parameters, _SCALE)
         colour = np.array(get_numbers(parameters, _COLOUR))
         curve = half_space("walk", tabulated_albedo("walk", colour), path)

@@ -1,4 +1,4 @@
-"""Maps of a head in its own uv layout, with light before and after it spreads, as pictures."""
+"""Export of a head's maps in its uv layout, with light before and after diffusion, as pictures."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ _MAX_ATLAS_SIDE = 2048  # of the map in which light is diffused [texel]
 
 @dataclass(frozen=True)
 class MapInfo:
-    """Meaning of a map.
+    """Properties of a map.
 
-    unit : of its numbers in OpenEXR, empty for none
-    shown : how a PNG has it
-    words : what it is
+    unit : unit of the values in OpenEXR; "" for none
+    png_encoding : encoding as PNG
+    description : meaning of the values
     """
 
     unit: str
@@ -84,7 +84,7 @@ MAP_INFOS: Mapping[str, MapInfo] = MappingProxyType(
 
 
 class MapFolder(Target):
-    """OpenEXR in linear numbers and PNG to look at, with a JSON of units and ranges."""
+    """Folder of maps: OpenEXR with linear values, PNG for viewing, and JSON with units and ranges."""
 
     name = "maps"
     title = "maps"
@@ -97,7 +97,7 @@ class MapFolder(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return what is written, and which of the two maps of light is to be shown."""
+        """Return the format of the maps, and which of the two maps of light is to be displayed."""
         return (
             Parameter("size", self.side, "texel", "side of the maps"),
             Parameter("normal_green", self._green, "-", "direction of green: towards row 0, or away from it"),
@@ -105,11 +105,11 @@ class MapFolder(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return light that has not spread, times the albedo: an ordinary light map."""
+        """Return the parameters for an ordinary light map, without diffusion."""
         return replace_values(self.parameters(subject, version), {_SCATTERED: False})
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the sum of Gaussians by which the frame spreads light, or none."""
+        """Return the sum of Gaussians with which the renderer diffuses light, or no diffusion."""
         energy = subject.curve.energy
         if not get_value(parameters, _SCATTERED) or subject.scene is None:
             return CumulativeProfile.from_function(
@@ -134,14 +134,14 @@ class MapFolder(Target):
 
 
 def encode_map_exr(name: str, values: Floats) -> bytes:
-    """Return a map as OpenEXR: channels R, G, B of colours and vectors, Y of one number."""
+    """Return a map as OpenEXR, with channels R, G, B for colours and vectors, and Y for scalars."""
     letters = "Y" if values.ndim == 2 else "RGB"
     channels = [values] if values.ndim == 2 else list(np.moveaxis(values, -1, 0))
     return encode_exr_parts({name: dict(zip(letters, channels, strict=True))}, fast=True)
 
 
 def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:
-    """Return the levels of a map in a PNG, and how they become numbers."""
+    """Return the PNG levels of a map, and how to convert them to values."""
     if encoding == "colour":
         return encode_srgb8(np.clip(values, 0.0, 1.0)), {"png": "sRGB"}
     if encoding == "light":
@@ -160,7 +160,7 @@ def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint
 
 
 def orient_green(normal: Floats, normal_y: NormalY) -> Floats:
-    """Return normals whose green points to row 0 ("up", OpenGL) or away from it ("down", DirectX)."""
+    """Return normals whose green points towards row 0 ("up", OpenGL) or away from it ("down", DirectX)."""
     if normal_y == "up":
         return normal
     return normal * np.array([1.0, -1.0, 1.0], np.float32)
@@ -171,9 +171,9 @@ def _to_uint16(fraction: Floats) -> NDArray[np.uint16]:
 
 
 def check_side(side: object) -> int:
-    """Return the side of the maps.
+    """Return the side of the maps [texel].
 
-    Raises DermisError for one that is none of `SIDES`.
+    Raises DermisError if it is not one of `SIDES`.
     """
     if side not in SIDES or isinstance(side, bool):
         actual = f"got {side!r}"
@@ -183,7 +183,7 @@ def check_side(side: object) -> int:
 
 
 def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> BakedMaps:
-    """Return the maps of the skin in the scene's light, with its relief as heights where it has such."""
+    """Return the maps of the skin in the scene's light, including its height map if there is one."""
     baked = bake(renderer, scene, settings, side)
     painted = renderer.reopening_device.run(
         lambda: with_painted_maps(renderer.device, scene.head, min(max(side, MIN_SIDE), MAX_SIDE))
@@ -197,7 +197,7 @@ def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -
 
 
 def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tuple[str, bytes]]:
-    """Return names and contents of the files, the JSON last."""
+    """Yield names and contents of the files, with the JSON last."""
     described: dict[str, Ranges] = {}
     for name, info in MAP_INFOS.items():
         if name not in baked.maps:
@@ -218,7 +218,7 @@ def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tup
 def _description(
     baked: BakedMaps, scene: Scene, normal_y: NormalY, described: dict[str, Ranges]
 ) -> dict[str, object]:
-    """Return what a reader of the maps must know."""
+    """Return the content of the JSON file."""
     return {
         "format": "dermis maps 1",
         "made_by": f"dermis {version()}",
@@ -239,7 +239,7 @@ def _description(
 
 
 def resample(values: Floats, side: int) -> Floats:
-    """Return a map (h, w) at another side: means of texels where that is smaller, else interpolated."""
+    """Return a map (h, w) resampled to another side by averaging, or by linear interpolation if enlarged."""
     height, width = values.shape
     while min(height, width) >= 2 * side and not (height | width) & 1:
         values = 0.25 * (values[0::2, 0::2] + values[1::2, 0::2] + values[0::2, 1::2] + values[1::2, 1::2])

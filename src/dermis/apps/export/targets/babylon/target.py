@@ -1,8 +1,9 @@
-"""Babylon.js: a page with the head, lit and turned, whose skin scatters light on the screen.
+"""Export to a web page with Babylon.js, which diffuses light in screen space.
 
-By the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A profile is a colour c. Samples are drawn
-from the lobe of width max(c), on a spiral, and weighted by Burley's lobe with S = c, so that a channel's
-width is 1/c. Half a pixel is taken for a pixel, so that all of it is twice as wide as metersPerUnit says.
+The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is a
+colour c. Sample positions follow Burley's profile of width max(c) on a spiral, and are weighted by Burley's
+profile with S = c, so that a channel's width is 1/c. The shader confuses half a pixel with a pixel, so all
+widths are twice as large as metersPerUnit specifies.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ _LOADERS = "4FQhr/DrxLfjm5tCJq7Cs1uJIC29544DNb4rVCt4qVzXM7rw07KsDYgdH8/ayoss"
 
 
 class Babylon(EnginePage):
-    """Page with Babylon.js."""
+    """Web page with Babylon.js."""
 
     name = "babylon"
     title = "Babylon.js"
@@ -54,26 +55,26 @@ class Babylon(EnginePage):
     }
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return a profile of 1/d, and a scale that has the widest channel's lobe drawn from.
+        """Return a colour proportional to 1/d, and a scale that fits the sample positions.
 
-        A channel c is 1/c wide and all are drawn from a lobe of width max(c), both times 2/metersPerUnit mm.
-        So with k = sqrt(d_min d_max) the colour k/d and metersPerUnit 2/k, both are true.
+        The width of channel c is 1/c, and the sample positions follow a profile of width max(c), both times
+        2/metersPerUnit mm. With k = sqrt(d_min d_max), the colour k/d and metersPerUnit 2/k satisfy both.
         """
         d = fit_burley_width(subject.curve)
         k = float(np.sqrt(d.min() * d.max()))
         return _parameters(subject, k / d, WIDTH_ERROR / k)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return widths in mm as the colour, as in the engine of the shader; the file is in metres."""
+        """Return the widths in mm as the colour, with metersPerUnit 1 for the scene in metres."""
         return _parameters(subject, fit_burley_width(subject.curve), 1.0)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the curve of its samples."""
+        """Return the profile of the shader's samples."""
         profile, (metres,) = get_numbers(parameters, _PROFILE), get_numbers(parameters, _SCALE)
         return spiral_curve(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return two scripts."""
+        """Return the elements of two scripts, and their sources."""
         files = self.library_files[version]
         if self.library_folder is None:
             return "\n".join(file.element for file in files), [file.url for file in files]
@@ -90,9 +91,9 @@ def _parameters(subject: Subject, profile: Floats, metres: float) -> Parameters:
 
 
 def spiral_samples(colour: ArrayLike, samples: int = SAMPLE_COUNT) -> tuple[Floats, Floats, Floats]:
-    """Return radii (n,) and angles (n,) [rad] of the samples, and weights (n, 3) that add up to 1.
+    """Return radii (n,), angles (n,) [rad] and normalised weights (n, 3) of the shader's samples.
 
-    Radii are in mm where the screen's scale is that of metersPerUnit and would be right.
+    The radii are in mm for the scale given by metersPerUnit, without the error in width.
     """
     s = np.asarray(colour, np.float64)
     i = np.arange(samples)
@@ -104,7 +105,7 @@ def spiral_samples(colour: ArrayLike, samples: int = SAMPLE_COUNT) -> tuple[Floa
 
 
 def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
-    """Return radii within which shares of a lobe of width 1 lie, and their weights 1 / (r pdf(r))."""
+    """Return the radii that contain fractions of a Burley profile of width 1, and 1 / (r pdf(r))."""
     u = 1.0 - np.asarray(fraction, np.float64)
     g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
     n = g ** (-1.0 / 3.0)
@@ -113,7 +114,7 @@ def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> CumulativeProfile:
-    """Return the curve of the samples over all directions of an edge, in a scene whose unit is a metre.
+    """Return the profile of the samples, averaged over all directions of an edge, in a scene in metres.
 
     metres : metersPerUnit
     """

@@ -1,9 +1,9 @@
-"""Skin in Blender, written by dermis: a head or a ball of it with its material, lights and camera, in metres.
+"""Skin in Blender, written by dermis: a head or a ball with its material, lights and camera, in metres.
 
     blender --python THIS_FILE                   # or open it in the text editor and run it
     blender -b --python THIS_FILE -- --render picture.png --samples 64 --save scene.blend
 
-A Python with the module bpy takes it too: python THIS_FILE -- --render picture.png
+A Python with the module bpy can run it too: python THIS_FILE -- --render picture.png
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Files of an export to Blender: a script with the numbers of one export, the head beside it, or a .blend.
+"""Files of an export to Blender: a script with its data, the head beside it, or a .blend.
 
-Scenes are in metres with Z upwards.
+Scenes are in metres with Z up.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ _MAIN_GUARD = 'if __name__ == "__main__":'
 def write_scene(
     subject: Subject, parameters: Parameters, output: Path, method: str, versions: Versions
 ) -> list[Path]:
-    """Write the files of a subject to the place that `Target.write` gets; return their paths.
+    """Write the files of a subject to the output of `Target.write`, and return their paths.
 
-    method : of Principled BSDF, or EEVEE
+    method : subsurface method of the Principled BSDF, or EEVEE
     """
     skin = _describe_skin(subject, parameters, method, versions)
     if output.suffix == ".blend":
@@ -112,7 +112,7 @@ def _write(subject: Subject, skin: SceneDict, script: Path, head: str) -> list[P
 
 
 def _encode_head(subject: Subject, scene: Scene) -> bytes:
-    """Return the head with all that moves it, its eyes and its hairs."""
+    """Return the head with its morph targets, bones, eyes and hairs as .glb."""
     return encode_head(
         scene.head,
         roughness=scene.skin.roughness,
@@ -123,15 +123,15 @@ def _encode_head(subject: Subject, scene: Scene) -> bytes:
 
 
 def skin_slots(head: Head) -> list[int]:
-    """Return the skin's materials in the written file, which has only those that triangles use."""
+    """Return the indices of the skin's materials in the written file, which omits unused materials."""
     used = np.unique(head.mesh.material)
     return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
 
 
 def script_text(export: Mapping[str, object]) -> str:
-    """Return the script for what is described: plain numbers, words, lists and tables of them.
+    """Return the script with its data: numbers, texts, lists and tables of them.
 
-    Words become literals as Python writes them, so that no name can be code.
+    Texts are written as Python literals, so a name cannot become code.
     """
     text = Path(__file__).with_name("blender_script.py").read_text(encoding="utf-8")
     source = (Path(*truths.__path__) / "cycles_script.py").read_text(encoding="utf-8")
@@ -150,16 +150,16 @@ def script_text(export: Mapping[str, object]) -> str:
 
 
 def _ball_scene(ball: Head) -> Scene:
-    """Return studio light and a camera before a ball."""
+    """Return studio lights and a camera in front of a ball."""
     return Scene(ball, camera=Camera(position=(0.0, 0.0, _BALL_DISTANCE_MM), frame_mm=_BALL_FRAME_MM))
 
 
 def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArray[np.float32] | None]:
-    """Return lights, camera and world for the script, and their panorama.
+    """Return the lights, camera and world for the script, and the panorama of the world.
 
-    centre_mm : (3,) about which they are placed
+    centre_mm : (3,) point relative to which they are positioned
 
-    Raises DermisError for lights and cameras that Blender has not.
+    Raises DermisError for lights and cameras that Blender does not support.
     """
     centre = np.array(centre_mm) * METRES_PER_MM
     supported = supported_lights(scene.lights, CYCLES, "Blender")
@@ -174,14 +174,14 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
 
 
 def _upright_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]:
-    """Return a matrix of Cycles' scenes about the head's centre, for the upright head in metres."""
+    """Return a transformation of Cycles' scenes for the upright head, in metres."""
     matrix = np.array(to_world, np.float64)
     matrix[:3, 3] = matrix[:3, 3] * _UNIT_M + centre
     return [[float(value) for value in row] for row in _UPRIGHT @ matrix]
 
 
 def _convert_lamp(lamp: SceneDict, centre: Floats) -> SceneDict:
-    """Return a lamp of Cycles' scenes for the upright head in metres."""
+    """Return a lamp of Cycles' scenes for the upright head, in metres."""
     fields = dict(lamp["set"])
     fields |= {name: fields[name] * _UNIT_M for name in _LENGTH_FIELDS if name in fields}
     if lamp["type"] != "SUN":

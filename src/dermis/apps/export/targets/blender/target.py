@@ -1,6 +1,6 @@
-"""What Cycles' subsurface methods make of a colour and a radius: their formulas, and the curves they show.
+"""Formulas and profiles of the subsurface methods of Cycles and EEVEE.
 
-Read in the kernel's source of Blender 4.5, 5.0 and 5.2, which each release brings with it.
+They follow the kernel source of Blender 4.5, 5.0 and 5.2, which is part of each release.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _FAR_RADIUS = 1e9
 
 
 def burley_cdf(radius: ArrayLike) -> Floats:
-    """Share of light within radii [d] of Burley's profile as Cycles cuts it, of their shape [-].
+    """Return the fraction of light within radii [d] of Burley's profile as truncated by Cycles [-].
 
     Source: [ChristensenBurley2015].
     """
@@ -51,7 +51,9 @@ def burley_cdf(radius: ArrayLike) -> Floats:
 
 
 def burley_shape_factor(colour: ArrayLike) -> Floats:
-    """s(A) by which EEVEE divides the radius, of the colour over its brightest channel (3,) [-].
+    """Return the factor s(A) (3,) by which EEVEE divides the radius [-].
+
+    colour : (3,) base colour; A is the colour divided by its brightest channel
 
     Source: [ChristensenBurley2015].
     """
@@ -61,7 +63,7 @@ def burley_shape_factor(colour: ArrayLike) -> Floats:
 
 
 def legacy_albedo(colour: ArrayLike) -> Floats:
-    """Albedo of an isotropic walk for a colour, by the polynomials of Cycles before 5.2 [-]."""
+    """Return the single-scattering albedo of a colour by the polynomials of Cycles before 5.2 [-]."""
     A = np.asarray(colour, np.float64)
     blend = A**0.25
     dim = 1.8260523782 * np.arctan(5.112467903288 * A) ** 1.09686102424
@@ -70,16 +72,16 @@ def legacy_albedo(colour: ArrayLike) -> Floats:
 
 
 def hulst_albedo(colour: ArrayLike) -> Floats:
-    """Albedo of an isotropic walk for a colour, by van de Hulst's formula, as Cycles has it from 5.2 [-]."""
+    """Return the single-scattering albedo of a colour by van de Hulst's formula, as in Cycles 5.2 [-]."""
     C = np.asarray(colour, np.float64)
     s = 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2) + 4.09712
     return np.asarray(np.clip(1.0 - s**2, 0.0, MAX_ALBEDO))
 
 
 def skin_path_ratio(colour: ArrayLike, eta: float) -> Floats:
-    """Mean free path of RANDOM_WALK_SKIN over its radius, of the colour's shape [-].
+    """Return the ratio of mean free path to radius of RANDOM_WALK_SKIN [-].
 
-    The radius is a diffuse mean free path; the albedo is the one whose dipole returns the colour.
+    The radius is a diffuse mean free path; the albedo is the one whose dipole reflectance is the colour.
 
     eta : Subsurface IOR
 
@@ -104,9 +106,10 @@ def _dipole_reflectance(albedo: Floats, A: float) -> Floats:
 
 
 def walk_cdf(radius: ArrayLike, albedo: float, entry: Entry) -> Floats:
-    """Share of light within radii [mean free paths] that a walk returns, of their shape [-].
+    """Return the fraction of the incident light that a random walk returns within radii [-].
 
-    albedo : of single scattering
+    radius : radii [mean free paths]
+    albedo : single-scattering albedo [-]
     entry : "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
@@ -119,7 +122,7 @@ def walk_cdf(radius: ArrayLike, albedo: float, entry: Entry) -> Floats:
 
 @cache
 def _interpolate_albedo(albedo: float, entry: Entry) -> tuple[Floats, Floats]:
-    """Radii, finely [mean free paths], and the share of light within them."""
+    """Return closely spaced radii [mean free paths], and the fraction of light within them [-]."""
     from scipy.interpolate import PchipInterpolator
 
     roots, radii, within = _load_table()[entry]
@@ -130,7 +133,7 @@ def _interpolate_albedo(albedo: float, entry: Entry) -> tuple[Floats, Floats]:
 
 @cache
 def _load_table() -> dict[Entry, tuple[Floats, Floats, Floats]]:
-    """By the way to enter: roots (n,), radii (m,) [mean free paths], and shares (n, m)."""
+    """Return roots (n,), radii (m,) [mean free paths] and fractions (n, m) by entry."""
     by_entry: dict[str, list[list[float]]] = {}
     for row in read_rows(__package__, "cycles_walk"):
         numbers = [float(row[name]) for name in ("root", "radius", "within")]
@@ -144,27 +147,27 @@ def _load_table() -> dict[Entry, tuple[Floats, Floats, Floats]]:
 
 
 class RandomWalk(NamedTuple):
-    """A random walk of Cycles for one colour.
+    """Random walk of Cycles for one colour.
 
-    albedo : of single scattering
-    entry : how walks begin
+    albedo : single-scattering albedo [-]
+    entry : how the walk enters the medium
     """
 
     albedo: float
     entry: Entry
 
     def cdf(self, radius: Floats) -> Floats:
-        """Return the share of what it returns that returns within radii [mean free paths]."""
+        """Return the fraction of the returned light within radii [mean free paths]."""
         return walk_cdf(radius, self.albedo, self.entry) / self.total
 
     @property
     def total(self) -> float:
-        """Light that it returns along the normal."""
+        """Return the light that leaves along the normal, per incident light."""
         return float(walk_cdf(np.array([_FAR_RADIUS]), self.albedo, self.entry)[0])
 
 
 class Blender(Target):
-    """Principled BSDF's subsurface scattering in Cycles, by each of its methods, and in EEVEE."""
+    """Subsurface scattering of the Principled BSDF, by each method of Cycles and in EEVEE."""
 
     name = "blender"
     title = "Blender"
@@ -179,7 +182,7 @@ class Blender(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the radius whose curve is nearest to the true one, by the method's own use of it."""
+        """Return the radius for which the method's profile is closest to the reference."""
         units = self._unit_cdfs(subject, version)
         fitted = np.array(
             [fit_length_scale(subject.curve, channel, unit) for channel, unit in enumerate(units)]
@@ -192,7 +195,7 @@ class Blender(Target):
         return self._parameters(JENSEN_MM, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the curve by the formulas of Cycles' kernel and of EEVEE's shader."""
+        """Return the profile by the formulas of Cycles' kernel and EEVEE's shader."""
         metres = np.array(get_numbers(parameters, _RADIUS)) * get_numbers(parameters, _SCALE)[0]
         lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
         units = self._unit_cdfs(subject, version)
@@ -204,15 +207,15 @@ class Blender(Target):
         return CumulativeProfile.from_function(within, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write a script with the files beside it, or the .blend that it saves.
+        """Write a script with its files, or the .blend that the script saves.
 
-        Raises DermisError when a .blend is asked for and DERMIS_BLENDER_PYTHON names no Python with bpy.
+        Raises DermisError for a .blend if DERMIS_BLENDER_PYTHON does not name a Python with bpy.
         """
         method = self.variant.replace("-", "_").upper()
         return write_scene(subject, parameters, output, method, self._valid_versions(version))
 
     def _valid_versions(self, version: str) -> Versions:
-        """Return the versions that the numbers hold for."""
+        """Return the versions for which the parameters are valid."""
         if self.variant != "random-walk":
             return list(_FIRST_VERSION), None
         return (list(_MFP_VERSION), None) if _is_mfp(version) else (list(_FIRST_VERSION), list(_MFP_VERSION))
@@ -246,7 +249,7 @@ class Blender(Target):
         }[self.variant]
 
     def _unit_lengths(self, subject: Subject, version: str) -> Floats:
-        """Return the curve's lengths (3,), d or mean free paths, at a radius of 1."""
+        """Return d or the mean free path (3,) of each channel, for a radius of 1."""
         if self.variant == "random-walk":
             return np.full(3, 1.0 if _is_mfp(version) else 1.0 / _4_PI)
         if self.variant == "random-walk-skin":
@@ -261,13 +264,13 @@ class Blender(Target):
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
     def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return the curve of each channel at a length of 1."""
+        """Return the cumulative profile of each channel, for a length of 1."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]
 
     def _energy_ratio(self, subject: Subject, version: str) -> Floats:
-        """Return the light (3,) that leaves along the normal over the base colour."""
+        """Return the light (3,) that leaves along the normal, divided by the base colour."""
         if self.variant in ("burley", "eevee"):
             return np.ones(3)
         total = np.array([walk.total for walk in self._random_walks(subject, version)])
@@ -275,7 +278,7 @@ class Blender(Target):
 
 
 def _is_mfp(version: str) -> bool:
-    """Return whether the radius of a random walk is a mean free path there."""
+    """Return whether the radius of a random walk is a mean free path in a version."""
     return tuple(map(int, version.split("."))) >= _MFP_VERSION
 
 

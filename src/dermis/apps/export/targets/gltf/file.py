@@ -1,4 +1,4 @@
-"""The bytes of an exported .glb file."""
+"""Encoding of the exported .glb file."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _STEPS = 1024
 
 
 def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
-    """Return the bytes of the head, or the ball, with its eyes, hairs, targets and bones.
+    """Return the .glb of the head, or of a ball, with its eyes, hairs, morph targets and bones.
 
-    extensions : of the skin's material, by name
-    draft : name of an extension that is not ratified, "" for a file without
+    extensions : extensions of the skin's material by name
+    draft : name of an extension that is not ratified; "" for none
     """
     head = subject.head_or_ball
     notes: dict[str, object] = {"draft": draft} if draft else {}
@@ -43,7 +43,7 @@ def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
 
 
 def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft: str) -> SkinAdditions:
-    """Return additions to the skin's material; a colour map gives a map of scattered colours too."""
+    """Return additions to the skin's material, including a map of scattering colours for a colour map."""
     if not draft:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
         return SkinAdditions({} if head.maps.colour is not None else colour, extensions)

@@ -45,13 +45,13 @@ class Gltf(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """The volume whose walk comes nearest, or what an ear lets through."""
+        """Return the volume whose random walk is closest to the profile, or the transmission of an ear."""
         if self.variant == DIFFUSE:
             return _diffuse_parameters(subject, *_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """The skin's colour for every colour, and the mean radius of the light for the distance."""
+        """Return the skin's colour for every colour, and the mean radius of the light for the distance."""
         if self.variant == DIFFUSE:
             return _diffuse_parameters(subject, _NAIVE_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -59,14 +59,14 @@ class Gltf(Target):
         return _scatter_parameters(Volume(radius_m, colour, colour))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """A walk under a refracting surface; for diffuse transmission all light where it falls."""
+        """Return the profile of the volume; without scattering, light leaves where it arrives."""
         if self.variant == DIFFUSE:
             reflected = (1.0 - get_numbers(parameters, _FACTOR)[0]) * subject.curve.energy
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), reflected)
         return subject.rescale_energy(volume_curve(_parameter_volume(parameters)))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """One .glb file; the skin's material has the extensions, none of which is required."""
+        """Write a .glb file whose skin has the extensions, none of which is required."""
         extensions: dict[str, dict[str, Value | list[float]]] = {"KHR_materials_ior": {"ior": SKIN_ETA}}
         for one in parameters:
             extension, _, member = one.name.partition(".")
@@ -103,7 +103,7 @@ def _diffuse_parameters(subject: Subject, factor: float, colour: Floats) -> Para
 
 
 def _transmission(subject: Subject) -> tuple[float, Floats]:
-    """Return the share of the light that comes through an ear, over that which comes back, and its colour.
+    """Return the transmitted fraction of the light that leaves an ear on both sides, and its colour.
 
     Source: [ChristensenBurley2015], integrated over a plane at a depth.
     """

@@ -1,4 +1,4 @@
-"""What glTF's volume means for light: a walk under a refracting surface, by the draft's own inversion."""
+"""Scattering volume of glTF: a random walk under a refracting surface, inverted as in the draft extension."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MAX_COLOUR = 1.0 - 1e-12
 
 
 class Volume(NamedTuple):
-    """The numbers of KHR_materials_volume and KHR_materials_scatter that say how light spreads.
+    """Parameters of KHR_materials_volume and KHR_materials_scatter that determine the profile.
 
     distance_m, colour : attenuationDistance [m] and attenuationColor (3,)
     multiscatter : multiscatterColorFactor (3,) [-]
@@ -29,21 +29,21 @@ class Volume(NamedTuple):
 
     @property
     def mean_free_path_mm(self) -> Floats:
-        """(3,) between two events [mm]."""
+        """Return the mean free paths (3,) [mm]."""
         return np.asarray(1e3 * self.distance_m / -np.log(np.clip(self.colour, _MIN_COLOUR, _MAX_COLOUR)))
 
 
 def volume_from_paths(mean_free_path_mm: ArrayLike, multiscatter: ArrayLike) -> Volume:
-    """The numbers for mean free paths (3,): the longest is the distance, so that no colour underflows."""
+    """Return the volume of mean free paths (3,) [mm]; its distance is the largest of them."""
     path = np.asarray(mean_free_path_mm, np.float64)
     longest = float(path.max())
     return Volume(1e-3 * longest, np.exp(-longest / path), np.asarray(multiscatter, np.float64))
 
 
 def single_scattering(multiscatter: ArrayLike, anisotropy: float = 0.0) -> Floats:
-    """Albedo of single scattering of a colour, as KHR_materials_scatter has it: van de Hulst's [-].
+    """Return the single-scattering albedo of a multiscatter colour by van de Hulst's formula [-].
 
-    Source: [dEon2016] equation 53.7.
+    Source: [dEon2016] equation 53.7, as used by KHR_materials_scatter.
     """
     C = np.asarray(multiscatter, np.float64)
     s = 4.09712 + 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2)
@@ -51,25 +51,25 @@ def single_scattering(multiscatter: ArrayLike, anisotropy: float = 0.0) -> Float
 
 
 def multiscatter_colour(albedo: ArrayLike) -> Floats:
-    """The colour of an albedo of isotropic single scattering: the same the other way [-]."""
+    """Return the multiscatter colour of an isotropic single-scattering albedo [-]."""
     s = np.sqrt(np.clip(1.0 - np.asarray(albedo, np.float64), 0.0, 1.0))
     return np.asarray((1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s))
 
 
 def multiscatter_for_reflectance(energy: ArrayLike) -> Floats:
-    """The colour with which a share (...,) of the light that enters comes back through the surface [-]."""
+    """Return the multiscatter colour for which a fraction (...,) of the entering light leaves again [-]."""
     return multiscatter_colour(tabulated_albedo("skin", energy))
 
 
 def volume_curve(volume: Volume) -> CumulativeProfile:
-    """The curve of light that walks through such a volume."""
+    """Return the cumulative profile of a volume."""
     return half_space("skin", single_scattering(volume.multiscatter), volume.mean_free_path_mm)
 
 
 def fit_volume(curve: CumulativeProfile, energy: Floats | None = None) -> Volume:
-    """The volume whose walk gives back a curve's energy, and is nearest to it cumulatively.
+    """Return the volume whose cumulative profile is closest to a curve.
 
-    energy : (3,) that it gives back instead, a colour map's [-]
+    energy : (3,) total energy of the volume, by default that of the curve [-]
     """
     medium = fit_homogeneous_medium(curve, energy)
     return volume_from_paths(medium.mfp_mm, multiscatter_colour(medium.albedo))

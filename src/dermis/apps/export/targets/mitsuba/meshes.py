@@ -1,4 +1,4 @@
-"""Meshes of a head for Mitsuba: closed surfaces about the skin's medium, and its other parts with colours."""
+"""Meshes for Mitsuba: closed surfaces around the skin's medium, and coloured meshes of other materials."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _SUBDIVISIONS = 4  # parts of each edge
 
 
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
-    """Return PLY files of the skin about the head's centre [mm], by the names of their shapes.
+    """Return PLY files of the skin by name of the shape, relative to the head's centre [mm].
 
-    "skin" has normals and uv, "caps" shut its openings; "upper" and "upper_caps" are a little outside,
-    for a matched surface, which is there twice.
+    "skin" has normals and uv, and "caps" closes its openings. "upper" and "upper_caps" are slightly outside;
+    they are the second layer of a matched surface.
 
-    Raises DermisError when the skin encloses no volume.
+    Raises DermisError if the skin does not enclose a volume.
     """
     mesh, centre = head.mesh, np.array(head.centre_mm, np.float32)
     solid = closed_skin(mesh, head.name)
@@ -47,11 +47,11 @@ def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
 
 
 class SubdividedTriangles(NamedTuple):
-    """Triangles that are divided evenly.
+    """Triangles that are subdivided evenly.
 
-    triangle : (n,) in which each corner lies
-    weights : (n, 3) of that triangle's corners
-    corners : (m, 3) of the smaller triangles
+    triangle : (n,) original triangle of each new vertex
+    weights : (n, 3) barycentric weights of each new vertex in that triangle
+    corners : (m, 3) vertices of the new triangles
     """
 
     triangle: NDArray[np.int64]
@@ -60,9 +60,9 @@ class SubdividedTriangles(NamedTuple):
 
 
 def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) -> SubdividedTriangles:
-    """Divide each of some triangles into finer^2 smaller ones, which share no corners with those of others.
+    """Divide each triangle into n^2 smaller ones, without vertices shared between original triangles.
 
-    triangles : (t,) numbers
+    triangles : (t,) numbers of the triangles
     """
     grid = [(i, j) for i in range(n + 1) for j in range(n + 1 - i)]
     at = {point: index for index, point in enumerate(grid)}
@@ -78,9 +78,9 @@ def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) 
 
 
 def coloured_meshes(renderer: Renderer, scene: Scene) -> dict[int, bytes]:
-    """Return files of all materials but the skin, by their indices; the head about its centre [mm].
+    """Return PLY files of all materials except skin by index, relative to the head's centre [mm].
 
-    They have no maps: fine triangles have a colour at each corner.
+    Triangles are subdivided and have a colour per vertex instead of maps.
     """
     mesh = scene.head.mesh
     used = np.unique(mesh.material).tolist()

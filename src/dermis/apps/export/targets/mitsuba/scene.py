@@ -1,4 +1,4 @@
-"""Scene of Mitsuba as files: `mitsuba scene.xml` renders it, `-D boundary=rough` under another surface."""
+"""Scene of Mitsuba as files; `mitsuba scene.xml -D boundary=rough` renders it with another skin surface."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ _OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m
 
 
 class IsotropicMedium(NamedTuple):
-    """A medium of isotropic scattering.
+    """Medium with isotropic scattering.
 
     sigma_t : (3,) extinction [1/mm]
-    albedo : (3,) of one scattering [-]
+    albedo : (3,) single-scattering albedo [-]
     """
 
     sigma_t: tuple[float, ...]
@@ -50,14 +50,13 @@ class IsotropicMedium(NamedTuple):
 
 
 class SkinAppearance(NamedTuple):
-    """Medium and surface of the skin.
+    """Media, surface and textures of the skin.
 
-    media : of each boundary
-    roughness : Beckmann m, one number or (n, n)
-    passing : (n, n, 3) share that a refracting surface lets pass each way, of skin that differs from place to
-        place; None for skin that is alike everywhere
-    held_back : (n, n) share that a matched surface keeps of what leaves, as it has no colours
-    opaque : files of other materials, by their indices
+    media : medium for each kind of surface
+    roughness : Beckmann m, a number or (n, n)
+    transmittance : (n, n, 3) transmittance of a refracting surface in each direction; None for uniform skin
+    dimming : (n, n) fraction of the leaving light that a matched surface absorbs; None for uniform skin
+    opaque : PLY files of other materials by index
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -70,10 +69,10 @@ class SkinAppearance(NamedTuple):
 def scene_files(
     scene: Scene, appearance: SkinAppearance, boundary: Boundary, size: tuple[int, int], samples: int
 ) -> Iterator[tuple[str, bytes]]:
-    """Return names and contents of the files, the scene first.
+    """Yield names and contents of the files, with the scene first.
 
-    Raises DermisError for what Mitsuba has no words for: lights without shadows, cameras with shifted lenses,
-    skin that encloses no volume.
+    Raises DermisError for what Mitsuba does not support: lights without shadows, cameras with shifted lenses,
+    and skin that does not enclose a volume.
     """
     backend = XmlBackend()
     meshes = skin_meshes(backend, scene.head)
@@ -93,7 +92,7 @@ def scene_files(
 
 
 def medium_description(medium: IsotropicMedium) -> SceneDict:
-    """Return a homogeneous medium [mm]; colours are at most 1, the largest extinction is the scale."""
+    """Return a homogeneous medium [mm], with the largest extinction as its scale."""
     extinction = np.asarray(medium.sigma_t)
     return {
         "type": "homogeneous",
@@ -108,9 +107,9 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
 def surface_description(
     boundary: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
-    """Return the surface of the skin, as light meets it from outside.
+    """Return the surface of the skin for light from outside.
 
-    passing : share that a refracting surface lets pass each way, a texture; None for all
+    transmittance : texture of the transmittance in each direction; None for 1
     roughness : Beckmann m, a number or a texture
     """
     facets = {"distribution": "beckmann", "alpha": roughness}
@@ -126,7 +125,7 @@ def surface_description(
 
 
 def _lower_surface(dimmed: bool) -> SceneDict:
-    """Return a matched surface for light from below: it dims what leaves, by the skin's lightness."""
+    """Return the inner layer of a matched surface, which dims leaving light by the lightness of the skin."""
     if not dimmed:
         return {"type": "null", "id": "skin_below"}
     black = {"type": "diffuse", "reflectance": rgb((0.0, 0.0, 0.0))}
@@ -140,9 +139,9 @@ def _scene_elements(
     boundary: Boundary,
     picture: tuple[int, int, int],
 ) -> list[ET.Element]:
-    """Return all parts but the skin.
+    """Return all elements of the scene except the skin.
 
-    picture : width, height [pixel], samples of each
+    picture : width and height [pixel], and samples per pixel
     """
     sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
     sensor = mitsuba_sensor(backend, scene.camera, picture[:2])
@@ -170,7 +169,7 @@ def _scene_elements(
 def _skin_elements(
     backend: XmlBackend, boundary: Boundary, appearance: SkinAppearance, meshes: Mapping[str, bytes]
 ) -> list[ET.Element]:
-    """Return the skin under a surface."""
+    """Return the elements of the skin with one kind of surface."""
     roughness = appearance.roughness if isinstance(appearance.roughness, float) else _texture("roughness")
     transmittance = None if appearance.transmittance is None else _texture("passing")
     parts = [

@@ -1,7 +1,8 @@
-"""Mitsuba 3: a scene whose skin is a homogeneous medium, as it has no diffusion profiles.
+"""Export to Mitsuba 3: a scene whose skin is a homogeneous medium, as it has no diffusion profiles.
 
-A surface of index 1.4 around the medium is what tissue has, and light that is found by rays alone passes it:
-an environment, lamps of some size. Points and spots need the matched one, whose medium is another.
+A surface of index 1.4 around the medium corresponds to tissue. Light through it is found by random rays only,
+so an environment and area lights work. Point and spot lights need the index-matched surface, whose medium
+differs.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ _SIZE, _SAMPLES = (512, 512), 256
 
 
 class Mitsuba(Target):
-    """Scene, medium, surface, lights, camera and meshes, in mm."""
+    """Scene with medium, surface, lights, camera and meshes, in millimetres."""
 
     name = "mitsuba"
     title = "Mitsuba"
@@ -61,7 +62,7 @@ class Mitsuba(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the medium whose curve is nearest, for the map's brightest skin; textures dim the rest."""
+        """Return the medium closest to the profile for the brightest skin; textures dim the others."""
         boundary, colours = self._boundary, skin_colours(subject)
         medium = fit_medium(subject.curve, colours, boundary)
         transmittance = colours.transmittance(boundary)
@@ -80,7 +81,7 @@ class Mitsuba(Target):
         return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the curve of walks through the medium, of light along the normal."""
+        """Return the profile of random walks through the medium, for light along the normal."""
         boundary = self._boundary
         names = _SIGMA, _ALBEDO, _PASSING
         sigma, albedo, transmittance = (np.array(get_numbers(parameters, name)) for name in names)
@@ -92,7 +93,7 @@ class Mitsuba(Target):
         return curve.with_energy(factor * energy * transmittance / mean)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the scene with a file for each surface, meshes and textures."""
+        """Write the scene with one file per surface, meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
         appearance = SkinAppearance(media, *textures(subject, colours), _opaque_meshes(scene, self.adapter))
@@ -104,10 +105,10 @@ class Mitsuba(Target):
 
 
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
-    """Return the medium that shows a curve best under a surface, as bright as the brightest skin.
+    """Return the medium under a surface that is closest to a curve, as bright as the brightest skin.
 
-    Light falls on heads from everywhere. Under a matched surface oblique light brings back up to a quarter
-    more than light along the normal; refraction leaves no such difference.
+    Heads are lit from all directions. Under a matched surface, oblique light returns up to a quarter more
+    light than light along the normal; refraction removes this difference.
     """
     energy = colours.medium_colour(boundary) / _boundary_factor(boundary)
     if boundary == "matched":
@@ -121,12 +122,12 @@ def _half_space_kind(boundary: Boundary) -> HalfSpaceKind:
 
 
 def _boundary_factor(boundary: Boundary) -> float:
-    """Return the share that enters a matched surface, over that which its rough mirror does not reflect."""
+    """Return the light that enters a matched surface, relative to the reference."""
     return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
 
 
 def _opaque_meshes(scene: Scene, adapter: str) -> dict[int, bytes]:
-    """Return files of the head's other materials."""
+    """Return the PLY files of the head's other materials."""
     if all(material.kind == "skin" for material in scene.head.mesh.materials):
         return {}
     from dermis.apps.export.targets.mitsuba.meshes import coloured_meshes
@@ -137,10 +138,10 @@ def _opaque_meshes(scene: Scene, adapter: str) -> dict[int, bytes]:
 
 @dataclass(frozen=True, eq=False)
 class SkinColours:
-    """Colours of a skin: a medium has the brightest, and textures dim it.
+    """Colours of a skin: the medium has the brightest one, and textures dim it.
 
-    mean, peak : (3,) linear Rec. 709, the same for a skin that is alike everywhere
-    lightest : luminance of the lightest over that of the mean
+    mean, peak : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
+    lightness_ratio : luminance of the lightest texels relative to the mean [-]
     """
 
     mean: Floats
@@ -148,16 +149,16 @@ class SkinColours:
     lightness_ratio: float
 
     def medium_colour(self, boundary: Boundary) -> Floats:
-        """Return the colour (3,) of the medium alone; a matched surface dims by lightness alone."""
+        """Return the colour (3,) of the medium alone; matched surfaces change the lightness only."""
         return np.minimum(self.lightness_ratio * self.mean if boundary == "matched" else self.peak, 0.97)
 
     def transmittance(self, boundary: Boundary) -> tuple[float, ...]:
-        """Return the mean share that textures let pass, both ways."""
+        """Return the mean transmittance (3,) of the textures, both ways [-]."""
         return floats(self.mean / self.medium_colour(boundary))
 
 
 def skin_colours(subject: Subject) -> SkinColours:
-    """Return the colours of the subject's map, or the one of its profile."""
+    """Return the colours of the subject's colour map, or the colour of its profile."""
     texels = None if subject.head is None else subject.head.maps.colour
     if texels is None:
         colour = np.asarray(subject.albedo, np.float64)
@@ -171,12 +172,12 @@ def skin_colours(subject: Subject) -> SkinColours:
 
 
 def mean_roughness(subject: Subject) -> float:
-    """Return Beckmann's roughness where no map has it."""
+    """Return Beckmann's m of skin without a roughness map."""
     return float(subject.skin.smoothing * subject.skin.roughness)
 
 
 def textures(subject: Subject, colours: SkinColours) -> tuple[float | Map, Map | None, Map | None]:
-    """Return the roughness, the share that a refracting surface lets pass, and what a matched one keeps."""
+    """Return roughness, transmittance of a refracting surface, and dimming of a matched one."""
     roughness: float | Map = mean_roughness(subject)
     maps = None if subject.head is None else subject.head.maps
     if maps is not None and maps.roughness is not None:

@@ -30,13 +30,13 @@ _PLUGIN_KINDS = {plugin: kind for kind, plugins in _KINDS.items() for plugin in 
 
 
 class Transform:
-    """A matrix as Mitsuba builds it: each call acts before those that came earlier."""
+    """Transformation with Mitsuba's convention: each call is applied before the earlier ones."""
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
 
     def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
-        """From +Z towards the target, Y upwards."""
+        """Return the transformation that turns +Z towards the target, with Y up."""
         forward = _unit(np.subtract(target, origin))
         left = _unit(np.cross(np.asarray(up, np.float64), forward))
         matrix = np.eye(4)
@@ -44,22 +44,22 @@ class Transform:
         return Transform(self.matrix @ matrix)
 
     def scale(self, factors: ArrayLike) -> Transform:
-        """Along the axes, or alike."""
+        """Return the transformation that scales along the axes."""
         return Transform(self.matrix @ np.diag([*np.broadcast_to(factors, 3), 1.0]))
 
 
 @dataclass(eq=False)
 class Bitmap:
-    """A picture that goes into a file of its own."""
+    """Picture that is written to its own file."""
 
     values: NDArray[np.float32]
 
 
 @dataclass
 class XmlBackend:
-    """Replacement of the module `mitsuba` where scenes are described.
+    """Replacement for the module `mitsuba` in functions that describe scenes.
 
-    bitmaps : pictures, in the order in which they are written
+    bitmaps : pictures in the order in which they are written
     """
 
     bitmaps: list[NDArray[np.float32]] = field(default_factory=list)
@@ -70,23 +70,23 @@ class XmlBackend:
 
 @dataclass(frozen=True)
 class Ref:
-    """Something that is described elsewhere in the scene, by its name."""
+    """Reference to an object by its id."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class Override:
-    """A value that `mitsuba -D NAME=...` replaces, and its kind."""
+    """Value that `mitsuba -D NAME=...` replaces, with its type."""
 
     kind: str
     name: str
 
 
 def xml_element(description: Mapping[str, object], name: str, backend: XmlBackend) -> ET.Element:
-    """Return the element of a description, under a name.
+    """Return the XML element of a description.
 
-    words : takes the pictures
+    backend : collects the pictures
     """
     plugin = str(description["type"])
     element = ET.Element(_PLUGIN_KINDS[plugin], {"type": plugin, **_name_attributes(name, description)})
@@ -97,12 +97,12 @@ def xml_element(description: Mapping[str, object], name: str, backend: XmlBacken
 
 
 def bitmap_path(index: int) -> str:
-    """Return the file of a picture beside the scene."""
+    """Return the path of a picture relative to the scene."""
     return f"textures/light_{index}.exr"
 
 
 def xml_document(parts: list[ET.Element]) -> bytes:
-    """Return a scene of these parts."""
+    """Return the scene of some elements as XML."""
     root = ET.Element("scene", {"version": VERSION})
     root.extend(parts)
     ET.indent(root)
@@ -111,12 +111,12 @@ def xml_document(parts: list[ET.Element]) -> bytes:
 
 
 def default_element(name: str, value: str) -> ET.Element:
-    """Return a value that the command line may replace."""
+    """Return the default of a value that the command line may replace."""
     return ET.Element("default", {"name": name, "value": value})
 
 
 def include_element(filename: str) -> ET.Element:
-    """Return a reference to another file."""
+    """Return the inclusion of another file."""
     return ET.Element("include", {"filename": filename})
 
 

@@ -12,10 +12,10 @@ from dermis.base.errors import refuse
 
 
 def build_document(definitions: Sequence[OpenPbrMaterial], shader: str, prefix: str) -> MaterialX.Document:
-    """Return the document, checked by MaterialX's own library; lengths in metres, colours linear Rec. 709.
+    """Return a validated document; lengths are in metres, colours linear Rec. 709.
 
     shader : `OPEN_PBR` or `STANDARD`
-    prefix : of the maps' names, which lie beside the document
+    prefix : prefix of the names of the maps beside the document
     """
     document = MaterialX.createDocument()
     document.setColorSpace("lin_rec709")
@@ -30,7 +30,7 @@ def build_document(definitions: Sequence[OpenPbrMaterial], shader: str, prefix: 
 
 @cache
 def standard_library() -> MaterialX.Document:
-    """Return MaterialX's own definitions."""
+    """Return MaterialX's standard definitions."""
     library = MaterialX.createDocument()
     folders, search_path = MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath()
     MaterialX.loadLibraries(folders, search_path, library)
@@ -60,7 +60,7 @@ def _add_material(
 
 
 def _add_map(graph: MaterialX.NodeGraph, role: str, file: str) -> MaterialX.Output:
-    """Return the output of a graph that reads a picture."""
+    """Add the nodes that read a picture, and return their output."""
     map_type = MAPS[role]
     image = graph.addNode("image", f"{role}_image", map_type.type)
     filename = image.setInputValue("file", file, "filename")

@@ -1,4 +1,4 @@
-"""Materials of OpenPBR: values, the maps that drive inputs, and their files."""
+"""OpenPBR materials: input values, the maps of inputs, and their files."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ DISTANCES = ("subsurface_radius",)
 
 
 def input_name(shader: str, name: str) -> str:
-    """Return the name of an input of OpenPBR in a shader."""
+    """Return the name of an OpenPBR input in a shader."""
     return name if shader == OPEN_PBR else _STANDARD_NAMES[name]
 
 
 class MapType(NamedTuple):
-    """Type and colour space of a map in MaterialX, and its colour space in USD's preview."""
+    """Type and colour space of a map in MaterialX, and its colour space in USD's preview surface."""
 
     type: str
     space: str
@@ -79,11 +79,11 @@ MAPS: Mapping[str, MapType] = {
 
 @dataclass(frozen=True)
 class OpenPbrMaterial:
-    """A material.
+    """Values and maps of a material's inputs.
 
     name : any text
-    values : of inputs, lengths in metres
-    maps : names of maps by the inputs that they drive
+    values : values of inputs; lengths in metres
+    maps : roles of maps by input
     """
 
     name: str
@@ -100,9 +100,9 @@ def skin_material(
 ) -> OpenPbrMaterial:
     """Return the material of skin.
 
-    radius_m : mean free paths
-    colour : of skin without a map of it, linear Rec. 709 [-]
-    roles : of the maps that there are
+    radius_m : (3,) mean free paths [m]
+    colour : colour without a colour map, linear Rec. 709 [-]
+    roles : roles of the existing maps
     """
     longest = max(radius_m)
     values: dict[str, Value] = {
@@ -121,7 +121,7 @@ def skin_material(
 
 
 def opaque_material(material: Material) -> OpenPbrMaterial:
-    """Return the material of what is not skin."""
+    """Return the OpenPBR material of a part of the head other than skin."""
     name = material.name.casefold()
     values: dict[str, Value] = {
         "base_color": floats(material.colour),
@@ -134,15 +134,15 @@ def opaque_material(material: Material) -> OpenPbrMaterial:
 
 
 def eye_material(name: str) -> OpenPbrMaterial:
-    """Return the material of an eyeball with a map of its colour."""
+    """Return the material of an eyeball with a colour map."""
     values: dict[str, Value] = {"specular_roughness": _ROUGHNESS["eye"], "specular_ior": _EYE_IOR}
     return OpenPbrMaterial(name, values, {"base_color": "eye"})
 
 
 def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
-    """Return the material of hairs, a plain surface of their mean colour.
+    """Return the material of hairs: an opaque surface of their mean colour.
 
-    absorption : (n, 3) of their inside [1/mm]
+    absorption : (n, 3) absorption inside the hairs [1/mm]
 
     Source: [Chiang2016] eq. 9 for the colour, at a roughness of 0.3.
     """
@@ -152,9 +152,9 @@ def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
 
 
 def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
-    """Return the maps of a skin by role, as numbers that go into files.
+    """Return the maps of a skin by role, scaled as they are stored in files.
 
-    slopes : (n, n, 2) of the relief, where `maps` has no normals
+    slopes : (n, n, 2) slopes of the relief, used if `maps` has no normals
     """
     arrays: dict[str, Floats] = {}
     if maps.colour is not None and skin.albedo == "map":
@@ -172,7 +172,7 @@ def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
 
 
 def encode_map_files(arrays: Mapping[str, Floats]) -> dict[str, bytes]:
-    """Return PNG files of 8 bits by role."""
+    """Return 8-bit PNG files by role."""
     with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
         return dict(zip(arrays, pool.map(_png, arrays, arrays.values()), strict=True))
 
@@ -185,13 +185,13 @@ def _png(role: str, values: Floats) -> bytes:
 
 
 def file_prefix(file: Path, subject: Subject) -> str:
-    """Return the prefix of the names of the files beside a target's main file."""
+    """Return the prefix of the names of files beside a target's main file."""
     identifier = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_MAX_NAME_LENGTH]
     return f"{identifier or subject.identifier}_"
 
 
 def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
-    """Write the maps of the skin; return their paths by role, none for a skin by itself."""
+    """Write the maps of the head's skin, and return their paths by role."""
     if subject.head is None:
         return {}
     files = encode_map_files(map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head)))
@@ -200,10 +200,10 @@ def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
 
 
 def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
-    """Return materials by their number in the subject's mesh.
+    """Return the materials by their number in the subject's mesh.
 
-    mfp_mm : (3,) mean free paths of the skin
-    roles : of the maps that there are
+    mfp_mm : (3,) mean free paths of the skin [mm]
+    roles : roles of the existing maps
     """
     red, green, blue = (_METRES_PER_MM * float(path) for path in mfp_mm)
     colour, known_roles = floats(subject.clipped_albedo()), list(roles)

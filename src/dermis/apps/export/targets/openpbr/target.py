@@ -1,7 +1,7 @@
-"""OpenPBR and Standard Surface as a MaterialX document, with the maps of a head beside it.
+"""Export to OpenPBR and Standard Surface as a MaterialX document, with the maps of a head beside it.
 
-OpenPBR takes the radius for the mean free path of a random walk through a medium of the index of the air,
-whatever its phase function; the fit is of the curve of such a walk.
+OpenPBR interprets the radius as the mean free path of a random walk through an index-matched medium,
+independent of its phase function. The parameters are fitted to the profile of such a walk.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ _SHADERS = {
 
 
 class OpenPbr(Target):
-    """A document with a material for each part of the head.
+    """MaterialX document with one material per part of the head.
 
-    Variants that end in "profile" are for renderers that take the radius for the d of a profile.
+    Variants that end in "profile" are for renderers that interpret the radius as the d of a profile.
     """
 
     name = "openpbr"
@@ -59,16 +59,16 @@ class OpenPbr(Target):
 
     @property
     def shader(self) -> str:
-        """Of the material's node."""
+        """Return the category of the material's node."""
         return _SHADERS[self.variant or "open-pbr"]
 
     @property
     def is_profile(self) -> bool:
-        """Whether the radius is the d of a profile, and not the mean free path of a walk."""
+        """Return whether the radius is the d of a profile instead of a mean free path."""
         return self.variant.endswith("profile")
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the walk, or the profile, whose curve is nearest."""
+        """Return the random walk, or the profile, closest to the reference."""
         if self.is_profile:
             d = fit_burley_width(subject.curve)
             return surface_parameters(subject, self.shader, d, "largest d of the profiles")
@@ -77,11 +77,11 @@ class OpenPbr(Target):
         return surface_parameters(subject, self.shader, path, meaning)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the diffuse mean free paths of published tables, typed in."""
+        """Return the published diffuse mean free paths as the radius."""
         return surface_parameters(subject, self.shader, published_path_mm(subject), PUBLISHED_MEANING)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the curve of the walk of these rows, or of the profile."""
+        """Return the cumulative profile of the random walk, or of MaterialX's profile."""
         radius = get_radii_mm(parameters, self.shader)
         if self.is_profile:
             return materialx_profile(radius, subject)
@@ -103,7 +103,10 @@ class OpenPbr(Target):
 
 
 def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning: str) -> Parameters:
-    """Return the parameters of a shader with radii (3,); meaning is that of the longest."""
+    """Return the parameters of a shader with radii (3,) [mm].
+
+    meaning : meaning of the largest radius
+    """
     longest, skin, colour = float(radius_mm.max()), subject.skin, floats(subject.clipped_albedo())
     roughness = float(np.sqrt(skin.roughness * skin.smoothing))
     inputs = (
@@ -120,24 +123,24 @@ def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning
 
 
 def profile_error_text(mfp_mm: Floats, subject: Subject) -> str:
-    """Return how wrong renderers are that take the radius for the d of a profile."""
+    """Return the errors of renderers that interpret the mean free path as the d of a profile."""
     errors = curve_error(subject.curve, materialx_profile(mfp_mm, subject)).edge
     return f"interpreted as d, errors at shadow edges are {', '.join(f'{error:.3f}' for error in errors)}"
 
 
 def get_radii_mm(parameters: Parameters, shader: str) -> Floats:
-    """Return the radii (3,) of rows [mm]."""
+    """Return the radii (3,) of the parameters [mm]."""
     longest = get_numbers(parameters, input_name(shader, "subsurface_radius"))[0] / _METRES_PER_MM
     return longest * np.array(get_numbers(parameters, input_name(shader, "subsurface_radius_scale")))
 
 
 def fitted_path_mm(subject: Subject) -> Floats:
-    """Return the mean free paths (3,) of the walk of the subject's colour whose curve is nearest [mm]."""
+    """Return the mean free paths (3,) of the random walk closest to the subject's profile [mm]."""
     return fit_homogeneous_medium(subject.curve, subject.albedo, "walk").mfp_mm
 
 
 def published_path_mm(subject: Subject) -> Floats:
-    """Return the diffuse mean free path (3,) that tables print for tissue, without tissue the lobe's d [mm].
+    """Return the diffuse mean free paths (3,) as published for tissue, or d without tissue [mm].
 
     Source: 1 / sigma_tr of the lowest layer, [Jensen2001].
     """
@@ -148,7 +151,7 @@ def published_path_mm(subject: Subject) -> Floats:
 
 
 def lowest_layer(subject: Subject) -> Layer | None:
-    """Return the lowest layer of tissue in three channels, None without one."""
+    """Return the lowest layer of a tissue with three channels, or None."""
     tissue = subject.tissue
     if tissue is None or tissue.rgb is not None or tissue.medium.channels != 3:
         return None
@@ -156,15 +159,16 @@ def lowest_layer(subject: Subject) -> Layer | None:
 
 
 def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
-    """Return the curve of a walk whose albedo follows from a colour by van de Hulst's formula.
+    """Return the cumulative profile of a random walk whose albedo follows from a colour.
 
-    All light together is that of the subject, times what the formula is off by.
+    The albedo is given by van de Hulst's formula. The energy is the subject's, times the error of that
+    formula.
     """
     return subject.rescale_energy(half_space("walk", albedo_from_colour(colour), mfp_mm))
 
 
 def materialx_profile(mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
-    """Return the curve of a renderer with the lobe of MaterialX's specification: its d is the radius."""
+    """Return the cumulative profile of MaterialX's specification, in which the radius is d."""
     return burley_curve(mfp_mm, subject.curve.energy)
 
 

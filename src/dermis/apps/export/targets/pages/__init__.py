@@ -1,1 +1,1 @@
-"""Web pages around a library of JavaScript, shared by Babylon.js and three.js."""
+"""Web pages based on a JavaScript library, shared by Babylon.js and three.js."""

@@ -1,4 +1,4 @@
-"""Pages that draw a head with a JavaScript library: the library's files, the page, its camera and lights."""
+"""Web pages that draw a head with a JavaScript library: library files, page, camera and lights."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ _HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class LibraryFile:
-    """A file of an npm package.
+    """File of an npm package.
 
-    name : by which a page's modules import it, "" for one that is simply run
-    sha384 : of its bytes, base64
+    name : name by which modules of the page import it; "" for a script without imports
+    sha384 : SHA-384 of its bytes, in base64
     """
 
     package: str
@@ -52,23 +52,23 @@ class LibraryFile:
 
     @property
     def url(self) -> str:
-        """Address that it is loaded from."""
+        """Return the address from which it is loaded."""
         return f"{_CDN_URL}/{self.package}@{self.version}/{self.path}"
 
     @property
     def integrity(self) -> str:
-        """Hash by which the browser checks it."""
+        """Return the hash by which the browser checks it."""
         return f"sha384-{self.sha384}"
 
     @property
     def element(self) -> str:
-        """Element of HTML that loads it, if its hash is right."""
+        """Return the HTML element that loads and checks it."""
         return f'<script src="{self.url}" integrity="{self.integrity}" crossorigin="anonymous"></script>'
 
     def read(self, folder: Path) -> str:
-        """Return its text, from the folder that npm installs packages into (node_modules).
+        """Return its text from a folder node_modules of npm.
 
-        DermisError : it is not there, or another version
+        DermisError : if it is missing or belongs to another version
         """
         expected = f"{self.path} of {self.package} {self.version}, as npm installs it"
         file = folder / self.package / self.path
@@ -81,10 +81,9 @@ class LibraryFile:
 
 @dataclass(frozen=True)
 class EnginePage(Target):
-    """A page that draws a head with a library.
+    """Web page that draws a head with a library.
 
-    installed : folder that npm has installed the library's packages into, whose files the page then holds;
-        None loads them from a public server
+    library_folder : folder node_modules of npm whose files are embedded; None loads them from a public server
     """
 
     library_folder: Path | None = None
@@ -99,7 +98,7 @@ class EnginePage(Target):
     """Files of the library, by version."""
 
     def with_library(self, folder: str | Path) -> EnginePage:
-        """Return the same with the library inside the page."""
+        """Return the target with an installed library to embed in its page."""
         return replace(self, library_folder=Path(folder))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -122,7 +121,7 @@ class EnginePage(Target):
 
     @abstractmethod
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return elements that load or hold the library, and the allowed sources of scripts."""
+        """Return the HTML that loads or contains the library, and the allowed sources of scripts."""
 
     def _settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)
@@ -139,15 +138,15 @@ class EnginePage(Target):
 
 
 def html_safe_json(value: Json) -> str:
-    """Return JSON in which no element of HTML begins or ends."""
+    """Return JSON without characters that begin or end HTML elements."""
     text = json.dumps(value, ensure_ascii=True)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def module_url(text: str, names: Mapping[str, str]) -> str:
-    """Return a module as an address that holds it.
+    """Return a data URL with a JavaScript module.
 
-    names : by which it imports others, and by which the page knows these
+    names : names by which the page knows imported modules, by the names in the text
     """
     for old, new in names.items():
         text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", text)
@@ -155,7 +154,7 @@ def module_url(text: str, names: Mapping[str, str]) -> str:
 
 
 def material_parameters(subject: Subject) -> Parameters:
-    """Return the parameters of the surface in both libraries."""
+    """Return the parameters of the skin's surface in both libraries."""
     return (
         Parameter("albedo", floats(subject.albedo), "-", "diffuse reflectance; the mean of a colour map"),
         Parameter("ior", SKIN_ETA, "-", "of the surface; reflectance 0.028 at normal incidence"),
@@ -163,9 +162,9 @@ def material_parameters(subject: Subject) -> Parameters:
 
 
 def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
-    """Return the scene's camera in the head's file: places [m], vertical angle of view [rad].
+    """Return the scene's camera relative to the head's file: positions [m], vertical angle of view [rad].
 
-    middle_mm : about which cameras are placed
+    centre_mm : point relative to which the camera is positioned
     """
     camera, centre = scene.camera, np.array(centre_mm)
     position, target = (_METRES_PER_MM * (centre + one) for one in (camera.position, camera.target))
@@ -174,7 +173,7 @@ def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
 
 
 def page_light(light: Light) -> Json:
-    """Return a light as parallel light with its irradiance at the head."""
+    """Return a light as a directional light with its irradiance at the head."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)
     else:

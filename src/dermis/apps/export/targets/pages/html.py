@@ -1,4 +1,4 @@
-"""HTML files that hold all they need: inline scripts and styles, and a policy that lets only these run."""
+"""HTML files that contain all of their scripts and styles, and a policy that allows no others."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def render_page(
     sources: Sequence[str] = (),
     **fields: str,
 ) -> str:
-    """Return the text of page.html in a folder with its page.css, a script and other fields.
+    """Return the text of a folder's page.html with its page.css, a script and other fields.
 
-    title, note : any text, which is escaped
-    script : as `escape_script` returns it
-    policy : directives of the Content-Security-Policy beside those for scripts and styles
-    sources : of other scripts, as in a Content-Security-Policy
+    title, note : texts, which are escaped
+    script : script from `escape_script`
+    policy : Content-Security-Policy directives other than those of scripts and styles
+    sources : sources of other scripts, as in a Content-Security-Policy
     """
     style = (folder / "page.css").read_text("utf-8")
     allowed = " ".join([csp_hash(script), *sources])
@@ -44,7 +44,7 @@ def render_page(
 
 
 def escape_script(text: str) -> str:
-    """Return a script so that it may be between <script> and </script>: strings keep their meaning."""
+    """Return a script that can be placed in a <script> element without changing its strings."""
     return _SCRIPT_END.sub(r"<\\/", text).replace("<!--", r"<\!--")
 
 

@@ -33,7 +33,7 @@ class Polygons(NamedTuple):
     material : (f,)
     """
 
-    corner_counts: Ints
+    vertex_counts: Ints
     vertices: Ints
     material: Ints
 

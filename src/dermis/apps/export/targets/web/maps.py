@@ -25,7 +25,7 @@ from dermis.mesh.maps import Maps
 
 Halves = NDArray[np.float16]
 PictureKey = tuple[str, int, int]
-"""Role, mip and layer."""
+"""Role, mip level and layer."""
 MIN_SIDE = 64
 """Side of the smallest map that becomes a picture [texels]."""
 _WEBP_QUALITY = 88
