@@ -44,11 +44,11 @@ class _AnimatedScene:
 
     def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
         """Yield the scene of each frame; targets and bones without animation keep the pose of the scene."""
-        from dermis.mesh.pose import laid_over
+        from dermis.mesh.pose import merge_poses
 
         for frame in numbers:
             pose = self.clip.pose_at(float(frame / self.rate))
-            yield replace(self.scene, pose=laid_over(pose, self.scene.pose))
+            yield replace(self.scene, pose=merge_poses(pose, self.scene.pose))
 
 
 def animate(
@@ -229,7 +229,7 @@ class TimeSpan:
     begin: Fraction | None
     end: Fraction | None
     rate: Fraction | None
-    own_rate: float | None
+    motion_rate: float | None
 
     def frames(self, clip: Clip) -> tuple[range, Fraction]:
         """Return the range of frame numbers and the frame rate [1/s]; frame k is at time k / rate.
@@ -252,22 +252,22 @@ class TimeSpan:
 
 
 def parse_time_span(
-    begin: float | None, end: float | None, fps: str | None, own_rate: float | None
+    begin: float | None, end: float | None, fps: str | None, motion_rate: float | None
 ) -> TimeSpan:
     """Return the time span given by the options --from, --to, --fps and --motion-fps."""
     from dermis.images.movie import parse_frame_rate
-    from dermis.mesh.clip import LONGEST_S, check_rate
+    from dermis.mesh.clip import MAX_DURATION_S, check_rate
 
     for option, seconds in (("--from", begin), ("--to", end)):
         if seconds is not None:
-            checked_number(option, seconds, 0.0, LONGEST_S, "s")
+            checked_number(option, seconds, 0.0, MAX_DURATION_S, "s")
     if end is not None and end <= (begin or 0):
         refuse("--to", f"a time after --from ({begin or 0:g} s)", f"got {end:g} s", "Correct one of them")
-    if own_rate is not None:
-        check_rate("--motion-fps", own_rate)
+    if motion_rate is not None:
+        check_rate("--motion-fps", motion_rate)
     # exact decimal values: the float nearest to 0.1 is after frame 3 at 30 frames per second
     start, stop = (None if seconds is None else Fraction(str(seconds)) for seconds in (begin, end))
-    return TimeSpan(start, stop, None if fps is None else parse_frame_rate(fps, "--fps"), own_rate)
+    return TimeSpan(start, stop, None if fps is None else parse_frame_rate(fps, "--fps"), motion_rate)
 
 
 def motion_file(name: str, motion: str | None) -> str:
@@ -294,7 +294,7 @@ def load_clip(
     from dermis.formats.motion.sequence import is_sequence
     from dermis.scene.motion import load_motion
 
-    rate = span.own_rate
+    rate = span.motion_rate
     if rate is None and span.rate and is_sequence(Path(motion)):  # one file per frame
         rate = float(span.rate)
     fields = {**_table(name), **head_options}

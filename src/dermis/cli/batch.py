@@ -150,9 +150,9 @@ def _parse_part(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def _checked_count(option: str, value: int | None, least: int) -> int | None:
-    if value is not None and not least <= value <= _MAX_PROCESSES:
-        refuse(option, f"{least} to {_MAX_PROCESSES}", f"got {value}", "Correct it")
+def _checked_count(option: str, value: int | None, minimum: int) -> int | None:
+    if value is not None and not minimum <= value <= _MAX_PROCESSES:
+        refuse(option, f"{minimum} to {_MAX_PROCESSES}", f"got {value}", "Correct it")
     return value
 
 
@@ -278,8 +278,8 @@ class ImageRate:
         self._samples.append((now, done))
         while len(self._samples) > 2 and now - self._samples[1][0] >= _RATE_WINDOW_S:
             self._samples.popleft()
-        began, before = self._samples[0]
-        return (done - before) / (now - began) if now > began else 0.0
+        start, done_at_start = self._samples[0]
+        return (done - done_at_start) / (now - start) if now > start else 0.0
 
 
 class ProgressLog:

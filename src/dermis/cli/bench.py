@@ -92,9 +92,9 @@ def _report_lines(benchmark: Benchmark) -> list[str]:
         _align_columns([COLUMNS, *map(cells, benchmark.rows)]),
         _align_columns(stage_table(benchmark)),
     )
-    usual_lines = ["", "the default frame:", *stages] if stages else []
+    default_lines = ["", "the default frame:", *stages] if stages else []
     published_lines = ["", text] if (text := published_text(benchmark)) else []
-    return [summary(benchmark), "", *rows, *skipped_lines(benchmark), *usual_lines, *published_lines]
+    return [summary(benchmark), "", *rows, *skipped_lines(benchmark), *default_lines, *published_lines]
 
 
 def _align_columns(table: Sequence[tuple[str, ...]]) -> list[str]:

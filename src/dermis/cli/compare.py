@@ -182,7 +182,7 @@ def _compare_techniques(
     report = {
         "title": result.title,
         "adapter": result.adapter,
-        "truth": {"seconds": result.truth.seconds, "notes": list(result.truth.notes)},
+        "truth": {"seconds": result.reference.seconds, "notes": list(result.reference.notes)},
         "rows": [asdict(row) for row in result.rows],
     }
     print_report(as_json, report, lambda: _report_lines(result))
@@ -191,7 +191,7 @@ def _compare_techniques(
 def _report_lines(comparison: Comparison) -> Sequence[str]:
     from dermis.apps.validation.comparisons.report import cells
 
-    truth = comparison.truth
+    truth = comparison.reference
     lines = [
         f"{comparison.title}; times on {comparison.adapter}",
         f"against {comparison.against}, {truth.seconds:.0f} s: {'; '.join(truth.notes)}",

@@ -11,7 +11,7 @@ from dermis.base.console import note, print_report, progress_bar
 from dermis.cli.options import AdapterOption, Integer, JsonOption, OutputPath
 
 if TYPE_CHECKING:
-    from dermis.apps.gallery.script import Picture
+    from dermis.apps.gallery.script import GalleryPicture
 
 _SIZE = 448
 
@@ -80,7 +80,7 @@ def gallery(
     return 2 if any(picture.fault for picture in pictures) else 0
 
 
-def _picture_row(picture: Picture) -> dict[str, object]:
+def _picture_row(picture: GalleryPicture) -> dict[str, object]:
     return {
         "name": picture.script.name,
         "deck": list(picture.script.deck),

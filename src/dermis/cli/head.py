@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dermis.human.person import Human
     from dermis.human.skin.look import SkinLook
     from dermis.mesh.eye_look import EyeLook
-    from dermis.mesh.eyeball import EyePictures
+    from dermis.mesh.eyeball import EyeTextures
     from dermis.mesh.head import Head
 
 Look = TypeVar("Look", "SkinLook", "EyeLook", "HairLook")
@@ -206,7 +206,7 @@ def _with_maps(head: Head, files: Options) -> Head:
 
 
 def _write(
-    output: Path, person: Human, head: Head, expression: dict[str, float], eyes: EyePictures | None
+    output: Path, person: Human, head: Head, expression: dict[str, float], eyes: EyeTextures | None
 ) -> int:
     from dermis.human.person_file import write_person_glb
     from dermis.mesh.pose import Pose

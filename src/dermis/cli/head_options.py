@@ -98,27 +98,27 @@ BoneAngleOptions = Annotated[
 ]
 
 
-def parse_weights(words: Sequence[str], option: str = POSE) -> dict[str, float]:
+def parse_weights(texts: Sequence[str], option: str = POSE) -> dict[str, float]:
     """Return a dictionary of weights by name, parsed from texts such as "jawOpen=0.6,mouthSmileLeft=1"."""
     expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1"
-    parts = (part for text in words for part in text.split(","))
+    parts = (part for text in texts for part in text.split(","))
     return {name: weight for name, (weight,) in _parse_pairs(parts, 1, option, expected)}
 
 
-def parse_bone_angles(words: Sequence[str]) -> dict[str, list[float]]:
+def parse_bone_angles(texts: Sequence[str]) -> dict[str, list[float]]:
     """Return a dictionary of the three angles [degrees] by bone, parsed from texts such as "head=0,25,0"."""
-    return dict(_parse_pairs(words, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"))
+    return dict(_parse_pairs(texts, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"))
 
 
 def _parse_pairs(
-    words: Iterable[str], count: int, option: str, expected: str
+    texts: Iterable[str], count: int, option: str, expected: str
 ) -> Iterator[tuple[str, list[float]]]:
     """Yield the name and the numbers of each text "NAME=NUMBER,..."."""
-    for word in words:
-        name, _, text = word.rpartition("=")
+    for item in texts:
+        name, _, text = item.rpartition("=")
         numbers = _parse_numbers(text)
         if not name.strip() or numbers is None or len(numbers) != count:
-            refuse(option, expected, f"got {word!r}", "Correct it")
+            refuse(option, expected, f"got {item!r}", "Correct it")
         yield name.strip(), numbers
 
 

@@ -34,8 +34,8 @@ def _to_choice(model: type[FrozenModel], field: str, kind: object, tokens: Seque
     raise CoercionError(token=tokens[0], target_type=expected_type)
 
 
-def _to_int_or_word(words: Collection[str], _: type, tokens: Sequence[Token]) -> int | str:
-    return tokens[0].value if tokens[0].value in words else int(tokens[0].value)
+def _to_int_or_word(keywords: Collection[str], _: type, tokens: Sequence[Token]) -> int | str:
+    return tokens[0].value if tokens[0].value in keywords else int(tokens[0].value)
 
 
 def _to_size(_: type, tokens: Sequence[Token]) -> tuple[int, int]:
@@ -122,12 +122,12 @@ def _option_type(model: type[FrozenModel], field: str) -> tuple[Any, Options]:
 
     if choices := field_choices(model, field):
         return Literal[choices] | str, {"converter": partial(_to_choice, model, field), "metavar": "CHOICE"}
-    if words := field_keywords(model, field):
+    if keywords := field_keywords(model, field):
         number = model.model_fields[field].annotation in (float, int)
-        display = {"metavar": "|".join((*words, "NUMBER" if number else "COLOUR")), "show_choices": False}
+        display = {"metavar": "|".join((*keywords, "NUMBER" if number else "COLOUR")), "show_choices": False}
         if model.model_fields[field].annotation is int:
-            return int | Literal[words], display | {"converter": partial(_to_int_or_word, words)}
-        return (float | Literal[words] if number else str), display
+            return int | Literal[keywords], display | {"converter": partial(_to_int_or_word, keywords)}
+        return (float | Literal[keywords] if number else str), display
     kind = model.model_fields[field].annotation
     kind = next((one for one in get_args(kind) if get_args(kind)[-1] is NoneType), kind)
     parts = tuple(get_args(part)[0] if get_args(part) else part for part in get_args(kind))

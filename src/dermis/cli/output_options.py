@@ -170,7 +170,7 @@ class AnimationOutput:
 
     path: Path
     crf: int | None
-    anew: bool
+    overwrite: bool
 
     @property
     def numbered(self) -> bool:
@@ -192,7 +192,7 @@ class AnimationOutput:
                 refuse("--crf", f"a movie ({MOVIE_SUFFIX}) as output", f"got {self.path}", "Leave it out")
             FrameFiles(self.path).prepare()
             return
-        if self.anew:
+        if self.overwrite:
             refuse("--anew", "numbered pictures with it", f"got {self.path}", "Leave it out")
         if self.path.suffix.lower() in (".png", ".exr"):
             numbered = self.path.with_name(f"%05d{self.path.suffix}")
@@ -209,7 +209,7 @@ class AnimationOutput:
         if not self.numbered:
             return numbers
         files = FrameFiles(self.path)
-        files.start(digest, anew=self.anew)
+        files.start(digest, force=self.overwrite)
         return files.missing(numbers, size)
 
     @contextmanager

@@ -148,8 +148,8 @@ def _write(
 def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> None:
     """Print notes about lighting that may surprise: unscattered triangles, sun-like peaks, wrong gamma."""
     technique, suns = TECHNIQUES[settings.technique], rendered.suns
-    if technique.uses_atlas and technique.stitches_seams and rendered.unscattered > _MAX_UNSCATTERED:
-        fraction = f"{rendered.unscattered:.0%} of the skin's triangles"
+    if technique.uses_atlas and technique.stitches_seams and rendered.unscattered_fraction > _MAX_UNSCATTERED:
+        fraction = f"{rendered.unscattered_fraction:.0%} of the skin's triangles"
         reason = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
         note(f"note: {fraction} are lit without scattering: {reason}")
     if suns and scene.environment:

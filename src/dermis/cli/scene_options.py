@@ -107,10 +107,10 @@ def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
     scene, settings = _base_scene(name, options)
     note_eyes(scene.head, options.head.get("eyes"))
     if weights or bone_angles:
-        from dermis.mesh.pose import laid_over
+        from dermis.mesh.pose import merge_poses
 
         scene = replace(
-            scene, pose=laid_over(pose_from_options(weights, bone_angles, scene.head, name), scene.pose)
+            scene, pose=merge_poses(pose_from_options(weights, bone_angles, scene.head, name), scene.pose)
         )
     environment = _merge_environment(scene.environment, options.environment)
     assembled = Scene(
@@ -139,8 +139,8 @@ def note_subdivision(name: str, options: SceneOptions, head: Head) -> None:
     from dermis.scene.heads import MIN_HUMAN_LEVELS, is_person_name
 
     head_options = head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else options.head
-    least = MIN_HUMAN_LEVELS if is_person_name(head.name) else 0
-    if head_options.get("subdivide", AUTO) == AUTO and head.levels > least:
+    min_levels = MIN_HUMAN_LEVELS if is_person_name(head.name) else 0
+    if head_options.get("subdivide", AUTO) == AUTO and head.levels > min_levels:
         count = f"{len(head.mesh.triangles):,} triangles"
         note(f"note: --subdivide {head.levels} for a smooth outline in this picture: {count}")
 

@@ -11,7 +11,7 @@ from dermis.cli.options import AdapterOption, Flag, JsonOption, OutputPath, drop
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
-    from dermis.apps.inverse.unmixing.unmix import Change, Unmixed
+    from dermis.apps.inverse.unmixing.unmix import PigmentChange, UnmixResult
 
 
 def unmix(
@@ -84,7 +84,7 @@ def unmix(
     adapter:
         Adapter to compute on: auto, cpu or part of a name.
     """
-    from dermis.apps.inverse.unmixing.profile_widths import save_widths, widths_of
+    from dermis.apps.inverse.unmixing.profile_widths import save_mixture, profile_mixture
     from dermis.apps.inverse.unmixing.unmix import SUMMARY, save_maps
     from dermis.apps.inverse.unmixing.unmix import unmix as unmixed
     from dermis.base.atomic_write import check_folder
@@ -106,27 +106,27 @@ def unmix(
     recoloured = None if change is None else result.recoloured(change, adapter)
     written = save_maps(output, result, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))
     if widths:
-        written += save_widths(output, widths_of(result))
+        written += save_mixture(output, profile_mixture(result))
     _report(result, written, time.perf_counter() - started, as_json)
     return 0
 
 
 def _parse_change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
-) -> Change | None:
+) -> PigmentChange | None:
     """Return the change of colour given by the options, None if there is none."""
-    from dermis.apps.inverse.unmixing.unmix import Change, parse_share
+    from dermis.apps.inverse.unmixing.unmix import PigmentChange, parse_fraction_change
     from dermis.base.quantities import checked_number
 
     values = drop_none(oxygen=oxygen, eumelanin=eumelanin)
     for name, value in values.items():
         checked_number(f"--{name}", value, 0.0, 1.0, "a fraction")
     for name, text in drop_none(melanin=melanin, blood=blood).items():
-        values[name] = parse_share(f"--{name}", text)
-    return Change(**values) if values else None
+        values[name] = parse_fraction_change(f"--{name}", text)
+    return PigmentChange(**values) if values else None
 
 
-def _report(result: Unmixed, written: list[Path], seconds: float, as_json: bool) -> None:
+def _report(result: UnmixResult, written: list[Path], seconds: float, as_json: bool) -> None:
     summary = result.summary() | {"files": [str(path) for path in written], "seconds": round(seconds, 3)}
     if as_json:
         print_json(summary)

@@ -96,8 +96,8 @@ def _free_changes(target: LobeTarget, column: int) -> Floats:
     """Return the changes (20, k) that a fit may make: of lobes in the plane, then of the pair."""
     left, right = (LOBE_COUNT - 2, 1.0), (LOBE_COUNT - 1, 1.0)
     if column == VIEW_COUNT - 1:  # at normal incidence the lobe is isotropic, and so is the fit
-        groups, kinds = ([(0, 1.0)], [left, right]), (_LOG_WIDTH, _LOG_WEIGHT)
-        return np.stack([_change(kind, *group) for group in groups for kind in kinds], 1)
+        groups, sizes = ([(0, 1.0)], [left, right]), (_LOG_WIDTH, _LOG_WEIGHT)
+        return np.stack([_change(kind, *group) for group in groups for kind in sizes], 1)
     kinds = _POSITION, _LOG_WIDTH, _LOG_WEIGHT
     in_plane = [_change(kind, (k, 1.0)) for k in range(_IN_PLANE_LOBES[column]) for kind in kinds]
     if _is_elongated(target):

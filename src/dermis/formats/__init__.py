@@ -1,1 +1,1 @@
-"""Files of other programs, read and written: meshes, maps, motion. What they say is checked here."""
+"""Reading and writing of other programs' files: meshes, maps and motion, with checks of their content."""

@@ -1,7 +1,7 @@
-"""What moves a mesh that is written: morph targets and bones of its control points, carried to finer ones.
+"""Deformation of exported meshes: morph targets and bone weights of refined vertices.
 
-Other programs take four bones for each point. For a finer mesh they are chosen so that turns take its points
-where those of its control points take them.
+Other programs use four bones per vertex. For vertices of a refined mesh these are chosen so that rotations
+move them to where the rotated control points would.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 
-_MIN_DISPLACEMENT_MM = 1e-3  # a smaller displacement is none
-_MIN_NORMAL_CHANGE = 2e-3  # of a normal, a tenth of a degree
-_MIN_WEIGHT = 1e-6  # a share below it is none
-_MAX_CANDIDATES = 8  # bones among which four are chosen
-_PRIOR_MM2 = 1.0  # how much a share is worth that stays as the control points have it
+_MIN_DISPLACEMENT_MM = 1e-3  # smaller displacements count as 0
+_MIN_NORMAL_CHANGE = 2e-3  # of a unit normal, a tenth of a degree
+_MIN_WEIGHT = 1e-6  # smaller weights count as 0
+_MAX_CANDIDATES = 8  # bones among which four are selected
+_PRIOR_MM2 = 1.0  # penalty for deviations from the interpolated weights
 
 
 class VertexTarget(NamedTuple):
-    """Vertices that a morph target moves, by how much at weight 1, and what that adds to their normals.
+    """Morph target of a mesh: displaced vertices, and their changes at weight 1.
 
     vertex : (n,)
-    delta_mm, normal : (n, 3)
+    delta_mm, normal : (n, 3) changes of position and normal
     """
 
     vertex: Index
@@ -45,18 +45,18 @@ class VertexTarget(NamedTuple):
 
 @dataclass(frozen=True)
 class DeformableMesh:
-    """The vertices of a head's mesh, and what moves them."""
+    """Vertices of a head's mesh, with morph targets and bone weights."""
 
     head: Head
 
     @property
     def rig(self) -> Rig:
-        """Of the control points."""
+        """Return the rig of the control points."""
         return self.head.control
 
     @cached_property
     def refinement(self) -> csr_array | None:
-        """(q, p) the points of the mesh as means of control points; None where they are the same."""
+        """Return the matrix (q, p) from control points to mesh points, or None if they are the same."""
         from scipy.sparse import csr_array
 
         stencils = self.rig.stencils
@@ -67,18 +67,18 @@ class DeformableMesh:
 
     @cached_property
     def positions_mm(self) -> Floats:
-        """(v, 3) where vertices lie with all targets at 0 [mm]."""
+        """Return the vertex positions with all target weights at 0, (v, 3) [mm]."""
         mesh, rest = self.head.mesh, self.rig.targets.rest
         if rest is None:
             return mesh.positions
-        control = np.zeros((len(self.rig.positions_mm), 3))
+        displacement = np.zeros((len(self.rig.positions_mm), 3))
         for number, weight in enumerate(rest.tolist()):
-            control += weight * self._control_displacements(number)
-        return (mesh.positions - self._refine(control)[mesh.point]).astype(np.float32)
+            displacement += weight * self._control_displacements(number)
+        return (mesh.positions - self._refine(displacement)[mesh.point]).astype(np.float32)
 
     @cached_property
     def normals(self) -> Floats:
-        """(v, 3) normals there."""
+        """Return the vertex normals at `positions_mm`, (v, 3)."""
         return self._smooth_normals if self.rig.targets.rest is not None else self.head.mesh.normals
 
     @cached_property
@@ -87,153 +87,165 @@ class DeformableMesh:
         return vertex_normals(self.positions_mm, mesh.point, mesh.triangles)
 
     def targets(self) -> Iterator[VertexTarget]:
-        """Each of the morph targets."""
+        """Yield each morph target."""
         mesh = self.head.mesh
         for number in range(len(self.rig.targets.names)):
             delta = self._refine(self._control_displacements(number))
             delta[np.abs(delta).max(axis=1) < _MIN_DISPLACEMENT_MM] = 0.0
-            moved = delta[mesh.point].astype(np.float32)
-            turned = self._normal_changes(moved)
-            vertex = np.flatnonzero(moved.any(axis=1) | turned.any(axis=1))
-            yield VertexTarget(vertex, moved[vertex], turned[vertex])
+            delta_mm = delta[mesh.point].astype(np.float32)
+            normal = self._normal_changes(delta_mm)
+            vertex = np.flatnonzero(delta_mm.any(axis=1) | normal.any(axis=1))
+            yield VertexTarget(vertex, delta_mm[vertex], normal[vertex])
 
-    def _normal_changes(self, moved: Floats) -> Floats:
-        """(v, 3) what displacements [mm] add to the normals, by the triangles around them."""
-        mesh, found = self.head.mesh, np.zeros_like(moved)
-        moves = np.asarray(moved.any(axis=1))
+    def _normal_changes(self, delta_mm: Floats) -> Floats:
+        """Return the changes of vertex normals due to displacements [mm], (v, 3)."""
+        mesh, change = self.head.mesh, np.zeros_like(delta_mm)
+        moves = np.asarray(delta_mm.any(axis=1))
         changed = moves[mesh.triangles].any(axis=1)
         touched = np.zeros(int(mesh.point.max()) + 1, bool)
         touched[mesh.point[mesh.triangles[changed]]] = True
         around = mesh.triangles[touched[mesh.point[mesh.triangles]].any(axis=1)]
         if not len(around):
-            return found
+            return change
         vertex, corner = np.unique(around, return_inverse=True)
         point = np.unique(mesh.point[vertex], return_inverse=True)[1].astype(np.int32)
-        places, triangles = self.positions_mm[vertex] + moved[vertex], corner.reshape(-1, 3).astype(np.int32)
-        found[vertex] = vertex_normals(places, point, triangles) - self._smooth_normals[vertex]
-        found[~touched[mesh.point] | (np.abs(found).max(axis=1) < _MIN_NORMAL_CHANGE)] = 0.0
-        return found
+        positions, triangles = (
+            self.positions_mm[vertex] + delta_mm[vertex],
+            corner.reshape(-1, 3).astype(np.int32),
+        )
+        change[vertex] = vertex_normals(positions, point, triangles) - self._smooth_normals[vertex]
+        change[~touched[mesh.point] | (np.abs(change).max(axis=1) < _MIN_NORMAL_CHANGE)] = 0.0
+        return change
 
     @cached_property
     def bone_influences(self) -> tuple[Numbers, Floats]:
-        """(v, 4) bones that each vertex follows, and by what share."""
-        bone, share = influences(self.rig, self.refinement)
-        kind = np.uint8 if bone.max() < 256 else np.uint16
+        """Return four bones and weights of each vertex, (v, 4) each."""
+        bone, weight = influences(self.rig, self.refinement)
+        dtype = np.uint8 if bone.max() < 256 else np.uint16
         point = self.head.mesh.point
-        return bone[point].astype(kind), share[point].astype(np.float32)
+        return bone[point].astype(dtype), weight[point].astype(np.float32)
 
     def _control_displacements(self, target: int) -> Doubles:
-        """(p, 3) displacements of the control points."""
-        targets, found = self.rig.targets, np.zeros((len(self.rig.positions_mm), 3))
-        part = targets.of(target)
-        found[targets.point[part]] = targets.delta_mm[part]
-        return found
+        """Return displacements of the control points by a target, (p, 3) [mm]."""
+        targets, displacement = self.rig.targets, np.zeros((len(self.rig.positions_mm), 3))
+        part = targets.rows(target)
+        displacement[targets.point[part]] = targets.delta_mm[part]
+        return displacement
 
-    def _refine(self, control: Doubles) -> Doubles:
-        """(q, 3) of the points of the mesh."""
-        return control if self.refinement is None else np.asarray(self.refinement @ control)
-
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    def _refine(self, values: Doubles) -> Doubles:
+        """Return values at the points of the mesh (q, 3) from values at the control points (p, 3)."""
+        return values if self.refinement is None else np.asarray(self.refinement @ values)
 
 
-def influences(rig: Rig, finer: csr_array | None) -> tuple[Index, Doubles]:
-    """(q, 4) bones and shares of the points of a mesh; the shares of a point add up to 1.
+def influences(rig: Rig, refinement: csr_array | None) -> tuple[Index, Doubles]:
+    """Return four bones and weights of each point of a mesh, (q, 4); weights sum to 1.
 
-    finer : (q, p) weights of the control points, None where the mesh has them as they are
+    refinement : (q, p) matrix from control points to points of the mesh, None if they are the same
 
-    A control point's own are kept. A mean of points that turn differently is no turn of their mean, and may
-    follow more than four bones: of all choices that one is taken which comes nearest, by least squares over a
-    turn of each bone about any axis.
+    Weights of control points are kept. A refined point may follow more than four bones, and the mean of
+    differently rotated points is not a rotation of their mean: the four bones and weights are chosen for the
+    smallest squared distance over rotations of each bone about any axis.
     """
     skeleton = rig.skeleton
     assert skeleton is not None
-    shares = _bone_weights(skeleton)
-    if finer is not None:
-        shares = _fit_weights(rig.positions_mm.astype(np.float64), skeleton, shares, finer)
-    bone = np.argsort(-shares, axis=1, kind="stable")[:, :INFLUENCES]
+    weights = _bone_weights(skeleton)
+    if refinement is not None:
+        weights = _fit_weights(rig.positions_mm.astype(np.float64), skeleton, weights, refinement)
+    bone = np.argsort(-weights, axis=1, kind="stable")[:, :INFLUENCES]
     bone = np.pad(bone, ((0, 0), (0, INFLUENCES - bone.shape[1])))
-    weight = np.take_along_axis(shares, bone, axis=1)
-    weight[:, shares.shape[1] :] = 0.0
+    weight = np.take_along_axis(weights, bone, axis=1)
+    weight[:, weights.shape[1] :] = 0.0
     weight /= weight.sum(axis=1, keepdims=True)
     return np.where(weight > 0, bone, 0), weight
 
 
 def _bone_weights(skeleton: Skeleton) -> Doubles:
-    """(p, b) of each bone at each control point."""
+    """Return the weight of each bone at each control point, (p, b)."""
     count = len(skeleton.bone)
-    shares = np.zeros((count, len(skeleton.names)))
-    np.add.at(shares, (np.arange(count)[:, None], skeleton.bone), skeleton.weight)
-    return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+    weights = np.zeros((count, len(skeleton.names)))
+    np.add.at(weights, (np.arange(count)[:, None], skeleton.bone), skeleton.weight)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
-def _fit_weights(places_mm: Doubles, skeleton: Skeleton, control: Doubles, finer: csr_array) -> Doubles:
-    """(q, b) with at most four shares in a row."""
-    shares = np.asarray(finer @ control)
-    shares[shares < _MIN_WEIGHT] = 0.0
-    below = _descendants(skeleton)
-    kinds, kind = np.unique(shares > 0, axis=0, return_inverse=True)
-    order = np.argsort(kind.reshape(-1), kind="stable")
-    ends = np.cumsum(np.bincount(kind.reshape(-1), minlength=len(kinds)))
-    for used, rows in zip(kinds, np.split(order, ends[:-1]), strict=True):
-        mean = shares[rows]
+def _fit_weights(
+    positions_mm: Doubles, skeleton: Skeleton, control_weights: Doubles, refinement: csr_array
+) -> Doubles:
+    """Return weights (q, b) of refined points with at most four bones each."""
+    weights = np.asarray(refinement @ control_weights)
+    weights[weights < _MIN_WEIGHT] = 0.0
+    descendants = _descendants(skeleton)
+    patterns, pattern = np.unique(weights > 0, axis=0, return_inverse=True)
+    order = np.argsort(pattern.reshape(-1), kind="stable")
+    ends = np.cumsum(np.bincount(pattern.reshape(-1), minlength=len(patterns)))
+    for used, rows in zip(patterns, np.split(order, ends[:-1]), strict=True):
+        interpolated = weights[rows]
         bones = np.flatnonzero(used)
         if len(bones) > 1:
             if len(bones) > _MAX_CANDIDATES:
-                bones = np.sort(np.argsort(-mean.sum(axis=0), kind="stable")[:_MAX_CANDIDATES])
-            hessian, slope = _quadratic_error(
-                places_mm, skeleton, control @ below.T, finer[rows], below[:, bones]
+                bones = np.sort(np.argsort(-interpolated.sum(axis=0), kind="stable")[:_MAX_CANDIDATES])
+            hessian, gradient = _quadratic_error(
+                positions_mm,
+                skeleton,
+                control_weights @ descendants.T,
+                refinement[rows],
+                descendants[:, bones],
             )
             hessian += _PRIOR_MM2 * np.eye(len(bones))
-            shares[rows] = 0.0
-            shares[rows[:, None], bones] = _best_weights(hessian, slope + _PRIOR_MM2 * mean[:, bones])
-    return shares
+            weights[rows] = 0.0
+            weights[rows[:, None], bones] = _best_weights(
+                hessian, gradient + _PRIOR_MM2 * interpolated[:, bones]
+            )
+    return weights
 
 
 def _descendants(skeleton: Skeleton) -> Doubles:
-    """(b, b) 1 where the second bone is the first, or below it."""
-    below = np.eye(len(skeleton.names))
+    """Return a matrix (b, b) that is 1 where the second bone is the first or one of its descendants."""
+    descendants = np.eye(len(skeleton.names))
     for bone, parent in enumerate(skeleton.parent.tolist()):
         if parent >= 0:
-            below[:, bone] += below[:, parent]
-    return below
+            descendants[:, bone] += descendants[:, parent]
+    return descendants
 
 
 def _quadratic_error(
-    places_mm: Doubles, skeleton: Skeleton, follow: Doubles, finer: csr_array, below: Doubles
+    positions_mm: Doubles,
+    skeleton: Skeleton,
+    control_motion: Doubles,
+    refinement: csr_array,
+    descendants: Doubles,
 ) -> tuple[Doubles, Doubles]:
-    """How far points miss, as w H w - 2 g w of their shares w [mm2]: H (n, u, u) and g (n, u).
+    """Return H (n, u, u) and g (n, u) of the squared error w H w - 2 g w of points by weights w [mm2].
 
-    follow : (p, b) how much of each bone's turn takes each control point, by bones below too
-    below : (b, u) 1 where a bone among which is chosen is another one, or below it
+    control_motion : (p, b) fraction of each bone's rotation that each control point follows, also by its
+        descendants
+    descendants : (b, u) 1 where a candidate bone is another bone or one of its descendants
     """
-    points = np.asarray(finer @ places_mm)
-    hessian = np.zeros((len(points), below.shape[1], below.shape[1]))
-    slope = np.zeros(hessian.shape[:2])
-    for bone in np.flatnonzero(below.any(axis=1)):
-        origin, moved = np.array(skeleton.origin_mm[bone]), below[bone]
+    points = np.asarray(refinement @ positions_mm)
+    hessian = np.zeros((len(points), descendants.shape[1], descendants.shape[1]))
+    gradient = np.zeros(hessian.shape[:2])
+    for bone in np.flatnonzero(descendants.any(axis=1)):
+        origin, moves = np.array(skeleton.origin_mm[bone]), descendants[bone]
         arm = points - origin
-        meant = np.asarray(finer @ (follow[:, bone, None] * (places_mm - origin)))
-        hessian += (arm**2).sum(axis=1)[:, None, None] * np.outer(moved, moved)
-        slope += (arm * meant).sum(axis=1)[:, None] * moved
-    return hessian, slope
+        target = np.asarray(refinement @ (control_motion[:, bone, None] * (positions_mm - origin)))
+        hessian += (arm**2).sum(axis=1)[:, None, None] * np.outer(moves, moves)
+        gradient += (arm * target).sum(axis=1)[:, None] * moves
+    return hessian, gradient
 
 
-def _best_weights(hessian: Doubles, slope: Doubles) -> Doubles:
-    """(n, u) shares of 0 and more, at most four of them not 0, that add up to 1 and miss least."""
-    count, bones = slope.shape
-    best, found = np.full(count, np.inf), np.zeros(slope.shape)
-    for some in chain.from_iterable(combinations(range(bones), k) for k in range(1, INFLUENCES + 1)):
-        chosen = list(some)
-        part, side = hessian[:, chosen][:, :, chosen], slope[:, chosen]
+def _best_weights(hessian: Doubles, gradient: Doubles) -> Doubles:
+    """Return non-negative weights (n, u), at most four of them above 0, with sum 1 and the smallest error."""
+    count, bones = gradient.shape
+    smallest, best = np.full(count, np.inf), np.zeros(gradient.shape)
+    for subset in chain.from_iterable(combinations(range(bones), k) for k in range(1, INFLUENCES + 1)):
+        chosen = list(subset)
+        matrix, vector = hessian[:, chosen][:, :, chosen], gradient[:, chosen]
         system = np.ones((count, len(chosen) + 1, len(chosen) + 1))
-        system[:, :-1, :-1], system[:, -1, -1] = part, 0.0
-        right = np.concatenate([side, np.ones((count, 1))], axis=1)
+        system[:, :-1, :-1], system[:, -1, -1] = matrix, 0.0
+        right = np.concatenate([vector, np.ones((count, 1))], axis=1)
         weight = np.linalg.solve(system, right[..., None])[:, :-1, 0]
-        missed = np.einsum("nk,nkl,nl->n", weight, part, weight) - 2 * (side * weight).sum(axis=1)
-        better = (weight >= 0).all(axis=1) & (missed < best)
-        best[better] = missed[better]
-        found[better] = 0.0
-        found[np.flatnonzero(better)[:, None], chosen] = weight[better]
-    return found
+        error = np.einsum("nk,nkl,nl->n", weight, matrix, weight) - 2 * (vector * weight).sum(axis=1)
+        better = (weight >= 0).all(axis=1) & (error < smallest)
+        smallest[better] = error[better]
+        best[better] = 0.0
+        best[np.flatnonzero(better)[:, None], chosen] = weight[better]
+    return best

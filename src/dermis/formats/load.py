@@ -1,4 +1,4 @@
-"""Meshes and rigs from files of any unit, up axis and uv origin, kept on disk by their content."""
+"""Loading of meshes and rigs from files of any unit, up axis and uv origin, with a disk cache."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from dermis.formats.parts import MaterialGroup, MeshPart, default_unit_mm, is_gl
 from dermis.formats.read import Origin, Up, join_parts, read_mesh_file, select_vertices, to_y_up
 from dermis.formats.rig_from_file import build_rig, split_points
 from dermis.formats.size_limits import MAX_FILE_BYTES
-from dermis.mesh.geometry import compacted, weld
+from dermis.mesh.geometry import compact_vertices, weld
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
-_CACHE_VERSION = 5  # raise when `load_rigged` gives other results for the same file
+_CACHE_VERSION = 5  # increment when `load_rigged` returns other results for the same file
 _MESH = [field.name for field in fields(Mesh) if field.name != "materials"]
 _TARGETS = [field.name for field in fields(MorphTargets) if field.name != "names"]
 _SKELETON = [field.name for field in fields(Skeleton) if field.name != "names"]
 _NAMES = [
     *_MESH,
     "outline",
-    "told",
+    "metadata",
     "control",
     *(f"target {name}" for name in _TARGETS),
     *(f"bone {name}" for name in _SKELETON),
@@ -51,21 +51,6 @@ _NOT_EYE_PATTERN = re.compile(
 )
 
 
-def load_mesh(
-    path: str | Path,
-    *,
-    unit_mm: float | None = None,
-    v_origin: Origin = "auto",
-    up: Up = "y",
-    opaque: tuple[str, ...] = (),
-    eye_groups: tuple[str, ...] = (),
-) -> Mesh:
-    """The mesh of a file alone; see `load_rigged`."""
-    return load_rigged(
-        path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=opaque, eye_groups=eye_groups
-    ).mesh
-
-
 @logged_step("reading the mesh")
 def load_rigged(
     path: str | Path,
@@ -76,30 +61,30 @@ def load_rigged(
     opaque: tuple[str, ...] = (),
     eye_groups: tuple[str, ...] = (),
 ) -> RiggedMesh:
-    """The mesh of a .glb, .gltf, .obj or .ply file, in millimetres, Y up, v down, and what moves it.
+    """Load mesh and rig of a .glb, .gltf, .obj or .ply file, in millimetres, with Y up and v down.
 
-    A group (material, or glTF mesh or OBJ `g`) with "skin" in its name is skin and all others are opaque;
-    in a file without one, every group is skin. The mesh has passed `check_mesh`; its size is not judged.
+    Groups (materials, glTF meshes or OBJ `g`) with "skin" in their name are skin and all others are opaque;
+    in a file without such a group, every group is skin. The mesh is checked by `check_mesh`; its size is not
+    checked.
 
-    path : the file
-    unit_mm : length of the file's unit [mm]; None for the format's own (`default_unit_mm`)
-    v_origin : where v = 0 lies in the map by the file, "top" as glTF has it, "bottom" as OBJ and PLY have
-        it; "auto" takes the format's standard
-    up : the file's axis that points up; with "z" the face looks along -Y, as in Blender
-    opaque : names of groups that are not skin, whatever they are called
-    eye_groups : names of groups that hold eyeballs, beside those that are called so (`is_eye_name`)
+    unit_mm : length of the file's unit [mm]; None for that of the format (`default_unit_mm`)
+    v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" for that of the
+        format
+    up : up axis of the file; with "z" the face looks along -Y, as in Blender
+    opaque : names of groups that are not skin
+    eye_groups : names of groups that contain eyeballs, besides those found by `is_eye_name`
 
     Raises `DermisError` when the file is missing, damaged or not a mesh, has no uv, or fails `check_mesh`.
     """
     source = Path(path)
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
     load = partial(_load, source, unit, v_origin, up, opaque, eye_groups)
-    glb = source.suffix.lower() == ".glb" and is_file(source)
-    data = read_file(source, "a mesh file", MAX_FILE_BYTES) if glb else b""
-    if not data or b'"uri"' in data:  # parts of it lie in other files
+    is_glb = source.suffix.lower() == ".glb" and is_file(source)
+    data = read_file(source, "a mesh file", MAX_FILE_BYTES) if is_glb else b""
+    if not data or b'"uri"' in data:  # parts of it are in other files
         return load()
-    named = source.stem  # as a group without a name is
-    return cached_rigged(data, repr((named, unit, v_origin, up, opaque, eye_groups)), load)
+    default_name = source.stem  # of groups without a name
+    return cached_rigged(data, repr((default_name, unit, v_origin, up, opaque, eye_groups)), load)
 
 
 def _load(
@@ -110,63 +95,62 @@ def _load(
     opaque: tuple[str, ...],
     eye_groups: tuple[str, ...],
 ) -> RiggedMesh:
-    """The mesh and the rig as they are in the file."""
+    """Load mesh and rig without the disk cache."""
     with np.errstate(all="ignore"), parsing(source, "a mesh", *MALFORMED_DATA_ERRORS):
-        model = read_mesh_file(source)
-        part, to_head = join_parts(model.parts, source), np.eye(4)
+        mesh_file = read_mesh_file(source)
+        part, to_head = join_parts(mesh_file.parts, source), np.eye(4)
         assert part.uv is not None and part.normals is not None
         to_head[:3, :3] = to_y_up(unit * np.eye(3), up).T
-        place, normals = to_y_up(unit * part.positions, up).astype(np.float32), to_y_up(part.normals, up)
-        flat = _uv_from_top(part.uv, source, v_origin).astype(np.float32)
-        check_arrays(place, flat, part.triangles, source)
-        material, materials = _materials(model.parts, opaque, eye_groups, source)
-        used, corners = compacted(part.triangles)
-        kept, point = (
-            select_vertices(part, used),
-            weld(np.column_stack((place, _separation_numbers(model.parts)))[used]),
-        )
-        if model.is_deformable:
-            point = split_points(point, kept, to_head[:3, :3], source)
+        positions, normals = to_y_up(unit * part.positions, up).astype(np.float32), to_y_up(part.normals, up)
+        uv = _uv_from_top(part.uv, source, v_origin).astype(np.float32)
+        check_arrays(positions, uv, part.triangles, source)
+        material, materials = _materials(mesh_file.parts, opaque, eye_groups, source)
+        used, corners = compact_vertices(part.triangles)
+        vertices = select_vertices(part, used)
+        point = weld(np.column_stack((positions, _separation_numbers(mesh_file.parts)))[used])
+        if mesh_file.is_deformable:
+            point = split_points(point, vertices, to_head[:3, :3], source)
         mesh = build_mesh(
-            place[used], flat[used], corners, material, materials, normals[used], point, part.quads
+            positions[used], uv[used], corners, material, materials, normals[used], point, part.quads
         )
         check_mesh(mesh, source)
-        rig = build_rig(mesh.positions, point, kept, model.bones, model.weights, to_head, source)
+        rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)
         if rig is not None:
             check_rig(rig, source)
     return RiggedMesh(mesh, rig)
 
 
 def _separation_numbers(parts: list[MeshPart]) -> Floats:
-    """(v,) a number for each vertex; those at one place are one point only if they share it."""
+    """Return a number for each vertex, (v,): only coincident vertices with the same number are welded."""
     numbers = [number if part.separate else 0 for number, part in enumerate(parts, start=1)]
     return np.repeat(np.array(numbers, np.float32), [len(part.positions) for part in parts])
 
 
 def _uv_from_top(uv: Doubles, source: Path, v_origin: Origin) -> Doubles:
-    """`uv` (v, 2) with v = 0 in the top row; what misses [0, 1] by rounding only is put back."""
+    """Return uv (v, 2) with v = 0 in the top row, clamped to [0, 1] where rounding exceeds it."""
     from_top = v_origin == "top" or (v_origin == "auto" and is_gltf(source))
-    down = uv if from_top else np.column_stack((uv[:, 0], 1 - uv[:, 1]))
-    inside = np.clip(down, 0, 1)
-    return np.where(np.abs(down - inside) <= UV_TOLERANCE, inside, down)
+    flipped = uv if from_top else np.column_stack((uv[:, 0], 1 - uv[:, 1]))
+    clamped = np.clip(flipped, 0, 1)
+    return np.where(np.abs(flipped - clamped) <= UV_TOLERANCE, clamped, flipped)
 
 
 def _materials(
     parts: list[MeshPart], opaque: tuple[str, ...], eye_groups: tuple[str, ...], source: Path
 ) -> tuple[Ints, tuple[Material, ...]]:
-    """Material of each triangle (f,) and the materials, in the order of the file."""
+    """Return the material index of each triangle (f,) and the materials, in the order of the file."""
     groups = [
         part.group if part.group.names else MaterialGroup((source.stem,), part.group.colour) for part in parts
     ]
-    unwanted = _match_groups(groups, opaque, "opaque", source)
-    eyes = _match_groups(groups, eye_groups, "eye_groups", source)
-    named = any(group.name_contains("skin") for group in groups)
+    is_opaque = _match_groups(groups, opaque, "opaque", source)
+    is_eye = _match_groups(groups, eye_groups, "eye_groups", source)
+    has_skin_group = any(group.name_contains("skin") for group in groups)
     index: dict[Material, int] = {}
     per_part = []
-    for group, chosen, eye in zip(groups, unwanted, eyes, strict=True):
-        kind = "opaque" if chosen or (named and not group.name_contains("skin")) else "skin"
-        made = Material(group.names[0], kind, group.colour, eye=eye or is_eye_name(group.names))
-        per_part.append(index.setdefault(made, len(index)))
+    for group, opaque_group, eye_group in zip(groups, is_opaque, is_eye, strict=True):
+        kind = "opaque" if opaque_group or (has_skin_group and not group.name_contains("skin")) else "skin"
+        eye = eye_group or is_eye_name(group.names)
+        material = Material(group.names[0], kind, group.colour, eye=eye)
+        per_part.append(index.setdefault(material, len(index)))
     counts = [len(part.triangles) for part in parts]
     return np.repeat(np.array(per_part, dtype=np.int32), counts), tuple(index)
 
@@ -174,28 +158,28 @@ def _materials(
 def _match_groups(
     groups: list[MaterialGroup], names: tuple[str, ...], option: str, source: Path
 ) -> list[bool]:
-    """Whether each group is among those that an option names."""
-    wanted = {name.casefold() for name in names}
-    unknown = wanted - {name.casefold() for group in groups for name in group.names}
+    """Return whether each group is named by an option; an unknown name is refused."""
+    folded = {name.casefold() for name in names}
+    unknown = folded - {name.casefold() for group in groups for name in group.names}
     if unknown:
         known = ", ".join(dict.fromkeys(name for group in groups for name in group.names))
-        expected = f"{option} to name groups of the file ({known})"
+        expected = f"{option} with names of groups of the file ({known})"
         refuse(source, expected, f"{sorted(unknown)[0]!r} is none", "Check the spelling")
-    return [any(name.casefold() in wanted for name in group.names) for group in groups]
+    return [any(name.casefold() in folded for name in group.names) for group in groups]
 
 
 class RiggedMesh(NamedTuple):
-    """A mesh, and the rig that moves its points; None for none."""
+    """Mesh with the rig that deforms it, or None without a rig."""
 
     mesh: Mesh
     rig: Rig | None
 
 
 def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
-    """What `load` makes of a file, kept on disk by its content.
+    """Return mesh and rig of a file from the disk cache, or load and cache them.
 
-    data : the file, with everything that the mesh is made of
-    options : how it is read
+    data : content of the file; the mesh depends on no other files
+    options : text with all options for reading
     """
     digest = hashlib.sha256(f"{_CACHE_VERSION} {options}".encode())
     digest.update(data)
@@ -203,48 +187,49 @@ def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> 
 
 
 def _to_arrays(rigged: RiggedMesh) -> Arrays:
-    """All of it as arrays, empty ones for what there is not."""
+    """Return mesh and rig as arrays by name; missing parts are empty arrays."""
     mesh, rig = rigged
-    told: dict[str, Any] = {"materials": [asdict(material) for material in mesh.materials]}
-    arrays = {name: getattr(mesh, name) for name in _MESH} | {"outline": mesh.outline.places_mm}
-    rest: Arrays = dict.fromkeys((name for name in _NAMES if name not in arrays), _EMPTY)
+    metadata: dict[str, Any] = {"materials": [asdict(material) for material in mesh.materials]}
+    arrays = {name: getattr(mesh, name) for name in _MESH} | {"outline": mesh.outline.points_mm}
+    rig_arrays: Arrays = dict.fromkeys((name for name in _NAMES if name not in arrays), _EMPTY)
     if rig is not None:
-        told |= {"targets": list(rig.targets.names), "bones": None}
-        rest["control"] = rig.positions_mm
-        rest |= _prefixed_fields(rig.targets, "target", _TARGETS)
+        metadata |= {"targets": list(rig.targets.names), "bones": None}
+        rig_arrays["control"] = rig.positions_mm
+        rig_arrays |= _prefixed_fields(rig.targets, "target", _TARGETS)
     if rig is not None and rig.skeleton is not None:
-        told["bones"] = list(rig.skeleton.names)
-        rest |= _prefixed_fields(rig.skeleton, "bone", _SKELETON)
-    return arrays | rest | {"told": np.frombuffer(json.dumps(told).encode(), np.uint8)}
+        metadata["bones"] = list(rig.skeleton.names)
+        rig_arrays |= _prefixed_fields(rig.skeleton, "bone", _SKELETON)
+    encoded = np.frombuffer(json.dumps(metadata).encode(), np.uint8)
+    return arrays | rig_arrays | {"metadata": encoded}
 
 
-def _prefixed_fields(thing: MorphTargets | Skeleton, kind: str, names: list[str]) -> Arrays:
-    found = {f"{kind} {name}": getattr(thing, name) for name in names}
-    return {name: _EMPTY if array is None else array for name, array in found.items()}
+def _prefixed_fields(value: MorphTargets | Skeleton, prefix: str, names: list[str]) -> Arrays:
+    arrays = {f"{prefix} {name}": getattr(value, name) for name in names}
+    return {name: _EMPTY if array is None else array for name, array in arrays.items()}
 
 
-def _from_arrays(found: Arrays) -> RiggedMesh:
-    told = json.loads(found["told"].tobytes())
-    kinds = [Material(**one | {"colour": tuple(one["colour"])}) for one in told["materials"]]
-    mesh = Mesh(**{name: found[name] for name in _MESH}, materials=tuple(kinds))
-    vars(mesh)["outline"] = Outline(found["outline"])  # finding it imports scipy, which is slower
-    if "targets" not in told:
+def _from_arrays(arrays: Arrays) -> RiggedMesh:
+    metadata = json.loads(arrays["metadata"].tobytes())
+    materials = [Material(**one | {"colour": tuple(one["colour"])}) for one in metadata["materials"]]
+    mesh = Mesh(**{name: arrays[name] for name in _MESH}, materials=tuple(materials))
+    vars(mesh)["outline"] = Outline(arrays["outline"])  # computing it would import scipy
+    if "targets" not in metadata:
         return RiggedMesh(mesh, None)
-    values: dict[str, Numbers | None] = {name: found[f"target {name}"] for name in _TARGETS}
-    values["rest"] = values["rest"] if len(found["target rest"]) else None
-    targets = MorphTargets(tuple(told["targets"]), **values)  # type: ignore[arg-type]
-    if told["bones"] is None:
-        return RiggedMesh(mesh, Rig(found["control"], targets))
-    skeleton = Skeleton(tuple(told["bones"]), **{name: found[f"bone {name}"] for name in _SKELETON})
-    return RiggedMesh(mesh, Rig(found["control"], targets, skeleton))
+    values: dict[str, Numbers | None] = {name: arrays[f"target {name}"] for name in _TARGETS}
+    values["rest"] = values["rest"] if len(arrays["target rest"]) else None
+    targets = MorphTargets(tuple(metadata["targets"]), **values)  # type: ignore[arg-type]
+    if metadata["bones"] is None:
+        return RiggedMesh(mesh, Rig(arrays["control"], targets))
+    skeleton = Skeleton(tuple(metadata["bones"]), **{name: arrays[f"bone {name}"] for name in _SKELETON})
+    return RiggedMesh(mesh, Rig(arrays["control"], targets, skeleton))
 
 
 def is_eye_name(names: Sequence[str]) -> bool:
-    """Whether a group is an eyeball or a part of one: eye, Eye_L, LeftEyeball, sclera, Std_Cornea_R.
+    """Return whether a group is an eyeball or a part of one, such as Eye_L, sclera or Std_Cornea_R.
 
-    names : of the group, its material's first, which decides where it says either
+    names : of the group, its material first; the first name with a known word decides
 
-    Lashes, brows, lids, and films of tears and shadows that lie on the eye are none.
+    Lashes, brows, lids and transparent layers on the eye, such as tear films, are not eyes.
     """
     for name in names:
         words = _WORD_PATTERN.findall(name)

@@ -1,4 +1,4 @@
-"""Maps of a head from picture files."""
+"""Loading of maps of a head from picture files."""
 
 from __future__ import annotations
 
@@ -24,19 +24,21 @@ PathLike = str | Path | EmbeddedPicture
 A = TypeVar("A", bound=Numbers)
 
 MAX_SIDE = 8192
-"""Texels of a map's side: as many as any device takes."""
-_GREY_TOLERANCE = 2.5 / 255  # JPEG may separate the channels of a grey picture by a level or two
-_MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
+"""Largest number of texels along a side, which every device supports."""
+_GREY_TOLERANCE = 2.5 / 255  # JPEG changes channels of a grey picture by a level or two
+_MIN_NORMAL_Z = 0.05  # clamps slopes to 87 degrees
 Load = Callable[[PathLike], Numbers]
-_MAX_PARALLEL_TEXELS = MAX_PIXELS  # texels of all maps, for maps to be decoded side by side
-_MIN_CACHED_BYTES = 1 << 14  # bytes; maps of larger files are kept on disk, to be read faster than decoded
-_CACHE_VERSION = 1  # increment when the same files give other maps
+_MAX_PARALLEL_TEXELS = MAX_PIXELS  # of all maps together, so that they can be decoded in parallel
+_MIN_CACHED_BYTES = (
+    1 << 14
+)  # maps of larger files are cached on disk, because reading is faster than decoding
+_CACHE_VERSION = 1  # increment when the same files result in other maps
 
 
 def check_finite(path: PathLike, values: A) -> A:
-    """A map whose numbers are all finite.
+    """Return a map after checking that all its values are finite.
 
-    DermisError : some are not, after whatever was done to those of the file
+    Raises DermisError for infinite values and NaN.
     """
     if values.size and not (np.isfinite(values.min()) and np.isfinite(values.max())):
         refuse(
@@ -46,14 +48,15 @@ def check_finite(path: PathLike, values: A) -> A:
 
 
 def _convert_in_strips(image: Pixels, shape: tuple[int, ...], convert: Callable[[Any], Floats]) -> Floats:
-    """(H, W, *shape) of what a picture becomes, some rows at a time, so that little is in memory twice."""
-    found = np.empty((*image.shape[:2], *shape), np.float32)
+    """Convert a picture to (H, W, *shape) in strips of rows, to limit memory."""
+    converted = np.empty((*image.shape[:2], *shape), np.float32)
     for rows in strips(image):
-        found[rows] = convert(image[rows])
-    return found
+        converted[rows] = convert(image[rows])
+    return converted
 
 
 def colour_map(path: PathLike) -> Floats:
+    """Return a colour map (H, W, 3), linear Rec. 709."""
     image = _read(path, "a colour map")
     if image.shape[2] < 3:
         refuse(path, "a colour map with red, green and blue", "it is grey", "Save it as RGB")
@@ -64,7 +67,10 @@ def colour_map(path: PathLike) -> Floats:
 
 
 def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
-    """(H, W) of so many mm for the full scale; 8-bit steps are smoothed away, finer ones stay."""
+    """Return a height map (H, W) [mm]; the steps of 8-bit maps are smoothed.
+
+    relief_mm : height of the full scale
+    """
     image = _read(path, "a height map")
     grey = _grey(path, "a height map", image)
     height = smooth_quantisation(grey) if image.dtype == np.uint8 else grey
@@ -74,22 +80,26 @@ def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
 
 
 def mixture_map(path: PathLike) -> Floats:
-    """(H, W, 2) shares of two others in a mixture, 0..1, together at most 1: red and green, or grey and 0."""
+    """Return fractions (H, W, 2) of two further profiles in a mixture, 0 to 1, together at most 1.
+
+    They are red and green of a colour picture, or grey and 0.
+    """
     role = "a map of profiles"
     image = _to_unit_range(_read(path, role))
-    shares = np.zeros((*image.shape[:2], 2), np.float32)
-    given = 2 if image.shape[2] >= 3 and _channel_difference(image) > _GREY_TOLERANCE else 1
-    shares[..., :given] = image[..., :given]
-    shares = _check_unit_range(path, role, shares)
-    return np.asarray(shares / np.maximum(shares.sum(axis=-1, keepdims=True), 1.0))
+    fractions = np.zeros((*image.shape[:2], 2), np.float32)
+    channels = 2 if image.shape[2] >= 3 and _channel_difference(image) > _GREY_TOLERANCE else 1
+    fractions[..., :channels] = image[..., :channels]
+    fractions = _check_unit_range(path, role, fractions)
+    return np.asarray(fractions / np.maximum(fractions.sum(axis=-1, keepdims=True), 1.0))
 
 
 def scalar_map(path: PathLike, role: str) -> Floats:
-    """(H, W) values 0..1 [-], not through the sRGB curve."""
+    """Return a map (H, W) of values from 0 to 1, without sRGB conversion [-]."""
     return _check_unit_range(path, role, _grey(path, role, _read(path, role)))
 
 
 def label_map(path: PathLike) -> Bytes:
+    """Return a map (H, W) of 8-bit labels."""
     image = _read(path, "a map of labels")
     if image.dtype != np.uint8 or image.shape[2] != 1:
         refuse(path, "labels in 8-bit grey", f"got {image.dtype} x {image.shape[2]}", "Save it as such")
@@ -97,27 +107,30 @@ def label_map(path: PathLike) -> Bytes:
 
 
 def slope_map(path: PathLike, normal_y: str) -> Floats:
-    """(H, W, 2) slopes of a normal map of 0..1 or -1..1; texels without an outward normal are flat."""
+    """Return the slopes (H, W, 2) of a normal map with components in 0..1 or -1..1.
+
+    Texels whose normal does not point outwards are flat.
+    """
     image = _read(path, "a normal map")
     if image.shape[2] < 3:
-        refuse(path, "a normal map with red, green and blue", "it is grey", "If it is a height map, say so")
+        refuse(path, "a normal map with red, green and blue", "it is grey", "Pass a height map as height")
     image = image[..., :3]
     signed = image.dtype == np.float32 and bool(image.min() < -0.01)
-    slopes, found = np.empty((*image.shape[:2], 2), np.float32), np.zeros(4)
+    slopes, statistics = np.empty((*image.shape[:2], 2), np.float32), np.zeros(4)
     for rows in strips(image):
         value = _to_unit_range(image[rows])
         normals = value if signed else 2 * value - 1
-        found += _normal_statistics(normals)
+        statistics += _normal_statistics(normals)
         np.divide(-normals[..., :2], np.maximum(normals[..., 2:], _MIN_NORMAL_Z), out=slopes[rows])
         slopes[rows][normals[..., 2] <= 0] = 0
-    _check_normals(path, *found.tolist())
+    _check_normals(path, *statistics.tolist())
     if normal_y == "down":
         slopes[..., 1] *= -1
     return slopes
 
 
 def _normal_statistics(normals: Floats) -> Doubles:
-    """How many texels there are, how many are unit vectors that point outwards, and the sums of both's z."""
+    """Return number of texels, number of outward unit vectors, and the sum of z over both."""
     length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
     z = normals[..., 2]
     outward = (np.abs(length - 1) < 0.15) & (z > 0)
@@ -125,10 +138,10 @@ def _normal_statistics(normals: Floats) -> Doubles:
 
 
 def _check_normals(path: PathLike, texels: float, outward: float, z: float, outward_z: float) -> None:
-    """Refuse pictures that are no normal maps: few of their texels are unit vectors that point outwards."""
-    # A quarter is enough: the rest may be empty space between uv islands.
+    """Refuse pictures that are not normal maps, in which few texels are outward unit vectors."""
+    # A quarter suffices, as the rest may be empty space between uv islands.
     if outward < 0.25 * texels or outward_z < 0.7 * outward:
-        actual = f"its mean blue is {(z / texels + 1) / 2:.2f} and its colours are no unit vectors"
+        actual = f"its mean blue is {(z / texels + 1) / 2:.2f} and its colours are not unit vectors"
         refuse(path, "a tangent-space normal map, which looks light blue", actual, "Check which map this is")
 
 
@@ -142,17 +155,17 @@ def _read(path: PathLike, role: str) -> Pixels:
 
 
 def _grey(path: PathLike, role: str, image: Pixels) -> Floats:
-    """(H, W) in units of the full scale, of a grey picture or of RGB whose channels agree."""
+    """Return a grey picture (H, W) scaled to [0, 1]; RGB is accepted if its channels are equal."""
     if image.shape[2] > 1:
-        apart = max(_channel_difference(image[rows]) for rows in strips(image))
-        if apart > _GREY_TOLERANCE:
-            actual = f"its red, green and blue differ by up to {apart:.2f} of the full scale"
+        difference = max(_channel_difference(image[rows]) for rows in strips(image))
+        if difference > _GREY_TOLERANCE:
+            actual = f"its red, green and blue differ by up to {difference:.2f} of the full scale"
             refuse(path, f"{role} in grey", actual, "Check which map this is, or save it as grey")
     return _convert_in_strips(image[..., 0], (), _to_unit_range)
 
 
 def _channel_difference(image: Pixels) -> float:
-    """How much green and blue differ from red at most, in units of the full scale."""
+    """Return the largest difference of green and blue from red, relative to the full scale."""
     channels = _to_unit_range(image[..., :3])
     return max(float(np.abs(channels[..., k] - channels[..., 0]).max()) for k in (1, 2))
 
@@ -180,26 +193,28 @@ def load_maps(
     region: PathLike | None = None,
     normal_y: Literal["up", "down"] = "up",
 ) -> Maps:
-    """The maps in these picture files.
+    """Load maps from picture files.
 
-    colour : RGB in sRGB, or linear when the file holds floats; alpha is left out
-    normal : tangent-space normals, red towards +u, green as `normal_y` says
-    height : grey, white outwards; needs `height_mm`
-    height_mm : relief of one grey level of an 8-bit map, 1/255 of the full scale at any depth, so that
-        the same picture gives the same relief in 8 bits, 16 bits or floats of 0..1 [mm]
-    specular, roughness : grey, taken as plain numbers and not through the sRGB curve
-    region : grey of 8 bits, the labels themselves
-    normal_y : "up" when green points to row 0 (OpenGL, Blender), "down" when away from it (DirectX)
-    DermisError : a file is not what its role asks for; the message names it
+    colour : RGB in sRGB, or linear if the file holds floats; alpha is ignored
+    normal : tangent-space normals, red towards +u, green as given by `normal_y`
+    height : grey, white outwards; requires `height_mm`
+    height_mm : relief of one grey level of an 8-bit map, 1/255 of the full scale at any bit depth [mm]
+    specular, roughness : grey, linear values without sRGB conversion
+    region : 8-bit grey labels
+    normal_y : "up" if green points to row 0 (OpenGL, Blender), "down" if away from it (DirectX)
+
+    Raises DermisError for a file that does not fit its role; the message names it.
     """
     relief_mm = np.float32(255 * (height_mm or 0.0))
     if height is not None and not (np.isfinite(relief_mm) and relief_mm > 0):
-        actual = "none was given" if height_mm is None else f"it is {height_mm}"
-        advice = "Skin maps have about 0.02 to 0.03; the map's author knows"
+        actual = "it is not set" if height_mm is None else f"it is {height_mm}"
+        advice = "Skin maps have about 0.02 to 0.03; ask the author of the map"
         refuse(height, "a height map with height_mm, the mm per grey level, above 0", actual, advice)
     if normal is not None and normal_y not in ("up", "down"):
-        refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Try the other if bumps look like dents")
-    roles: dict[str, tuple[PathLike | None, str, Load]] = {  # the largest first
+        refuse(
+            "normal_y", '"up" or "down"', f"it is {normal_y!r}", "Use the other one if bumps look like dents"
+        )
+    roles: dict[str, tuple[PathLike | None, str, Load]] = {  # largest first
         "height": (height, f"height {relief_mm!r}", partial(height_map, relief_mm=relief_mm)),
         "colour": (colour, "colour", colour_map),
         "normal": (normal, f"normal {normal_y}", partial(slope_map, normal_y=normal_y)),
@@ -208,15 +223,15 @@ def load_maps(
         "region": (region, "labels", label_map),
     }
     files = [path for path, _, _ in roles.values() if path is not None]
-    few = sum(_texel_count(path) for path in files) <= _MAX_PARALLEL_TEXELS
-    with ThreadPoolExecutor(os.cpu_count() if few else 1) as pool:  # decoders do not hold other threads up
+    parallel = sum(_texel_count(path) for path in files) <= _MAX_PARALLEL_TEXELS
+    with ThreadPoolExecutor(os.cpu_count() if parallel else 1) as pool:  # decoders release the GIL
         return Maps(
             **dict(zip(roles, pool.map(lambda role: _cached_map(*role), roles.values()), strict=True))
         )
 
 
 def load_labels(path: PathLike) -> Bytes:
-    """(H, W) labels of a grey picture of 8 bits."""
+    """Load labels (H, W) from an 8-bit grey picture."""
     labels: Bytes = _cached_map(path, "labels", label_map)
     return labels
 
@@ -226,10 +241,10 @@ def _texel_count(path: PathLike) -> int:
     return width * height
 
 
-def _cached_map(path: PathLike | None, how: str, load: Load) -> Any:
-    """The map that `load` returns for a picture file, kept on disk when the file is large; None for no file.
+def _cached_map(path: PathLike | None, parameters: str, load: Load) -> Any:
+    """Return the map of a picture file, from the disk cache if the file is large; None without a file.
 
-    how : all that the map depends on besides the file
+    parameters : text with everything that the map depends on besides the file
     """
     if path is None:
         return None
@@ -239,4 +254,4 @@ def _cached_map(path: PathLike | None, how: str, load: Load) -> Any:
     from dermis.base.disk import cached_array
 
     source = np.frombuffer(data, np.uint8)
-    return cached_array(source, f"map {_CACHE_VERSION} {how}", lambda: check_finite(path, load(path)))
+    return cached_array(source, f"map {_CACHE_VERSION} {parameters}", lambda: check_finite(path, load(path)))

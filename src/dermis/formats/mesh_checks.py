@@ -1,4 +1,4 @@
-"""Checks of meshes and rigs from files, each refusal with its remedy."""
+"""Checks of meshes and rigs from files; each error says how to fix the file."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from dermis.mesh.rig import Rig
 
 UV_TOLERANCE = 1e-4
 MAX_DISTANCE_MM = 1e6
-"""A kilometre: beyond it single precision is too coarse for skin, and the mesh is hardly a head."""
+"""Largest distance from the origin: beyond a kilometre single precision is too coarse for skin [mm]."""
 HEAD_HEIGHT_MM = (100.0, 1000.0)
 LIKELY_HEAD_HEIGHT_MM = (150.0, 500.0)
 UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 MIN_RELATIVE_AREA = 1e-6
-"""Area over squared longest side below which a triangle is degenerate in single precision [-]."""
+"""Area over the squared longest side below which a triangle is degenerate in single precision [-]."""
 _DAMAGED = "The file is damaged: export it again"
 _UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
 
@@ -31,8 +31,8 @@ def check_mesh(mesh: Mesh, culprit: object) -> None:
 
     culprit : named in the message, usually the file
 
-    Raises `DermisError` for numbers that are not finite, indices out of range, uv outside the map,
-    triangles without area, edges of more than two triangles, and a mesh without skin.
+    Raises `DermisError` for numbers that are not finite, indices out of range, uv outside [0, 1], degenerate
+    triangles, edges of more than two triangles, and a mesh without skin.
     """
     check_arrays(mesh.positions, mesh.uv, mesh.triangles, culprit)
     for name in ("normals", "dpdu", "dpdv"):
@@ -46,7 +46,7 @@ def check_mesh(mesh: Mesh, culprit: object) -> None:
 def check_arrays(
     positions: NDArray[np.floating], uv: NDArray[np.floating], triangles: NDArray[np.integer], culprit: object
 ) -> None:
-    """Refuse arrays that no `Mesh` can be built from.
+    """Refuse arrays from which no `Mesh` can be built.
 
     positions : (v, 3) [mm]
     uv : (v, 2)
@@ -68,28 +68,25 @@ def check_arrays(
         refuse(culprit, expected, actual, f"{_UNIT_ADVICE}, or move the head to the origin")
 
 
-def _check_finite(name: str, values: NDArray[np.floating], culprit: object, of: str = "vertices") -> None:
+def _check_finite(name: str, values: NDArray[np.floating], culprit: object, items: str = "vertices") -> None:
     lost = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
     if len(lost):
-        actual = f"{len(lost)} {of} are NaN or infinite, first {lost[0]}"
+        actual = f"{len(lost)} {items} are NaN or infinite, first {lost[0]}"
         refuse(culprit, f"finite {name}", actual, _DAMAGED)
 
 
 def check_rig(rig: Rig, culprit: object) -> None:
-    """Refuse what moves a mesh where its numbers are not finite, or places that nobody's head is as large as.
-
-    Raises `DermisError` then.
-    """
+    """Refuse a rig whose numbers are not finite."""
     _check_finite("displacements of targets", rig.targets.delta_mm, culprit, "of them")
     if rig.targets.rest is not None:
         _check_finite("weights of targets", rig.targets.rest, culprit, "of them")
     if rig.skeleton is not None:
-        for name in ("local", "inverse_bind", "resting", "weight"):
+        for name in ("local", "inverse_bind", "rest_matrices", "weight"):
             _check_finite(f"bones ({name})", getattr(rig.skeleton, name), culprit, "of them")
 
 
 def check_counts(parts: Sequence[MeshPart], culprit: object) -> None:
-    """Refuse parts that have more triangles or vertices than a head's, before they are put together."""
+    """Refuse parts with too many triangles or vertices before they are joined."""
     for name, most, count in (
         ("triangles", MAX_TRIANGLES, sum(len(part.triangles) for part in parts)),
         ("vertices", MAX_VERTICES, sum(len(part.positions) for part in parts)),
@@ -104,7 +101,7 @@ def _check_uv_range(mesh: Mesh, culprit: object) -> None:
     if min(low) < -UV_TOLERANCE or max(high) > 1 + UV_TOLERANCE:
         actual = f"u runs from {low[0]:.4g} to {high[0]:.4g} and v from {low[1]:.4g} to {high[1]:.4g}"
         advice = "Move every uv island into the one tile (in Blender: UV Editor, UV > Pack Islands)"
-        refuse(culprit, "uv in [0, 1]: one tile, no UDIM tiles, no repeats", actual, advice)
+        refuse(culprit, "uv in [0, 1], without UDIM tiles and repeats", actual, advice)
 
 
 def _check_areas(mesh: Mesh, culprit: object) -> None:
@@ -119,11 +116,11 @@ def _check_areas(mesh: Mesh, culprit: object) -> None:
 
 def _check_manifold(mesh: Mesh, culprit: object) -> None:
     ends, _, counts = edges(mesh.point[mesh.triangles])
-    crowded = np.flatnonzero(counts > 2)
-    if len(crowded):
-        place = mesh.positions[np.flatnonzero(mesh.point == ends[crowded[0], 0])[0]]
-        where = f"{counts[crowded[0]]} triangles at ({', '.join(f'{x:.4g}' for x in place)}) mm"
-        actual = f"{len(crowded)} edges are non-manifold, the first has {where}"
+    non_manifold = np.flatnonzero(counts > 2)
+    if len(non_manifold):
+        position = mesh.positions[np.flatnonzero(mesh.point == ends[non_manifold[0], 0])[0]]
+        where = f"{counts[non_manifold[0]]} triangles at ({', '.join(f'{x:.4g}' for x in position)}) mm"
+        actual = f"{len(non_manifold)} edges are non-manifold, the first has {where}"
         advice = "In Blender: Select > All by Trait > Non Manifold, delete inner or double faces, "
         advice += "then Mesh > Merge > By Distance"
         refuse(culprit, "a surface of one sheet, two triangles to an edge", actual, advice)
@@ -134,25 +131,25 @@ def _check_skin(mesh: Mesh, culprit: object) -> None:
         actual = f"they run from {mesh.material.min()} to {mesh.material.max()}"
         refuse(culprit, f"material indices below {len(mesh.materials)}", actual, "Build the mesh again")
     for one in mesh.materials:
-        if not all(0 <= value <= 1 for value in one.colour):  # NaN is not either
+        if not all(0 <= value <= 1 for value in one.colour):  # rejects NaN as well
             actual = f"that of {one.name!r} is {', '.join(f'{value:g}' for value in one.colour)}"
-            refuse(culprit, "colours of materials from 0 to 1", actual, "Correct it there")
+            refuse(culprit, "colours of materials from 0 to 1", actual, "Correct it in the file")
     used = np.bincount(mesh.material, minlength=len(mesh.materials))
     skins = [(one.name, n) for one, n in zip(mesh.materials, used, strict=True) if one.kind == "skin"]
     empty = [name for name, count in skins if count == 0]
     if not skins or empty:
         groups = ", ".join(material.name for material in mesh.materials)
-        bare = f"none of its groups is skin ({groups})"
-        actual = f"skin group {empty[0]!r} has no triangles" if empty else bare
+        no_skin = f"none of its groups is skin ({groups})"
+        actual = f"skin group {empty[0]!r} has no triangles" if empty else no_skin
         advice = "Assign the skin's faces to a material called skin, or name fewer groups opaque"
         refuse(culprit, "a group of triangles that is skin", actual, advice)
 
 
 def check_head_height(mesh: Mesh, culprit: object, unit_mm: float | None) -> None:
-    """Refuse a head that is not 100 to 1000 mm high: usually the unit was forgotten.
+    """Refuse a head that is not 100 to 1000 mm high, usually because its unit was not set.
 
     culprit : the file, named in the message
-    unit_mm : the unit the file was read with [mm]; None for that of its format
+    unit_mm : the unit with which the file was read [mm]; None for that of its format
     """
     height = float(mesh.size_mm[1])
     if HEAD_HEIGHT_MM[0] <= height <= HEAD_HEIGHT_MM[1]:

@@ -1,4 +1,4 @@
-"""OBJ files: their text, checked before it is parsed, their groups, and the maps of their materials."""
+"""OBJ files: checks of their text before parsing, groups, and maps of their materials."""
 
 from __future__ import annotations
 
@@ -41,27 +41,34 @@ from dermis.mesh.maps import Maps
 _TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILINE)
 _GROUP_LINE = re.compile(r"^[ \t]*(usemtl|g)(?:[ \t]([^\n]*))?$", re.MULTILINE)
 _FACE_OR_NUMBER = re.compile(r"^(?:usemtl (\d+)|f([ \t].*))$", re.MULTILINE)
-_MAX_LINE, _MAX_VERTEX_LINE = 1 << 17, 256  # characters of a line
+_MAX_LINE, _MAX_VERTEX_LINE = 1 << 17, 256  # characters
 _ZERO = re.compile(r"(?<![^ \t/])0+(?![^ \t/])")
 _GROUP_OR_FACE = re.compile(r"^[ \t]*(usemtl|g|f)(?:[ \t]([^\n]*))?$", re.MULTILINE)
 _RELIEF_ROLES = ("normal", "height")
-_SAMPLES_PER_SIDE = 256  # texels a side
-_ROLES = {"map_kd": "colour", "map_ks": "specular", "map_pr": "roughness", "norm": "normal"}
+_SAMPLES_PER_SIDE = 256  # texels that are compared along a side
+_ROLES = {
+    "map_kd": "colour",
+    "map_ks": "specular",
+    "map_pr": "roughness",
+    "norm": "normal",
+    "map_bump": "bump",
+    "bump": "bump",
+}
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _OPTION = re.compile(
     rf"-(?:bm\s+(?P<factor>{_NUMBER})"
-    rf"|(?P<place>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
+    rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
     r"|mm\s+\S+\s+\S+"
     r"|(?:blendu|blendv|boost|cc|clamp|imfchan|texres|type)\s+\S+)\s+",
     re.IGNORECASE,
 )
-_WHOLE_NUMBER = re.compile(_NUMBER)
-_MAX_MTL_LINE = 4096  # characters of a line
+_NUMBER_PATTERN = re.compile(_NUMBER)
+_MAX_MTL_LINE = 4096  # characters
 _LIBRARY = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 
 
 def read_obj_text(path: Path) -> str:
-    """The text of a .obj file with line feeds alone.
+    """Return the text of a .obj file with line feeds as line ends.
 
     Raises DermisError when it cannot be read or is too large.
     """
@@ -70,9 +77,9 @@ def read_obj_text(path: Path) -> str:
 
 
 def join_continued_lines(path: Path, text: str) -> str:
-    """The text with continued lines joined, and numbers without comments behind them.
+    """Return the text with continued lines joined, and without comments after numbers.
 
-    Raises DermisError for lines that are longer than any that means something, and for too many vertices.
+    Raises DermisError for overlong lines, and for too many vertices.
     """
     text = text.replace("\\\n", " ")
     _check_lines(path, np.frombuffer(text.encode("utf-8", "replace"), np.uint8))
@@ -83,10 +90,10 @@ def join_continued_lines(path: Path, text: str) -> str:
 def _check_lines(path: Path, data: Bytes) -> None:
     ends = np.flatnonzero(data == ord("\n"))
     starts = np.concatenate([[0], ends + 1])
-    long = np.diff(starts, append=len(data) + 1)
+    length = np.diff(starts, append=len(data) + 1)
     vertex = data[np.minimum(starts, len(data) - 1)] == ord("v") if len(data) else np.zeros(1, bool)
-    if long.max() > _MAX_LINE or long[vertex].max(initial=0) > _MAX_VERTEX_LINE:
-        actual, advice = f"one has {long.max():,}", "The file is damaged: export it again"
+    if length.max() > _MAX_LINE or length[vertex].max(initial=0) > _MAX_VERTEX_LINE:
+        actual, advice = f"one has {length.max():,}", "The file is damaged: export it again"
         expected = f"lines of at most {_MAX_LINE:,} characters, {_MAX_VERTEX_LINE} for vertices"
         refuse(path, expected, actual, advice)
     if int(vertex.sum()) > 3 * MAX_VERTICES:
@@ -95,7 +102,7 @@ def _check_lines(path: Path, data: Bytes) -> None:
 
 
 def face_groups(text: str) -> Iterator[tuple[str, str]]:
-    """The names `usemtl` and `g` of each face."""
+    """Yield the names of `usemtl` and `g` of each face."""
     current = {"usemtl": "", "g": ""}
     for line in _GROUP_OR_FACE.finditer(text):
         if line[1] == "f":
@@ -105,9 +112,9 @@ def face_groups(text: str) -> Iterator[tuple[str, str]]:
 
 
 def number_groups(path: Path, text: str) -> tuple[str, list[tuple[str, str]]]:
-    """Each `usemtl` and `g` as `usemtl` of a number, one for each pair of names, and these pairs.
+    """Return the text with each pair of `usemtl` and `g` as a numbered `usemtl`, and the pairs of names.
 
-    Raises DermisError when they are too many.
+    Raises DermisError for too many pairs.
     """
     current = {"usemtl": "", "g": ""}
     numbers: dict[tuple[str, str], int] = {("", ""): 0}
@@ -125,9 +132,9 @@ def number_groups(path: Path, text: str) -> tuple[str, list[tuple[str, str]]]:
 
 
 def face_corner_counts(path: Path, text: str, groups: int) -> list[Index]:
-    """How many corners each face of each group has; the text names groups by number, `usemtl 0` first.
+    """Return the number of corners of each face of each group; the text has groups by number.
 
-    Raises DermisError for indices that are relative or 0, and for too many corners.
+    Raises DermisError for relative indices, for indices of 0, and for too many corners.
     """
     sides: list[list[int]] = [[] for _ in range(groups)]
     current, triangles = sides[0], 0
@@ -152,18 +159,18 @@ def face_corner_counts(path: Path, text: str, groups: int) -> list[Index]:
 def _refuse_faces(path: Path, corners: int) -> None:
     if corners > MAX_CORNERS:
         actual = f"one has {corners:,}"
-        refuse(path, f"faces of at most {MAX_CORNERS:,} corners", actual, "Cut it into smaller ones")
+        refuse(path, f"faces of at most {MAX_CORNERS:,} corners", actual, "Divide it into smaller ones")
     actual, advice = "it has more", "Decimate it (in Blender: Modifiers > Decimate)"
     refuse(path, f"a mesh of at most {MAX_TRIANGLES:,} triangles", actual, advice)
 
 
 def read_obj(path: Path) -> MeshFile:
-    """Parts of a .obj file by `usemtl` and `g`; colours are Kd of its .mtl, taken as linear."""
+    """Read the parts of a .obj file by `usemtl` and `g`; colours are Kd of its .mtl, taken as linear."""
     return parse_obj(path, read_obj_text(path))
 
 
 def parse_obj(path: Path, text: str) -> MeshFile:
-    """The same of a file's text."""
+    """Parse the text of a .obj file as `read_obj` does."""
     text = join_continued_lines(path, text)
     materials = read_materials(path, text).materials
     colours = {name: parse_colour(one.kd) for name, one in materials.items() if len(one.kd) >= 3}
@@ -174,12 +181,12 @@ def parse_obj(path: Path, text: str) -> MeshFile:
         MaterialGroup(name, colours.get(pair[0], GREY)) for name, pair in zip(names, pairs, strict=True)
     ]
     numbers = "\n".join(f"newmtl {k}" for k in range(len(groups)))
-    # trimesh pops groups from the end: file order again
+    # trimesh pops groups from the end; this restores the order of the file
     parts = list(trimesh_parts(text.encode(), "obj", groups, resolver={"marked.mtl": numbers.encode()}))[::-1]
-    faces = {id(group): each for group, each in zip(groups, sides, strict=True)}
-    parts = [replace(part, quads=find_quads(faces[id(part.group)], part.triangles)) for part in parts]
-    full, none = [part.group for part in parts], np.empty((0, 3))
-    empty = [MeshPart(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
+    corners = {id(group): counts for group, counts in zip(groups, sides, strict=True)}
+    parts = [replace(part, quads=find_quads(corners[id(part.group)], part.triangles)) for part in parts]
+    used, none = [part.group for part in parts], np.empty((0, 3))
+    empty = [MeshPart(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in used]
     return MeshFile(parts + empty)
 
 
@@ -187,114 +194,112 @@ def obj_maps(
     path: Path,
     *,
     opaque: Collection[str] = (),
-    given: Collection[str] = (),
+    overridden: Collection[str] = (),
     height_mm: float | None = None,
     normal_y: Literal["up", "down"] = "up",
 ) -> tuple[Maps, str]:
-    """Maps of the skin's material: map_Kd, norm, map_Bump or bump, map_Ks and map_Pr.
+    """Return the maps of the skin's material, and a note about maps that could not be used.
 
-    A bump map may hold normals, as many programs write it, or heights, which need `height_mm`; -bm multiplies
-    either. map_Pr is the root of the roughness m. What cannot be used is left out; the second result says
-    why, if need be.
+    They are map_Kd, norm, map_Bump or bump, map_Ks and map_Pr. A bump map may contain normals, as many
+    programs write it, or heights, which require `height_mm`; -bm scales both. map_Pr is the square root of
+    the roughness m.
 
     opaque : groups that are not skin
-    given : roles of maps that are not wanted
+    overridden : roles of maps that are set otherwise
     height_mm, normal_y : see `load_maps`
     """
     text = read_obj_text(path)
     library, faults = read_materials(path, text), list[str]()
     faults += [f"mtllib: {name} is not in its folder" for name in library.missing]
-    wanted = _skin_material(text, library.materials, opaque).textures
-    maps, roles = Maps(), [role for role in ("colour", "specular", "roughness") if role not in given]
-    if not set(_RELIEF_ROLES) & set(given):
-        roles.append("normal" if "normal" in wanted else "bump")
-    left = MAX_TOTAL_PIXELS
-    for role in (one for one in roles if one in wanted):
-        texture = wanted[role]
+    textures = _skin_material(text, library.materials, opaque).textures
+    maps, roles = Maps(), [role for role in ("colour", "specular", "roughness") if role not in overridden]
+    if not set(_RELIEF_ROLES) & set(overridden):
+        roles.append("normal" if "normal" in textures else "bump")
+    remaining = MAX_TOTAL_PIXELS
+    for role in (one for one in roles if one in textures):
+        texture = textures[role]
         file = find_referenced_file(path, texture.name)
         if file is None:
             faults.append(f"{texture.key}: {texture.name} is not in its folder")
             continue
         try:
-            left -= _checked_texel_count(file, left)
+            remaining -= _checked_texel_count(file, remaining)
             maps = replace(maps, **_load_map(role, file, texture, height_mm, normal_y))
         except DermisError as fault:
             faults.append(f"{texture.key}: {fault}")
         if texture.transformed:
-            faults.append(f"{texture.key}: {texture.name} is taken without its -s, -o or -t")
+            faults.append(f"{texture.key}: {texture.name} is used without its -s, -o or -t")
     return maps, _unused_files_note(path, faults)
 
 
-def _checked_texel_count(file: Path, left: int) -> int:
-    """How many texels a picture has, of those that are left to a mesh file."""
+def _checked_texel_count(file: Path, remaining: int) -> int:
+    """Return the number of texels of a picture after checking it against the remaining limit."""
     width, height = read_size(file)
-    if width * height > left:
+    if width * height > remaining:
         expected = f"pictures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"
-        refuse(file, expected, "with this one there are more", "Resize them")
+        refuse(file, expected, "this one exceeds the limit", "Resize them")
     return width * height
 
 
 def _unused_files_note(path: Path, faults: list[str]) -> str:
     if not faults:
         return ""
-    advice = "Put the files beside it, or name maps yourself (--colour, --normal, ...)"
-    return "\n  ".join([f"{path}: not all that its .mtl names is used. {advice}.", *faults])
+    advice = "Put the files next to it, or set maps by options (--colour, --normal, ...)"
+    return "\n  ".join([f"{path}: some maps of its .mtl are not used. {advice}.", *faults])
 
 
 def _load_map(
     role: str, file: Path, texture: Texture, height_mm: float | None, normal_y: Literal["up", "down"]
 ) -> dict[str, Any]:
-    """The map in a file, by its role."""
+    """Load the map in a file by its role."""
     if role == "roughness":
-        made = load_maps(roughness=file).roughness
-        return {} if made is None else {role: made * made}
+        root = load_maps(roughness=file).roughness
+        return {} if root is None else {role: root * root}
     if role == "bump" and _is_grey(file):
-        made = load_maps(height=file, height_mm=height_mm).height
-        return {} if made is None else {"height": _scaled(made, texture, file)}
+        height = load_maps(height=file, height_mm=height_mm).height
+        return {} if height is None else {"height": _scaled(height, texture, file)}
     if role in ("bump", "normal"):
-        made = load_maps(normal=file, normal_y=normal_y).normal
-        return {} if made is None else {"normal": _scaled(made, texture, file)}
+        normal = load_maps(normal=file, normal_y=normal_y).normal
+        return {} if normal is None else {"normal": _scaled(normal, texture, file)}
     return {role: getattr(load_maps(**{role: file}), role)}  # type: ignore[arg-type]
 
 
-def _scaled(made: Floats, texture: Texture, file: Path) -> Floats:
-    """A relief multiplied as its material says."""
+def _scaled(relief: Floats, texture: Texture, file: Path) -> Floats:
+    """Return a relief scaled by the factor of its material."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return check_finite(file, made * np.float32(texture.factor))
+        return check_finite(file, relief * np.float32(texture.factor))
 
 
 def _is_grey(file: Path) -> bool:
-    """Whether a picture's channels agree, but for what JPEG does to them; of a large one few texels tell."""
-    whole = read_image(file)
-    apart = max(min(whole.shape[:2]) // _SAMPLES_PER_SIDE, 1)
-    image = whole[::apart, ::apart, :3].astype(float)
-    most = float(image.max()) or 1.0
-    return bool((abs(image - image[..., :1]) <= 0.02 * most).all())
+    """Return whether the channels of a picture agree up to JPEG artefacts; large pictures are sampled."""
+    picture = read_image(file)
+    step = max(min(picture.shape[:2]) // _SAMPLES_PER_SIDE, 1)
+    samples = picture[::step, ::step, :3].astype(float)
+    largest = float(samples.max()) or 1.0
+    return bool((abs(samples - samples[..., :1]) <= 0.02 * largest).all())
 
 
 def _skin_material(text: str, materials: dict[str, MtlMaterial], opaque: Collection[str]) -> MtlMaterial:
-    """The material of the skin: of groups called so, else of all, the one with the most faces."""
+    """Return the material with the most faces among groups named skin, or among all groups."""
     faces = Counter(face_groups(text))
-    unwanted = {name.casefold() for name in opaque}
-    left = {names: count for names, count in faces.items() if not unwanted & set(map(str.casefold, names))}
-    named = {names: count for names, count in left.items() if "skin" in " ".join(names).casefold()}
+    excluded = {name.casefold() for name in opaque}
+    counted = {names: count for names, count in faces.items() if not excluded & set(map(str.casefold, names))}
+    skin = {names: count for names, count in counted.items() if "skin" in " ".join(names).casefold()}
     counts = Counter[str]()
-    for (material, _), count in (named or left).items():
+    for (material, _), count in (skin or counted).items():
         if material in materials and materials[material].textures:
             counts[material] += count
     return materials[counts.most_common(1)[0][0]] if counts else MtlMaterial()
 
 
-_ROLES |= {"map_bump": "bump", "bump": "bump"}
-
-
 @dataclass(frozen=True)
 class Texture:
-    """A picture that a material names.
+    """Picture referenced by a material.
 
-    key : the statement that names it, such as map_Kd
+    key : statement that references it, such as map_Kd
+    name : of the file
     factor : by which its values are multiplied (-bm) [-]
-    transformed : whether it is to be scaled, shifted or made turbulent (-s, -o, -t)
+    transformed : whether it is scaled, shifted or made turbulent (-s, -o, -t)
     """
 
     key: str
@@ -305,7 +310,7 @@ class Texture:
 
 @dataclass
 class MtlMaterial:
-    """A material: Kd as it is written, and its pictures by role; "bump" is a relief of either kind."""
+    """Material with its Kd as written and its pictures by role; "bump" is a relief of either kind."""
 
     kd: list[str] = field(default_factory=list)
     textures: dict[str, Texture] = field(default_factory=dict)
@@ -313,62 +318,63 @@ class MtlMaterial:
 
 @dataclass
 class Library:
-    """The materials of an OBJ file by name, and the names of the .mtl files that are missing."""
+    """Materials of an OBJ file by name, and names of missing .mtl files."""
 
     materials: dict[str, MtlMaterial] = field(default_factory=dict)
     missing: list[str] = field(default_factory=list)
 
 
 def read_materials(path: Path, text: str) -> Library:
-    """What the .mtl files say that an OBJ file names.
+    """Read the .mtl files that an OBJ file references.
 
     text : of the OBJ file
     """
-    found, left = Library(), MAX_MTL_BYTES
-    for told in library_names(text)[:MAX_LIBRARIES]:
-        for name in [told] if find_referenced_file(path, told) else told.split(".mtl ")[:MAX_LIBRARIES]:
+    library, remaining = Library(), MAX_MTL_BYTES
+    for listed in library_names(text)[:MAX_LIBRARIES]:
+        names = [listed] if find_referenced_file(path, listed) else listed.split(".mtl ")[:MAX_LIBRARIES]
+        for name in names:
             file = find_referenced_file(path, name) or find_referenced_file(path, f"{name}.mtl")
             if file is None:
-                found.missing.append(name)
+                library.missing.append(name)
             else:
-                data = read_file(file, "material libraries", left)
-                left -= len(data)
-                found.materials |= _parse_mtl(data.decode("utf-8", errors="replace"))
-    return found
+                data = read_file(file, "material libraries", remaining)
+                remaining -= len(data)
+                library.materials |= _parse_mtl(data.decode("utf-8", errors="replace"))
+    return library
 
 
 def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
-    found: dict[str, MtlMaterial] = {}
+    materials: dict[str, MtlMaterial] = {}
     current = MtlMaterial()
     for line in text.splitlines():
         if len(line) > _MAX_MTL_LINE:
             continue
         key, _, value = line.strip().replace("\t", " ").partition(" ")
         if key.lower() == "newmtl":
-            current = found.setdefault(value.strip(), MtlMaterial())
+            current = materials.setdefault(value.strip(), MtlMaterial())
         elif key.lower() == "kd":
             current.kd = value.split()
         elif key.lower() in _ROLES and value.strip():
             current.textures[_ROLES[key.lower()]] = _parse_texture(key, value.strip())
-    return found
+    return materials
 
 
-def _parse_texture(key: str, rest: str) -> Texture:
-    """What a statement says; its name goes to the end of the line, with its spaces."""
-    factor, moved, place = 1.0, False, 0
-    while option := _OPTION.match(rest, place):
+def _parse_texture(key: str, statement: str) -> Texture:
+    """Parse a statement with options; the name of the file extends to the end of the line."""
+    factor, transformed, start = 1.0, False, 0
+    while option := _OPTION.match(statement, start):
         factor = float(option["factor"] or factor)
-        if option["place"]:
-            usual = 1.0 if option["place"] in "sS" else 0.0
-            moved |= any(float(number) != usual for number in option["numbers"].split())
-        place = option.end()
-    rest = rest[place:]
-    match rest.rsplit(maxsplit=2):
-        case [name, last, number] if last.lower() == "-bm" and _WHOLE_NUMBER.fullmatch(number):
-            factor, rest = float(number), name  # as some programs write it
-    return Texture(key, rest, factor, moved)
+        if option["transform"]:
+            default = 1.0 if option["transform"] in "sS" else 0.0
+            transformed |= any(float(number) != default for number in option["numbers"].split())
+        start = option.end()
+    name = statement[start:]
+    match name.rsplit(maxsplit=2):
+        case [first, last, number] if last.lower() == "-bm" and _NUMBER_PATTERN.fullmatch(number):
+            factor, name = float(number), first  # some programs write the option after the name
+    return Texture(key, name, factor, transformed)
 
 
 def library_names(text: str) -> list[str]:
-    """What its lines `mtllib` say, each once."""
+    """Return the names in `mtllib` lines, each once."""
     return list(dict.fromkeys(line[1].strip() for line in _LIBRARY.finditer(text)))

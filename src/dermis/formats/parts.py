@@ -1,6 +1,6 @@
-"""Groups of triangles as they are in mesh files: in file units, with uv untouched.
+"""Parts of mesh files: groups of triangles in file units, with uv as in the file.
 
-trimesh parses OBJ and PLY; the groups, which it would rename, are numbered in the text of the file first.
+trimesh parses OBJ and PLY. It would rename groups, so they are numbered in the text first.
 """
 
 from __future__ import annotations
@@ -25,36 +25,42 @@ GREY: Colour = (0.8, 0.8, 0.8)
 
 
 def is_gltf(path: str | Path) -> bool:
-    """Whether the file is glTF by its suffix."""
+    """Return whether a file is glTF by its suffix."""
     return Path(path).suffix.lower() in (".glb", ".gltf")
 
 
 def default_unit_mm(path: str | Path) -> float:
-    """Length of the file's unit if nothing else is said [mm]: 1000 for glTF, which is in metres, else 1."""
+    """Return the unit of a file format [mm]: 1000 for glTF, which is in metres, else 1."""
     return 1000.0 if is_gltf(path) else 1.0
 
 
 @dataclass(frozen=True)
 class MaterialGroup:
-    """Name of the material (or mesh) first, then all other names; diffuse colour, linear [-]."""
+    """Group of triangles with the name of its material or mesh first, then other names, and a colour.
+
+    colour : diffuse, linear [-]
+    """
 
     names: tuple[str, ...]
     colour: Colour = GREY
 
     def name_contains(self, word: str) -> bool:
-        """Whether a word is part of one of its names."""
+        """Return whether a word is part of one of the names."""
         return any(word in name.casefold() for name in self.names)
 
 
 @dataclass(frozen=True)
 class MeshPart:
-    """One group's triangles in the file's units and the file's v direction, at rest.
+    """Triangles of one group at rest, in the units and v direction of the file.
 
-    positions (v, 3), uv (v, 2) or None, normals (v, 3) or None, triangles (f, 3)
-    targets : by name the vertices that a morph target moves (n,) and by how much at weight 1 (n, 3)
-    bone, weight : (v, k) bones that each vertex follows, by shares that add up to 1; None for no bones
-    quads : (q, 2) pairs of triangles that are the halves of one
-    separate : whether its points are no others' at the same places, as of a skin and of the lid on its cut
+    positions : (v, 3)
+    uv : (v, 2), or None
+    normals : (v, 3), or None
+    triangles : (f, 3)
+    targets : by name, displaced vertices (n,) of a morph target and displacements (n, 3) at weight 1
+    bone, weight : (v, k) bones of each vertex and weights that sum to 1; None without bones
+    quads : (q, 2) pairs of triangles that are the halves of a quad
+    separate : whether its vertices are not welded to coincident vertices of other parts
     """
 
     group: MaterialGroup
@@ -71,8 +77,9 @@ class MeshPart:
 
 @dataclass(frozen=True)
 class Bones:
-    """Bones of a file, parents before children; -1 for the parent of a root.
+    """Bones of a file, parents before children.
 
+    parent : (b,) index of the parent, -1 for a root
     local, world : (b, 4, 4) from each bone's space to its parent's and to the file's, at rest
     """
 
@@ -84,9 +91,9 @@ class Bones:
 
 @dataclass(frozen=True)
 class MeshFile:
-    """All that a file says of a head's shape.
+    """Content of a mesh file.
 
-    weights : of morph targets at rest, by name, where they are not 0
+    weights : default weights of morph targets by name, where they are not 0
     """
 
     parts: list[MeshPart]
@@ -95,21 +102,21 @@ class MeshFile:
 
     @property
     def is_deformable(self) -> bool:
-        """Whether it has bones or targets."""
+        """Return whether the file has bones or morph targets."""
         return self.bones is not None or any(part.targets for part in self.parts)
 
 
 def trimesh_parts(
     data: bytes, kind: str, groups: list[MaterialGroup], **options: object
 ) -> Iterator[MeshPart]:
-    """What trimesh reads from `data`, each under the group that its material numbers."""
+    """Yield the meshes that trimesh reads from `data`, with the groups that their materials number."""
     from io import BytesIO
 
     import trimesh
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        # text that breaks off in the middle must not pass as a shorter mesh
+        # truncated text must not be read as a smaller mesh
         warnings.filterwarnings("error", message="string or file could not be read")
         scene = trimesh.load_scene(BytesIO(data), file_type=kind, process=False, **options)
     names = [scene.graph[node][1] for node in scene.graph.nodes_geometry]
@@ -120,16 +127,16 @@ def trimesh_parts(
 
 
 def _part(mesh: Trimesh, group: MaterialGroup) -> MeshPart:
-    """A trimesh's arrays."""
+    """Return a trimesh mesh as a part."""
     uv = getattr(mesh.visual, "uv", None)
     normals = mesh.vertex_normals if "vertex_normals" in mesh._cache else None
     triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
-    places = np.asarray(mesh.vertices, dtype=np.float64) + 0.0  # without -0
-    if places.ndim != 2 or places.shape[1] != 3:
-        raise ValueError(f"its vertices have {places.shape[-1]} coordinates, not 3")
+    positions = np.asarray(mesh.vertices, dtype=np.float64) + 0.0  # converts -0 to 0
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        raise ValueError(f"its vertices have {positions.shape[-1]} coordinates, not 3")
     return MeshPart(
         group,
-        places,
+        positions,
         None if uv is None else to_floats(np.asarray(uv)),
         None if normals is None else to_floats(np.asarray(normals)) + 0.0,
         triangles,
@@ -138,30 +145,30 @@ def _part(mesh: Trimesh, group: MaterialGroup) -> MeshPart:
 
 
 def to_floats(values: Numbers) -> Doubles:
-    """Numbers of which integers stand for fractions of their type's largest."""
+    """Convert values to floats; integers become fractions of the largest value of their type."""
     scale = np.iinfo(values.dtype.str).max if values.dtype.kind in "iu" else 1
     return np.asarray(values / scale, dtype=np.float64)
 
 
 def parse_colour(numbers: Sequence[float | str]) -> Colour:
-    """Three numbers in [0, 1]."""
+    """Return the first three numbers, clamped to [0, 1]."""
     r, g, b = (min(max(float(x), 0.0), 1.0) for x in list(numbers)[:3])
     return (r, g, b)
 
 
-def find_quads(sides: NDArray[np.integer], triangles: Index) -> Index:
-    """(q, 2) triangles that are the halves of each quad of a file; empty when they are in no known order.
+def find_quads(corner_counts: NDArray[np.integer], triangles: Index) -> Index:
+    """Return the pairs of triangles that are halves of quads, (q, 2); empty if the order is unknown.
 
-    sides : (n,) how many corners each face of the file has
-    triangles : (f, 3) its faces as the reader has cut them: one after the other, or triangles first, then the
-        first halves of all quads, the second halves and the fans of all others
+    corner_counts : (n,) number of corners of each face of the file
+    triangles : (f, 3) triangulated faces, one face after the other, or triangles first, then the first halves
+        of all quads, the second halves, and all other polygons
     """
-    none, count = np.empty((0, 2), dtype=np.int64), int((sides == 4).sum())
-    if count == 0 or int((sides - 2).sum()) != len(triangles):
+    none, count = np.empty((0, 2), dtype=np.int64), int((corner_counts == 4).sum())
+    if count == 0 or int((corner_counts - 2).sum()) != len(triangles):
         return none
-    in_place = (np.cumsum(sides - 2) - 2)[sides == 4]
-    sorted_by_sides = int((sides == 3).sum()) + np.arange(count)
-    for first, step in ((in_place, 1), (sorted_by_sides, count)):
+    sequential = (np.cumsum(corner_counts - 2) - 2)[corner_counts == 4]
+    grouped = int((corner_counts == 3).sum()) + np.arange(count)
+    for first, step in ((sequential, 1), (grouped, count)):
         pairs = np.column_stack((first, first + step))
         a, b = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
         if (a[:, [0, 2]] == b[:, [2, 0]]).all():
@@ -170,11 +177,11 @@ def find_quads(sides: NDArray[np.integer], triangles: Index) -> Index:
 
 
 def ply_corner_counts(metadata: Mapping[str, Any]) -> Index:
-    """How many corners each face of a .ply file has, by what trimesh keeps of it; no numbers for others."""
+    """Return the number of corners of each face from trimesh's metadata of a .ply file; empty for others."""
     data = metadata.get("_ply_raw", {}).get("face", {}).get("data")
-    known = data.dtype.names if isinstance(data, np.ndarray) else data
+    properties = data.dtype.names if isinstance(data, np.ndarray) else data
     for name in ("vertex_index", "vertex_indices"):
-        if name in (known or ()):
+        if name in (properties or ()):
             rows = data[name]["f1"] if isinstance(data, np.ndarray) else data[name]
             return np.fromiter(map(len, rows), np.int64) if rows.dtype == object else np.full(*rows.shape)
     return np.empty(0, np.int64)

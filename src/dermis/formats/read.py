@@ -1,4 +1,4 @@
-"""Parts of a head from any mesh file, by its suffix; PLY headers."""
+"""Reading of mesh files of all formats; PLY files."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ _MAX_ELEMENTS = {"vertex": MAX_VERTICES, "face": MAX_TRIANGLES}
 _MAX_PROPERTIES = 256
 _DAMAGED = "The file is damaged: export it again"
 MAX_UV = 1e4
-"""Beyond this uv are damage, not tiles."""
+"""Largest valid absolute uv coordinate; larger ones mean a damaged file, not tiles."""
 S = TypeVar("S", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 
 
 def check_ply(path: Path, data: bytes) -> bytes:
-    """The header of a PLY file whose numbers of elements and properties are those of a mesh.
+    """Return the header of a PLY file after checking its numbers of elements and properties.
 
     data : the whole file
 
-    Raises DermisError for others.
+    Raises DermisError for an invalid header.
     """
     end = data.find(b"end_header", 0, _MAX_HEADER)
     if not data.startswith(b"ply") or end < 0:
-        refuse(path, "a PLY file", "it cannot be read (its header does not begin or end as one)", _DAMAGED)
+        refuse(path, "a PLY file", "it cannot be read (its header is invalid)", _DAMAGED)
     header = data[:end]
     lines = [line.split() for line in header.splitlines()]
     properties = sum(line[:1] == [b"property"] for line in lines)
@@ -51,23 +51,23 @@ def check_ply(path: Path, data: bytes) -> bytes:
     return header
 
 
-def _check_element(path: Path, line: list[bytes], left: int) -> None:
-    """Refuse an element of which there are more than may be, or than bytes are left for."""
+def _check_element(path: Path, line: list[bytes], remaining_bytes: int) -> None:
+    """Refuse an element count that is too large for a mesh or for the size of the file."""
     name, count = (line[1].decode("latin-1"), line[2]) if len(line) == 3 else ("", b"")
     if not (count.isdigit() and len(count) < 12):
         refuse(path, "elements with a name and a number", f"got {b' '.join(line)[:80]!r}", _DAMAGED)
-    most = min(_MAX_ELEMENTS.get(name, MAX_TRIANGLES), left)
-    if int(count) > most:
+    limit = min(_MAX_ELEMENTS.get(name, MAX_TRIANGLES), remaining_bytes)
+    if int(count) > limit:
         actual, advice = f"its header says {int(count):,}", "Decimate it (in Blender: Modifiers > Decimate)"
-        refuse(path, f"at most {most:,} elements called {name!r}", actual, advice)
+        refuse(path, f"at most {limit:,} elements named {name!r}", actual, advice)
 
 
 def read_ply(path: Path) -> MeshFile:
-    """The one part of a .ply file; uv from the vertex properties s, t or u, v or texture_u, texture_v."""
+    """Read a .ply file; uv are vertex properties s, t or u, v or texture_u, texture_v, or face properties."""
     data = read_file(path, "a PLY file", MAX_FILE_BYTES)
     header = check_ply(path, data)
-    # uv by face corner need vertices split, after which normals need not fit them any more; uv by vertex
-    # do not, and splitting would drop the normals as soon as one vertex is unused
+    # uv coordinates by face corner require split vertices, for which the file's normals may be wrong;
+    # for uv by vertex, splitting would drop the normals of files with unused vertices
     by_corner = b"texcoord" in header
     parts = list(
         trimesh_parts(data, "ply", [MaterialGroup((path.stem,))], fix_texture=by_corner, skip_materials=True)
@@ -84,10 +84,10 @@ READERS: dict[str, Callable[[Path], MeshFile]] = {
 
 
 def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
-    """All parts together as one; its normals are NaN where the file has none."""
+    """Join all parts into one; normals are NaN where the file has none."""
     uv = [_part_uv(part, source) for part in parts]
-    for part, given in zip(parts, uv, strict=True):
-        check_arrays(part.positions, given, part.triangles, source)
+    for part, part_uv in zip(parts, uv, strict=True):
+        check_arrays(part.positions, part_uv, part.triangles, source)
     start = np.cumsum([0, *(len(part.positions) for part in parts)])
     faces = np.cumsum([0, *(len(part.triangles) for part in parts)])
     targets: dict[str, list[tuple[Index, Doubles]]] = {}
@@ -103,12 +103,12 @@ def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
         {name: (np.concatenate(i), np.concatenate(d)) for name, (i, d) in _transposed(targets).items()},
         _stack_padded([part.bone for part in parts]),
         _stack_padded([part.weight for part in parts]),
-        np.vstack([part.quads + begin for part, begin in zip(parts, faces, strict=False)]),
+        np.vstack([part.quads + offset for part, offset in zip(parts, faces, strict=False)]),
     )
 
 
 def select_vertices(part: MeshPart, used: Index) -> MeshPart:
-    """Some of a part's vertices, and what moves them."""
+    """Return a part with some of its vertices, and with their targets and bones."""
     number = np.full(len(part.positions), -1)
     number[used] = np.arange(len(used))
     targets = {
@@ -123,7 +123,9 @@ def select_vertices(part: MeshPart, used: Index) -> MeshPart:
 def _transposed(
     rows: dict[str, list[tuple[Index, Doubles]]],
 ) -> dict[str, tuple[list[Index], list[Doubles]]]:
-    return {name: ([one for one, _ in pairs], [two for _, two in pairs]) for name, pairs in rows.items()}
+    return {
+        name: ([first for first, _ in pairs], [second for _, second in pairs]) for name, pairs in rows.items()
+    }
 
 
 def _part_normals(part: MeshPart) -> Doubles:
@@ -133,12 +135,12 @@ def _part_normals(part: MeshPart) -> Doubles:
 
 
 def _stack_padded(arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
-    """Arrays of any width one under the other, filled up with 0; None if they are None."""
-    given = [array for array in arrays if array is not None]
-    if len(given) < len(arrays):
+    """Stack arrays of any width vertically, padded with 0; None if one is None."""
+    present = [array for array in arrays if array is not None]
+    if len(present) < len(arrays):
         return None
-    width = max(array.shape[1] for array in given)
-    return np.vstack([np.pad(array, ((0, 0), (0, width - array.shape[1]))) for array in given])
+    width = max(array.shape[1] for array in present)
+    return np.vstack([np.pad(array, ((0, 0), (0, width - array.shape[1]))) for array in present])
 
 
 def _part_uv(part: MeshPart, source: Path) -> Doubles:
@@ -153,27 +155,27 @@ def _part_uv(part: MeshPart, source: Path) -> Doubles:
 
 
 def read_mesh_file(source: Path) -> MeshFile:
-    """The file as it is; whatever its reader raises on a damaged file becomes a refusal."""
+    """Read a mesh file of any format; errors of its reader become a DermisError."""
     reader = READERS.get(source.suffix.lower())
     if reader is None:
         actual = f"the suffix is {source.suffix!r}"
         refuse(source, f"a mesh file ({', '.join(READERS)})", actual, "Export it as one of these")
     if not is_file(source):
         refuse(source, "a mesh file", "there is no such file", "Check the path")
-    # a damaged file makes trimesh fail anywhere, with any exception
-    with parsing(source, f"a sound {source.suffix} mesh", Exception):
-        model = reader(source)
-    full = [part for part in model.parts if len(part.triangles)]
-    if not full:
+    # trimesh raises any exception for damaged files
+    with parsing(source, f"a valid {source.suffix} mesh", Exception):
+        mesh_file = reader(source)
+    parts = [part for part in mesh_file.parts if len(part.triangles)]
+    if not parts:
         refuse(source, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
-    skins = [part for part in model.parts if part.group.name_contains("skin")]
+    skins = [part for part in mesh_file.parts if part.group.name_contains("skin")]
     if skins and not any(len(part.triangles) for part in skins):
         actual = f"skin group {skins[0].group.names[0]!r} has no triangles"
         refuse(source, "a group of triangles that is skin", actual, "Assign its faces to it, or rename it")
-    check_counts(full, source)
-    return replace(model, parts=full)
+    check_counts(parts, source)
+    return replace(mesh_file, parts=parts)
 
 
 def to_y_up(vectors: Doubles, up: Up) -> Doubles:
-    """`vectors` (v, 3) with Y up: z-up turns about X, so that -Y, Blender's front, becomes +Z."""
+    """Return vectors (v, 3) with Y up: for z-up, -Y, Blender's front, becomes +Z."""
     return vectors if up == "y" else np.column_stack((vectors[:, 0], vectors[:, 2], -vectors[:, 1]))

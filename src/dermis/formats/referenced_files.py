@@ -1,4 +1,4 @@
-"""Files that a mesh file names, in its own folder or below it."""
+"""Files referenced by a mesh file, in its own folder or below it."""
 
 from __future__ import annotations
 
@@ -8,42 +8,42 @@ from urllib.parse import unquote
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file
 
-_MAX_PATH_LENGTH = 4096  # characters of a path; some systems take their time to say so
+_MAX_PATH_LENGTH = 4096  # characters; some systems are slow to refuse longer paths
 
 
 def find_referenced_file(path: Path, name: str) -> Path | None:
-    """The file of that name in the folder of `path` or below it; None for one that is elsewhere or nowhere.
+    """Return an existing file by its name relative to the folder of `path`, or None.
 
-    Names with the separators of Windows will do. Of a name that leads elsewhere the last part is looked for.
+    Windows separators are accepted. If the name leads elsewhere, its last part is searched in the folder.
     """
-    told = PureWindowsPath(name.strip().strip('"'))
-    for part in (told, PureWindowsPath(told.name)):
-        file = _resolve_below(path.parent, part)
+    named = PureWindowsPath(name.strip().strip('"'))
+    for candidate in (named, PureWindowsPath(named.name)):
+        file = _resolve_below(path.parent, candidate)
         if file is not None and is_file(file):
             return file
     return None
 
 
 def resolve_uri(path: Path, uri: str) -> Path:
-    """The file that a glTF file names by a relative reference, be it there or not.
+    """Return the path of a relative reference in a glTF file, whether the file exists or not.
 
-    Raises DermisError for one outside of the file's folder, by its name or by a link.
+    Raises DermisError for a file outside the folder, also through a link.
     """
     file = _resolve_below(path.parent, PureWindowsPath(unquote(uri)))
     if file is None or ":" in uri.partition("/")[0]:
-        told = uri if len(uri) <= 80 else f"{uri[:77]}..."
-        advice = "Move it into that folder and name it so, or export one .glb file"
-        refuse(path, "files in its own folder or below", f"it names {told!r}", advice)
+        shortened = uri if len(uri) <= 80 else f"{uri[:77]}..."
+        advice = "Move it into that folder and change the reference, or export one .glb file"
+        refuse(path, "files in its own folder or below", f"it references {shortened!r}", advice)
     return file
 
 
 def _resolve_below(folder: Path, name: PureWindowsPath) -> Path | None:
-    """The file's real place; None for what no file is called, and for what is not below the folder."""
+    """Return the resolved path of a name below a folder, or None if it is invalid or elsewhere."""
     if len(str(name)) > _MAX_PATH_LENGTH:
         return None
     try:
-        home = folder.resolve()
-        file = home.joinpath(*name.parts).resolve()
-    except (OSError, ValueError):  # too long, a NUL, links in a circle
+        root = folder.resolve()
+        file = root.joinpath(*name.parts).resolve()
+    except (OSError, ValueError):  # too long, a NUL, or circular links
         return None
-    return None if name.anchor or not file.is_relative_to(home) else file
+    return None if name.anchor or not file.is_relative_to(root) else file

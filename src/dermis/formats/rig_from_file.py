@@ -1,4 +1,4 @@
-"""Rigs of the points of a mesh, from the targets and bones of the vertices of a file."""
+"""Rigs of mesh points from the targets and bones of vertices in a file."""
 
 from __future__ import annotations
 
@@ -12,53 +12,53 @@ from dermis.formats.parts import Bones, MeshPart
 from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
 
 SPLIT_TOLERANCE_MM = 0.01
-"""Vertices at one place that a target moves this far apart are two points, as of lips that touch."""
+"""Coincident vertices that a target separates by more, such as those of touching lips, are two points."""
 _MAX_COINCIDENT = 64
-_WEIGHT_TOLERANCE = 0.004  # a step of weights in 8 bits
-_MIN_DISPLACEMENT_MM = 1e-4  # what rounding leaves of vertices that do not move
+_WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
+_MIN_DISPLACEMENT_MM = 1e-4  # rounding errors of vertices that do not move
 
 
 def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) -> Ints:
-    """(v,) points of which vertices that move differently are no longer one; in the order they were in.
+    """Return point indices (v,) in which coincident vertices that move differently are separate points.
 
-    point : (v,) welded by their places
+    point : (v,) point of each vertex, welded by position
     linear : (3, 3) from the file's space to mm
 
-    Raises DermisError for more such vertices at one place than any mesh has.
+    Raises DermisError for too many such vertices at one position.
     """
-    left = np.flatnonzero(np.bincount(point)[point] > 1)
+    remaining = np.flatnonzero(np.bincount(point)[point] > 1)
     copy, number = np.zeros(len(point), np.int64), 0
-    while len(left):
+    while len(remaining):
         if number > _MAX_COINCIDENT:
-            actual = f"{number} of them move apart"
-            refuse(culprit, "a few vertices at one place", actual, "The file is damaged: export it again")
-        groups, first = np.unique(point[left], return_index=True)
-        other = left[first[np.searchsorted(groups, point[left])]]
-        apart = _targets_differ(part, left, other, linear) | _weights_differ(part, left, other)
-        copy[left[~apart]] = number
-        left, number = left[apart], number + 1
-    _, parted = np.unique(point * np.int64(number + 1) + copy, return_inverse=True)
-    return np.asarray(parted.reshape(-1), np.int32)
+            actual = f"{number} of them move differently"
+            refuse(culprit, "a few coincident vertices", actual, "The file is damaged: export it again")
+        groups, first = np.unique(point[remaining], return_index=True)
+        other = remaining[first[np.searchsorted(groups, point[remaining])]]
+        apart = _targets_differ(part, remaining, other, linear) | _weights_differ(part, remaining, other)
+        copy[remaining[~apart]] = number
+        remaining, number = remaining[apart], number + 1
+    _, split = np.unique(point * np.int64(number + 1) + copy, return_inverse=True)
+    return np.asarray(split.reshape(-1), np.int32)
 
 
-def _targets_differ(part: MeshPart, one: Index, other: Index, linear: Doubles) -> Mask:
-    """Whether some target moves vertices (n,) and others (n,) apart."""
-    apart, delta = np.zeros(len(one), bool), np.zeros((len(part.positions), 3))
-    for vertex, moved in part.targets.values():
-        delta[vertex] = moved @ linear.T
-        apart |= np.linalg.norm(delta[one] - delta[other], axis=1) > SPLIT_TOLERANCE_MM
+def _targets_differ(part: MeshPart, first: Index, second: Index, linear: Doubles) -> Mask:
+    """Return whether a target separates vertices `first` and `second`, (n,)."""
+    apart, delta = np.zeros(len(first), bool), np.zeros((len(part.positions), 3))
+    for vertex, delta_of_vertex in part.targets.values():
+        delta[vertex] = delta_of_vertex @ linear.T
+        apart |= np.linalg.norm(delta[first] - delta[second], axis=1) > SPLIT_TOLERANCE_MM
         delta[vertex] = 0
     return apart
 
 
-def _weights_differ(part: MeshPart, one: Index, other: Index) -> Mask:
-    """Whether vertices (n,) and others (n,) follow bones by different shares."""
+def _weights_differ(part: MeshPart, first: Index, second: Index) -> Mask:
+    """Return whether vertices `first` and `second` have different bone weights, (n,)."""
     if part.bone is None or part.weight is None:
-        return np.zeros(len(one), bool)
-    both = np.concatenate([part.bone[one], part.bone[other]], axis=1)
-    share = np.concatenate([part.weight[one], -part.weight[other]], axis=1)
-    same = both[:, :, None] == both[:, None, :]
-    return np.asarray((np.abs((same * share[:, None, :]).sum(axis=2)) > _WEIGHT_TOLERANCE).any(axis=1))
+        return np.zeros(len(first), bool)
+    bones = np.concatenate([part.bone[first], part.bone[second]], axis=1)
+    weights = np.concatenate([part.weight[first], -part.weight[second]], axis=1)
+    same = bones[:, :, None] == bones[:, None, :]
+    return np.asarray((np.abs((same * weights[:, None, :]).sum(axis=2)) > _WEIGHT_TOLERANCE).any(axis=1))
 
 
 def build_rig(
@@ -70,38 +70,38 @@ def build_rig(
     to_head: Doubles,
     culprit: object,
 ) -> Rig | None:
-    """The rig of a mesh's points, None where nothing moves them.
+    """Return the rig of a mesh's points, or None without targets and bones.
 
     positions_mm : (v, 3) in the head's space
-    part : all of the file's vertices that are used, (v,)
-    weights : of targets at rest
+    part : all used vertices of the file, (v,)
+    weights : default weights of targets
     to_head : (4, 4) from the file's space to the head's [mm]
 
-    Raises DermisError for bones without extent.
+    Raises DermisError for bones with a scale of 0.
     """
     if not part.targets and bones is None:
         return None
     _, first = np.unique(point, return_index=True)
-    places = np.ascontiguousarray(positions_mm[first])
+    point_positions = np.ascontiguousarray(positions_mm[first])
     skeleton = None if bones is None else _skeleton(part, bones, first, to_head, culprit)
-    return Rig(places, _targets(part, point, first, weights, to_head), skeleton)
+    return Rig(point_positions, _targets(part, point, first, weights, to_head), skeleton)
 
 
 def _targets(
     part: MeshPart, point: Ints, first: Index, weights: Mapping[str, float], to_head: Doubles
 ) -> MorphTargets:
-    """The targets of points that move as the `first` of their vertices does."""
+    """Return the targets of points, which move like the `first` of their vertices."""
     if not part.targets:
         return no_targets()
-    stands = np.zeros(len(point), bool)
-    stands[first] = True
+    is_first = np.zeros(len(point), bool)
+    is_first[first] = True
     moved, deltas = [], []
     for vertex, delta in part.targets.values():
         delta_mm = (delta @ to_head[:3, :3].T).astype(np.float32)
-        kept = np.flatnonzero(stands[vertex] & (np.abs(delta_mm) > _MIN_DISPLACEMENT_MM).any(axis=1))
-        kept = kept[np.argsort(point[vertex[kept]])]
-        moved.append(point[vertex[kept]])
-        deltas.append(delta_mm[kept])
+        used = np.flatnonzero(is_first[vertex] & (np.abs(delta_mm) > _MIN_DISPLACEMENT_MM).any(axis=1))
+        used = used[np.argsort(point[vertex[used]])]
+        moved.append(point[vertex[used]])
+        deltas.append(delta_mm[used])
     start = np.cumsum([0, *map(len, moved)]).astype(np.int32)
     rest = np.array([weights.get(name, 0.0) for name in part.targets], np.float32)
     return MorphTargets(
@@ -114,17 +114,17 @@ def _targets(
 
 
 def _skeleton(part: MeshPart, bones: Bones, first: Index, to_head: Doubles, culprit: object) -> Skeleton:
-    """The bones of points that follow them as the `first` of their vertices does."""
+    """Return the skeleton of points, which have the weights of the `first` of their vertices."""
     assert part.bone is not None and part.weight is not None
     bone = np.zeros((len(first), INFLUENCES), np.int32)
     weight = np.zeros((len(first), INFLUENCES), np.float32)
     bone[:, : part.bone.shape[1]], weight[:, : part.weight.shape[1]] = part.bone[first], part.weight[first]
     size = np.linalg.norm(bones.world[:, :3, :3], axis=(1, 2))
     flat = np.abs(np.linalg.det(bones.world[:, :3, :3])) <= 1e-9 * size**3
-    followed = np.flatnonzero(flat & np.isin(np.arange(len(flat)), bone[weight > 0]))
-    if len(followed):
-        actual = f"{bones.names[followed[0]]!r} is scaled to nothing at rest"
-        refuse(culprit, "bones with an extent", actual, "Export it with another scale")
+    unusable = np.flatnonzero(flat & np.isin(np.arange(len(flat)), bone[weight > 0]))
+    if len(unusable):
+        actual = f"{bones.names[unusable[0]]!r} has a scale of 0 at rest"
+        refuse(culprit, "bones with a scale above 0", actual, "Export it with another scale")
     inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(4), bones.world))
     return Skeleton(
         bones.names, bones.parent, bones.local, np.asarray(inverse, np.float64), to_head, bone, weight

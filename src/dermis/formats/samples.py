@@ -1,4 +1,4 @@
-"""Sample heads and environments: known by hash, fetched once, credited to their authors."""
+"""Sample heads and environments, downloaded once and verified by hash."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DATA_VARIABLE = "DERMIS_DATA"
 
 @dataclass(frozen=True)
 class SampleFile:
-    """One file of a sample: its name, where it is public, and the hash it must have."""
+    """File of a sample: name, public URL and expected hash."""
 
     name: str
     url: str
@@ -31,13 +31,14 @@ class SampleFile:
 
 @dataclass(frozen=True)
 class Sample:
-    """What is known about a sample before it is fetched.
+    """Description of a sample.
 
     kind : "head" is a mesh with maps, "environment" a latitude-longitude picture
-    folder : where its files lie below DERMIS_DATA or below the cache
+    folder : of its files below DERMIS_DATA or below the cache
     files : by role: mesh, colour, specular, normal, height, licence, or environment
+    licence, attribution : of its authors
     unit_mm : length of one unit of the mesh [mm]
-    v_origin : the side of the maps where v = 0
+    v_origin : edge of the maps where v = 0
     height_mm : relief of one grey level of the 8-bit height map [mm]
     """
 
@@ -67,12 +68,13 @@ SAMPLES = _load_registry()
 
 
 def fetch(name: str) -> dict[str, Path]:
-    """Paths of a sample's files by role; missing files are downloaded.
+    """Return the paths of a sample's files by role; missing files are downloaded.
 
     name : a key of `SAMPLES`
-    DermisError : no such sample; no network; or a file differs from the one that is known
 
-    With DERMIS_DATA set, that folder has to hold the files and nothing is downloaded.
+    If DERMIS_DATA is set, that folder must contain the files and nothing is downloaded.
+
+    Raises DermisError for an unknown sample, without network, and for files with another hash.
     """
     sample = _find(name)
     paths = {role: _folder(sample) / file.name for role, file in sample.files.items()}
@@ -85,7 +87,7 @@ def fetch(name: str) -> dict[str, Path]:
 
 
 def is_available(name: str) -> bool:
-    """Whether `fetch` would find every file of a sample without the network.
+    """Return whether all files of a sample exist locally.
 
     name : a key of `SAMPLES`
     """
@@ -95,7 +97,12 @@ def is_available(name: str) -> bool:
 
 def _find(name: str) -> Sample:
     if name not in SAMPLES:
-        refuse(f"sample {name!r}", f"one of {', '.join(SAMPLES)}", "there is none of this name", "Choose one")
+        refuse(
+            f"sample {name!r}",
+            f"one of {', '.join(SAMPLES)}",
+            "there is none of this name",
+            "Choose one of them",
+        )
     return SAMPLES[name]
 
 
@@ -109,10 +116,10 @@ def _folder(sample: Sample) -> Path:
 
 
 def _has_known_hash(path: Path, file: SampleFile) -> bool:
-    """Whether the file is there with the known hash."""
+    """Return whether a file exists and has the expected hash."""
     try:
         status = path.stat()
-        if not stat.S_ISREG(status.st_mode):  # a pipe would hold the reader up
+        if not stat.S_ISREG(status.st_mode):  # a pipe would block the reader
             return False
         return _sha256(path, status.st_size, status.st_mtime_ns) == file.sha256
     except OSError:
@@ -121,7 +128,7 @@ def _has_known_hash(path: Path, file: SampleFile) -> bool:
 
 @lru_cache(maxsize=256)
 def _sha256(path: Path, size: int, mtime_ns: int) -> str:
-    """Hash of a file, computed once for each size and time of change."""
+    """Return the hash of a file, computed once for each size and modification time."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -134,8 +141,8 @@ def _download(sample: Sample, roles: list[str]) -> None:
         downloader = pooch.HTTPDownloader(progressbar=progress, timeout=30)
         try:
             make_private_folder(_folder(sample))
-            if not (place := _folder(sample) / file.name).is_file():
-                place.unlink(missing_ok=True)  # pooch would read from a pipe
+            if not (path := _folder(sample) / file.name).is_file():
+                path.unlink(missing_ok=True)  # pooch would read from a pipe
             pooch.retrieve(
                 file.url, f"sha256:{file.sha256}", file.name, _folder(sample), downloader=downloader
             )
@@ -146,7 +153,7 @@ def _download(sample: Sample, roles: list[str]) -> None:
 
 
 class _Progress:
-    """A progress bar on stderr, with the methods that pooch calls."""
+    """Progress bar on stderr with the interface that pooch expects."""
 
     def __init__(self, name: str) -> None:
         from rich.console import Console
@@ -165,7 +172,7 @@ class _Progress:
         self._bars.reset(self._task)
 
     def close(self) -> None:
-        """Called by pooch only when all went well, so `stop` does the work."""
+        """Do nothing: pooch calls it only after success, so `stop` stops the bar."""
 
     def stop(self) -> None:
         if self._bars.live.is_started:
@@ -180,12 +187,12 @@ def _refuse_data(path: Path) -> NoReturn:
 
 def _refuse_download(sample: Sample, roles: list[str], fault: Exception) -> NoReturn:
     if isinstance(fault, OSError):
-        why = f"it failed ({fault.strerror or type(fault).__name__})"
+        reason = f"it failed ({fault.strerror or type(fault).__name__})"
     else:
-        why = "another file is there now (its sha256 differs)"
+        reason = "the file has changed (its sha256 differs)"
     urls = "\n".join(f"  {sample.files[role].url}" for role in roles)
     raise DermisError(
-        f"sample {sample.name!r}: expected to download it, but {why}. "
-        f"Fetch these files by hand:\n{urls}\n"
+        f"sample {sample.name!r}: expected to download it, but {reason}. "
+        f"Download these files manually:\n{urls}\n"
         f"into {_folder(sample)}, or into FOLDER/{sample.folder} with {DATA_VARIABLE}=FOLDER set."
     ) from fault

@@ -223,7 +223,7 @@ def _eye_poses(head: Head, motion: Motion) -> EyePoses | None:
     if head.eyes is None:
         return None
     rig = head.control
-    edges = None if rig.contact is None else rig.edges_mm(motion)
+    edges = None if rig.contact is None else rig.lid_edges_mm(motion)
     return EyePoses(head.eyes.frames(rig, motion), edges)
 
 

@@ -145,8 +145,8 @@ def perspective(rows: Rows, window: Window, near: float, far: float) -> list[Seq
 
 def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
     """Return the nearest and farthest depth of a shape in view space, slightly extended [mm]."""
-    z = np.array(rows[2], np.float32) @ outline.columns
-    near, far = float(z.min()) - outline.slack_mm, float(z.max()) + outline.slack_mm
+    z = np.array(rows[2], np.float32) @ outline.homogeneous
+    near, far = float(z.min()) - outline.margin_mm, float(z.max()) + outline.margin_mm
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
 
@@ -163,16 +163,16 @@ def point_shadow_views(
     if not lights:
         return []
     eyes = [world_position(light.position, centre) for _, light in lights]
-    axes = [view_axes(vector_between(eye, outline.middle_mm)) for eye in eyes]
+    axes = [view_axes(vector_between(eye, outline.centre_mm)) for eye in eyes]
     rows = [view_rows(*one) for one in zip(eyes, axes, strict=True)]
     stacked = np.array(list(zip(*rows, strict=True)), np.float32).reshape(-1, 4)
-    view_points = (stacked @ outline.columns).reshape(3, len(rows), -1)
+    view_points = (stacked @ outline.homogeneous).reshape(3, len(rows), -1)
     depth = view_points[2]
     near, far = depth.min(axis=1).tolist(), depth.max(axis=1).tolist()
     _check_outside(lights, [one > _MIN_DISTANCE_MM for one in near])
     steepest = _steepest(view_points[:2], depth)
     _check_outside(lights, [one <= _MAX_LIGHT_TANGENT for one in steepest])
-    slack = outline.slack_mm
+    slack = outline.margin_mm
     bounds = [
         (1.02 * h, max(0.98 * n - slack, 0.1 * n), 1.02 * f + slack)
         for h, n, f in zip(steepest, near, far, strict=True)
@@ -206,10 +206,10 @@ def parallel_shadow_view(direction: Vec, outline: Outline, size: int) -> ShadowV
 
     size : side of the map [texels]
     """
-    points = outline.places_mm
+    points = outline.points_mm
     axes = view_axes_array(direction, np.array(_UP))
     local = points @ np.stack(axes, axis=1)
-    margin = 1.0 + np.array([0.0, 0.0, outline.slack_mm])
+    margin = 1.0 + np.array([0.0, 0.0, outline.margin_mm])
     low, high = local.min(axis=0) - margin, local.max(axis=0) + margin
     half = 0.51 * float(max(high[0] - low[0], high[1] - low[1]))
     clip = np.eye(4)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.human.makehuman import EXPRESSION_PREFIX, Points, model_data, target_deltas
 from dermis.human.movement import expression_targets, gaze_turns
 from dermis.human.skin.surface import average_surface, lid_rings
-from dermis.mesh.eyeball import SCLERA_MM, Contact, clearance_mm, globe
+from dermis.mesh.eyeball import SCLERA_MM, LidContact, build_eyeball, radial_distances_mm
 
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -111,19 +111,19 @@ def _project_lids(
     centre = eye.centre + eye.size * EYE_OFFSET_MM * FORWARD
     size = CONTROL_SCALE * eye.size
     off = (points_mm[..., side.contact, :] - centre) / size
-    far, surface = clearance_mm(off, axis)
+    far, surface = radial_distances_mm(off, axis)
     out = np.maximum(1.0, (surface + side.clearances_mm) / far)
     points_mm[..., side.contact, :] = centre + size * off * out[..., None]
 
 
-def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> Contact:
+def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> LidContact:
     """Return the points that slide over the eyes, with their distances from the eyeballs.
 
     first, eyeball_size : index of the first point of the left eyeball, and the number of points of an eyeball
     apex, back : indices of points of an eyeball
     """
     both = lid_sides()
-    return Contact(
+    return LidContact(
         np.concatenate([side.contact for side in both]).astype(np.int32),
         np.repeat(np.arange(2, dtype=np.int32), [len(side.contact) for side in both]),
         np.concatenate([side.clearances_mm for side in both]).astype(np.float32),
@@ -286,7 +286,7 @@ def eyeball_mesh() -> tuple[Doubles, Index]:
 
     It looks along +Z.
     """
-    return globe(swell=CONTROL_SCALE)
+    return build_eyeball(scale=CONTROL_SCALE)
 
 
 def place_eyeball(eye: EyeSocket) -> tuple[Doubles, Doubles]:

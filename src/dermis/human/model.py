@@ -18,7 +18,7 @@ from dermis.human.movement import expression_targets, gaze_turns, skeleton
 from dermis.mesh import eyeball
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
-from dermis.mesh.geometry import halves
+from dermis.mesh.geometry import split_quads
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material, build_mesh
@@ -77,7 +77,7 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
     mesh = build_mesh(
         points[faces.point],
         faces.uv,
-        halves(faces.quads),
+        split_quads(faces.quads),
         np.repeat(faces.material, 2),
         tuple(MATERIALS.values()),
         point=faces.point,
@@ -85,9 +85,9 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
     )
     bones = skeleton(points_mm[mesh_point_count() :], (left_centre, right_centre), len(left))
     targets = replace(expression_targets(), delta_mm=fit_lid_targets(points_mm, sockets))
-    apex, back, _ = eyeball.marks()
+    apex, back, _ = eyeball.axis_points()
     contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
-    rig = Rig(points.astype(np.float32), targets, bones, turns=gaze_turns(), contact=contact)
+    rig = Rig(points.astype(np.float32), targets, bones, bone_rotations=gaze_turns(), contact=contact)
     return Head("human", mesh, maps, CREDIT, rig, _eyes(eyes))
 
 
@@ -110,7 +110,7 @@ def _eyes(look: EyeLook) -> Eyes:
     size = len(lids.eyeball_mesh()[0])
     apex, back, side = (
         np.array([mesh_point_count() + mark, mesh_point_count() + size + mark], np.int32)
-        for mark in eyeball.marks()
+        for mark in eyeball.axis_points()
     )
     material = np.array([list(MATERIALS).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
     return Eyes(apex, back, side, material, look)
@@ -146,7 +146,7 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
         uv = np.concatenate([uv, tooth_uv])
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return (
-        np.concatenate([uv, eyeball.layout()]),
+        np.concatenate([uv, eyeball.eyeball_uv()]),
         np.concatenate([points[stays], mesh_point_count() + quads, mesh_point_count() + size + quads]),
         np.concatenate([corner[stays], len(uv) + quads, len(uv) + quads]),
         np.concatenate([material[stays], *eyes]),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.makehuman import EXPRESSION_PREFIX, Points, model_data, target_deltas
-from dermis.mesh.rig import MorphTargets, Skeleton, Turn
+from dermis.mesh.rig import BoneRotation, MorphTargets, Skeleton
 
 _BONE_ORIGINS: dict[str, tuple[str, str, float]] = {  # two joints, and the position between them, 0 to 1
     "spine": ("neck", "neck", 0.0),
@@ -35,10 +35,10 @@ _GAZE_ANGLES = {
 """Angles of the left eye, at +X, about x, y and z [degrees]; of the right eye with the opposite sign of y."""
 
 
-def gaze_turns() -> tuple[Turn, ...]:
+def gaze_turns() -> tuple[BoneRotation, ...]:
     """Return the rotations of the eyes that belong to the eyeLook targets of ARKit."""
     return tuple(
-        Turn(f"eyeLook{direction}{name}", f"eye.{name[0]}", (x, side * y, z))
+        BoneRotation(f"eyeLook{direction}{name}", f"eye.{name[0]}", (x, side * y, z))
         for name, side in (("Left", 1.0), ("Right", -1.0))
         for direction, (x, y, z) in _GAZE_ANGLES.items()
     )

@@ -29,7 +29,7 @@ from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.mesh.subdivide import levels_of
+from dermis.mesh.subdivide import resolve_levels
 
 _MAX_SEED = 2**32 - 1
 _MIN_BEARD_SHADOW = 0.6  # shadow of shaved hair below a beard
@@ -98,7 +98,8 @@ def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
         "targets": {**dict(_sample_targets(rng)), **given.get("targets", {})},
     }
     fields |= dict(zip(_ANCESTRY, map(float, ancestry), strict=True)) | macro
-    demographics = Demographics(*ancestry, fields["sex"], fields["age"])
+    african, asian, caucasian = ancestry
+    demographics = Demographics(african, asian, caucasian, fields["sex"], fields["age"])
     skin, eyes = sample_skin(rng, demographics), sample_eyes(rng, demographics)
     brown, red = _sample_hair_pigments(np.random.default_rng((int(seed), 1)), ancestry)
     colour = {"hair_eumelanin": brown, "hair_pheomelanin": red} | macro
@@ -337,7 +338,7 @@ class Human:
         checked_number("hairs", hairs, _MIN_HAIR_FRACTION, 1.0)
         painted = maps or PaintedMaps(look=self.look)
         control_head = build_head(self.weights(), painted, layout, self.iris)
-        shared = template(layout, levels_of(control_head, subdivide))
+        shared = template(layout, resolve_levels(control_head, subdivide))
         head = shared.refine_head(control_head)
         return add_hair(head, control_head, shared.root_finder, self.hairdo, self.look.recession, hairs)
 

@@ -21,7 +21,7 @@ from dermis.human.makehuman import check_targets
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import EyePictures
+from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
 
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
@@ -84,7 +84,7 @@ def write_person_glb(
     *,
     roughness: float,
     weights: Mapping[str, float] | None = None,
-    eyes: EyePictures | None = None,
+    eyes: EyeTextures | None = None,
 ) -> int:
     """Write a person's head as a .glb file in an atomic write, and return the size of the file [byte].
 

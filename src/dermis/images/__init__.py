@@ -1,1 +1,1 @@
-"""Pictures: pixels read and written, colour spaces, filters and movies."""
+"""Pictures: reading and writing of files, colour spaces, filters and movies."""

@@ -1,4 +1,4 @@
-"""Pixels of PNG, JPEG and TIFF files from their bytes, and PNG files of pixels, with all bits kept."""
+"""Decoding of PNG, JPEG and TIFF files with all bits of their pixels, and encoding of PNG files."""
 
 from __future__ import annotations
 
@@ -23,13 +23,15 @@ Pixels = Bytes | NDArray[np.uint16] | Floats
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PILLOW_SIGNATURES = (PNG_SIGNATURE, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_PNG_KINDS = {1: 0, 3: 2, 4: 6}  # by channels
-_UP_FILTER = 2  # PNG's number for differences from the row above
+_PNG_COLOUR_TYPES = {1: 0, 3: 2, 4: 6}  # by number of channels
+_UP_FILTER = 2  # number of PNG's filter that stores differences from the row above
 
 _PILLOW_LOCK = threading.Lock()
 _STRIP_PIXELS = 1 << 20  # pixels converted at a time
 _JPEG_SCAN = b"\xff\xda"
-_MAX_SCANNED_PIXELS = 1 << 30  # pixels in all scans of a progressive JPEG: sixteen scans of the largest
+_MAX_SCANNED_PIXELS = (
+    1 << 30
+)  # pixels in all scans of a progressive JPEG: sixteen scans of the largest picture
 _CHANNELS_OF_16_BIT = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}
 _MODES: dict[str, tuple[str, type[np.generic]]] = {
     "1": ("L", np.uint8),
@@ -44,29 +46,29 @@ _MODES: dict[str, tuple[str, type[np.generic]]] = {
     "I;16B": ("I;16B", np.uint16),
     "F": ("F", np.float32),
 }
-"""What each of Pillow's kinds of pixel becomes."""
-_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG's kinds of colour
+"""Pillow's mode and the NumPy type of the result by Pillow's mode of the file."""
+_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG colour type
 
 
 def decode_with_pillow(data: bytes) -> Pixels:
-    """(H, W) or (H, W, 3 or 4) of a PNG, JPEG or TIFF file, with all bits of its pixels.
+    """Decode a PNG, JPEG or TIFF file to (H, W) or (H, W, 3 or 4) with all bits of its pixels.
 
-    data : the whole file
-    ValueError, OSError and others : the data are damaged, too large, or hold pixels of another kind
+    Raises ValueError, OSError and other errors when the data are damaged, too large or of an unsupported
+    kind.
     """
     picture = _open_checked(data)
-    deep = _format_of_16_bit(data, picture)
-    if deep:
-        plain = decode_up_filtered_png(data)
-        return _decode_16_bit(data, deep, picture) if plain is None else plain
+    pixel_format = _format_of_16_bit(data, picture)
+    if pixel_format:
+        image = decode_up_filtered_png(data)
+        return _decode_16_bit(data, pixel_format, picture) if image is None else image
     if picture.mode not in _MODES:
         raise ValueError(f"its pixels are of kind {picture.mode}, not 8 or 16 bit grey, RGB or RGBA")
-    mode, kind = _MODES[picture.mode]
+    mode, dtype = _MODES[picture.mode]
     if picture.mode == "P" and "transparency" in picture.info:
         mode = "RGBA"
     picture.load()
     channels = {"RGB": 3, "RGBA": 4}.get(mode, 1)
-    image = np.empty((picture.height, picture.width, channels), kind)
+    image = np.empty((picture.height, picture.width, channels), dtype)
     for rows in strips(image):
         strip = picture.crop((0, rows.start, picture.width, rows.stop))
         strip = strip if strip.mode == mode else strip.convert(mode)
@@ -75,24 +77,24 @@ def decode_with_pillow(data: bytes) -> Pixels:
 
 
 def pillow_size(data: bytes) -> tuple[int, int]:
-    """Width and height of a PNG, JPEG or TIFF file by its header."""
+    """Return width and height of a PNG, JPEG or TIFF file from its header."""
     picture = _open_header(data)
     return check_size(picture.width, picture.height)
 
 
 def strips(image: Numbers) -> Iterator[slice]:
-    """Rows of a picture, some at a time: enough for whole arrays to be fast, too few to fill the memory."""
+    """Yield slices of rows that are large enough for fast array operations and small in memory."""
     rows = max(1, _STRIP_PIXELS // max(1, image.shape[1]))
     for top in range(0, len(image), rows):
         yield slice(top, min(top + rows, len(image)))
 
 
 def _open_checked(data: bytes) -> Image:
-    """The picture opened by Pillow: its header is read and its size accepted."""
+    """Open a picture with Pillow after checking its header and its size."""
     picture = _open_header(data)
     check_size(picture.width, picture.height)
     if picture.format == "PNG":
-        _open_header(data).verify()  # the checksums, which Pillow leaves out when it decodes
+        _open_header(data).verify()  # the checksums, which Pillow does not check when it decodes
     if (
         picture.format == "JPEG"
         and data.count(_JPEG_SCAN) * picture.width * picture.height > _MAX_SCANNED_PIXELS
@@ -104,7 +106,7 @@ def _open_checked(data: bytes) -> Image:
 def _open_header(data: bytes) -> Image:
     import PIL.Image
 
-    with _PILLOW_LOCK:  # Pillow's own limit is a global, and other than ours
+    with _PILLOW_LOCK:  # Pillow's own limit is a global variable and differs
         limit, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
         try:
             return PIL.Image.open(io.BytesIO(data), formats=("PNG", "JPEG", "TIFF"))
@@ -115,7 +117,7 @@ def _open_header(data: bytes) -> Image:
 
 
 def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
-    """FFmpeg's name of the pixel format where Pillow would drop the lower 8 of 16 bits, else None."""
+    """Return FFmpeg's name of the pixel format if Pillow would drop the lower 8 of 16 bits, else None."""
     if data.startswith(PNG_SIGNATURE):
         depth, kind = data[24], data[25]
         return {0: "gray16", 2: "rgb48", 4: "ya16", 6: "rgba64"}[kind] if depth == 16 else None
@@ -125,8 +127,8 @@ def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
 
 def _decode_16_bit(data: bytes, pixel_format: str, picture: Image) -> NDArray[np.uint16]:
     av = import_extra("av", "a picture with 16 bits of colour")
-    # bytes, not the path: FFmpeg would take a percent sign in a name for a numbered sequence; and one format,
-    # not what it guesses from them, as some of its formats open other files
+    # FFmpeg gets bytes, because it treats names with percent signs as numbered sequences, and a format,
+    # because some of the formats that it guesses open other files
     with av.open(io.BytesIO(data), format=f"{picture.format}_pipe".lower()) as container:
         container.streams.video[0].codec_context.options = {"max_pixels": str(MAX_PIXELS)}
         frame = next(container.decode(video=0))
@@ -143,15 +145,15 @@ def _decode_16_bit(data: bytes, pixel_format: str, picture: Image) -> NDArray[np
     return levels.astype(np.uint16)
 
 
-def encode_png(levels: Numbers, effort: int = 6, quick: bool = False) -> bytes:
-    """A PNG file of (H, W, 1, 3 or 4) uint8 or uint16.
+def encode_png(levels: Numbers, effort: int = 6, use_isal: bool = False) -> bytes:
+    """Encode a picture (H, W, 1, 3 or 4) of uint8 or uint16 as a PNG file.
 
-    effort : of zlib's compression, from 1 (fast) to 9 (small files)
-    quick : compress by ISA-L instead, of the extra "batch": rendered pictures and their normals take a
-        quarter of the time that zlib takes at its fastest, and the files are no larger
+    effort : level of zlib's compression, from 1 (fast) to 9 (small files)
+    use_isal : compress with ISA-L of the extra "batch", four times as fast as zlib's level 1 for rendered
+        pictures
 
-    Each row is stored as its difference from the one above: for rendered pictures the files are as small as
-    those of libraries that try every filter on every row, in a third to half of the time.
+    Each row is stored as its difference from the row above. For rendered pictures the files are as small as
+    with a choice among all filters for every row, in half of the time.
     """
     height, width, channels = levels.shape
     bits = 8 * levels.itemsize
@@ -159,9 +161,9 @@ def encode_png(levels: Numbers, effort: int = 6, quick: bool = False) -> bytes:
     filtered = np.full((height, 1 + rows.shape[1]), _UP_FILTER, np.uint8)
     filtered[0, 1:] = rows[0]
     np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
-    header = struct.pack(">IIBBBBB", width, height, bits, _PNG_KINDS[channels], 0, 0, 0)
-    packer, strength = (import_extra("isal.isal_zlib", "a data set"), 1) if quick else (zlib, effort)
-    pixels = packer.compress(filtered.data, strength)  # releases the GIL
+    header = struct.pack(">IIBBBBB", width, height, bits, _PNG_COLOUR_TYPES[channels], 0, 0, 0)
+    library, level = (import_extra("isal.isal_zlib", "a data set"), 1) if use_isal else (zlib, effort)
+    pixels = library.compress(filtered.data, level)  # releases the GIL
     return PNG_SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", pixels) + _chunk(b"IEND", b"")
 
 
@@ -170,9 +172,9 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def png_size(data: bytes) -> tuple[int, int]:
-    """Width and height of a PNG file whose bytes are all there, by its checksums; pixels are not decoded.
+    """Return width and height of a PNG file after checking that it is complete; pixels are not decoded.
 
-    ValueError : it is another file, cut off or damaged
+    Raises ValueError when it is another file, truncated or damaged.
     """
     if not data.startswith(PNG_SIGNATURE):
         raise ValueError("its first bytes are not those of PNG")
@@ -183,29 +185,30 @@ def png_size(data: bytes) -> tuple[int, int]:
 
 
 def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
-    """(H, W, 1, 3 or 4) uint8 or uint16; None for PNG files of other forms, and for other files.
+    """Decode a PNG file written by `encode_png` to (H, W, 1, 3 or 4) uint8 or uint16.
 
-    data : of which the checksums are tested
-    ValueError : it is damaged, or too large
+    The result is None for PNG files with other filters and for other files.
+
+    Raises ValueError when the file is damaged or too large.
     """
     if not data.startswith(PNG_SIGNATURE) or len(data) < 33:
         return None
-    width, height, bits, colour, *how = struct.unpack_from(">IIBBBBB", data, 16)
-    if bits not in (8, 16) or colour not in _CHANNELS or how != [0, 0, 0]:
+    width, height, bits, colour, *methods = struct.unpack_from(">IIBBBBB", data, 16)
+    if bits not in (8, 16) or colour not in _CHANNELS or methods != [0, 0, 0]:
         return None
     check_size(width, height)
     channels = _CHANNELS[colour]
     step = 1 + width * channels * bits // 8
-    packed = _compressed_pixels(data)
-    if packed is None:
+    compressed = _compressed_pixels(data)
+    if compressed is None:
         return None
-    unpacker = zlib.decompressobj()
+    decompressor = zlib.decompressobj()
     try:
-        stored = unpacker.decompress(packed, height * step + 1)
+        stored = decompressor.decompress(compressed, height * step + 1)
     except zlib.error as fault:
         raise ValueError("its pixels are damaged") from fault
     if len(stored) != height * step:
-        raise ValueError("its pixels are cut off, or more than it says")
+        raise ValueError("its pixels are truncated, or there are too many")
     rows = np.frombuffer(stored, np.uint8).reshape(height, step)
     if (rows[:, 0] != _UP_FILTER).any():
         return None
@@ -215,28 +218,28 @@ def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
 
 
 def _compressed_pixels(data: bytes) -> bytes | None:
-    """The compressed pixels; None where other parts that change them are there."""
-    packed = list[memoryview]()
-    for kind, part in png_chunks(data):
+    """Return the compressed pixels, or None if other chunks change their meaning."""
+    parts = list[memoryview]()
+    for kind, content in png_chunks(data):
         if kind == b"tRNS":
             return None
         if kind == b"IDAT":
-            packed.append(part)
-    return b"".join(packed)
+            parts.append(content)
+    return b"".join(parts)
 
 
 def png_chunks(data: bytes) -> Iterator[tuple[bytes, memoryview]]:
-    """Kind and content of each part of a PNG file up to its end, by their checksums.
+    """Yield kind and content of each chunk of a PNG file after checking its checksum.
 
-    ValueError : it is cut off or damaged
+    Raises ValueError when the file is truncated or damaged.
     """
-    view, place, kind = memoryview(data), len(PNG_SIGNATURE), b""
+    view, offset, kind = memoryview(data), len(PNG_SIGNATURE), b""
     while kind != b"IEND":
-        if place + 12 > len(data):
-            raise ValueError("it is cut off")
-        (length,), kind = struct.unpack_from(">I", data, place), data[place + 4 : place + 8]
-        end = place + 8 + length
-        if data[end : end + 4] != struct.pack(">I", zlib.crc32(view[place + 4 : end])):
-            raise ValueError(f"its part {kind!r} is damaged")
-        yield kind, view[place + 8 : end]
-        place = end + 4
+        if offset + 12 > len(data):
+            raise ValueError("it is truncated")
+        (length,), kind = struct.unpack_from(">I", data, offset), data[offset + 4 : offset + 8]
+        end = offset + 8 + length
+        if data[end : end + 4] != struct.pack(">I", zlib.crc32(view[offset + 4 : end])):
+            raise ValueError(f"its chunk {kind!r} is damaged")
+        yield kind, view[offset + 8 : end]
+        offset = end + 4

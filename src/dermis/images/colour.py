@@ -1,4 +1,4 @@
-"""Linear Rec. 709 colours: the sRGB curve, luminance, and CIEDE2000."""
+"""Colours in linear Rec. 709: conversion from and to sRGB, luminance and CIEDE2000."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)
 _XYZ_OF_REC709 = np.array(
     [[0.4123908, 0.3575843, 0.1804808], [0.2126390, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]]
 )
-_WHITE = _XYZ_OF_REC709.sum(axis=1)
-_EDGE = 6.0 / 29.0
+_WHITE_XYZ = _XYZ_OF_REC709.sum(axis=1)
+_DELTA = 6.0 / 29.0  # of the CIELAB function
 
 
 def encode_srgb(linear: ArrayLike) -> NDArray[np.floating]:
-    """sRGB values [-] of linear ones by the exact piecewise curve, neither clipped nor rounded.
+    """Return sRGB values of linear values by the exact piecewise curve, neither clipped nor rounded [-].
 
-    linear : any shape; float32 stays float32, everything else becomes float64
+    linear : any shape; float32 stays float32, all other types become float64
     """
     value = _as_float(linear)
-    # The power branch is computed everywhere: clamp it where the linear segment is taken.
+    # The power branch is computed everywhere, so its argument is clamped where the linear branch is used.
     curve = 1.055 * np.maximum(value, 0.0031308) ** (1 / 2.4) - 0.055
     return np.asarray(np.where(value <= 0.0031308, 12.92 * value, curve))
 
 
 def decode_srgb(encoded: ArrayLike) -> NDArray[np.floating]:
-    """Linear values [-] of sRGB ones in 0..1 by the exact piecewise curve, not clipped.
+    """Return linear values of sRGB values by the exact piecewise curve, not clipped [-].
 
-    encoded : any shape; float32 stays float32, everything else becomes float64
+    encoded : any shape; float32 stays float32, all other types become float64
     """
     value = _as_float(encoded)
     curve = ((np.maximum(value, 0.04045) + 0.055) / 1.055) ** 2.4
@@ -39,21 +39,21 @@ def decode_srgb(encoded: ArrayLike) -> NDArray[np.floating]:
 
 
 def encode_srgb8(linear: ArrayLike) -> Bytes:
-    """Grey levels 0..255 of linear values, rounded to nearest.
+    """Return 8-bit sRGB levels of linear values, rounded to nearest.
 
-    linear : any shape; clipped to 0..1, NaN becomes 0
+    linear : any shape; clipped to [0, 1], NaN becomes 0
     """
     value = np.clip(np.nan_to_num(_as_float(linear), nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
     return np.asarray(np.rint(encode_srgb(value) * 255.0).astype(np.uint8))
 
 
 def decode_srgb_levels(levels: Bytes | NDArray[np.uint16]) -> Floats:
-    """Linear values [-] of 8- or 16-bit sRGB grey levels of any shape, read from a table."""
-    return _linear_of_level(np.iinfo(levels.dtype).max + 1)[levels]
+    """Return linear values of 8- or 16-bit sRGB levels of any shape, by table lookup [-]."""
+    return _linear_by_level(np.iinfo(levels.dtype).max + 1)[levels]
 
 
 def luminance(linear: ArrayLike) -> NDArray[np.floating]:
-    """Relative luminance Y [-] of linear Rec. 709 colours.
+    """Return the relative luminance Y of linear Rec. 709 colours [-].
 
     linear : (..., 3) or (..., 4), whose alpha is ignored
     """
@@ -62,7 +62,7 @@ def luminance(linear: ArrayLike) -> NDArray[np.floating]:
 
 
 @lru_cache(maxsize=2)
-def _linear_of_level(count: int) -> Floats:
+def _linear_by_level(count: int) -> Floats:
     table = decode_srgb(np.arange(count) / (count - 1)).astype(np.float32)
     table.flags.writeable = False
     return table
@@ -74,43 +74,43 @@ def _as_float(values: ArrayLike) -> NDArray[np.floating]:
 
 
 def lab(linear: ArrayLike) -> Doubles:
-    """CIE L*a*b* (..., 3) under D65 of linear Rec. 709 colours (..., 3)."""
-    t = np.asarray(linear, np.float64) @ _XYZ_OF_REC709.T / _WHITE
-    f = np.where(t > _EDGE**3, np.cbrt(t), t / (3.0 * _EDGE**2) + 4.0 / 29.0)
+    """Return CIE L*a*b* (..., 3) under D65 of linear Rec. 709 colours (..., 3)."""
+    t = np.asarray(linear, np.float64) @ _XYZ_OF_REC709.T / _WHITE_XYZ
+    f = np.where(t > _DELTA**3, np.cbrt(t), t / (3.0 * _DELTA**2) + 4.0 / 29.0)
     X, Y, Z = np.moveaxis(f, -1, 0)
     return np.stack([116.0 * Y - 16.0, 500.0 * (X - Y), 200.0 * (Y - Z)], axis=-1)
 
 
 def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Doubles:
-    """CIEDE2000 (...) between linear Rec. 709 colours (..., 3); 1 is just seen side by side.
+    """Return the CIEDE2000 difference (...) of linear Rec. 709 colours (..., 3); 1 is just noticeable.
 
     Source: [Sharma2005].
     """
     (L1, a1, b1), (L2, a2, b2) = (np.moveaxis(lab(one), -1, 0) for one in (first, second))
     mean_chroma = 0.5 * (np.hypot(a1, b1) + np.hypot(a2, b2))
-    stretch = 1.5 - 0.5 * _seventh(mean_chroma)
+    stretch = 1.5 - 0.5 * _chroma_term(mean_chroma)
     C1, C2 = np.hypot(stretch * a1, b1), np.hypot(stretch * a2, b2)
     h1, h2 = (np.degrees(np.arctan2(b, stretch * a)) % 360.0 for a, b in ((a1, b1), (a2, b2)))
     grey = C1 * C2 == 0.0
     turn = np.where(grey, 0.0, (h2 - h1 + 180.0) % 360.0 - 180.0)
-    apart = np.abs(h1 - h2) > 180.0
+    wraps = np.abs(h1 - h2) > 180.0
     hue = np.where(
-        grey, h1 + h2, 0.5 * (h1 + h2) + np.where(apart, np.where(h1 + h2 < 360.0, 180.0, -180.0), 0.0)
+        grey, h1 + h2, 0.5 * (h1 + h2) + np.where(wraps, np.where(h1 + h2 < 360.0, 180.0, -180.0), 0.0)
     )
     L, C = 0.5 * (L1 + L2), 0.5 * (C1 + C2)
     lightness = (L2 - L1) / (1.0 + 0.015 * (L - 50.0) ** 2 / np.sqrt(20.0 + (L - 50.0) ** 2))
     chroma = (C2 - C1) / (1.0 + 0.045 * C)
     tint = 2.0 * np.sqrt(C1 * C2) * np.sin(np.radians(turn / 2.0)) / (1.0 + 0.015 * C * _hue_weight(hue))
-    rotation = -np.sin(np.radians(60.0 * np.exp(-(((hue - 275.0) / 25.0) ** 2)))) * 2.0 * _seventh(C)
+    rotation = -np.sin(np.radians(60.0 * np.exp(-(((hue - 275.0) / 25.0) ** 2)))) * 2.0 * _chroma_term(C)
     return np.asarray(np.sqrt(lightness**2 + chroma**2 + tint**2 + rotation * chroma * tint))
 
 
-def _seventh(chroma: Doubles) -> Doubles:
+def _chroma_term(chroma: Doubles) -> Doubles:
     return np.asarray(np.sqrt(chroma**7 / (chroma**7 + 25.0**7)))
 
 
 def _hue_weight(hue: Doubles) -> Doubles:
     terms = ((-0.17, 1.0, -30.0), (0.24, 2.0, 0.0), (0.32, 3.0, 6.0), (-0.20, 4.0, -63.0))
     return np.asarray(
-        1.0 + sum(share * np.cos(np.radians(times * hue + shift)) for share, times, shift in terms)
+        1.0 + sum(weight * np.cos(np.radians(factor * hue + shift)) for weight, factor, shift in terms)
     )

@@ -7,16 +7,16 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Floats
 
-_STRIP = 16  # rows filtered at a time, which stay in the cache
+_STRIP = 16  # rows filtered at a time, which fit into the processor cache
 
 
 def mip_chain(image: NDArray[np.floating]) -> list[Floats]:
-    """The picture and its mip levels down to one texel, each the mean of the one before.
+    """Return a picture and its mip levels down to one texel, each averaged from the one before.
 
     image : (H, W, C) or (H, W), linear values; level k has max(1, H >> k) x max(1, W >> k) texels
 
-    An even side is averaged in pairs. An odd side of 2m + 1 texels goes to m texels, each as wide as
-    2 + 1/m of the old ones: three taps whose weights are the overlaps.
+    Even sides are averaged in pairs. An odd side of 2m + 1 texels becomes m texels, each the mean of 2 + 1/m
+    old texels: three taps weighted by overlap.
     """
     levels = [np.asarray(image, np.float32)]
     while max(levels[-1].shape[:2]) > 1:
@@ -40,11 +40,11 @@ def _halve_axis(image: Floats, axis: int) -> Floats:
 
 
 def smooth_quantisation(height: NDArray[np.floating]) -> Floats:
-    """A height map smoothed by 1.2 texels, since 8-bit steps would show as contour lines.
+    """Smooth a height map by 1.2 texels, because 8-bit steps would be visible as contour lines.
 
     height : (H, W) in any unit
 
-    Six sums of two neighbours along each axis: binomial weights of seven texels.
+    The filter is binomial over seven texels along each axis.
     """
     plain = np.asarray(height, np.float32)
     padded, smooth = np.pad(plain, 3, "edge"), np.empty_like(plain)

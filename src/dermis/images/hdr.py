@@ -1,4 +1,4 @@
-"""Pictures of linear light, OpenEXR and Radiance: headers are checked before pixels are decoded."""
+"""OpenEXR and Radiance files; headers are checked before pixels are decoded."""
 
 from __future__ import annotations
 
@@ -15,38 +15,37 @@ from dermis.images.sizes import MAX_PIXELS, TooLargeError, check_size
 
 EXR_SIGNATURE = b"\x76\x2f\x31\x01"
 _CHANNELS = ("RGBA", "RGB", "Y")
-_NAMES = {1: "Y", 3: "RGB"}  # by channels
-_MAX_SAMPLES = 3 * MAX_PIXELS  # in all channels of all parts: the library decodes all of them
+_NAMES = {1: "Y", 3: "RGB"}  # by number of channels
+_MAX_SAMPLES = 3 * MAX_PIXELS  # in all channels of all parts, because the library decodes all of them
 _MAX_CHANNELS = 1024
 RADIANCE_SIGNATURE = b"#?"
 _MAX_HEADER = 1 << 16
 _STRIP = 1 << 18  # pixels decoded at a time
-_MAX_LITERAL = 128  # bytes that are not repeated; a larger number is that of a run
+_MAX_LITERAL = 128  # codes up to this count literal bytes, larger codes are runs
 _COUNT = [k if k <= _MAX_LITERAL else k - _MAX_LITERAL for k in range(256)]
 _STEP = [k + 1 if k <= _MAX_LITERAL else 2 for k in range(256)]
 
 
 def decode_exr(data: bytes) -> Floats:
-    """(H, W, 1, 3 or 4) of the channels Y, RGB or RGBA of an OpenEXR file.
+    """Decode the channels Y, RGB or RGBA of an OpenEXR file to (H, W, 1, 3 or 4).
 
-    data : the whole file
-    ValueError : there are no such channels, they are too large, or the data are damaged
+    Raises ValueError when there are no such channels, and for files that are too large or damaged.
     """
     import OpenEXR
 
     names = _check_exr_header(_exr_header(data))
     file = OpenEXR.File(io.BytesIO(data), separate_channels=True)
     if not file.parts:
-        raise ValueError("its pixels are cut off or damaged")
+        raise ValueError("its pixels are truncated or damaged")
     channels = file.channels()
     image = np.empty((*channels[names[0]].pixels.shape, len(names)), np.float32)
-    for place, name in enumerate(names):
-        image[..., place] = channels[name].pixels
+    for index, name in enumerate(names):
+        image[..., index] = channels[name].pixels
     return image
 
 
 def exr_size(data: bytes) -> tuple[int, int]:
-    """Width and height of an OpenEXR file whose header is judged; pixels are not decoded."""
+    """Return width and height of an OpenEXR file after checking its header; pixels are not decoded."""
     file = _exr_header(data)
     _check_exr_header(file)
     return _window_size(file.parts[0].header["dataWindow"])
@@ -59,31 +58,31 @@ def _exr_header(data: bytes) -> Any:
 
 
 def _check_exr_header(file: Any) -> str:
-    """The names of the channels to take, where all that the library decodes with them is no more than may be.
+    """Return the names of the channels to decode after checking the size of everything that is decoded.
 
-    file : opened for its header alone
+    file : opened with its header only
     """
-    numbers = 0
+    samples = 0
     for part in file.parts:
         width, height = _window_size(part.header["dataWindow"])
         check_size(width, height)
         if "deep" in str(part.header.get("type", "")).lower():
-            raise ValueError("it holds deep samples, not pixels")
+            raise ValueError("it has deep samples, not pixels")
         tiles = part.header.get("tiles")
         if tiles is not None:
             check_size(tiles.xSize, tiles.ySize)
-        numbers += width * height * len(part.header["channels"])
+        samples += width * height * len(part.header["channels"])
     if not file.parts:
-        raise ValueError("its header is cut off or damaged")
-    if numbers > _MAX_SAMPLES:
-        raise TooLargeError(f"all its channels have {numbers / 1e6:.0f} million numbers")
+        raise ValueError("its header is truncated or damaged")
+    if samples > _MAX_SAMPLES:
+        raise TooLargeError(f"all its channels have {samples / 1e6:.0f} million numbers")
     channels = {channel.name: channel for channel in file.parts[0].header["channels"]}
     names = next((names for names in _CHANNELS if set(names) <= channels.keys()), None)
     if names is None or len(channels) > _MAX_CHANNELS:
-        told = ", ".join(sorted(channels)[:20])
-        raise ValueError(f"it has channels {told}, not R, G, B or Y")
+        listed = ", ".join(sorted(channels)[:20])
+        raise ValueError(f"it has channels {listed}, not R, G, B or Y")
     if any((channels[name].xSampling, channels[name].ySampling) != (1, 1) for name in names):
-        raise ValueError("its channels are of several sizes")
+        raise ValueError("its channels have different sizes")
     return names
 
 
@@ -93,9 +92,9 @@ def _window_size(window: Any) -> tuple[int, int]:
 
 
 def encode_exr(picture: NDArray[np.floating]) -> bytes:
-    """An OpenEXR file of (H, W, 1 or 3) float16 or float32, as the channels Y or R, G, B.
+    """Encode a picture (H, W, 1 or 3) of float16 or float32 as an OpenEXR file with channels Y or R, G, B.
 
-    Runs of equal bytes alone are compressed: pictures with noise pack no better otherwise, and slower.
+    Only runs of equal bytes are compressed: for noisy pictures other methods are slower and no smaller.
     """
     import OpenEXR
 
@@ -109,36 +108,37 @@ def encode_exr(picture: NDArray[np.floating]) -> bytes:
 
 
 def decode_radiance(data: bytes) -> Floats:
-    """Linear radiance (H, W, 3) of the bytes of a .hdr file, divided by its EXPOSURE.
+    """Decode a .hdr file to linear radiance (H, W, 3), divided by its EXPOSURE.
 
-    data : the whole file, in the top-down left-to-right order that programs write
-    ValueError : the data are cut off, damaged, or in another order or colour space
+    Rows have to be top-down and pixels left to right, as programs write them. FFmpeg is not used because it
+    accepts truncated files.
 
-    Ours rather than FFmpeg's, which accepts a file that lacks its last bytes.
+    Raises ValueError for files that are truncated, damaged, or in another order or colour space.
     """
-    height, width, exposure, at = _radiance_header(data)
-    coded = data[at : at + 4] == _scanline_marker(width) and 8 <= width < 32768
-    if len(data) - at < height * (4 if coded else 4 * width):
-        raise ValueError("it ends in the middle")
+    height, width, exposure, offset = _radiance_header(data)
+    compressed = data[offset : offset + 4] == _scanline_marker(width) and 8 <= width < 32768
+    if len(data) - offset < height * (4 if compressed else 4 * width):
+        raise ValueError("it is truncated")
     radiance = np.empty((height, width, 3), np.float32)
     rows = max(1, _STRIP // width)
     for top in range(0, height, rows):
         strip = radiance[top : top + rows]
-        rgbe, at = (_decode_runs if coded else _decode_flat)(data, at, len(strip), width)
-        # A mantissa byte counts 1/256 of 2^(E - 128); E = 0 means black, and 2^-136 is black in any case.
+        decode = _decode_runs if compressed else _decode_flat
+        rgbe, offset = decode(data, offset, len(strip), width)
+        # A mantissa byte is in units of 1/256 of 2^(E - 128); E = 0 means black, and 2^-136 is black as well.
         scale = np.ldexp(np.float32(1 / exposure), rgbe[..., 3].astype(np.int32) - 136)
         np.multiply(rgbe[..., :3], scale[..., None], out=strip)
     return radiance
 
 
 def radiance_size(data: bytes) -> tuple[int, int]:
-    """Width and height of a .hdr file by its header."""
+    """Return width and height of a .hdr file from its header."""
     height, width, _, _ = _radiance_header(data)
     return width, height
 
 
 def _radiance_header(data: bytes) -> tuple[int, int, float, int]:
-    """(height, width, exposure, where the pixels begin)."""
+    """Return height, width, exposure and the offset of the pixels."""
     found = re.search(rb"\n\n-Y (\d{1,9}) \+X (\d{1,9})\n", data[:_MAX_HEADER])
     if not found:
         raise ValueError("its header has no size of the form -Y height +X width")
@@ -154,38 +154,38 @@ def _radiance_header(data: bytes) -> tuple[int, int, float, int]:
 
 
 def _scanline_marker(width: int) -> bytes:
-    """What a coded scanline begins with."""
+    """Return the first bytes of a run-length encoded scanline."""
     return bytes((2, 2, width >> 8 & 255, width & 255))
 
 
-def _decode_runs(data: bytes, at: int, height: int, width: int) -> tuple[Bytes, int]:
-    """(H, W, 4) bytes of scanlines, and where the next begins: runs are found one by one, filled at once."""
+def _decode_runs(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
+    """Decode run-length encoded scanlines to (H, W, 4) bytes, and return the offset of the next scanline."""
     starts: list[int] = []
-    mark, add = _scanline_marker(width), starts.append
+    marker, append = _scanline_marker(width), starts.append
     for _ in range(height):
-        if data[at : at + 4] != mark:
-            raise ValueError("a scanline does not begin as it should")
-        at += 4
+        if data[offset : offset + 4] != marker:
+            raise ValueError("a scanline has an invalid start")
+        offset += 4
         for _ in range(4):
             x = 0
             try:
                 while x < width:
-                    code = data[at]
-                    add(at)
+                    code = data[offset]
+                    append(offset)
                     x += _COUNT[code]
-                    at += _STEP[code]
+                    offset += _STEP[code]
             except IndexError:
-                raise ValueError("it ends in the middle") from None
+                raise ValueError("it is truncated") from None
             if x != width:
                 raise ValueError("a run is longer than its scanline")
-    if at > len(data):
-        raise ValueError("it ends in the middle")
+    if offset > len(data):
+        raise ValueError("it is truncated")
     planes = _expand_runs(np.frombuffer(data, np.uint8), np.array(starts)).reshape(height, 4, width)
-    return planes.transpose(0, 2, 1), at
+    return planes.transpose(0, 2, 1), offset
 
 
 def _expand_runs(data: Bytes, starts: Index) -> Bytes:
-    """The bytes that runs stand for; starts : (n,) where each begins in the data."""
+    """Return the bytes encoded by runs that start at offsets (n,)."""
     code = data[starts]
     count = np.array(_COUNT)[code]
     if not count.all():
@@ -195,9 +195,9 @@ def _expand_runs(data: Bytes, starts: Index) -> Bytes:
     return np.asarray(data[first + within * np.repeat(code <= _MAX_LITERAL, count)])
 
 
-def _decode_flat(data: bytes, at: int, height: int, width: int) -> tuple[Bytes, int]:
-    pixels = np.frombuffer(data, np.uint8, height * width * 4, at).reshape(height, width, 4)
-    # (1, 1, 1, n) repeats a pixel in files from before 1991; no program of today writes it.
+def _decode_flat(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
+    pixels = np.frombuffer(data, np.uint8, height * width * 4, offset).reshape(height, width, 4)
+    # (1, 1, 1, n) repeats a pixel in the format of before 1991, which current programs do not write.
     if np.any(np.all(pixels[..., :3] == 1, axis=-1)):
-        raise ValueError("its pixels are in the old run-length code")
-    return pixels, at + pixels.size
+        raise ValueError("its pixels use the old run-length encoding")
+    return pixels, offset + pixels.size

@@ -15,32 +15,34 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base import atomic_write as outputs
+from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.errors import format_value, refuse
 from dermis.base.extras import import_extra
 from dermis.base.quantities import checked_array, checked_integer
 
 MOVIE_SUFFIX = ".mp4"
 DEFAULT_CRF = 18
-"""Constant rate factor at which rendered skin shows no blocks."""
+"""Constant rate factor at which rendered skin shows no compression artefacts."""
 _MAX_CRF, _ENCODER, _PRESET = 51, "libx264", "medium"
-_BT709, _LIMITED_RANGE = 1, 1  # H.264's numbers for primaries, transfer and matrix; for levels from 16 to 235
+_BT709, _LIMITED_RANGE = 1, 1  # H.264's codes of the colour space, and of levels from 16 to 235
 _QUEUE_LENGTH = 8
-_MAX_SIDE = 1 << 14  # along a side, as of H.264
+_MAX_SIDE = 1 << 14  # of a frame in H.264
 _NTSC = tuple(Fraction(1000 * whole, 1001) for whole in (24, 30, 48, 60, 120))
 _NTSC_TOLERANCE = Fraction(5, 1000)
-_RATE = re.compile(r"\d{1,9}(\.\d{1,20})?(/\d{1,9}|e[-+]?\d{1,2})?")  # of a few digits: exponents are powers
+_RATE = re.compile(
+    r"\d{1,9}(\.\d{1,20})?(/\d{1,9}|e[-+]?\d{1,2})?"
+)  # limits the digits, because exponents of fractions are expensive
 _MAX_RATE, _MAX_DENOMINATOR = 1000, 1001
 
 
-def parse_frame_rate(given: str | float | Fraction, culprit: object = "rate") -> Fraction:
-    """Frames a second as a ratio, since sums of rounded steps would drift.
+def parse_frame_rate(value: str | float | Fraction, culprit: object = "rate") -> Fraction:
+    """Return a frame rate as an exact fraction, because rounded frame times would drift.
 
-    given : 30, 12.5, "24000/1001"; 23.976, 29.97, 59.94 and the like mean 24000/1001 and so on
+    value : 30, 12.5, "24000/1001"; 23.976, 29.97, 59.94 and similar values mean 24000/1001 and so on
 
-    Raises DermisError for what is no rate up to 1000.
+    Raises DermisError for values that are not a rate up to 1000.
     """
-    text = str(given).strip() if isinstance(given, str | float | Fraction) else format_value(given)
+    text = str(value).strip() if isinstance(value, str | float | Fraction) else format_value(value)
     try:
         rate = Fraction(text if _RATE.fullmatch(text) else 0)
     except (ValueError, ZeroDivisionError):
@@ -48,28 +50,29 @@ def parse_frame_rate(given: str | float | Fraction, culprit: object = "rate") ->
     if not 0 < rate <= _MAX_RATE:
         expected = f"frames a second up to {_MAX_RATE}, such as 30, 23.976 or 24000/1001"
         refuse(culprit, expected, f"got {format_value(text)}", "Correct it")
-    near = min(_NTSC, key=lambda ntsc: abs(ntsc - rate))
-    rate = near if abs(near - rate) < _NTSC_TOLERANCE else rate.limit_denominator(_MAX_DENOMINATOR)
+    nearest = min(_NTSC, key=lambda ntsc: abs(ntsc - rate))
+    rate = nearest if abs(nearest - rate) < _NTSC_TOLERANCE else rate.limit_denominator(_MAX_DENOMINATOR)
     return max(rate, Fraction(1, _MAX_DENOMINATOR))
 
 
 def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF) -> Path:
-    """The path, once it is clear that such a movie can be written there: call it before a long rendering.
+    """Check that a movie can be written to a path, and return the path; call it before long work.
 
-    DermisError : the path cannot be written to, a side is odd, the factor is none, or there is no encoder
+    Raises DermisError when the path is not writable, a side is odd, the rate factor is invalid, or there is
+    no encoder.
     """
-    target = outputs.check_output(path, (MOVIE_SUFFIX,), f"Give it the suffix {MOVIE_SUFFIX}")
+    target = check_output(path, (MOVIE_SUFFIX,), f"Give it the suffix {MOVIE_SUFFIX}")
     checked_array("--size", size, (2,), 1, _MAX_SIDE, "pixels")
     if size[0] % 2 or size[1] % 2:
         even = f"{size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
         actual = f"got {size[0]}x{size[1]}"
         refuse(
             "--size",
-            f"even sides, which {MOVIE_SUFFIX} needs",
+            f"even width and height, which {MOVIE_SUFFIX} requires",
             actual,
-            f"Take {even}, or write frames/%05d.png",
+            f"Use {even}, or write frames/%05d.png",
         )
-    checked_integer("--crf", crf, 0, _MAX_CRF, f"0 without loss, {DEFAULT_CRF} as usual")
+    checked_integer("--crf", crf, 0, _MAX_CRF, f"0 is lossless, {DEFAULT_CRF} the default")
     _check_encoder(path)
     return target
 
@@ -80,24 +83,36 @@ def _check_encoder(path: str | Path) -> None:
         av.codec.Codec(_ENCODER, "w")
     except ValueError:
         advice = "Install av from PyPI (pip install av), or write frames/%05d.png"
-        refuse(path, f"FFmpeg with the encoder {_ENCODER}", "PyAV's here has none", advice)
+        refuse(path, f"FFmpeg with the encoder {_ENCODER}", "the installed PyAV lacks it", advice)
 
 
 class MovieWriter:
-    """Encodes pictures in turn on another thread; the file is there at the end, whole, or not at all.
+    """Writer of H.264 movies, which encodes on another thread and writes the file atomically.
 
-    Frame k lies at exactly k / rate. Levels are stored with BT.709's primaries and matrix, and tagged so.
+    Frame k is shown at exactly k / rate. Levels are stored and tagged with the primaries and matrix of
+    BT.709.
 
-    path : to write, .mp4
-    size : width and height of the pictures [pixel], even
-    rate : frames a second, see `parse_frame_rate`
-    crf : constant rate factor, 0 without loss to 51
+    Parameters
+    ----------
+    path : str or Path
+        File to write, .mp4.
+    size : tuple of int
+        Width and height of the frames [pixel], both even.
+    rate : str, float or Fraction, optional
+        Frames per second, such as 30, 23.976 or "24000/1001".
+    crf : int, optional
+        Constant rate factor, from 0 (lossless) to 51.
 
-    with MovieWriter("smile.mp4", (1024, 1024)) as movie:
-        for image in renderer.render_many(scenes):
-            movie.write(image)
+    Raises
+    ------
+    DermisError
+        The path is not writable, an argument is invalid, or there is no encoder.
 
-    Raises DermisError as `check_movie` does.
+    Examples
+    --------
+    >>> with MovieWriter("smile.mp4", (1024, 1024)) as movie:  # doctest: +SKIP
+    ...     for image in renderer.render_many(scenes):
+    ...         movie.write(image)
     """
 
     def __init__(
@@ -109,21 +124,23 @@ class MovieWriter:
     ) -> None:
         self.path, self.size, self.rate = check_movie(path, size, crf), size, parse_frame_rate(rate)
         self._crf, self._count = crf, 0
-        self._waiting: deque[Future[None]] = deque()
+        self._queue: deque[Future[None]] = deque()
         self._context = self._writing()
 
     def __enter__(self) -> Self:
+        """Open the movie file."""
         self._context.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Finish the movie and close the file; after an error no file is left."""
         self._context.__exit__(kind, error, trace)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        with outputs.atomic_file(self.path) as temporary:
+        with atomic_file(self.path) as temporary:
             self._open(temporary)
             try:
                 yield
@@ -148,20 +165,31 @@ class MovieWriter:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="dermis-movie")
 
     def write(self, picture: NDArray[np.generic]) -> None:
-        """Queue the next frame; waits only while the queue is full.
+        """Queue the next frame; the call blocks only while the queue is full.
 
-        picture : (H, W, 3) uint8 sRGB; do not change it afterwards
+        Parameters
+        ----------
+        picture : numpy.ndarray
+            (H, W, 3) uint8 sRGB; it must not be changed afterwards.
 
-        Raises DermisError when an earlier frame could not be written.
+        Raises
+        ------
+        DermisError
+            The picture has another shape or type, or an earlier frame could not be written.
         """
         width, height = self.size
         if picture.shape != (height, width, 3) or picture.dtype != np.uint8:
             actual = f"they have shape {picture.shape} and type {picture.dtype}"
-            refuse(self.path, f"pixels ({height}, {width}, 3) of uint8", actual, "Take the renderer's bytes")
-        self._waiting.append(self._pool.submit(self._encode, self._count, picture))
+            refuse(
+                self.path,
+                f"pixels ({height}, {width}, 3) of uint8",
+                actual,
+                "Use the renderer's sRGB picture",
+            )
+        self._queue.append(self._pool.submit(self._encode, self._count, picture))
         self._count += 1
-        while len(self._waiting) > _QUEUE_LENGTH or (self._waiting and self._waiting[0].done()):
-            self._waiting.popleft().result()
+        while len(self._queue) > _QUEUE_LENGTH or (self._queue and self._queue[0].done()):
+            self._queue.popleft().result()
 
     def _encode(self, number: int, picture: NDArray[np.generic]) -> None:
         import av
@@ -178,9 +206,9 @@ class MovieWriter:
         self._container.mux(self._stream.encode(frame))
 
     def _finish(self) -> None:
-        """Wait for all frames, and write what the encoder still holds."""
-        while self._waiting:
-            self._waiting.popleft().result()
+        """Wait for all frames, and flush the encoder."""
+        while self._queue:
+            self._queue.popleft().result()
         if self._count == 0:
-            refuse(self.path, "a movie of at least one frame", "got none", "Write one")
+            refuse(self.path, "a movie of at least one frame", "got none", "Write a frame")
         self._container.mux(self._stream.encode(None))

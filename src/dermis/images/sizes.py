@@ -1,23 +1,23 @@
-"""Largest sizes of pictures, checked in their headers before any pixel is decoded."""
+"""Limits of picture sizes, checked in headers before any pixel is decoded."""
 
 from __future__ import annotations
 
 MAX_FILE_BYTES = 256 << 20
-"""Of a picture's file."""
+"""Largest size of a picture file."""
 MAX_PIXELS = 8192**2
-"""Of a picture: a map of the largest side that a device must take, or a panorama of 11585 columns."""
+"""Largest number of pixels of a picture: a map of the largest texture size that every device supports."""
 MAX_TOTAL_PIXELS = 2 * MAX_PIXELS
-"""Of all pictures that a mesh file names."""
+"""Largest number of pixels of all pictures of one mesh file."""
 
 
 class TooLargeError(ValueError):
-    """A picture is sound, as far as its header tells, but larger than any may be."""
+    """Error of a picture that is valid but too large."""
 
 
 def check_size(width: int, height: int) -> tuple[int, int]:
-    """The size, which is one and not too large.
+    """Return width and height after checking that they are positive and not too large.
 
-    ValueError : it has no pixels; TooLargeError : it has too many
+    Raises ValueError if there are no pixels, TooLargeError if there are too many.
     """
     if width < 1 or height < 1:
         raise ValueError(f"it has {width} x {height} pixels")

@@ -11,7 +11,7 @@ from dermis.base.summary import ShortRepr
 from dermis.mesh.pose import Pose
 
 _SHOWN = 8  # names in a note
-LONGEST_S = 86_400.0
+MAX_DURATION_S = 86_400.0
 _LATEST_S = 1e9
 _SLOWEST, _FASTEST = 0.001, 1000.0
 _EARLY = 1e-6  # of a frame: how far a frame that rounding lost may lie before the end
@@ -56,7 +56,11 @@ class Clip(ShortRepr):
 
     def __post_init__(self) -> None:
         checked_number(
-            f"{self.name}: duration", self.duration_s, 0.0, LONGEST_S, "s: no motion lasts longer than a day"
+            f"{self.name}: duration",
+            self.duration_s,
+            0.0,
+            MAX_DURATION_S,
+            "s: no motion lasts longer than a day",
         )
 
     @property

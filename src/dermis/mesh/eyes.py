@@ -31,9 +31,9 @@ class Eyes(ShortRepr):
     side: Ints
     material: Ints
     look: EyeLook
-    ball_mm: Doubles = field(default_factory=lambda: np.full(2, SCLERA_MM))
-    middle_mm: Doubles = field(default_factory=lambda: np.zeros(2))
-    sight: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
+    radius_mm: Doubles = field(default_factory=lambda: np.full(2, SCLERA_MM))
+    centre_offset_mm: Doubles = field(default_factory=lambda: np.zeros(2))
+    gaze: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
 
     def frames(self, rig: Rig, motion: Motion) -> Doubles:
         """(k, 4, 4) from the head's space [mm] to each eye's own: in mm of a usual eye, z along its axis.
@@ -41,19 +41,19 @@ class Eyes(ShortRepr):
         The cornea lies in all spaces where a usual eye has it, whatever the size of the ball behind.
         """
         count = len(self.apex)
-        points = rig.some_posed(np.concatenate([self.apex, self.back, self.side]), motion)
+        points = rig.pose_points(np.concatenate([self.apex, self.back, self.side]), motion)
         apex, back, side = points.reshape(3, count, 3)
         length = np.linalg.norm(apex - back, axis=1, keepdims=True)
-        behind = (self.ball_mm - self.middle_mm)[:, None]
+        behind = (self.radius_mm - self.centre_offset_mm)[:, None]
         axis, scale = (apex - back) / length, (apex_mm() + behind) / length
-        middle = back + axis * behind / scale
-        across = side - middle
+        centre = back + axis * behind / scale
+        across = side - centre
         across -= (across * axis).sum(axis=1, keepdims=True) * axis
         across /= np.linalg.norm(across, axis=1, keepdims=True)
-        turned = np.stack([across, np.cross(axis, across), axis], axis=1) * scale[:, :, None]
+        rotation = np.stack([across, np.cross(axis, across), axis], axis=1) * scale[:, :, None]
         frames = np.zeros((count, 4, 4))
-        frames[:, :3, :3], frames[:, 3, 3] = turned, 1.0
-        frames[:, :3, 3] = -np.einsum("kij,kj->ki", turned, middle)
+        frames[:, :3, :3], frames[:, 3, 3] = rotation, 1.0
+        frames[:, :3, 3] = -np.einsum("kij,kj->ki", rotation, centre)
         return frames
 
     def with_look(self, look: EyeLook) -> Eyes:

@@ -29,7 +29,7 @@ def weld(rows: ArrayLike) -> Ints:
     return index
 
 
-def compacted(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
+def compact_vertices(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
     """Vertices that triangles (f, 3) use (n,), in order, and the triangles by numbers of these."""
     seen = np.zeros(int(triangles.max()) + 1, bool)
     seen[triangles] = True
@@ -41,10 +41,10 @@ def edges(triangles: NDArray[np.integer]) -> tuple[Index, Index, Index]:
 
     triangles : (f, 3) point indices; sides come as all 0-1, then all 1-2, then all 2-0
     """
-    return unite_sides(np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])))
+    return unique_sides(np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])))
 
 
-def unite_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
+def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
     """Unique edges (e, 2), the edge of each side (n,) and the number of sides on each edge (e,).
 
     sides : (n, 2) point indices, in either order
@@ -71,20 +71,20 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     columns, corner = np.ascontiguousarray(positions.T, np.float64), np.ascontiguousarray(triangles.T)
     a, b, c = (columns.take(one, axis=1) for one in corner)  # (3, f) each
     ab, bc, ca = b - a, c - b, a - c
-    across = crosses(ab, ca)
-    sine = np.sqrt(dots(across, across))  # of each angle, times the lengths of its sides
-    beside = [np.arctan2(sine, -dots(one, other)) for one, other in ((ca, ab), (ab, bc))]
+    across = cross_columns(ab, ca)
+    sine = np.sqrt(dot_columns(across, across))  # of each angle, times the lengths of its sides
+    beside = [np.arctan2(sine, -dot_columns(one, other)) for one, other in ((ca, ab), (ab, bc))]
     angle = np.stack([*beside, np.pi - beside[0] - beside[1]])
     angle /= np.where(sine > 0, -sine, 1.0)
     at, count = point.astype(np.intp).take(corner.ravel()), int(point.max()) + 1
     summed = np.stack([np.bincount(at, (one * angle).ravel(), count) for one in across], dtype=np.float64)
-    length = np.sqrt(dots(summed, summed))
+    length = np.sqrt(dot_columns(summed, summed))
     flat = ~(length > 0)
     length[flat], summed[:, flat] = 1.0, [[0.0], [0.0], [1.0]]
     return np.ascontiguousarray((summed / length).astype(np.float32).take(point, axis=1).T)
 
 
-def sum_at(index: NDArray[np.integer], values: Doubles, count: int) -> Doubles:
+def sum_by_index(index: NDArray[np.integer], values: Doubles, count: int) -> Doubles:
     """Sum of the rows of `values` (n, k) that carry each `index` (n,), as (count, k)."""
     columns = [np.bincount(index, weights=column, minlength=count) for column in values.T]
     return np.column_stack(columns)
@@ -130,7 +130,7 @@ def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) ->
     dpdv = (e2 * d1[:, :1] - e1 * d2[:, :1]) / cross
     corner = triangles[valid].ravel()
     rows = np.repeat(np.hstack((dpdu * weight, dpdv * weight, weight)), 3, axis=0)
-    summed = sum_at(corner, rows, len(positions))
+    summed = sum_by_index(corner, rows, len(positions))
     mean = summed[:, :6] / np.where(summed[:, 6:] > 0, summed[:, 6:], 1)
     return _with_length(mean[:, :3], mean[:, 3:], normals.astype(np.float64))
 
@@ -146,18 +146,18 @@ def _with_length(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[Floats
     return u.astype(np.float32), v.astype(np.float32)
 
 
-def halves(quads: NDArray[np.integer]) -> Index:
+def split_quads(quads: NDArray[np.integer]) -> Index:
     """(2q, 3) triangles (a, b, c) and (c, d, a) of each quad, side by side; quads : (q, 4)."""
     return np.ascontiguousarray(quads[:, [0, 1, 2, 2, 3, 0]], np.int64).reshape(-1, 3)
 
 
-def dots(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
+def dot_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
     """(..., n) of vectors (..., 3, n)."""
     x, y, z = (a[..., c, :] * b[..., c, :] for c in range(3))
     return np.asarray(x + y + z)
 
 
-def crosses(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
+def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
     """(..., 3, n) of vectors (3, n) and (..., 3, n)."""
     found: NDArray[T] = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
     for c in range(3):  # each into its place: to stack three new arrays takes ten times as long

@@ -47,7 +47,7 @@ class Head:
     def __repr__(self) -> str:
         """Name, size, maps and what moves it, on two lines."""
         maps = [one.name for one in fields(Maps) if getattr(self.maps, one.name) is not None]
-        told = [f"maps: {', '.join([*maps, *(['painted'] if self.maps.painted else [])]) or 'none'}"]
+        told = [f"maps: {', '.join([*maps, *(['painted'] if self.maps.is_painted else [])]) or 'none'}"]
         counts = {"targets": len(self.targets), "bones": len(self.bones)}
         told += [f"{count} {name}" for name, count in counts.items() if count]
         told += [name for name in ("eyes", "strands", "hair") if getattr(self, name) is not None]
@@ -80,10 +80,10 @@ class Head:
     def positions_mm(self) -> Floats:
         """(n, 3) the unique points of the mesh as it was loaded, before any subdivision [mm].
 
-        Without those of eyeballs that are not the file's own, see `Rig.carried`.
+        Without those of eyeballs that are not the file's own, see `Rig.rigid_followers`.
         """
         places = self.control.positions_mm
-        return places[: self.control.of_file] if self.control.carried else places
+        return places[: self.control.file_point_count] if self.control.rigid_followers else places
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -99,7 +99,7 @@ class Head:
     @property
     def centre_mm(self) -> tuple[float, float, float]:
         """The middle of the head itself, without neck and shoulders: scenes are placed around it [mm]."""
-        return self.mesh.skull_mm
+        return self.mesh.skull_centre_mm
 
     def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
         """The point of the surface in front of (x, y), relative to the centre [mm]."""

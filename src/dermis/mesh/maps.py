@@ -32,11 +32,11 @@ class Maps(ShortRepr):
     specular: Floats | None = None
     roughness: Floats | None = None
     region: Bytes | None = None
-    painted: ClassVar[bool] = False
+    is_painted: ClassVar[bool] = False
     """Whether the device paints those that are None."""
 
     @property
-    def rough(self) -> bool:
+    def has_roughness(self) -> bool:
         """Whether the roughness comes from a map."""
         return self.roughness is not None
 

@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike
 from dermis.base.arrays import Doubles, Floats, Ints
 from dermis.base.summary import ShortRepr
 from dermis.mesh.geometry import tangents, vertex_normals, weld
-from dermis.mesh.outline import Outline, hull
+from dermis.mesh.outline import Outline, convex_hull
 
 _CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
 
-Part = Literal["upper teeth", "lower teeth", "tongue"]
-PARTS: tuple[Part, ...] = ("upper teeth", "lower teeth", "tongue")
+MouthPart = Literal["upper teeth", "lower teeth", "tongue"]
+MOUTH_PARTS: tuple[MouthPart, ...] = ("upper teeth", "lower teeth", "tongue")
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Material:
     name: str
     kind: str = "skin"
     colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
-    part: Part | None = None
+    part: MouthPart | None = None
     eye: bool = False
 
 
@@ -78,10 +78,10 @@ class Mesh(ShortRepr):
     @cached_property
     def outline(self) -> Outline:
         """Corners of the convex hull."""
-        return hull(self.positions)
+        return convex_hull(self.positions)
 
     @cached_property
-    def skull_mm(self) -> tuple[float, float, float]:
+    def skull_centre_mm(self) -> tuple[float, float, float]:
         """The middle of a head, without neck and shoulders [mm]."""
         x, y, z = self.positions.T
         top = float(y.max())
@@ -90,7 +90,7 @@ class Mesh(ShortRepr):
         return middle_x, top - _CROWN_TO_CENTRE_MM, middle_z
 
     @cached_property
-    def layout_key(self) -> bytes:
+    def topology_key(self) -> bytes:
         """The same for all meshes that differ in where their points are alone."""
         digest = hashlib.blake2b(digest_size=16)
         for part in (self.uv, self.point, self.triangles, self.material):

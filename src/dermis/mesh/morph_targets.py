@@ -34,11 +34,11 @@ class MorphTargets(ShortRepr):
         return {name: index for index, name in enumerate(self.names)}
 
     @cached_property
-    def by_point(self) -> Intp:
+    def point_order(self) -> Intp:
         """(n,) the displacements in the order of their points, and of targets for each."""
         return np.argsort(self.point, kind="stable")
 
-    def of(self, target: int) -> slice:
+    def rows(self, target: int) -> slice:
         """Which of the displacements are a target's."""
         return slice(int(self.first[target]), int(self.first[target + 1]))
 
@@ -47,14 +47,14 @@ class MorphTargets(ShortRepr):
 
         count : of all points
         """
-        place = np.full(count, -1, np.int64)
-        place[points] = np.arange(len(points))
-        at = place.take(self.point)
-        kept = np.flatnonzero(at >= 0)
-        target = np.searchsorted(self.first, kept, side="right") - 1
-        found = np.zeros((len(self.names), len(points), 3), np.float32)
-        found[target, at.take(kept)] = self.delta_mm.take(kept, axis=0)
-        return found
+        column_of = np.full(count, -1, np.int64)
+        column_of[points] = np.arange(len(points))
+        column = column_of.take(self.point)
+        rows = np.flatnonzero(column >= 0)
+        target = np.searchsorted(self.first, rows, side="right") - 1
+        dense = np.zeros((len(self.names), len(points), 3), np.float32)
+        dense[target, column.take(rows)] = self.delta_mm.take(rows, axis=0)
+        return dense
 
 
 def no_targets() -> MorphTargets:

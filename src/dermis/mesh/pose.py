@@ -17,13 +17,13 @@ from dermis.base.summary import ShortRepr
 from dermis.mesh.rig import Motion, Rig
 from dermis.mesh.skeleton import Skeleton
 
-MOST_WEIGHT = 100.0
-MOST_DEGREES = 1e5
-FARTHEST_MM = 1e6
-_FORMS = "three angles [degrees] or a (4, 4) matrix"
-_NEAR = 3  # names that are proposed
-_LONGEST_NAME = 80  # letters that are compared
-_FLAT = 1e-9  # determinant over size cubed
+MAX_WEIGHT = 100.0
+MAX_DEGREES = 1e5
+MAX_DISTANCE_MM = 1e6
+_BONE_VALUES = "three angles [degrees] or a (4, 4) matrix"
+_SUGGESTIONS = 3  # names that are proposed
+_MAX_LETTERS = 80  # of a name, that are compared
+_MIN_DETERMINANT = 1e-9  # of a matrix, relative to its size cubed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,19 +44,19 @@ class Pose(ShortRepr):
 
     def __post_init__(self) -> None:
         for part in ("weights", "bones"):
-            if not isinstance(given := getattr(self, part), Mapping):
-                refuse(f"pose: {part}", "a mapping by name", f"got {format_value(given)}", "Correct it")
+            if not isinstance(value := getattr(self, part), Mapping):
+                refuse(f"pose: {part}", "a mapping by name", f"got {format_value(value)}", "Correct it")
 
     @classmethod
-    def of(cls, given: object) -> Pose | None:
+    def coerce(cls, value: object) -> Pose | None:
         """A pose, the pose of a plain mapping of weights, or None."""
-        if given is None or isinstance(given, Pose):
-            return given
-        if not isinstance(given, Mapping):
+        if value is None or isinstance(value, Pose):
+            return value
+        if not isinstance(value, Mapping):
             refuse(
-                "pose", "a Pose or a mapping of weights by name", f"got {format_value(given)}", "Correct it"
+                "pose", "a Pose or a mapping of weights by name", f"got {format_value(value)}", "Correct it"
             )
-        return cls(weights=given)
+        return cls(weights=value)
 
     def motion(self, rig: Rig, culprit: object = "pose") -> Motion:
         """The pose as numbers for a rig.
@@ -75,92 +75,95 @@ class Pose(ShortRepr):
             return weights
         try:
             index = rig.target_index
-            places = [index[name] for name in self.weights]
-            given = checked_array(culprit, list(self.weights.values()), (0,), -MOST_WEIGHT, MOST_WEIGHT)
+            targets = [index[name] for name in self.weights]
+            values = checked_array(culprit, list(self.weights.values()), (0,), -MAX_WEIGHT, MAX_WEIGHT)
         except (KeyError, TypeError, DermisError):
             _refuse_weights(self.weights, rig.targets.names, culprit)
-        weights[places] = given if rig.targets.rest is None else given - rig.targets.rest[places]
+        weights[targets] = values if rig.targets.rest is None else values - rig.targets.rest[targets]
         return weights
 
     def _matrices(self, rig: Rig, culprit: object) -> Floats:
-        given = self._turned(rig)
-        if not given:
+        bone_values = self._all_bones(rig)
+        if not bone_values:
             return rig.rest.matrices
         if rig.skeleton is None:
-            _refuse_name(f"{culprit}: bones", next(iter(given)), (), "bone")
+            _refuse_name(f"{culprit}: bones", next(iter(bone_values)), (), "bone")
         index = rig.skeleton.index
-        for name in given:
+        for name in bone_values:
             if name not in index:
                 _refuse_name(f"{culprit}: bones", name, index, "bone")
-        ordered = sorted((index[name], name) for name in given)
+        ordered = sorted((index[name], name) for name in bone_values)
         bones = [bone for bone, _ in ordered]
-        return rig.skeleton.moved(bones, _changes(rig.skeleton, ordered, given, culprit))
+        return rig.skeleton.moved_matrices(bones, _changes(rig.skeleton, ordered, bone_values, culprit))
 
-    def _turned(self, rig: Rig) -> Mapping[str, ArrayLike]:
+    def _all_bones(self, rig: Rig) -> Mapping[str, ArrayLike]:
         """The bones with the turns that targets make; a bone that a matrix is given for keeps to it."""
-        turning = [turn for turn in rig.turns if self.weights.get(turn.target)]
-        if not turning:
+        rotations = [one for one in rig.bone_rotations if self.weights.get(one.target)]
+        if not rotations:
             return self.bones
-        found: dict[str, Any] = dict(self.bones)
-        for target, bone, degrees in turning:
-            before = found.get(bone, (0.0, 0.0, 0.0))
+        bones: dict[str, Any] = dict(self.bones)
+        for target, bone, degrees in rotations:
+            before = bones.get(bone, (0.0, 0.0, 0.0))
             if np.shape(before) == (3,):
-                found[bone] = [a + self.weights[target] * b for a, b in zip(before, degrees, strict=True)]
-        return found
+                bones[bone] = [a + self.weights[target] * b for a, b in zip(before, degrees, strict=True)]
+        return bones
 
     def _positions(self, rig: Rig, culprit: object) -> Floats:
         if self.positions_mm is None:
             return rig.positions_mm
         try:
-            with np.errstate(over="ignore"):  # what is too large becomes infinite, and is refused below
-                places = np.ascontiguousarray(self.positions_mm, np.float32)
+            with np.errstate(over="ignore"):  # too large numbers become infinite and are refused below
+                positions = np.ascontiguousarray(self.positions_mm, np.float32)
         except (TypeError, ValueError, OverflowError):
-            places = np.zeros(0, np.float32)
-        expected = (rig.of_file, 3)
-        if places.shape != expected:
-            actual = f"got {places.shape if places.size else format_value(self.positions_mm)}"
+            positions = np.zeros(0, np.float32)
+        expected = (rig.file_point_count, 3)
+        if positions.shape != expected:
+            actual = f"got {positions.shape if positions.size else format_value(self.positions_mm)}"
             advice = "Give as many points as Head.positions_mm lists, in its order"
             refuse(f"{culprit}: positions_mm", f"an array of {expected}", actual, advice)
         with np.errstate(invalid="ignore"):
-            if not np.abs(places).max(initial=0) <= FARTHEST_MM:
-                lost = np.flatnonzero(~(np.abs(places) <= FARTHEST_MM).all(axis=1))
-                actual = f"{len(lost)} are NaN, infinite or farther, first {lost[0]}"
-                expected_mm = f"points within {FARTHEST_MM:g} mm"
+            if not np.abs(positions).max(initial=0) <= MAX_DISTANCE_MM:
+                invalid = np.flatnonzero(~(np.abs(positions) <= MAX_DISTANCE_MM).all(axis=1))
+                actual = f"{len(invalid)} are NaN, infinite or farther, first {invalid[0]}"
+                expected_mm = f"points within {MAX_DISTANCE_MM:g} mm"
                 refuse(f"{culprit}: positions_mm", expected_mm, actual, "Correct them")
-        return rig.completed(places) if rig.carried else places
+        return rig.complete_positions(positions) if rig.rigid_followers else positions
 
 
-def laid_over(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
+def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
     """Return a pose that takes what it does not state from another one."""
-    under = Pose.of(base) or Pose()
-    places = under.positions_mm if pose.positions_mm is None else pose.positions_mm
-    return Pose({**under.weights, **pose.weights}, {**under.bones, **pose.bones}, places)
+    base = Pose.coerce(base) or Pose()
+    positions = base.positions_mm if pose.positions_mm is None else pose.positions_mm
+    return Pose({**base.weights, **pose.weights}, {**base.bones, **pose.bones}, positions)
 
 
 def _changes(
-    skeleton: Skeleton, ordered: list[tuple[int, str]], given: Mapping[str, Any], culprit: object
+    skeleton: Skeleton, ordered: list[tuple[int, str]], values: Mapping[str, Any], culprit: object
 ) -> Doubles:
     """(n, 4, 4) what angles or matrices of bones do in the head's space at rest [mm]."""
     changes = np.empty((len(ordered), 4, 4))
     rows: list[list[float]] = []
-    turned: list[int] = []
-    own: list[int] = []
-    for place, (bone, name) in enumerate(ordered):
+    by_angles: list[int] = []
+    by_matrix: list[int] = []
+    for k, (bone, name) in enumerate(ordered):
         try:
-            if len(given[name]) == 3:
-                angles = checked_array(culprit, given[name], (3,), -MOST_DEGREES, MOST_DEGREES)
-                rows.append(skeleton.turned(bone, angles.tolist()))
-                turned.append(place)
+            if len(values[name]) == 3:
+                angles = checked_array(culprit, values[name], (3,), -MAX_DEGREES, MAX_DEGREES)
+                rows.append(skeleton.bone_rotation(bone, angles.tolist()))
+                by_angles.append(k)
             else:
-                changes[place] = checked_array(culprit, given[name], (4, 4), -FARTHEST_MM, FARTHEST_MM)
-                own.append(place)
+                changes[k] = checked_array(
+                    culprit, values[name], (4, 4), -MAX_DISTANCE_MM, MAX_DISTANCE_MM
+                )
+                by_matrix.append(k)
         except (TypeError, DermisError):
-            _refuse_form(f"{culprit}: bones.{name}", given[name])
-    if turned:
-        changes[turned] = np.array(rows).reshape(-1, 4, 4)
-    if own:
-        _check_matrices(changes[own], [ordered[place][1] for place in own], culprit)
-        changes[own] = skeleton.changes([ordered[place][0] for place in own], changes[own])
+            _refuse_bone_value(f"{culprit}: bones.{name}", values[name])
+    if by_angles:
+        changes[by_angles] = np.array(rows).reshape(-1, 4, 4)
+    if by_matrix:
+        _check_matrices(changes[by_matrix], [ordered[k][1] for k in by_matrix], culprit)
+        bones = [ordered[k][0] for k in by_matrix]
+        changes[by_matrix] = skeleton.head_space_changes(bones, changes[by_matrix])
     return changes
 
 
@@ -168,15 +171,15 @@ def _check_matrices(matrices: Doubles, names: list[str], culprit: object) -> Non
     """Refuse matrices that flatten what they move."""
     linear = matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
-    flat = np.abs(np.linalg.det(linear)) <= _FLAT * size**3
-    if flat.any():
-        where = f"{culprit}: bones.{names[int(flat.argmax())]}"
-        refuse(where, "a matrix that can be inverted", "this one flattens what it moves", "Correct it")
+    singular = np.abs(np.linalg.det(linear)) <= _MIN_DETERMINANT * size**3
+    if singular.any():
+        name = f"{culprit}: bones.{names[int(singular.argmax())]}"
+        refuse(name, "a matrix that can be inverted", "this one flattens what it moves", "Correct it")
 
 
-def _refuse_form(culprit: str, given: object) -> NoReturn:
-    expected = f"{_FORMS}, no angle beyond {MOST_DEGREES:g}, nothing beyond {FARTHEST_MM:g}"
-    refuse(culprit, expected, f"got {format_value(given, 80)}", "Correct it")
+def _refuse_bone_value(culprit: str, value: object) -> NoReturn:
+    expected = f"{_BONE_VALUES}, no angle beyond {MAX_DEGREES:g}, nothing beyond {MAX_DISTANCE_MM:g}"
+    refuse(culprit, expected, f"got {format_value(value, 80)}", "Correct it")
 
 
 def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culprit: object) -> NoReturn:
@@ -184,7 +187,7 @@ def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culpr
     for name, weight in weights.items():
         if name not in names:
             _refuse_name(f"{culprit}: weights", name, names, "morph target")
-        checked_number(f"{culprit}: weights.{name}", weight, -MOST_WEIGHT, MOST_WEIGHT)
+        checked_number(f"{culprit}: weights.{name}", weight, -MAX_WEIGHT, MAX_WEIGHT)
     refuse(f"{culprit}: weights", "a number for each target", "got something else", "Correct it")
 
 
@@ -195,9 +198,9 @@ def _refuse_name(culprit: str, name: object, known: Iterable[str], kind: str) ->
         actual = f"got {format_value(name)} and it has none"
         refuse(culprit, f"a {kind} of the head", actual, f"Load a glTF file with {kind}s, or leave it out")
     plain = {one.casefold(): one for one in names}
-    near = difflib.get_close_matches(str(name)[:_LONGEST_NAME].casefold(), plain, _NEAR, 0.5)
-    meant = f"Nearest: {', '.join(plain[one] for one in near)}" if near else f"It has {_some(names)}"
-    refuse(culprit, f"a {kind} of the head", f"there is no {format_value(name)}", meant)
+    similar = difflib.get_close_matches(str(name)[:_MAX_LETTERS].casefold(), plain, _SUGGESTIONS, 0.5)
+    advice = f"Nearest: {', '.join(plain[one] for one in similar)}" if similar else f"It has {_some(names)}"
+    refuse(culprit, f"a {kind} of the head", f"there is no {format_value(name)}", advice)
 
 
 def _some(names: list[str]) -> str:

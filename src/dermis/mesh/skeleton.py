@@ -13,9 +13,9 @@ from dermis.base.summary import ShortRepr
 from dermis.mesh.rotations import angles_matrix
 
 INFLUENCES = 4
-"""Bones that move a point; of more, those with the largest weights stay."""
-_STILL = np.eye(4)
-_FEW = 12
+"""Number of bones that move a point; of more, those with the largest weights are kept."""
+_IDENTITY = np.eye(4)
+_MAX_SEQUENTIAL = 12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,9 +43,9 @@ class Skeleton(ShortRepr):
 
         local : (b, 4, 4) instead of those at rest
         """
-        world = self._world(self.local if local is None else local)
-        moved = self.to_head @ world @ self.inverse_bind @ np.linalg.inv(self.to_head)
-        return np.asarray(moved[:, :3])
+        world = self._bone_to_file(self.local if local is None else local)
+        matrices = self.to_head @ world @ self.inverse_bind @ np.linalg.inv(self.to_head)
+        return np.asarray(matrices[:, :3])
 
     @cached_property
     def index(self) -> dict[str, int]:
@@ -53,17 +53,17 @@ class Skeleton(ShortRepr):
         return {name: index for index, name in enumerate(self.names)}
 
     @cached_property
-    def resting(self) -> Floats:
+    def rest_matrices(self) -> Floats:
         """(b, 3, 4) the matrices at rest."""
         return self.matrices().astype(np.float32)
 
     @cached_property
     def origin_mm(self) -> list[list[float]]:
         """(b, 3) where each bone turns, at rest, in the head's space [mm]."""
-        places: list[list[float]] = (self.to_head @ self._world(self.local))[:, :3, 3].tolist()
-        return places
+        origins: list[list[float]] = (self.to_head @ self._bone_to_file(self.local))[:, :3, 3].tolist()
+        return origins
 
-    def turned(self, bone: int, degrees: Sequence[float]) -> list[float]:
+    def bone_rotation(self, bone: int, degrees: Sequence[float]) -> list[float]:
         """The 16 numbers of what a turn does about where a bone rests, in the head's space [mm].
 
         degrees : about x, y and z; see `angles_matrix`
@@ -73,12 +73,12 @@ class Skeleton(ShortRepr):
         p, q, r = x - a * x - b * y - c * z, y - d * x - e * y - f * z, z - g * x - h * y - i * z
         return [a, b, c, p, d, e, f, q, g, h, i, r, 0.0, 0.0, 0.0, 1.0]
 
-    def changes(self, bones: Sequence[int], local: Doubles) -> Doubles:
+    def head_space_changes(self, bones: Sequence[int], local: Doubles) -> Doubles:
         """(n, 4, 4) what other matrices from bones' spaces to their parents' do in the head's space [mm]."""
         index = list(bones)
-        return np.asarray(self._above[index] @ local @ self._inward[index])
+        return np.asarray(self._parent_to_head[index] @ local @ self._head_to_bone[index])
 
-    def moved(self, bones: Sequence[int], changes: Doubles) -> Floats:
+    def moved_matrices(self, bones: Sequence[int], changes: Doubles) -> Floats:
         """(b, 3, 4) the matrices when some bones move, and with them all below.
 
         bones : (n,) their numbers, parents before children
@@ -86,30 +86,31 @@ class Skeleton(ShortRepr):
 
         Few cost as much as there are changes, not bones.
         """
-        taken = self._taken(bones, changes) if len(bones) <= _FEW else self._all_taken(bones, changes)
-        if self._bound_at_rest:
-            return taken[:, :3].astype(np.float32)
-        moved = taken[:, :3].copy()
-        moved[:, :, 3:] += taken[:, :3, :3] @ self.resting[:, :, 3:]
-        moved[:, :, :3] = taken[:, :3, :3] @ self.resting[:, :, :3]
-        return moved.astype(np.float32)
+        transforms = self._transforms if len(bones) <= _MAX_SEQUENTIAL else self._transforms_by_depth
+        transform = transforms(bones, changes)
+        if self._is_bound_at_rest:
+            return transform[:, :3].astype(np.float32)
+        matrices = transform[:, :3].copy()
+        matrices[:, :, 3:] += transform[:, :3, :3] @ self.rest_matrices[:, :, 3:]
+        matrices[:, :, :3] = transform[:, :3, :3] @ self.rest_matrices[:, :, :3]
+        return matrices.astype(np.float32)
 
-    def _taken(self, bones: Sequence[int], changes: Doubles) -> Doubles:
+    def _transforms(self, bones: Sequence[int], changes: Doubles) -> Doubles:
         """(b, 4, 4) where each bone is taken, by one change after the other."""
-        nearest, taken = self._unmoved.copy(), np.empty((len(bones) + 1, 4, 4))
-        taken[0] = _STILL
-        for number, bone in enumerate(bones, start=1):
-            np.matmul(taken[nearest[bone]], changes[number - 1], out=taken[number])
-            nearest[self._below[bone]] = number
-        return taken[nearest]
+        nearest, transform = np.zeros(len(self.names), np.intp), np.empty((len(bones) + 1, 4, 4))
+        transform[0] = _IDENTITY
+        for index, bone in enumerate(bones, start=1):
+            np.matmul(transform[nearest[bone]], changes[index - 1], out=transform[index])
+            nearest[self._descendants[bone]] = index
+        return transform[nearest]
 
-    def _all_taken(self, bones: Sequence[int], changes: Doubles) -> Doubles:
+    def _transforms_by_depth(self, bones: Sequence[int], changes: Doubles) -> Doubles:
         """The same, all bones of one depth at once."""
-        taken = np.tile(_STILL, (len(self.names), 1, 1))
-        taken[list(bones)] = changes
+        transform = np.tile(_IDENTITY, (len(self.names), 1, 1))
+        transform[list(bones)] = changes
         for bones_of_depth, parents in self._depths[1:]:
-            taken[bones_of_depth] = taken[parents] @ taken[bones_of_depth]
-        return taken
+            transform[bones_of_depth] = transform[parents] @ transform[bones_of_depth]
+        return transform
 
     @cached_property
     def _depths(self) -> list[tuple[Ints, Ints]]:
@@ -120,7 +121,7 @@ class Skeleton(ShortRepr):
         levels = [np.flatnonzero(depth == k) for k in range(int(depth.max(initial=0)) + 1)]
         return [(level.astype(np.int32), self.parent[level]) for level in levels]
 
-    def _world(self, local: Doubles) -> Doubles:
+    def _bone_to_file(self, local: Doubles) -> Doubles:
         """(b, 4, 4) from each bone's space to the file's."""
         world = np.empty_like(local)
         for bone, parent in enumerate(self.parent.tolist()):
@@ -128,38 +129,34 @@ class Skeleton(ShortRepr):
         return world
 
     @cached_property
-    def _above(self) -> Doubles:
+    def _parent_to_head(self) -> Doubles:
         """(b, 4, 4) from the space of each bone's parent to the head's, at rest."""
-        placed = np.concatenate([self.to_head @ self._world(self.local), self.to_head[None]])
-        return np.asarray(placed[self.parent])  # -1 is the last
+        to_head = np.concatenate([self.to_head @ self._bone_to_file(self.local), self.to_head[None]])
+        return np.asarray(to_head[self.parent])  # the last one is for roots, with parent -1
 
     @cached_property
-    def _inward(self) -> Doubles:
+    def _head_to_bone(self) -> Doubles:
         """(b, 4, 4) from the head's space to each bone's, at rest."""
-        return np.asarray(np.linalg.pinv(self.to_head @ self._world(self.local)))
+        return np.asarray(np.linalg.pinv(self.to_head @ self._bone_to_file(self.local)))
 
     @cached_property
-    def _below(self) -> list[Intp]:
+    def _descendants(self) -> list[Intp]:
         """Numbers of each bone and of all below it."""
-        below: list[list[int]] = [[] for _ in self.names]
+        descendants: list[list[int]] = [[] for _ in self.names]
         for bone in range(len(self.names)):
-            above = bone
-            while above >= 0:
-                below[above].append(bone)
-                above = int(self.parent[above])
-        return [np.array(bones, np.intp) for bones in below]
+            ancestor = bone
+            while ancestor >= 0:
+                descendants[ancestor].append(bone)
+                ancestor = int(self.parent[ancestor])
+        return [np.array(bones, np.intp) for bones in descendants]
 
     @cached_property
-    def following(self) -> Doubles:
+    def follower_counts(self) -> Doubles:
         """(b,) how many points each bone moves with all below it, by their weights."""
         own = np.bincount(self.bone.ravel(), self.weight.ravel(), minlength=len(self.names))
-        return np.array([own[below].sum() for below in self._below])
+        return np.array([own[bones].sum() for bones in self._descendants])
 
     @cached_property
-    def _unmoved(self) -> Intp:
-        return np.zeros(len(self.names), np.intp)
-
-    @cached_property
-    def _bound_at_rest(self) -> bool:
+    def _is_bound_at_rest(self) -> bool:
         """Whether the matrices at rest are those that change nothing."""
-        return bool(np.abs(self.resting - np.eye(3, 4, dtype=np.float32)).max(initial=0) < 1e-3)
+        return bool(np.abs(self.rest_matrices - np.eye(3, 4, dtype=np.float32)).max(initial=0) < 1e-3)

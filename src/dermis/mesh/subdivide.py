@@ -13,7 +13,7 @@ from dermis.base.arrays import Floats, Index, Ints
 from dermis.base.disk import Arrays, cached_arrays
 from dermis.base.errors import format_value, refuse
 from dermis.base.progress import logged_step
-from dermis.mesh.geometry import halves
+from dermis.mesh.geometry import split_quads
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.rig import Stencils
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 MAX_LEVELS = 3
-_FORM = "subdivision 1"  # raise when weights or corners change for the same mesh
-_MANY = 500_000
-"""Finer triangles from which on reading weights from disk saves half a second or more."""
+_CACHE_VERSION = "subdivision 1"  # to be changed when weights or corners change for the same mesh
+_CACHED_TRIANGLES = 500_000
+"""Number of finer triangles from which weights are cached on disk, which saves half a second or more."""
 Corners = NDArray[np.integer]
 
 
-class Subdivided(NamedTuple):
+class SubdividedMesh(NamedTuple):
     """A finer mesh, and its points as means of those of the coarser one; None where they are the same."""
 
     mesh: Mesh
@@ -56,9 +56,11 @@ class Refinement:
 
     def mesh(self, coarse: Mesh) -> Mesh:
         """The finer mesh of one with this topology."""
-        places, kinds = (self.weights @ coarse.points_mm)[self.point], coarse.materials
-        rest = {"point": self.point, "quads": self.quads}
-        return build_mesh(places, self.uv, self.triangles, self.material, kinds, **rest)
+        positions = (self.weights @ coarse.points_mm)[self.point]
+        topology = {"point": self.point, "quads": self.quads}
+        return build_mesh(
+            positions, self.uv, self.triangles, self.material, coarse.materials, **topology
+        )
 
 
 def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
@@ -67,7 +69,7 @@ def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
     head : not subdivided yet
     levels : 0 to 3, or what finds them for the head
     """
-    levels = levels_of(head, levels)
+    levels = resolve_levels(head, levels)
     mesh, stencils = subdivide(head.mesh, levels)
     if stencils is None:
         return head
@@ -76,22 +78,22 @@ def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
     return replace(head, mesh=mesh, rig=rig, strands=strands, hair=hair, levels=int(levels), template=None)
 
 
-def levels_of(head: Head, levels: int | Callable[[Head], int]) -> int:
+def resolve_levels(head: Head, levels: int | Callable[[Head], int]) -> int:
     """Levels of subdivision, or those that are found for a head.
 
     Raises DermisError for other numbers than 0 to 3.
     """
-    return _checked(levels(head) if callable(levels) else levels)
+    return _check_levels(levels(head) if callable(levels) else levels)
 
 
-def _checked(levels: int) -> int:
+def _check_levels(levels: int) -> int:
     if not isinstance(levels, int | np.integer) or levels not in range(MAX_LEVELS + 1):
         actual = f"got {format_value(levels)}"
         refuse("subdivide", f"0 to {MAX_LEVELS} levels", actual, "Each level takes 4x the memory")
     return int(levels)
 
 
-def subdivide(mesh: Mesh, levels: int) -> Subdivided:
+def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
     """The mesh refined `levels` times: positions smoothed, uv halved linearly, materials kept.
 
     A mesh of more quads than triangles is refined by Catmull's and Clark's rules and put on the surface that
@@ -101,10 +103,10 @@ def subdivide(mesh: Mesh, levels: int) -> Subdivided:
 
     levels : 0 to 3, each takes four times the triangles
     """
-    if _checked(levels) == 0:
-        return Subdivided(mesh, None)
-    found = refinement(mesh, levels)
-    return Subdivided(found.mesh(mesh), found.stencils)
+    if _check_levels(levels) == 0:
+        return SubdividedMesh(mesh, None)
+    refined = refinement(mesh, levels)
+    return SubdividedMesh(refined.mesh(mesh), refined.stencils)
 
 
 def refinement(mesh: Mesh, levels: int) -> Refinement:
@@ -115,9 +117,9 @@ def refinement(mesh: Mesh, levels: int) -> Refinement:
     from scipy.sparse import csr_array
 
     by_quads = 2 * len(mesh.quads) > len(mesh.triangles) - len(mesh.quads)
-    finer = _kept(mesh, levels, by_quads)
+    finer = _cached_refinement(mesh, levels, by_quads)
     first, column, weight, point = (finer[name] for name in ("first", "control", "weight", "point"))
-    triangles = halves(finer["corner"].reshape(-1, 4)) if by_quads else finer["corner"].reshape(-1, 3)
+    triangles = split_quads(finer["corner"].reshape(-1, 4)) if by_quads else finer["corner"].reshape(-1, 3)
     quads = np.arange(len(triangles) if by_quads else 0, dtype=np.int32).reshape(-1, 2)
     return Refinement(
         csr_array((weight, column, first), shape=(len(first) - 1, int(mesh.point.max()) + 1)),
@@ -130,20 +132,20 @@ def refinement(mesh: Mesh, levels: int) -> Refinement:
     )
 
 
-def _kept(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
-    """What `_refined` returns, of large meshes kept on disk for all heads of the same topology."""
-    if len(mesh.triangles) * 4**levels < _MANY:
-        return _refined(mesh, levels, by_quads)
+def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
+    """What `_compute_refinement` returns, of large meshes kept on disk for all heads of the same topology."""
+    if len(mesh.triangles) * 4**levels < _CACHED_TRIANGLES:
+        return _compute_refinement(mesh, levels, by_quads)
     sources = [mesh.uv, mesh.point, mesh.triangles, mesh.material, mesh.quads]
     names = ["first", "control", "weight", "uv", "point", "corner", "material"]
-    return cached_arrays(sources, f"{_FORM} {levels}", names, lambda: _refined(mesh, levels, by_quads))
+    return cached_arrays(sources, f"{_CACHE_VERSION} {levels}", names, lambda: _compute_refinement(mesh, levels, by_quads))
 
 
 @logged_step("subdividing the mesh")
-def _refined(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
+def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     """Corners of the finer faces, and weights of control points, row after row as `Stencils` have them."""
-    alone = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material
-    faces = polygons(mesh) if by_quads else alone
+    triangles = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material
+    faces = polygons(mesh) if by_quads else triangles
     cage = Cage(mesh.uv.astype(np.float64), mesh.point.astype(np.int64), *faces)
     refine = refine_catmull_clark if by_quads else refine_loop
     weights, cage = refine(cage)
@@ -170,14 +172,14 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
     Triangles come first, then quads.
     """
     first, second = mesh.quads.T
-    alone = np.delete(np.arange(len(mesh.triangles)), mesh.quads.ravel())
+    loose = np.delete(np.arange(len(mesh.triangles)), mesh.quads.ravel())
     quads = np.column_stack((mesh.triangles[first], mesh.triangles[second, 1]))
-    corner = np.concatenate((mesh.triangles[alone].ravel(), quads.ravel())).astype(np.int64)
-    sides = np.repeat(np.array([3, 4]), (len(alone), len(quads)))
-    return corner, sides, np.concatenate((mesh.material[alone], mesh.material[first]))
+    corner = np.concatenate((mesh.triangles[loose].ravel(), quads.ravel())).astype(np.int64)
+    sides = np.repeat(np.array([3, 4]), (len(loose), len(quads)))
+    return corner, sides, np.concatenate((mesh.material[loose], mesh.material[first]))
 
 
-def coarse_triangles(head: Head, least: int, off_mm: float) -> Ints:
+def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
     """(t, 3) vertices of the head's mesh: its triangles, less the levels of subdivision that can be spared.
 
     Vertices stay where they are, on the finer surface.
@@ -188,46 +190,47 @@ def coarse_triangles(head: Head, least: int, off_mm: float) -> Ints:
     mesh, levels = head.mesh, head.levels
     by_quads = len(mesh.quads) > 0
     count = len(mesh.quads) if by_quads else len(mesh.triangles)
-    while levels > 0 and count // 4 >= least:
+    while levels > 0 and count // 4 >= min_faces:
         levels, count = levels - 1, count // 4
-    spared = head.levels - levels
-    if spared == 0:
+    skipped = head.levels - levels
+    if skipped == 0:
         return mesh.triangles
     if by_quads:
         quads = np.column_stack((mesh.triangles[mesh.quads[:, 0]], mesh.triangles[mesh.quads[:, 1], 1]))
-        return _of_quads(quads, mesh.positions, spared, off_mm)
-    return _of_triangles(mesh.triangles, mesh.positions, spared, off_mm)
+        return _coarsen_quads(quads, mesh.positions, skipped, tolerance_mm)
+    return _coarsen_triangles(mesh.triangles, mesh.positions, skipped, tolerance_mm)
 
 
-def _of_triangles(triangles: Ints, places_mm: Floats, levels: int, off_mm: float) -> Ints:
+def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
     """By Loop's rules four triangles come of one, the first three at its corners."""
-    coarse, near = triangles, triangles
+    coarse, finer = triangles, triangles
     for _ in range(levels):
-        coarse, near = coarse.reshape(-1, 4, 3)[:, :3, 0], coarse
-    middles = near.reshape(-1, 4, 3)[:, :3, 1]
-    kept = _off_mm(places_mm, middles, coarse, np.roll(coarse, -1, axis=1)).max(axis=1) > off_mm
-    return np.concatenate((coarse[~kept], triangles[np.repeat(kept, 4**levels)]))
+        coarse, finer = coarse.reshape(-1, 4, 3)[:, :3, 0], coarse
+    middles = finer.reshape(-1, 4, 3)[:, :3, 1]
+    deviation = _deviation_mm(positions_mm, middles, coarse, np.roll(coarse, -1, axis=1))
+    is_curved = deviation.max(axis=1) > tolerance_mm
+    return np.concatenate((coarse[~is_curved], triangles[np.repeat(is_curved, 4**levels)]))
 
 
-def _of_quads(quads: Corners, places_mm: Floats, levels: int, off_mm: float) -> Ints:
+def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
     """By Catmull's and Clark's a quad for each corner of a polygon, from that to the polygon's middle."""
-    near = quads
+    coarse = quads
     for _ in range(levels - 1):
-        near = near[:, 0].reshape(-1, 4)
-    corner, side, middle = near[:, 0], near[:, 1], near[:, 2]
-    begins = np.append(True, middle[1:] != middle[:-1])
-    ends, polygon = np.append(begins[1:], True), np.cumsum(begins) - 1
-    first = np.flatnonzero(begins)[polygon]
-    after = np.where(ends, corner[first], np.roll(corner, -1))
-    kept = np.zeros(polygon[-1] + 1, bool)
-    kept[polygon[_off_mm(places_mm, side, corner, after) > off_mm]] = True
-    fan = ~begins & ~ends & ~kept[polygon]
-    between = np.column_stack((corner[first], corner, after))[fan]
-    fine = quads[np.repeat(kept[polygon], 4 ** (levels - 1))]
-    return np.concatenate((between, halves(fine))).astype(np.int32)
+        coarse = coarse[:, 0].reshape(-1, 4)
+    corner, side, centre = coarse[:, 0], coarse[:, 1], coarse[:, 2]
+    is_first = np.append(True, centre[1:] != centre[:-1])
+    is_last, polygon = np.append(is_first[1:], True), np.cumsum(is_first) - 1
+    first = np.flatnonzero(is_first)[polygon]
+    following = np.where(is_last, corner[first], np.roll(corner, -1))
+    is_curved = np.zeros(polygon[-1] + 1, bool)
+    is_curved[polygon[_deviation_mm(positions_mm, side, corner, following) > tolerance_mm]] = True
+    in_fan = ~is_first & ~is_last & ~is_curved[polygon]
+    fans = np.column_stack((corner[first], corner, following))[in_fan]
+    fine = quads[np.repeat(is_curved[polygon], 4 ** (levels - 1))]
+    return np.concatenate((fans, split_quads(fine))).astype(np.int32)
 
 
-def _off_mm(places_mm: Floats, middle: Corners, start: Corners, end: Corners) -> Floats:
+def _deviation_mm(positions_mm: Floats, middle: Corners, start: Corners, end: Corners) -> Floats:
     """How far the middles of sides are from halfway between their ends [mm]."""
-    halfway = 0.5 * (places_mm[start] + places_mm[end])
-    return np.asarray(np.linalg.norm(places_mm[middle] - halfway, axis=-1))
+    halfway = 0.5 * (positions_mm[start] + positions_mm[end])
+    return np.asarray(np.linalg.norm(positions_mm[middle] - halfway, axis=-1))

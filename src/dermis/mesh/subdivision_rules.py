@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles, Index, Ints, Mask
-from dermis.mesh.geometry import unite_sides
+from dermis.mesh.geometry import unique_sides
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -48,13 +48,13 @@ class _Sides:
 
     points: int
     start: Index
-    before: Index
+    previous: Index
     face: Index
     ends: Index
     edge: Index
     border: Mask
-    cuts: Index
-    cut: Index
+    seam_edges: Index
+    seam_edge: Index
 
     @cached_property
     def valence(self) -> Index:
@@ -70,14 +70,14 @@ class _Sides:
 def _sides(cage: Cage) -> _Sides:
     last = np.cumsum(cage.sides) - 1
     first = last + 1 - cage.sides
-    number = np.arange(len(cage.corner))
-    after, before = number + 1, number - 1
-    after[last], before[first] = first, last
-    cuts, cut, _ = unite_sides(np.column_stack((cage.corner, cage.corner[after])))
+    index = np.arange(len(cage.corner))
+    following, previous = index + 1, index - 1
+    following[last], previous[first] = first, last
+    seam_edges, seam_edge, _ = unique_sides(np.column_stack((cage.corner, cage.corner[following])))
     start = cage.point[cage.corner]
-    ends, edge, counts = unite_sides(np.column_stack((start, start[after])))
+    ends, edge, counts = unique_sides(np.column_stack((start, start[following])))
     face = np.repeat(np.arange(len(cage.sides)), cage.sides)
-    return _Sides(int(cage.point.max()) + 1, start, before, face, ends, edge, counts != 2, cuts, cut)
+    return _Sides(int(cage.point.max()) + 1, start, previous, face, ends, edge, counts != 2, seam_edges, seam_edge)
 
 
 def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
@@ -90,15 +90,15 @@ def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
     from scipy.sparse import vstack
 
     sides = _sides(cage)
-    # 3/8 for all neighbours together, 9/16 for three
-    around = np.where(sides.valence == 3, 9 / 16, 3 / 8)
-    old = _old_points(sides, 1 - around, around / np.maximum(sides.valence, 1), along=1 / 8)
-    opposite = sides.start[sides.before]
-    across = _matrix(sides.edge, opposite, _inside(sides, 1 / 8), (len(sides.ends), sides.points))
-    new = _from_ends(sides, np.where(sides.border, 1 / 2, 3 / 8)) + across
-    uv, point = _with_edges(cage, sides)
+    # total weight of all neighbours
+    neighbours = np.where(sides.valence == 3, 9 / 16, 3 / 8)
+    old = _old_point_weights(sides, 1 - neighbours, neighbours / np.maximum(sides.valence, 1), along=1 / 8)
+    opposite = sides.start[sides.previous]
+    opposite_weights = _matrix(sides.edge, opposite, _inner_edge_weights(sides, 1 / 8), (len(sides.ends), sides.points))
+    new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 3 / 8)) + opposite_weights
+    uv, point = _add_edge_vertices(cage, sides)
     a, b, c = cage.corner.reshape(-1, 3).T
-    ab, bc, ca = (len(cage.uv) + sides.cut).reshape(-1, 3).T
+    ab, bc, ca = (len(cage.uv) + sides.seam_edge).reshape(-1, 3).T
     four = np.array([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]])
     corner, count = four.transpose(2, 0, 1).ravel(), np.repeat(cage.sides, 4)
     return vstack((old, new), "csr"), Cage(uv, point, corner, count, np.repeat(cage.material, 4))
@@ -116,22 +116,22 @@ def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
 
     sides = _sides(cage)
     n, count = np.maximum(sides.valence, 1), len(cage.sides)
-    middles = _matrix(sides.face, sides.start, 1 / cage.sides[sides.face], (count, sides.points))
-    beside = _matrix(sides.edge, sides.face, _inside(sides, 1 / 4), (len(sides.ends), count))
-    new = _from_ends(sides, np.where(sides.border, 1 / 2, 1 / 4)) + beside @ middles
-    around = _matrix(sides.start, sides.face, _around(sides, 1 / n**2), (sides.points, count))
-    old = _old_points(sides, (n - 2) / n, 1 / n**2, along=1 / 8) + around @ middles
-    uv, point = _with_edges(cage, sides)
+    centres = _matrix(sides.face, sides.start, 1 / cage.sides[sides.face], (count, sides.points))
+    face_weights = _matrix(sides.edge, sides.face, _inner_edge_weights(sides, 1 / 4), (len(sides.ends), count))
+    new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 1 / 4)) + face_weights @ centres
+    face_points = _matrix(sides.start, sides.face, _inner_point_weights(sides, 1 / n**2), (sides.points, count))
+    old = _old_point_weights(sides, (n - 2) / n, 1 / n**2, along=1 / 8) + face_points @ centres
+    uv, point = _add_edge_vertices(cage, sides)
     centre = np.add.reduceat(cage.uv[cage.corner], np.cumsum(cage.sides) - cage.sides) / cage.sides[:, None]
-    edge, face = len(cage.uv) + sides.cut, len(uv) + sides.face
+    edge, face = len(cage.uv) + sides.seam_edge, len(uv) + sides.face
     finer = Cage(
         np.vstack((uv, centre)),
         np.concatenate((point, sides.points + len(sides.ends) + np.arange(count))),
-        np.column_stack((cage.corner, edge, face, edge[sides.before])).ravel(),
+        np.column_stack((cage.corner, edge, face, edge[sides.previous])).ravel(),
         np.full(len(cage.corner), 4),
         np.repeat(cage.material, cage.sides),
     )
-    return vstack((old, new, middles), "csr"), finer
+    return vstack((old, new, centres), "csr"), finer
 
 
 def catmull_clark_limit(cage: Cage) -> csr_array:
@@ -141,51 +141,51 @@ def catmull_clark_limit(cage: Cage) -> csr_array:
     """
     sides = _sides(cage)
     n = np.maximum(sides.valence, 1)
-    near = _old_points(sides, n / (n + 5), 4 / (n * (n + 5)), along=1 / 6)
+    direct = _old_point_weights(sides, n / (n + 5), 4 / (n * (n + 5)), along=1 / 6)
     opposite = sides.start.reshape(-1, 4)[:, [2, 3, 0, 1]].ravel()
-    diagonal = _matrix(sides.start, opposite, _around(sides, 1 / (n * (n + 5))), near.shape)
-    limit: csr_array = near + diagonal
+    diagonal = _matrix(sides.start, opposite, _inner_point_weights(sides, 1 / (n * (n + 5))), direct.shape)
+    limit: csr_array = direct + diagonal
     return limit
 
 
-def _inside(sides: _Sides, weight: float) -> Doubles:
+def _inner_edge_weights(sides: _Sides, weight: float) -> Doubles:
     """(n,) the weight for sides on inner edges, 0 for those on borders."""
     return np.where(sides.border, 0, weight)[sides.edge]
 
 
-def _around(sides: _Sides, weight: Doubles) -> Doubles:
+def _inner_point_weights(sides: _Sides, weight: Doubles) -> Doubles:
     """(n,) weight (p,) of the point where each side begins, 0 for points on borders."""
     return np.where(sides.border_valence == 0, weight, 0)[sides.start]
 
 
-def _from_ends(sides: _Sides, weight: Doubles) -> csr_array:
+def _edge_end_weights(sides: _Sides, weight: Doubles) -> csr_array:
     """(e, p) the weight (e,) of either end of each edge."""
     rows = np.repeat(np.arange(len(sides.ends)), 2)
     return _matrix(rows, sides.ends.ravel(), np.repeat(weight, 2), (len(sides.ends), sides.points))
 
 
-def _old_points(sides: _Sides, own: Doubles, each: Doubles, along: float) -> csr_array:
+def _old_point_weights(sides: _Sides, own: Doubles, each: Doubles, along: float) -> csr_array:
     """(p, p) weights of the old points.
 
     own, each : (p,) inside: of the point itself, and of each of its neighbours
     along : on a border: of either neighbour along it
     """
-    inside, curve = (sides.border_valence == 0) & (sides.valence > 0), sides.border_valence == 2
+    is_inner, is_border = (sides.border_valence == 0) & (sides.valence > 0), sides.border_valence == 2
     both, other = sides.ends.T.ravel(), sides.ends[:, ::-1].T.ravel()
-    towards = np.where(inside, each, 0)[both]
-    towards[np.tile(sides.border, 2) & curve[both]] = along
-    # where borders meet, and where the surface is not one sheet, the point stays
-    stay = np.where(inside, own, np.where(curve, 1 - 2 * along, 1))
-    itself = np.arange(sides.points)
-    rows, columns = np.concatenate((itself, both)), np.concatenate((itself, other))
-    return _matrix(rows, columns, np.concatenate((stay, towards)), (sides.points, sides.points))
+    neighbour_weight = np.where(is_inner, each, 0)[both]
+    neighbour_weight[np.tile(sides.border, 2) & is_border[both]] = along
+    # points where borders meet, or where the surface is not manifold, stay
+    own_weight = np.where(is_inner, own, np.where(is_border, 1 - 2 * along, 1))
+    index = np.arange(sides.points)
+    rows, columns = np.concatenate((index, both)), np.concatenate((index, other))
+    return _matrix(rows, columns, np.concatenate((own_weight, neighbour_weight)), (sides.points, sides.points))
 
 
-def _with_edges(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
+def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
     """Uv and point of the old corner vertices and of one in the middle of each cut."""
-    edge_of_cut = np.empty(len(sides.cuts), dtype=np.int64)
-    edge_of_cut[sides.cut] = sides.edge
-    uv = np.vstack((cage.uv, cage.uv[sides.cuts].mean(axis=1)))
+    edge_of_cut = np.empty(len(sides.seam_edges), dtype=np.int64)
+    edge_of_cut[sides.seam_edge] = sides.edge
+    uv = np.vstack((cage.uv, cage.uv[sides.seam_edges].mean(axis=1)))
     return uv, np.concatenate((cage.point, sides.points + edge_of_cut))
 
 

@@ -14,7 +14,7 @@ from dermis.base.reading import checked_path, is_file, read_toml
 from dermis.human.regions.apply import with_regions
 from dermis.human.regions.region_table import load_region_table
 from dermis.mesh.head import Head
-from dermis.mesh.pose import MOST_WEIGHT, Pose
+from dermis.mesh.pose import MAX_WEIGHT, Pose
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
 from dermis.scene.field_errors import BoundsReason, InvalidFieldsError
@@ -32,7 +32,7 @@ P = TypeVar("P", bound=FrozenModel)
 _TABLES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
 _Weight = Annotated[
-    float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT), BoundsReason("faces break apart long before")
+    float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), BoundsReason("faces break apart long before")
 ]
 
 

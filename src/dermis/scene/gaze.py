@@ -14,8 +14,8 @@ from dermis.base.quantities import checked_array
 from dermis.formats.motion.captures import match_targets
 from dermis.human.movement import gaze_turns
 from dermis.mesh.head import Head
-from dermis.mesh.pose import FARTHEST_MM, Pose
-from dermis.mesh.rig import Rig, Turn
+from dermis.mesh.pose import MAX_DISTANCE_MM, Pose
+from dermis.mesh.rig import BoneRotation, Rig
 from dermis.mesh.rotations import angles_matrix
 
 Doubles = NDArray[np.float64]
@@ -38,16 +38,18 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 
     Raises DermisError for heads without anatomical eyes and for invalid points.
     """
-    base, rig, eyes = Pose.of(pose) or Pose(), head.control, head.eyes
+    base, rig, eyes = Pose.coerce(pose) or Pose(), head.control, head.eyes
     if eyes is None or rig.skeleton is None:
         advice = f"{head.note}. {_EYES_ADVICE}" if head.note else _EYES_ADVICE
         refuse(head.name, "a head with eyes that turn", "it has none", advice)
     goal_mm = checked_array(
-        "look at", target_mm, (3,), -FARTHEST_MM, FARTHEST_MM, "mm from the head's centre"
+        "look at", target_mm, (3,), -MAX_DISTANCE_MM, MAX_DISTANCE_MM, "mm from the head's centre"
     )
     eye_bones = [rig.skeleton.names[bone] for bone in rig.skeleton.bone[eyes.apex, 0]]
     weights = {
-        name: value for name, value in base.weights.items() if name not in _target_names(rig.turns, eye_bones)
+        name: value
+        for name, value in base.weights.items()
+        if name not in _target_names(rig.bone_rotations, eye_bones)
     }
     bones = {name: value for name, value in base.bones.items() if name not in eye_bones}
     frames = eyes.frames(rig, Pose(weights, bones, base.positions_mm).motion(rig))
@@ -56,10 +58,10 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
         to_target = (frame @ np.append(goal_mm + np.array(head.centre_mm), 1.0))[:3] - [
             0.0,
             0.0,
-            eyes.middle_mm[k],
+            eyes.centre_offset_mm[k],
         ]
-        angles = _rotation_angles(_unit(rest[:3, :3].T @ to_target), _unit(rest[:3, :3].T @ eyes.sight[k]))
-        turns = [turn for turn in rig.turns if turn.bone == bone]
+        angles = _rotation_angles(_unit(rest[:3, :3].T @ to_target), _unit(rest[:3, :3].T @ eyes.gaze[k]))
+        turns = [turn for turn in rig.bone_rotations if turn.bone == bone]
         if not turns:
             bones[bone] = [*np.clip(np.degrees(angles), -_MAX_BONE_DEGREES, _MAX_BONE_DEGREES).tolist(), 0.0]
             turns = _eyelid_turns(rig, _SIDES[k])
@@ -67,7 +69,7 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
     return Pose(weights, bones, base.positions_mm)
 
 
-def _eyelid_turns(rig: Rig, side: str) -> list[Turn]:
+def _eyelid_turns(rig: Rig, side: str) -> list[BoneRotation]:
     """Return the gaze targets of an eye that the head has; in files they move only the lids."""
     arkit_turns = [turn for turn in gaze_turns() if turn.target.endswith(side)]
     known = match_targets([turn.target for turn in arkit_turns], rig.targets.names)
@@ -96,11 +98,11 @@ def _unit(vector: Doubles) -> Doubles:
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
 
 
-def _target_names(turns: tuple[Turn, ...], bones: list[str]) -> set[str]:
+def _target_names(turns: tuple[BoneRotation, ...], bones: list[str]) -> set[str]:
     return {turn.target for turn in turns if turn.bone in bones}
 
 
-def _weights(turns: list[Turn], goal: tuple[float, float]) -> dict[str, Any]:
+def _weights(turns: list[BoneRotation], goal: tuple[float, float]) -> dict[str, Any]:
     """Return the weights of targets for rotation angles about x and y [rad]."""
     target_weights = {}
     for turn in turns:

@@ -32,7 +32,7 @@ def gaze_directions(scene: Scene) -> Doubles | None:
     head, motion = scene.head, _motion(scene)
     if head.eyes is None:
         return None
-    directions = np.einsum("kij,ki->kj", head.eyes.frames(head.control, motion)[:, :3, :3], head.eyes.sight)
+    directions = np.einsum("kij,ki->kj", head.eyes.frames(head.control, motion)[:, :3, :3], head.eyes.gaze)
     seen = directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera(scene)[0].T
     return np.asarray(seen)
 

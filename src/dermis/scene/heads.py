@@ -192,7 +192,7 @@ def _subdivided(head: Head, levels: SubdivisionLevels) -> Head:
     """Return the head on a subdivided mesh; its rig keeps the file's own vertices for sequences."""
     head_model = subdivide_head(head, levels)
     if head_model.levels and head_model.rig is not None:
-        return replace(head_model, rig=replace(head_model.rig, corner=head.mesh.point))
+        return replace(head_model, rig=replace(head_model.rig, vertex_point=head.mesh.point))
     return head_model
 
 
@@ -225,7 +225,7 @@ def _read_maps(
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y)
     if obj is None:
         return loaded, ""
-    head_name, notice = obj_maps(obj, opaque=opaque, given=given, height_mm=height_mm, normal_y=normal_y)
+    head_name, notice = obj_maps(obj, opaque=opaque, overridden=given, height_mm=height_mm, normal_y=normal_y)
     return replace(head_name, **{role: getattr(loaded, role) for role in given}), notice
 
 

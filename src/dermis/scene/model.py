@@ -79,7 +79,7 @@ class Scene:
         else:
             self._set("lights", as_lights(lights))
         self._set("camera", portrait(self.head) if camera is None else as_camera(camera, self.head))
-        self._set("pose", Pose.of(pose))
+        self._set("pose", Pose.coerce(pose))
         if self.pose is not None:
             self.motion  # noqa: B018 checks the pose
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.mesh.geometry import edges, sum_at
+from dermis.mesh.geometry import edges, sum_by_index
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.subdivide import MAX_LEVELS
@@ -99,7 +99,7 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, 
     The curve between two points with normals n deviates from its chord d by |dn . dd| / 8.
     """
     camera_points = mesh.points_mm @ R.T + t
-    normals = sum_at(mesh.point, mesh.normals.astype(np.float64), len(camera_points))
+    normals = sum_by_index(mesh.point, mesh.normals.astype(np.float64), len(camera_points))
     normals = normals @ R.T / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     depth = np.maximum(camera_points[:, 2], _NEAR_PLANE_MM)
     pixels = (camera_points @ K.T)[:, :2] / depth[:, None]

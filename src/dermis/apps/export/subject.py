@@ -134,8 +134,8 @@ def load_subject(
 ) -> Subject:
     """Return the subject of a name or file.
 
-    source : a profile by name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv), or a head: "human",
-        "human:7", a person's .json, a sample, or a mesh (.glb, .gltf, .obj, .ply)
+    source : a profile by name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv), or a head:
+        "human", "human:7", a person's .json, a sample, or a mesh (.glb, .gltf, .obj, .ply)
     profile : skin of a head; by default a person's own pigments, or the default skin
     model : model of the profile, see `reference_curve`
     head : options of `load_head`

@@ -104,19 +104,19 @@ class Target(ABC):
 
     name: ClassVar[str]
     title: ClassVar[str]
-    """The program's name as it is written."""
+    """Name of the program as its maker spells it."""
     suffixes: ClassVar[tuple[str, ...]]
-    """What the output's name may end in, the usual first; "" is a folder."""
+    """Suffixes of output files, the default first; "" means a folder."""
     versions: ClassVar[tuple[str, ...]]
-    """Known versions, oldest first; the newest is the default."""
+    """Supported versions, oldest first; the newest is the default."""
     variants: ClassVar[tuple[str, ...]] = ()
-    """Methods of scattering, say; the first is the default."""
+    """Names of alternative scattering methods or extensions; the first is the default."""
     needs_maps: ClassVar[bool] = False
-    """Whether the maps of a head have to be arrays before `write`: they are then painted."""
+    """Whether `write` needs the maps of a head as arrays, so that procedural maps are painted first."""
     limitations: ClassVar[str]
-    """What stays wrong there, in one or two sentences."""
+    """Differences from the reference that no parameters can remove, in one or two sentences."""
     untested: ClassVar[bool] = False
-    """Whether nobody has run the program with what is written."""
+    """Whether the exported files have not been tested in the program."""
 
     def with_variant(self: T, variant: str | None) -> T:
         """Return the target with one of its variants; None selects the first.
@@ -277,7 +277,7 @@ class Target(ABC):
         parameters : tuple of Parameter
             Parameters from `parameters`.
         output : Path
-            Empty folder if the name has no suffix; otherwise a file in an empty folder, beside which other files
+            Empty folder if the name has no suffix; otherwise a file in an empty folder, beside which others
             may be written. All are moved to the final output afterwards.
         version : str
             Version of the program.

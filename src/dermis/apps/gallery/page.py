@@ -12,14 +12,14 @@ from importlib import resources
 from pathlib import Path
 from string import Template
 
-from dermis.apps.gallery.script import Picture
+from dermis.apps.gallery.script import GalleryPicture
 from dermis.base import citations as cite
 from dermis.base.atomic_write import atomic_file
 
 _FIELD = re.compile(r"(\w+)\s*=\s*\{")
 _ACCENT = re.compile(r"\\(['\"`^~])\s*(\w)")
-_ABOVE = {"'": "\u0301", '"': "\u0308", "`": "\u0300", "^": "\u0302", "~": "\u0303"}
-_SIGNS = {
+_COMBINING_ACCENTS = {"'": "\u0301", '"': "\u0308", "`": "\u0300", "^": "\u0302", "~": "\u0303"}
+_TEX_SYMBOLS = {
     r"$\mu$": "µ",
     r"\&": "&",
     r"\AA": "Å",
@@ -31,7 +31,7 @@ _SIGNS = {
 }
 
 
-def write_page(path: Path, pictures: Sequence[Picture], head: str, adapter: str) -> None:
+def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapter: str) -> None:
     """Write the page; the file is complete or not there.
 
     head, adapter : what the pictures show, and what drew them
@@ -46,17 +46,17 @@ def write_page(path: Path, pictures: Sequence[Picture], head: str, adapter: str)
         contents="".join(_entry(picture) for picture in pictures),
         pictures="\n".join(_section(picture) for picture in pictures),
         deck=_deck(pictures),
-        works=_works(pictures),
+        works=_bibliography(pictures),
     )
     with atomic_file(path) as trial:
         trial.write_text(page, encoding="utf-8")
 
 
-def _entry(picture: Picture) -> str:
+def _entry(picture: GalleryPicture) -> str:
     return f'<li><a href="#{picture.script.name}">{html.escape(picture.script.title)}</a></li>'
 
 
-def _section(picture: Picture) -> str:
+def _section(picture: GalleryPicture) -> str:
     script = picture.script
     equation = f'<p class="equation">{_equation(script.equation)}</p>' if script.equation else ""
     return (
@@ -72,7 +72,7 @@ def _equation(text: str) -> str:
     return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", low)
 
 
-def _panels(picture: Picture) -> str:
+def _panels(picture: GalleryPicture) -> str:
     if picture.fault:
         return f'<p class="fault">Not made: {html.escape(picture.fault)}</p>'
     slider, panels = picture.script.slider, dict(picture.panels)
@@ -86,7 +86,7 @@ def _panels(picture: Picture) -> str:
 
 def _slider(captions: tuple[str, str], files: Sequence[bytes]) -> str:
     before, after = (html.escape(caption) for caption in captions)
-    below, above = (_source(file) for file in files)
+    below, above = (_data_url(file) for file in files)
     said = f"{before} on the left, {after} on the right"
     return (
         f'<figure class="slider"><img src="{above}" alt="{after}">'
@@ -98,36 +98,36 @@ def _slider(captions: tuple[str, str], files: Sequence[bytes]) -> str:
 
 def _figure(caption: str, file: bytes) -> str:
     text = html.escape(caption)
-    return f'<figure><img src="{_source(file)}" alt="{text}"><figcaption>{text}</figcaption></figure>'
+    return f'<figure><img src="{_data_url(file)}" alt="{text}"><figcaption>{text}</figcaption></figure>'
 
 
-def _source(file: bytes) -> str:
+def _data_url(file: bytes) -> str:
     return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
 
 
-def _facts(picture: Picture) -> str:
+def _facts(picture: GalleryPicture) -> str:
     script = picture.script
     width, height = picture.size
     facts = [f"<code>dermis gallery --only {script.name}</code>"]
     facts += [f"{width}×{height}"] if width else []
-    facts += [f"{_rounded(picture.frame_ms)} ms a frame"] if picture.frame_ms else []
+    facts += [f"{_short_number(picture.frame_ms)} ms a frame"] if picture.frame_ms else []
     facts += [f"{picture.seconds:.0f} s in all"]
     facts += [f'<a href="#{row}" title="row {row[1:]} of the talk, below">{row}</a>' for row in script.deck]
     facts += [f'<a href="#{key}">{key}</a>' for key in script.sources]
     return " · ".join(facts)
 
 
-def _rounded(value: float) -> str:
+def _short_number(value: float) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
-def _deck(pictures: Sequence[Picture]) -> str:
+def _deck(pictures: Sequence[GalleryPicture]) -> str:
     """Rows of the talk with the pictures that show them and the commands that make these."""
     rows = csv.DictReader(line for line in _resource("deck.csv").splitlines() if not line.startswith("#"))
     return "".join(_deck_row(row, pictures) for row in rows)
 
 
-def _deck_row(row: dict[str, str], pictures: Sequence[Picture]) -> str:
+def _deck_row(row: dict[str, str], pictures: Sequence[GalleryPicture]) -> str:
     shown = [picture.script for picture in pictures if row["row"] in picture.script.deck]
     links = ", ".join(f'<a href="#{script.name}">{html.escape(script.title)}</a>' for script in shown)
     command = row["command"] or " ".join(["dermis gallery", *(f"--only {one.name}" for one in shown)])
@@ -137,16 +137,16 @@ def _deck_row(row: dict[str, str], pictures: Sequence[Picture]) -> str:
     )
 
 
-def _works(pictures: Sequence[Picture]) -> str:
+def _bibliography(pictures: Sequence[GalleryPicture]) -> str:
     keys = sorted({key for picture in pictures for key in picture.script.sources})
-    return "".join(f'<dt id="{key}">{key}</dt><dd>{html.escape(reference(key))}</dd>' for key in keys)
+    return "".join(f'<dt id="{key}">{key}</dt><dd>{html.escape(format_reference(key))}</dd>' for key in keys)
 
 
 def _resource(name: str) -> str:
     return (resources.files("dermis.apps.gallery") / name).read_text(encoding="utf-8")
 
 
-def reference(key: str) -> str:
+def format_reference(key: str) -> str:
     """A work in one line: authors, title, year.
 
     Raises DermisError for a key that is not in the bibliography.
@@ -154,7 +154,7 @@ def reference(key: str) -> str:
     fields = dict(_fields(cite.bibtex([key])))
     if "author" in fields:
         fields["author"] = "; ".join(re.split(r"\s+and\s+", fields["author"]))
-    known = [_plain(fields[name]).rstrip(".") for name in ("author", "title", "year") if name in fields]
+    known = [_without_tex(fields[name]).rstrip(".") for name in ("author", "title", "year") if name in fields]
     return ". ".join(known)
 
 
@@ -169,10 +169,10 @@ def _fields(entry: str) -> Iterator[tuple[str, str]]:
         yield found[1].lower(), entry[found.end() : at - 1]
 
 
-def _plain(value: str) -> str:
+def _without_tex(value: str) -> str:
     """A value without TeX markup."""
     text = value.replace("{", "").replace("}", "")
-    for sign, meant in _SIGNS.items():
+    for sign, meant in _TEX_SYMBOLS.items():
         text = text.replace(sign, meant)
-    text = _ACCENT.sub(lambda accent: unicodedata.normalize("NFC", accent[2] + _ABOVE[accent[1]]), text)
+    text = _ACCENT.sub(lambda accent: unicodedata.normalize("NFC", accent[2] + _COMBINING_ACCENTS[accent[1]]), text)
     return " ".join(text.split())

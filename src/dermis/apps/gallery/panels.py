@@ -18,35 +18,35 @@ Panel = Image | list[Image]
 """A picture, or a film as a list of frames."""
 Panels = Mapping[str, Panel]
 Bytes = NDArray[np.uint8]
-_INCHES = 4.4
+_FIGURE_INCHES = 4.4
 _BAR, _TEXT, _INK, _PAPER = 24, 14, (200, 200, 206), (22, 22, 26)
 
 
-def as_bytes(image: Image) -> Bytes:
+def to_srgb8(image: Image) -> Bytes:
     """sRGB bytes of an image; floats are taken for linear light."""
     if image.dtype == np.uint8:
         return np.asarray(image, np.uint8)
     return encode_srgb8(np.maximum(image, 0.0).astype(np.float32))
 
 
-def still(panel: Panel) -> Image:
+def first_frame(panel: Panel) -> Image:
     """A panel, or the first frame of a film."""
     return panel[0] if isinstance(panel, list) else panel
 
 
-def sheet(panels: Panels, columns: int = 0) -> Bytes:
+def panel_sheet(panels: Panels, columns: int = 0) -> Bytes:
     """(h, w, 3) sRGB bytes of all panels in rows with captions below; films show their first frame.
 
     columns : panels in a row; 0 puts all of them in one
     """
-    cells = [_cell(as_bytes(still(panel)), name) for name, panel in panels.items()]
+    cells = [_cell(to_srgb8(first_frame(panel)), name) for name, panel in panels.items()]
     step = columns or len(cells)
-    rows = [_beside(cells[start : start + step]) for start in range(0, len(cells), step)]
+    rows = [_row(cells[start : start + step]) for start in range(0, len(cells), step)]
     width = max(row.shape[1] for row in rows)
     return np.vstack([_padded(row, row.shape[0], width) for row in rows])
 
 
-def plotted(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
+def plot_panel(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
     """sRGB bytes of a square figure.
 
     plot : draws into matplotlib axes
@@ -54,7 +54,7 @@ def plotted(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
     """
     canvases = import_extra("matplotlib.backends.backend_agg", "the gallery")
     figure = import_extra("matplotlib.figure", "the gallery").Figure(
-        figsize=(_INCHES, _INCHES), dpi=side / _INCHES, facecolor="#141417", layout="constrained"
+        figsize=(_FIGURE_INCHES, _FIGURE_INCHES), dpi=side / _FIGURE_INCHES, facecolor="#141417", layout="constrained"
     )
     plot(figure.subplots())
     canvas: Any = canvases.FigureCanvasAgg(figure)
@@ -72,7 +72,7 @@ def _cell(image: Bytes, caption: str) -> Bytes:
     return np.vstack([image, np.asarray(bar)])
 
 
-def _beside(cells: Sequence[Bytes]) -> Bytes:
+def _row(cells: Sequence[Bytes]) -> Bytes:
     height = max(cell.shape[0] for cell in cells)
     return np.hstack([_padded(cell, height, cell.shape[1]) for cell in cells])
 
@@ -83,7 +83,7 @@ def _padded(image: Bytes, height: int, width: int) -> Bytes:
     return room
 
 
-_RADIUS, _SEEN, _HIDDEN = 2.0, (90, 255, 120), (255, 70, 70)
+_RADIUS, _VISIBLE_COLOUR, _HIDDEN_COLOUR = 2.0, (90, 255, 120), (255, 70, 70)
 
 
 def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[np.uint8]:
@@ -94,29 +94,29 @@ def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[
     draw = ImageDraw.Draw(image)
     for (x, y), visible in zip(landmarks.pixels.tolist(), landmarks.visible.tolist(), strict=True):
         box = (x - _RADIUS, y - _RADIUS, x + _RADIUS, y + _RADIUS)
-        draw.ellipse(box, fill=_SEEN if visible else _HIDDEN)
+        draw.ellipse(box, fill=_VISIBLE_COLOUR if visible else _HIDDEN_COLOUR)
     return np.array(image)
 
 
-_LIGHT = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
-_COLOURS = 8192
-_RANGE = 0.02, 0.98  # quantiles of what is seen that are black and white
+_LIGHT_FACTORS = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
+_LABEL_COLOURS = 8192
+_QUANTILES = 0.02, 0.98  # quantiles of what is seen that are black and white
 
 
-def output_picture(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
+def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
     """(h, w, 3) bytes: light as it looks, a colour for each whole number, else dark to bright.
 
     values : (h, w) or (h, w, c) of the output
     """
-    if name in _LIGHT:
-        return encode_srgb8(_LIGHT[name] * values)
+    if name in _LIGHT_FACTORS:
+        return encode_srgb8(_LIGHT_FACTORS[name] * values)
     if OUTPUTS[name].kind != "float32":
-        colours = np.random.default_rng(8).integers(40, 255, (_COLOURS, 3), np.uint8)
-        colours = colours[values.astype(int) % _COLOURS]
+        colours = np.random.default_rng(8).integers(40, 255, (_LABEL_COLOURS, 3), np.uint8)
+        colours = colours[values.astype(int) % _LABEL_COLOURS]
         return np.where((values != OUTPUTS[name].background)[..., None], colours, np.uint8(0))
     each = values.reshape(*values.shape[:2], -1)[..., :3]
     seen = (each != 0).any(axis=-1)
-    low, high = np.quantile(each[seen], _RANGE, axis=0)
+    low, high = np.quantile(each[seen], _QUANTILES, axis=0)
     levels = np.clip((each - low) / np.maximum(high - low, 1e-6), 0.0, 1.0) * seen[..., None]
     if levels.shape[2] == 1:
         levels = levels.repeat(3, axis=2)

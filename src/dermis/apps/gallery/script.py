@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from dermis.apps.gallery.panels import Panel, Panels, as_bytes, sheet, still
+from dermis.apps.gallery.panels import Panel, Panels, to_srgb8, panel_sheet, first_frame
 from dermis.apps.gallery.studio import Studio
 from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import DermisError, refuse
 from dermis.base.extras import import_extra
 
-_FACT = re.compile(r"^(Deck|Equation|Sources|Slider|Columns): *(.+)$", re.MULTILINE)
+_METADATA = re.compile(r"^(Deck|Equation|Sources|Slider|Columns): *(.+)$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -63,16 +63,16 @@ class Script:
 def read_script(path: Path) -> Script:
     """The description in a script's docstring; the script is not run."""
     text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-    facts: dict[str, str] = dict(_FACT.findall(text))
-    title, _, caption = _FACT.sub("", text).partition("\n")
+    facts: dict[str, str] = dict(_METADATA.findall(text))
+    title, _, caption = _METADATA.sub("", text).partition("\n")
     before, _, after = (part.strip() for part in facts.get("Slider", "").partition("|"))
     return Script(
         path=path,
         title=title.rstrip("."),
         caption=" ".join(caption.split()),
-        deck=_listed(facts.get("Deck", "")),
+        deck=_split_list(facts.get("Deck", "")),
         equation=facts.get("Equation", ""),
-        sources=_listed(facts.get("Sources", "")),
+        sources=_split_list(facts.get("Sources", "")),
         slider=(before, after) if after else None,
         columns=int(facts.get("Columns", 0)),
     )
@@ -85,13 +85,13 @@ def find_scripts(only: Sequence[str] = ()) -> list[Script]:
     """
     scripts = [read_script(path) for path in sorted(scripts_folder().glob("[0-9]*.py"))]
     for wanted in only:
-        if not any(_named(script, wanted) for script in scripts):
+        if not any(_matches(script, wanted) for script in scripts):
             names = ", ".join(script.name for script in scripts)
             refuse("--only", "names of pictures", f"got {wanted!r}", f"Choose from: {names}")
-    return [script for script in scripts if not only or any(_named(script, name) for name in only)]
+    return [script for script in scripts if not only or any(_matches(script, name) for name in only)]
 
 
-def _named(script: Script, wanted: str) -> bool:
+def _matches(script: Script, wanted: str) -> bool:
     """Whether a number or part of a name matches the script."""
     if wanted.isdecimal():
         return int(wanted) == int(script.name.partition("_")[0])
@@ -105,7 +105,7 @@ def draw_script(draw: Callable[[Studio], Panels]) -> None:
     output, head = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
     with import_extra("matplotlib.style", "the gallery").context("dark_background"):
         panels = draw(Studio(head))
-    write_png(output, sheet(panels, read_script(Path(sys.argv[0])).columns))
+    write_png(output, panel_sheet(panels, read_script(Path(sys.argv[0])).columns))
 
 
 def scripts_folder() -> Path:
@@ -114,15 +114,15 @@ def scripts_folder() -> Path:
     return installed if installed.is_dir() else Path(__file__).parents[4] / "gallery"
 
 
-def _listed(text: str) -> tuple[str, ...]:
+def _split_list(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
-_QUALITY, _FILM_MS = 86, 80
+_QUALITY, _FRAME_MS = 86, 80
 
 
 @dataclass(frozen=True)
-class Picture:
+class GalleryPicture:
     """The result of a script.
 
     panels : WebP files by caption
@@ -140,19 +140,19 @@ class Picture:
     fault: str = ""
 
 
-def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[Picture]:
+def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[GalleryPicture]:
     """Each script's picture; a script that fails for lack of something gives a picture that says so."""
     for script in scripts:
         started, studio.frames_ms = time.perf_counter(), []
         try:
             drawn = script.draw(studio)
         except DermisError as fault:
-            yield Picture(script, {}, (0, 0), time.perf_counter() - started, None, str(fault))
+            yield GalleryPicture(script, {}, (0, 0), time.perf_counter() - started, None, str(fault))
             continue
-        height, width = still(next(iter(drawn.values()))).shape[:2]
+        height, width = first_frame(next(iter(drawn.values()))).shape[:2]
         panels = {caption: encode_webp(panel) for caption, panel in drawn.items()}
         frame_ms = float(np.median(studio.frames_ms)) if studio.frames_ms else None
-        yield Picture(script, panels, (width, height), time.perf_counter() - started, frame_ms)
+        yield GalleryPicture(script, panels, (width, height), time.perf_counter() - started, frame_ms)
 
 
 def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
@@ -160,14 +160,14 @@ def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
     from PIL import Image as Pillow
 
     images = panel if isinstance(panel, list) else [panel]
-    first, *others = (Pillow.fromarray(as_bytes(image)) for image in images)
+    first, *others = (Pillow.fromarray(to_srgb8(image)) for image in images)
     file = io.BytesIO()
-    film: dict[str, Any] = {"save_all": True, "append_images": others, "duration": _FILM_MS, "loop": 0}
+    film: dict[str, Any] = {"save_all": True, "append_images": others, "duration": _FRAME_MS, "loop": 0}
     first.save(file, "webp", quality=quality, method=4, **(film if others else {}))
     return file.getvalue()
 
 
-def write_panels(folder: Path, picture: Picture) -> None:
+def write_panels(folder: Path, picture: GalleryPicture) -> None:
     """Write a picture's panels as separate files.
 
     Raises DermisError when that is not possible.

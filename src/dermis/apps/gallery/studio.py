@@ -52,7 +52,7 @@ class Studio:
     def coloured_head(self) -> Head:
         """The head to show with its colours in a picture, also where the device paints them."""
         head = self.head()
-        return with_painted_maps(self.renderer.device, head, 1024) if head.maps.painted else head
+        return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
 
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB bytes.
@@ -93,7 +93,7 @@ class Studio:
             self._draw(scene, 1.0, settings)
             inputs = self.renderer.prepare(scene, self.settings(**settings))
             levels, blur = inputs.resources.diffusion.levels, inputs.blurs[0]
-            layer = blur.own[level]
+            layer = blur.profile_levels[level]
             halved = blur.halvings[layer]
             found = download(self.renderer.device, levels.stacks[halved], layer=layer - levels.first[halved])
             return np.asarray(found, np.float32)[..., :3] / np.float32(blur.scale)

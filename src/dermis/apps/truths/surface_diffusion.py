@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.truths.triangles import Floats, Index, triangle_edges
 from dermis.base.errors import refuse
-from dermis.mesh.geometry import sum_at
+from dermis.mesh.geometry import sum_by_index
 from dermis.mesh.mesh import Mesh
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def vertex_areas(positions: ArrayLike, triangles: ArrayLike) -> Floats:
     vertices, corners = _checked_surface(positions, triangles)
     surface = delaunay(intrinsic_triangulation(vertices, corners))
     thirds = np.repeat(surface.areas() / 3, 3)
-    return sum_at(surface.corners.ravel(), thirds[:, None], len(vertices))[:, 0]
+    return sum_by_index(surface.corners.ravel(), thirds[:, None], len(vertices))[:, 0]
 
 
 def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
@@ -237,7 +237,7 @@ def delaunay(surface: Triangulation) -> Triangulation:
     flippable = _interior_edges(corners, side, len(length))
     # Each flip lowers the Dirichlet energy of every function on the surface, so the loop ends.
     for _ in range(_MAX_SWEEPS):
-        weight = sum_at(side.ravel(), flipped.cotangents().reshape(-1, 1), len(length))[:, 0]
+        weight = sum_by_index(side.ravel(), flipped.cotangents().reshape(-1, 1), len(length))[:, 0]
         illegal = flippable & (weight < -_COCIRCULAR)
         if not illegal.any():
             break

@@ -1,1 +1,1 @@
-"""How wrong and how fast the package is: accuracy, peers, engines, comparisons and benchmarks."""
+"""Measured accuracy and speed: errors against references, other renderers, benchmarks."""

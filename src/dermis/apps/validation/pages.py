@@ -1,4 +1,4 @@
-"""Pages of the documentation with measured tables, and the browser that opens exported pages."""
+"""Pages of the documentation with measured tables, and a browser for exported pages."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
 
 JsonObject = dict[str, Any]
-"""A JSON object: numbers, words, lists and further objects."""
+"""JSON object: numbers, strings, lists and nested objects."""
 CHECKOUT = Path(str(files("dermis"))).resolve().parents[1]
 DOCS, RESULTS = CHECKOUT / "docs", CHECKOUT / "benchmarks" / "results"
-_CHECKOUT_HINT = "Install the package from a clone of the project (make setup) and run this there"
+_CHECKOUT_HINT = "Install the package from a clone of the project (make setup) and run the command there"
 SOFTWARE_WEBGL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
-def require_in_checkout(path: Path) -> Path:
-    """Return a path of the checkout that has to exist.
+def in_checkout(path: Path) -> Path:
+    """Return a path of the checkout that must exist.
 
-    Raises DermisError where the package was installed without the rest of the project.
+    Raises DermisError where the package is installed without a checkout of the project.
     """
     if not path.exists():
         refuse(path.name, "a checkout of the project", f"there is no {path}", _CHECKOUT_HINT)
@@ -36,19 +36,19 @@ def require_in_checkout(path: Path) -> Path:
 
 
 def add_tests_to_path() -> None:
-    """Make the modules of the tests importable: some measurements use their surfaces.
+    """Make the modules of the tests importable, whose meshes some measurements use.
 
     Raises DermisError where the tests are missing.
     """
-    folder = str(require_in_checkout(CHECKOUT / "tests"))
+    folder = str(in_checkout(CHECKOUT / "tests"))
     if folder not in sys.path:
         sys.path.append(folder)
 
 
 def data_file(name: str) -> Path:
-    """Return a file of the folder that DERMIS_DATA names.
+    """Return a file of the folder that the variable DERMIS_DATA names.
 
-    Raises DermisError when it is not there.
+    Raises DermisError when it is missing.
     """
     path = Path(os.environ.get("DERMIS_DATA", "../shared")) / name
     if not path.is_file():
@@ -57,32 +57,32 @@ def data_file(name: str) -> Path:
 
 
 def write_page(page: Path, text: str) -> None:
-    """Write a page of the documentation, whole or not at all."""
-    require_in_checkout(page.parent)
+    """Write a page of the documentation atomically."""
+    in_checkout(page.parent)
     with atomic_file(page) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
 
 
 def template_path(page: Path) -> Path:
-    """Return the template of a page of the documentation."""
+    """Return the path of a page's template."""
     return page.parent / "templates" / page.name
 
 
 def fill_page(page: Path, **parts: object) -> None:
-    """Write docs/NAME.md from docs/templates/NAME.md with its parts filled in."""
-    write_page(page, require_in_checkout(template_path(page)).read_text(encoding="utf-8").format(**parts))
+    """Write docs/NAME.md from docs/templates/NAME.md with values for its placeholders."""
+    write_page(page, in_checkout(template_path(page)).read_text(encoding="utf-8").format(**parts))
 
 
 def print_tables(tables: Mapping[str, str]) -> None:
-    """Print the tables of a page by their names in its template."""
+    """Print the tables of a page under their names in its template."""
     print_lines(*(f"{name}\n{text}\n" for name, text in tables.items()))
 
 
 def write_results(path: Path, figures: Mapping[str, Any], digits: int | None = None) -> None:
-    """Write raw figures as JSON, whole or not at all.
+    """Write results as JSON, atomically.
 
-    figures : what JSON can have
-    digits : significant digits of floats; all of them when left out
+    figures : JSON-compatible values
+    digits : significant digits of floats; None for all of them
     """
     values = figures if digits is None else _rounded(figures, digits)
     with atomic_file(path) as unfinished:
@@ -90,8 +90,8 @@ def write_results(path: Path, figures: Mapping[str, Any], digits: int | None = N
 
 
 def read_results(path: Path) -> Any:
-    """Return the figures that were written last."""
-    return json.loads(require_in_checkout(path).read_text(encoding="utf-8"))
+    """Return the results of the last measurement."""
+    return json.loads(in_checkout(path).read_text(encoding="utf-8"))
 
 
 def _rounded(value: object, digits: int) -> object:
@@ -108,7 +108,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def chromium_page(side: int, flags: Sequence[str] = SOFTWARE_WEBGL) -> Iterator[Page]:
-    """Open an empty page without a network, `side` pixels wide and high.
+    """Open an empty page of `side` pixels in Chromium, without a network, for a context.
 
     Raises DermisError when the package playwright is not installed.
     """

@@ -84,7 +84,7 @@ def interpolate_cameras(a: Camera, b: Camera, t: float) -> Camera:
         return b
     target = _interpolate(a.target, b.target, t)
     offset_a, offset_b = np.subtract(a.position, a.target), np.subtract(b.position, b.target)
-    lengths = [float(np.linalg.norm(away)) for away in (offset_a, offset_b)]
+    lengths = [float(np.linalg.norm(offset)) for offset in (offset_a, offset_b)]
     direction = _interpolate(offset_a / lengths[0], offset_b / lengths[1], t)
     if np.linalg.norm(direction) < 1e-3:  # opposite sides: the path is undefined
         return b

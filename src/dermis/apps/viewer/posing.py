@@ -40,7 +40,7 @@ def bone_angles(scene: Scene, bone: str) -> Angles:
     if values.shape == (3,):
         x, y, z = values.tolist()
         return x, y, z
-    matrix = skeleton.changes([skeleton.index[bone]], values[None])[0, :3, :3]
+    matrix = skeleton.head_space_changes([skeleton.index[bone]], values[None])[0, :3, :3]
     return matrix_angles(matrix / np.linalg.norm(matrix, axis=0))
 
 
@@ -62,7 +62,7 @@ def poses_equal(a: Pose | Mapping[str, float] | None, b: Pose | Mapping[str, flo
     """Return whether two poses are equal; vertex positions are compared by identity."""
     if a is b:
         return True
-    first, second = Pose.of(a) or REST_POSE, Pose.of(b) or REST_POSE
+    first, second = Pose.coerce(a) or REST_POSE, Pose.coerce(b) or REST_POSE
     return (
         first.positions_mm is second.positions_mm
         and dict(first.weights) == dict(second.weights)
@@ -77,7 +77,7 @@ def posed_positions(scene: Scene) -> NDArray[np.floating]:
     if vertex_motion is None:
         return mesh.positions
     rig = replace(scene.head.control, positions_mm=vertex_motion.positions_mm)
-    points = rig.posed(vertex_motion.weights.astype(np.float64), vertex_motion.matrices.astype(np.float64))
+    points = rig.pose(vertex_motion.weights.astype(np.float64), vertex_motion.matrices.astype(np.float64))
     if rig.stencils is not None:
         points = rig.stencils.points(points)
     return np.asarray(points[mesh.point])

@@ -13,7 +13,7 @@ from dermis.base.errors import refuse
 from dermis.human.person import Human
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
-from dermis.mesh.pose import Pose, laid_over
+from dermis.mesh.pose import Pose, merge_poses
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.files import head_table, load_lights, load_scene
@@ -151,7 +151,7 @@ class ViewerState:
 
         Raises DermisError if a frame cannot be read.
         """
-        pose = laid_over(clip.pose_at(seconds), self.scene.pose)
+        pose = merge_poses(clip.pose_at(seconds), self.scene.pose)
         return replace(self.with_pose(pose), seconds=seconds)
 
     def with_head(self, head: Head, table: Table, rho_s: float) -> ViewerState:

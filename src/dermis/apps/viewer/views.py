@@ -104,10 +104,10 @@ class IntermediateViews:
         """Return the atlas map of a view and the scale factor of its values."""
         if view in LEVEL_VIEWS:
             level, blur = LEVEL_VIEWS[view], next(iter(inputs.blurs), None)
-            count = len(blur.own) if blur else 0
+            count = len(blur.profile_levels) if blur else 0
             if blur is None or level >= count:
                 refuse(f"view {view}", "a pyramid level of the atlas", f"there are {count}", _ATLAS_ADVICE)
-            layer = blur.own[level]
+            layer = blur.profile_levels[level]
             texture = inputs.resources.diffusion.levels.layer(layer, blur.halvings[layer])
             return texture, self._exposure(inputs) / blur.scale
         if view == "stretch":
@@ -117,8 +117,8 @@ class IntermediateViews:
 
     def _exposure(self, inputs: FrameInputs) -> float:
         """Return the exposure of the last frame."""
-        meter, given = inputs.resources.post.meter, inputs.settings.exposure
-        return read_meter(self._renderer.device, meter) if meter else float(given)
+        meter, exposure = inputs.resources.post.meter, inputs.settings.exposure
+        return read_meter(self._renderer.device, meter) if meter else float(exposure)
 
     def _thickness(self, inputs: FrameInputs) -> Texture:
         translucency = inputs.layouts[0].translucency

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import components, edges, sum_at, triangle_areas
+from dermis.mesh.geometry import components, edges, sum_by_index, triangle_areas
 
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]
@@ -61,7 +61,9 @@ def _smooth_borders(chart: Index, triangles: Index) -> Index:
     triangle_count = np.maximum(np.bincount(corner), 1)
     weight = np.eye(int(chart.max()) + 1)[chart]
     for _ in range(_SMOOTHING_STEPS):
-        at_point = sum_at(corner, np.repeat(weight, 3, axis=0), len(triangle_count)) / triangle_count[:, None]
+        at_point = (
+            sum_by_index(corner, np.repeat(weight, 3, axis=0), len(triangle_count)) / triangle_count[:, None]
+        )
         weight = at_point[triangles].mean(axis=1)
     return np.asarray(weight.argmax(axis=1), dtype=np.int64)
 

@@ -1,1 +1,1 @@
-"""glTF 2.0: heads read from files with all that moves them, and written."""
+"""Reading and writing of glTF 2.0 heads with their deformation."""

@@ -1,4 +1,4 @@
-"""Animation clips of a glTF file, as curves between keys."""
+"""Animation clips of glTF files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
 
 
 class AnimationTrack(NamedTuple):
-    """What one curve moves: `path` of the named nodes, or "weights" of the named morph targets."""
+    """Curve that animates `path` of the named nodes, or "weights" of the named morph targets."""
 
     path: str
     names: tuple[str, ...]
@@ -34,7 +34,7 @@ class AnimationTrack(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Animation:
-    """A clip of a file."""
+    """Animation clip of a file."""
 
     name: str
     tracks: tuple[AnimationTrack, ...]
@@ -43,23 +43,23 @@ class Animation:
 class _Keys(NamedTuple):
     times_s: Doubles
     values: Doubles
-    kind: str
+    kind: Interpolation
 
     @property
     def plain(self) -> Doubles:
-        """(k, n) the values without tangents."""
+        """Return the values without tangents, (k, n)."""
         return self.values[:, 1] if self.kind == "CUBICSPLINE" else self.values
 
 
 def clip_names(path: Path) -> tuple[str, ...]:
-    """Names of the file's clips; those without are numbered."""
+    """Return the names of a file's clips; clips without a name are numbered."""
     return _names(read_document(path))
 
 
 def read_clip(path: Path, name: str | None) -> Animation:
-    """A clip of a .glb or .gltf file; the only one when no name is given.
+    """Read a clip of a .glb or .gltf file; without a name, its only clip.
 
-    Raises DermisError for a clip that is not there, and for one that is damaged.
+    Raises DermisError for a missing or damaged clip.
     """
     document = read_document(path)
     names = _names(document)
@@ -67,11 +67,11 @@ def read_clip(path: Path, name: str | None) -> Animation:
         refuse(path, "a file with animation clips", "it has none", "Export it with its animation")
     if name is None and len(names) > 1:
         actual, advice = f"it has {', '.join(names)}", f"Name one, as in {path.name}#{names[0]}"
-        refuse(path, "to know which of its clips is meant", actual, advice)
+        refuse(path, "the name of a clip", actual, advice)
     if name is not None and name not in names:
         refuse(path, f"one of its clips ({', '.join(names)})", f"got {name!r}", "Correct the name")
     index = 0 if name is None else names.index(name)
-    with parsing(f"{path}: clip {names[index][:80]!r}", "a sound animation", *MALFORMED_DATA_ERRORS):
+    with parsing(f"{path}: clip {names[index][:80]!r}", "a valid animation", *MALFORMED_DATA_ERRORS):
         return Animation(names[index], tuple(_tracks(document, index, names[index])))
 
 
@@ -81,39 +81,42 @@ def _names(document: Document) -> tuple[str, ...]:
 
 
 def _tracks(document: Document, index: int, name: str) -> list[AnimationTrack]:
-    """The clip's curves, those of the same kind and keys side by side in one."""
+    """Return the tracks of a clip; curves of the same kind with the same keys are merged."""
     clip, nodes = document.item("animations", index), read_nodes(document)
     if len(clip["channels"]) > MAX_CHANNELS:
         actual = f"{name!r} has {len(clip['channels']):,}"
         refuse(document.path, f"clips of at most {MAX_CHANNELS:,} channels", actual, "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keys]]] = {}
-    found, names = [], dict[int, tuple[str, ...]]()
+    tracks, names = [], dict[int, tuple[str, ...]]()
     for number, channel in enumerate(clip["channels"]):
         target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {number}"
         if "node" not in target or target["path"] not in (*_WIDTH, "weights"):
-            continue  # of an extension
+            continue  # a target of an extension
         _check_node(nodes, target["node"], culprit)
         sampler = clip["samplers"][checked_index(channel["sampler"], len(clip["samplers"]), "samplers")]
         if target["path"] == "weights":
-            found.append(_weight_track(document, target["node"], sampler, culprit, names))
+            tracks.append(_weight_track(document, target["node"], sampler, culprit, names))
             continue
         keys = _read_keys(document, sampler, _WIDTH[target["path"]], culprit)
         if target["path"] == "rotation" and not keys.plain.any(axis=-1).all():
-            refuse(culprit, "rotations as unit quaternions", "one is 0", _DAMAGED)
+            refuse(culprit, "unit quaternions as rotations", "one is 0", _DAMAGED)
         group = (target["path"], keys.kind, keys.times_s.tobytes())
         groups.setdefault(group, []).append((nodes.names[target["node"]], keys))
-    return found + [_merge_tracks(str(path), members) for (path, *_), members in groups.items()]
+    return tracks + [_merge_tracks(str(path), members) for (path, *_), members in groups.items()]
 
 
 def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
     if not 0 <= node < len(nodes.names):
-        refuse(culprit, f"nodes from 0 to {len(nodes.names) - 1}", f"it moves node {node}", _DAMAGED)
+        refuse(culprit, f"a node from 0 to {len(nodes.names) - 1}", f"got node {node}", _DAMAGED)
 
 
 def _weight_track(
     document: Document, node: int, sampler: Tree, culprit: str, known: dict[int, tuple[str, ...]]
 ) -> AnimationTrack:
-    """Weights of a node's targets; known : names by mesh, of those that were met."""
+    """Return the track of the morph target weights of a node.
+
+    known : names of targets by mesh, extended by this function
+    """
     mesh = document.items("nodes")[node].get("mesh")
     if mesh is not None and mesh not in known:
         known[mesh] = target_names(document.item("meshes", mesh))
@@ -122,20 +125,19 @@ def _weight_track(
         actual = f"node {node} has no morph targets"
         refuse(culprit, "weights of a mesh with morph targets", actual, _DAMAGED)
     keys = _read_keys(document, sampler, len(names), culprit)
-    return AnimationTrack(
-        "weights", names, AnimationCurve(keys.times_s, keys.values[..., None, :], keys.kind)
-    )  # type: ignore[arg-type]
+    curve = AnimationCurve(keys.times_s, keys.values[..., None, :], keys.kind)
+    return AnimationTrack("weights", names, curve)
 
 
 def _merge_tracks(path: str, members: list[tuple[str, _Keys]]) -> AnimationTrack:
     keys = members[0][1]
-    values = np.stack([one.values for _, one in members], axis=-2)
-    curve = AnimationCurve(keys.times_s, values, keys.kind, is_rotation=path == "rotation")  # type: ignore[arg-type]
+    values = np.stack([own.values for _, own in members], axis=-2)
+    curve = AnimationCurve(keys.times_s, values, keys.kind, is_rotation=path == "rotation")
     return AnimationTrack(path, tuple(name for name, _ in members), curve)
 
 
 def _read_keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keys:
-    """Times and values of a sampler, (k, n), or (k, 3, n) with the tangents of a spline."""
+    """Read times and values of a sampler, (k, n), or (k, 3, n) with the tangents of a spline."""
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in _KINDS:
         refuse(culprit, f"an interpolation of {', '.join(_KINDS)}", f"got {kind!r}", _DAMAGED)
@@ -147,19 +149,20 @@ def _read_keys(document: Document, sampler: Tree, width: int, culprit: str) -> _
     if not (np.isfinite(times).all() and np.isfinite(values).all()):
         refuse(culprit, "finite keys", "some are NaN or infinite", _DAMAGED)
     if (np.diff(times) < 0).any():
-        late = int(np.flatnonzero(np.diff(times) < 0)[0])
-        actual = f"key {late + 1} at {times[late + 1]:g} s comes after {times[late]:g} s"
-        refuse(culprit, "keys in the order of time", actual, _DAMAGED)
+        early = int(np.flatnonzero(np.diff(times) < 0)[0])
+        actual = f"key {early + 1} at {times[early + 1]:g} s comes after {times[early]:g} s"
+        refuse(culprit, "keys in temporal order", actual, _DAMAGED)
     return _Keys(times, values.reshape(shape), kind)
 
 
 @dataclass(frozen=True, eq=False)
 class AnimationCurve:
-    """Values that change over time, several with the same keys side by side.
+    """Interpolated values over time, for several channels with the same keys.
 
-    times_s : (k,) of the keys, growing
-    values : (k, m, n); of a cubic spline (k, 3, m, n): tangent in, value, tangent out
-    is_rotation : whether the values are quaternions (n = 4), which go round on arcs
+    times_s : (k,) of the keys, increasing
+    values : (k, m, n); for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent
+    kind : interpolation between keys
+    is_rotation : whether the values are quaternions (n = 4), which are interpolated spherically
 
     Source: glTF 2.0, appendix C.
     """
@@ -170,7 +173,7 @@ class AnimationCurve:
     is_rotation: bool = False
 
     def sample(self, seconds: float) -> Doubles:
-        """(m, n) the values at a time; before the first key and after the last theirs."""
+        """Return the values at a time, (m, n); constant before the first and after the last key."""
         index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
         keys = self.values[:, _VALUE] if self.kind == "CUBICSPLINE" else self.values
         if index < 0 or index + 1 >= len(self.times_s):
@@ -178,19 +181,19 @@ class AnimationCurve:
         if self.kind == "STEP":
             return self._unit(keys[index])
         step = float(self.times_s[index + 1] - self.times_s[index])
-        share = (seconds - float(self.times_s[index])) / step
+        fraction = (seconds - float(self.times_s[index])) / step
         if self.kind == "CUBICSPLINE":
-            return self._unit(self._spline(index, share, step))
+            return self._unit(self._spline(index, fraction, step))
         if self.is_rotation:
-            return slerp(self._unit(keys[index]), self._unit(keys[index + 1]), share)
-        return np.asarray((1 - share) * keys[index] + share * keys[index + 1])
+            return slerp(self._unit(keys[index]), self._unit(keys[index + 1]), fraction)
+        return np.asarray((1 - fraction) * keys[index] + fraction * keys[index + 1])
 
     def _spline(self, index: int, s: float, step: float) -> Doubles:
-        here, there = self.values[index], self.values[index + 1]
-        mixed = (2 * s**3 - 3 * s**2 + 1) * here[_VALUE] + (3 * s**2 - 2 * s**3) * there[_VALUE]
-        mixed += step * (s**3 - 2 * s**2 + s) * here[_TANGENT_OUT]
-        mixed += step * (s**3 - s**2) * there[_TANGENT_IN]
-        return np.asarray(mixed)
+        before, after = self.values[index], self.values[index + 1]
+        value = (2 * s**3 - 3 * s**2 + 1) * before[_VALUE] + (3 * s**2 - 2 * s**3) * after[_VALUE]
+        value += step * (s**3 - 2 * s**2 + s) * before[_TANGENT_OUT]
+        value += step * (s**3 - s**2) * after[_TANGENT_IN]
+        return np.asarray(value)
 
     def _unit(self, values: Doubles) -> Doubles:
         return values / np.linalg.norm(values, axis=-1, keepdims=True) if self.is_rotation else values

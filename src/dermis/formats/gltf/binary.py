@@ -1,4 +1,4 @@
-"""The numbers of a glTF file that is being written, and its bytes."""
+"""Binary buffer of a glTF file that is being written, with its views and accessors."""
 
 from __future__ import annotations
 
@@ -14,87 +14,92 @@ from dermis.base.arrays import Numbers
 from dermis.formats.gltf.document import FrozenTree, Tree
 
 VERTICES, INDICES = 34962, 34963
-"""What a buffer view holds, where it holds nothing else."""
+"""Targets of buffer views."""
 CLAMPED_SAMPLER = {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}
-"""A sampler that repeats nothing, with mips."""
+"""Sampler with mip levels and without repetition."""
 _TYPES = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
 _KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-_MAX_SHORT_COUNT = 65535  # the number itself begins a strip anew
+_MAX_SHORT_COUNT = 65535  # the value 65535 itself means primitive restart
 
 
 @dataclass
 class BufferBuilder:
-    """The file's one buffer as it grows, with the views and accessors into it."""
+    """Growing buffer with its views and accessors."""
 
     data: bytearray = field(default_factory=bytearray)
     views: list[Tree] = field(default_factory=list)
     accessors: list[Tree] = field(default_factory=list)
     _zero_accessors: dict[int, int] = field(default_factory=dict)
 
-    def add_view(self, part: bytes, target: int | None = None) -> int:
-        """The number of a new view of these bytes."""
+    def add_view(self, data: bytes, target: int | None = None) -> int:
+        """Append bytes to the buffer and return the index of their buffer view."""
         self.data += b"\0" * (-len(self.data) % 4)
-        entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(part)}
+        entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
         self.views.append(entry if target is None else entry | {"target": target})
-        self.data += part
+        self.data += data
         return len(self.views) - 1
 
     def add_accessor(self, rows: Numbers, target: int | None = None, *, bounded: bool = False) -> int:
-        """The number of a new accessor; rows : (n, k), float32 or unsigned.
+        """Append rows (n, k) of float32 or unsigned integers and return the index of their accessor.
 
-        bounded : tell the least and the largest of each column
+        bounded : store the smallest and largest value of each column
         """
         values = _little_endian(rows)
-        more = _bounds(values) if bounded else {}
-        return self._append_accessor(values, {"bufferView": self.add_view(values.tobytes(), target)} | more)
+        bounds = _bounds(values) if bounded else {}
+        view = self.add_view(values.tobytes(), target)
+        return self._append_accessor(values, {"bufferView": view} | bounds)
 
     def add_triangles(self, index: Numbers, count: int) -> int:
-        """An accessor of corners (f, 3) among so many vertices."""
+        """Append corners (f, 3) of triangles and return the index of their accessor.
+
+        count : number of vertices
+        """
         return self.add_accessor(index.reshape(-1, 1).astype(_index_dtype(count)), INDICES)
 
     def add_displacements(self, row: Numbers, columns: Sequence[Numbers], count: int) -> list[int]:
-        """Accessors of `count` rows of three of which most are 0, whichever form is the smaller.
+        """Append arrays (count, 3) that are mostly 0, sparse or dense, and return their accessors.
 
-        row : (m,) those that are not, in order
-        columns : each (m, 3) their values
+        row : (m,) indices of rows that are not 0, increasing
+        columns : their values, (m, 3) for each array
         """
         if not len(row):
             return [self._zero_accessor(count)] * len(columns)
         index = row.astype(_index_dtype(count))
         if len(row) * (12 + index.itemsize) >= 12 * count:
             return [self._dense_accessor(row, values, count) for values in columns]
-        places = {"bufferView": self.add_view(_little_endian(index).tobytes())}
-        places["componentType"] = _TYPES[_little_endian(index).dtype.str]
-        found = []
+        indices = {"bufferView": self.add_view(_little_endian(index).tobytes())}
+        indices["componentType"] = _TYPES[_little_endian(index).dtype.str]
+        accessors = []
         for values in columns:
             stored = _little_endian(values)
-            told = {"bufferView": self.add_view(stored.tobytes())}
-            sparse = {"count": len(row), "indices": dict(places), "values": told}
+            view = {"bufferView": self.add_view(stored.tobytes())}
+            sparse = {"count": len(row), "indices": dict(indices), "values": view}
             low, high = np.minimum(stored.min(axis=0), 0), np.maximum(stored.max(axis=0), 0)
-            more = {"sparse": sparse, "min": low.tolist(), "max": high.tolist()}
-            found.append(self._append_accessor(np.broadcast_to(np.zeros(1, "<f4"), (count, 3)), more))
-        return found
+            entries = {"sparse": sparse, "min": low.tolist(), "max": high.tolist()}
+            zeros = np.broadcast_to(np.zeros(1, "<f4"), (count, 3))
+            accessors.append(self._append_accessor(zeros, entries))
+        return accessors
 
     def _zero_accessor(self, count: int) -> int:
-        """One accessor for all of so many zeros; it takes no room."""
+        """Return an accessor of `count` zeros, which is shared and takes no space in the buffer."""
         if count not in self._zero_accessors:
-            none = np.broadcast_to(np.zeros(1, "<f4"), (count, 3))
-            self._zero_accessors[count] = self._append_accessor(none, {"min": [0.0] * 3, "max": [0.0] * 3})
+            zeros = np.broadcast_to(np.zeros(1, "<f4"), (count, 3))
+            self._zero_accessors[count] = self._append_accessor(zeros, {"min": [0.0] * 3, "max": [0.0] * 3})
         return self._zero_accessors[count]
 
     def _dense_accessor(self, row: Numbers, values: Numbers, count: int) -> int:
-        whole = np.zeros((count, 3), "<f4")
-        whole[row] = values
-        return self.add_accessor(whole, VERTICES, bounded=True)
+        dense = np.zeros((count, 3), "<f4")
+        dense[row] = values
+        return self.add_accessor(dense, VERTICES, bounded=True)
 
-    def _append_accessor(self, values: Numbers, more: FrozenTree) -> int:
-        told = {"componentType": _TYPES[values.dtype.str], "type": _KINDS[values.shape[1]]}
-        self.accessors.append({"count": len(values), **told, **more})
+    def _append_accessor(self, values: Numbers, entries: FrozenTree) -> int:
+        layout = {"componentType": _TYPES[values.dtype.str], "type": _KINDS[values.shape[1]]}
+        self.accessors.append({"count": len(values), **layout, **entries})
         return len(self.accessors) - 1
 
 
 def _little_endian(rows: Numbers) -> Numbers:
-    """The same with the bytes in a file's order."""
+    """Return rows in the byte order of glTF."""
     return np.ascontiguousarray(rows, rows.dtype.newbyteorder("<"))
 
 
@@ -103,22 +108,22 @@ def _bounds(values: Numbers) -> dict[str, list[float]]:
 
 
 def _index_dtype(count: int) -> str:
-    """The smallest type for numbers of so many things."""
+    """Return the smallest type of indices of so many vertices."""
     return "<u2" if count <= _MAX_SHORT_COUNT else "<u4"
 
 
-def resolve_textures(value: Any, places: Mapping[str, int]) -> Any:
-    """The tree with pictures' names, as {"index": name}, replaced by their textures' numbers."""
+def resolve_textures(value: Any, textures: Mapping[str, int]) -> Any:
+    """Return a JSON tree in which picture names, {"index": name}, are replaced by texture indices."""
     if isinstance(value, Mapping):
         return {
-            key: places[one] if key == "index" and one in places else resolve_textures(one, places)
-            for key, one in value.items()
+            key: textures[item] if key == "index" and item in textures else resolve_textures(item, textures)
+            for key, item in value.items()
         }
     return value
 
 
 def glb_bytes(tree: FrozenTree, binary: bytes | bytearray) -> bytes:
-    """A .glb file of a tree and its one buffer."""
+    """Return the bytes of a .glb file with a JSON tree and one buffer."""
     text = json.dumps(tree, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     body = bytes(binary) + b"\0" * (-len(binary) % 4)

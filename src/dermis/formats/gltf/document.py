@@ -1,7 +1,6 @@
-"""A .glb or .gltf file as its tree and its numbers.
+"""Access to the JSON tree and the buffers of .glb and .gltf files.
 
-An accessor may lie anywhere in a buffer, with gaps, be mostly zero or the same as another (sparse), and hold
-integers that stand for fractions.
+Accessors may be strided, sparse, and hold integers that represent fractions.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ from dermis.formats.size_limits import MAX_ACCESSOR_NUMBERS, MAX_FILE_BYTES, MAX
 
 Tree = dict[str, Any]
 FrozenTree = Mapping[str, Any]
-"""JSON as other programs write it: its values are checked where they are used."""
+"""JSON of another program, whose values are checked where they are used."""
 
 _MAGIC = 0x46546C67
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_MIN_READ_COST = 512  # numbers that take as long as reading any
+_MIN_READ_COST = 512  # numbers to which the overhead of reading an accessor corresponds
 _LISTS = (
     "accessors",
     "animations",
@@ -49,10 +48,10 @@ _LISTS = (
 
 @dataclass
 class Document:
-    """A file that was read.
+    """Content of a glTF file.
 
     tree : its JSON
-    binary : the chunk that a .glb file holds besides
+    binary : binary chunk of a .glb file
     """
 
     path: Path
@@ -62,25 +61,25 @@ class Document:
     _numbers_read: int = 0
 
     def items(self, key: str) -> list[Tree]:
-        """Things of one kind, none where the file has none."""
-        found: list[Tree] = self.tree.get(key, [])
-        return found
+        """Return the list of objects under a key, empty if the file has none."""
+        listed: list[Tree] = self.tree.get(key, [])
+        return listed
 
     def item(self, key: str, index: object) -> Tree:
-        """A thing by its kind and number.
+        """Return an object by key and index.
 
-        Raises ValueError where there is none of that number.
+        Raises ValueError for an invalid index.
         """
         return self.items(key)[checked_index(index, len(self.items(key)), key)]
 
     def read_buffer(self, index: int) -> bytes:
-        """One of its buffers, wherever it lies."""
+        """Return the bytes of a buffer, wherever it is stored."""
         if index not in self._buffers:
             self._buffers[index] = self._read(self.item("buffers", index).get("uri"))
         return self._buffers[index]
 
     def read_view(self, index: int) -> memoryview:
-        """The bytes of a buffer view, all of them."""
+        """Return the bytes of a buffer view."""
         view = self.item("bufferViews", index)
         start, length = _checked_size(view.get("byteOffset", 0)), _checked_size(view["byteLength"])
         data = memoryview(self.read_buffer(view["buffer"]))[start : start + length]
@@ -89,13 +88,13 @@ class Document:
         return data
 
     def read_values(self, index: int) -> Numbers:
-        """(n, k) the values of an accessor as they are stored; sparse ones in their places."""
+        """Return the values of an accessor as stored, (n, k), with sparse values applied."""
         accessor = self.item("accessors", index)
         kind, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
         shape = _checked_size(accessor["count"]), width
         self._numbers_read += max(shape[0] * width, _MIN_READ_COST)
         if self._numbers_read > MAX_ACCESSOR_NUMBERS:
-            actual = f"accessor {index} takes it beyond"
+            actual = f"accessor {index} exceeds the limit"
             advice = "Export it with fewer instances or targets, or decimated"
             refuse(
                 self.path,
@@ -113,7 +112,7 @@ class Document:
         return self._with_sparse(values, accessor["sparse"])
 
     def read_floats(self, index: int) -> Doubles:
-        """(n, k) the values of an accessor; integers that are normalised are fractions of the largest."""
+        """Return the values of an accessor as floats, (n, k); normalised integers become fractions."""
         values = self.read_values(index)
         if not self.item("accessors", index).get("normalized", False):
             return values.astype(np.float64)
@@ -122,18 +121,21 @@ class Document:
     def _with_sparse(self, values: Numbers, sparse: Tree) -> Numbers:
         count = _checked_size(sparse["count"])
         if count > len(values):
-            raise ValueError(f"{count} of {len(values)} values are said to differ")
-        places = np.dtype(_TYPES[sparse["indices"]["componentType"]])
-        index = self._rows(sparse["indices"], (count, 1), places).ravel()
-        changed = values.copy()
-        changed[index] = self._rows(sparse["values"], (count, values.shape[1]), values.dtype)
-        return changed
+            raise ValueError(f"{count} of {len(values)} values are listed as sparse")
+        index_type = np.dtype(_TYPES[sparse["indices"]["componentType"]])
+        index = self._rows(sparse["indices"], (count, 1), index_type).ravel()
+        result = values.copy()
+        result[index] = self._rows(sparse["values"], (count, values.shape[1]), values.dtype)
+        return result
 
     def _rows(
-        self, place: Tree, shape: tuple[int, int], kind: np.dtype[np.number], stride: int = 0
+        self, location: Tree, shape: tuple[int, int], kind: np.dtype[np.number], stride: int = 0
     ) -> Numbers:
-        """(n, k) numbers that begin at a place in a buffer view; stride [byte] 0 where they lie close."""
-        data, start = self.read_view(place["bufferView"]), _checked_size(place.get("byteOffset", 0))
+        """Return numbers (n, k) at a location in a buffer view.
+
+        stride : distance of rows [byte], 0 if they are contiguous
+        """
+        data, start = self.read_view(location["bufferView"]), _checked_size(location.get("byteOffset", 0))
         size = kind.itemsize
         if 0 in shape:
             return np.zeros(shape, kind)
@@ -142,21 +144,21 @@ class Document:
     def _read(self, uri: str | None) -> bytes:
         if uri is None:
             return self.binary
-        left = MAX_FILE_BYTES - sum(map(len, self._buffers.values()))
+        remaining = MAX_FILE_BYTES - sum(map(len, self._buffers.values()))
         if uri.startswith("data:"):
             data = base64.b64decode(uri.partition(",")[2])
         else:
-            data = read_file(resolve_uri(self.path, uri), "a buffer", left, f"{self.path}, {uri[:80]!r}")
-        if len(data) > left:
+            data = read_file(resolve_uri(self.path, uri), "a buffer", remaining, f"{self.path}, {uri[:80]!r}")
+        if len(data) > remaining:
             actual = "they have more"
             refuse(self.path, f"buffers of at most {MAX_FILE_BYTES >> 20} MiB", actual, "Make them smaller")
         return data
 
 
 def checked_index(index: object, count: int, kind: str) -> int:
-    """The number of one of so many things.
+    """Return an index after checking it against the number of items.
 
-    Raises ValueError where it is none of them.
+    Raises ValueError for an invalid index.
     """
     if not (isinstance(index, int) and 0 <= index < count):
         raise ValueError(f"there are {count} {kind}, and {str(index)[:40]!r} is none of them")
@@ -170,9 +172,9 @@ def _checked_size(value: object) -> int:
 
 
 def read_document(path: Path) -> Document:
-    """The file's tree and binary chunk.
+    """Read a .glb or .gltf file.
 
-    Raises DermisError when it is no glTF, is cut short, or says more than any head needs.
+    Raises DermisError when it is not glTF, truncated, or too large.
     """
     data = read_file(path, "a glTF file", MAX_FILE_BYTES)
     with parsing(path, "a glTF file", *MALFORMED_DATA_ERRORS):
@@ -180,7 +182,7 @@ def read_document(path: Path) -> Document:
             return Document(path, _parse_tree(path, data))
         magic, version, length = struct.unpack_from("<III", data)
         if magic != _MAGIC or version != 2:
-            raise ValueError("it does not begin as a .glb file of version 2")
+            raise ValueError("it does not start like a .glb file of version 2")
         if length > len(data):
             raise ValueError(f"it should have {length} bytes and has {len(data)}")
         chunks = dict(_chunks(data))
@@ -188,29 +190,29 @@ def read_document(path: Path) -> Document:
 
 
 def _parse_tree(path: Path, text: bytes) -> Tree:
-    """The tree that a text says, with lists of objects where there are to be some."""
+    """Parse the JSON of a file and check that its lists contain objects."""
     values = sum(text.count(mark) for mark in (b",", b"[", b"{"))
     if values > MAX_JSON_VALUES:
         actual, advice = f"it has {values:,}", "Export it with fewer nodes, materials or clips"
         refuse(path, f"JSON of at most {MAX_JSON_VALUES:,} values", actual, advice)
     tree = parse_json(text, path, "a glTF file")
     if not isinstance(tree, dict):
-        raise ValueError("its JSON is no object")
+        raise ValueError("its JSON is not an object")
     for key in _LISTS:
         listed = tree.get(key, [])
         if not (isinstance(listed, list) and all(isinstance(one, dict) for one in listed)):
-            raise ValueError(f"its {key} are no list of objects")
+            raise ValueError(f"its {key} are not a list of objects")
     return tree
 
 
 def _chunks(data: bytes) -> list[tuple[int, bytes]]:
-    """Kind and content of each chunk, the last of a kind first, so that of two the first counts."""
-    found, place = [], 12
-    while place + 8 <= len(data):
-        length, kind = struct.unpack_from("<II", data, place)
-        content = data[place + 8 : place + 8 + length]
+    """Return kind and content of each chunk in reverse order, so that the first of a kind is used."""
+    chunks, offset = [], 12
+    while offset + 8 <= len(data):
+        length, kind = struct.unpack_from("<II", data, offset)
+        content = data[offset + 8 : offset + 8 + length]
         if len(content) != length:
-            raise ValueError("a chunk is cut short")
-        found.append((kind, content))
-        place += 8 + length
-    return found[::-1]
+            raise ValueError("a chunk is truncated")
+        chunks.append((kind, content))
+        offset += 8 + length
+    return chunks[::-1]

@@ -1,4 +1,4 @@
-"""Maps and eyes that a glTF file holds for this package."""
+"""Maps and eyes embedded in glTF files."""
 
 from __future__ import annotations
 
@@ -20,29 +20,30 @@ ROLES = ("normal", "height", "specular", "roughness", "region")
 
 
 def embedded_maps(path: Path) -> Tree:
-    """Options of `load_maps` that a .glb or .gltf file gives itself, {} for one without pictures.
+    """Return options for `load_maps` from the pictures in a .glb or .gltf file, {} without pictures.
 
-    The skin's material gives its base colour and, when the package wrote the file, the maps that its extras
-    name: a normal map only where it is no picture of the height; any other file gives its normal map.
+    Base colour and normal map are those of the skin's material. For files written by this package, the
+    material's extras list all maps, and the normal map is used only if it is not computed from the height
+    map.
 
     Raises DermisError when the file is damaged.
     """
     document = read_document(path)
-    with parsing(path, "sound textures", *MALFORMED_DATA_ERRORS):
-        found = _maps(document)
+    with parsing(path, "valid textures", *MALFORMED_DATA_ERRORS):
+        options = _maps(document)
     texels = 0
-    for picture in (one for one in found.values() if isinstance(one, EmbeddedPicture) or is_file(str(one))):
+    for picture in (one for one in options.values() if isinstance(one, EmbeddedPicture) or is_file(str(one))):
         width, height = read_size(picture)
         texels += width * height
     if texels > MAX_TOTAL_PIXELS:
         actual, advice = (
             f"they have {texels / 1e6:.0f} million",
-            "Resize them, or name them yourself (--colour, ...)",
+            "Resize them, or set them by options (--colour, ...)",
         )
         refuse(
             path, f"textures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together", actual, advice
         )
-    return found
+    return options
 
 
 def _maps(document: Document) -> Tree:
@@ -55,19 +56,19 @@ def _maps(document: Document) -> Tree:
         source = document.item("textures", reference["index"]).get("source")
         return None if source is None else _picture(document, source)
 
-    found: Tree = {"colour": picture(skin.get("pbrMetallicRoughness", {}).get("baseColorTexture"))}
-    own = skin.get("extras", {}).get("dermis")
-    if own is None:
-        found["normal"] = picture(skin.get("normalTexture"))
+    options: Tree = {"colour": picture(skin.get("pbrMetallicRoughness", {}).get("baseColorTexture"))}
+    extras = skin.get("extras", {}).get("dermis")
+    if extras is None:
+        options["normal"] = picture(skin.get("normalTexture"))
     else:
-        found |= {role: picture(own.get(role)) for role in ROLES}
-        found["colour"] = picture(own.get("colour")) or found["colour"]
-        found["height_mm"] = _checked_relief(own.get("height_mm"))
-    return {role: value for role, value in found.items() if value is not None}
+        options |= {role: picture(extras.get(role)) for role in ROLES}
+        options["colour"] = picture(extras.get("colour")) or options["colour"]
+        options["height_mm"] = _checked_relief(extras.get("height_mm"))
+    return {role: value for role, value in options.items() if value is not None}
 
 
 def _checked_relief(height_mm: object) -> float | None:
-    """The relief of a grey level [mm] that a file tells."""
+    """Return the relief of one grey level in a file, after checking it [mm]."""
     if height_mm is None:
         return None
     if (
@@ -97,15 +98,15 @@ def _picture(document: Document, source: int) -> EmbeddedPicture | Path | None:
 
 
 def embedded_eye_look(path: Path) -> EyeLook:
-    """What a .glb or .gltf file tells of the eyes of its person; the usual look for others.
+    """Return the eye parameters of the person in a .glb or .gltf file, or the default.
 
-    Raises DermisError for such that no eyes can have.
+    Raises DermisError for invalid parameters.
     """
     notes = read_document(path).tree.get("asset", {}).get("extras")
     person = notes.get("person") if isinstance(notes, dict) else None
     eyes = person.get("eyes") if isinstance(person, dict) else None
     if not isinstance(eyes, dict):
         return EyeLook()
-    told = {one.name: eyes[one.name] for one in fields(EyeLook) if one.name in eyes}
-    with error_context(path), parsing(path, "sound numbers of eyes", *MALFORMED_DATA_ERRORS):
-        return EyeLook(**told)
+    values = {one.name: eyes[one.name] for one in fields(EyeLook) if one.name in eyes}
+    with error_context(path), parsing(path, "valid eye parameters", *MALFORMED_DATA_ERRORS):
+        return EyeLook(**values)

@@ -1,4 +1,4 @@
-"""The tree of a glTF file's nodes."""
+"""Node hierarchy of a glTF file."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from dermis.mesh.rotations import quaternion_matrix
 class Nodes:
     """All nodes of a file.
 
-    names : (n,) each another one
+    names : (n,) unique
     parent : (n,) -1 for a root
     order : (n,) parents before children
     local, world : (n, 4, 4) to the parent's space and to the scene's, at rest
-    scene_nodes : those of the scene, in the order in which their meshes come; None for a file without scenes
+    scene_nodes : nodes of the scene, in the order of their meshes; None for a file without scenes
     """
 
     names: tuple[str, ...]
@@ -32,17 +32,17 @@ class Nodes:
     scene_nodes: tuple[int, ...] | None
 
     def ancestors(self, node: int) -> list[int]:
-        """The node, its parent and so on up to the root."""
-        found = [node]
-        while self.parent[found[-1]] >= 0:
-            found.append(self.parent[found[-1]])
-        return found
+        """Return a node, its parent and so on up to the root."""
+        path = [node]
+        while self.parent[path[-1]] >= 0:
+            path.append(self.parent[path[-1]])
+        return path
 
 
 def read_nodes(document: Document) -> Nodes:
-    """The file's nodes.
+    """Read the nodes of a file.
 
-    Raises DermisError when they go round in a circle, or are too many or too deep.
+    Raises DermisError when they form a cycle, or are too many or too deep.
     """
     nodes = document.items("nodes")
     if len(nodes) > MAX_NODES:
@@ -63,16 +63,16 @@ def read_nodes(document: Document) -> Nodes:
 
 
 def node_names(nodes: list[Tree]) -> tuple[str, ...]:
-    """A name for each node: its own, with a number after it where another one has it already."""
-    found: dict[str, None] = {}
+    """Return unique names of nodes: their own, with a number appended to duplicates."""
+    names: dict[str, None] = {}
     counts: dict[str, int] = {}
     for index, node in enumerate(nodes):
         name = own = str(node.get("name") or f"node {index}")
         count = counts.get(own, 2)
-        while name in found:
+        while name in names:
             name, count = f"{own} {count}", count + 1
-        found[name], counts[own] = None, count
-    return tuple(found)
+        names[name], counts[own] = None, count
+    return tuple(names)
 
 
 def _parents(nodes: list[Tree]) -> tuple[int, ...]:
@@ -87,41 +87,41 @@ def _parents(nodes: list[Tree]) -> tuple[int, ...]:
 
 def _order(document: Document, names: tuple[str, ...], parent: tuple[int, ...]) -> tuple[int, ...]:
     children: dict[int, list[int]] = {}
-    for index, above in enumerate(parent):
-        children.setdefault(above, []).append(index)
+    for index, own_parent in enumerate(parent):
+        children.setdefault(own_parent, []).append(index)
     order = list(children.get(-1, []))
     for index in order:
         order.extend(children.get(index, []))
-    lost = sorted(set(range(len(parent))) - set(order))
-    if lost:
-        actual = f"{', '.join(repr(names[k]) for k in lost[:5])} are their own ancestors"
+    cyclic = sorted(set(range(len(parent))) - set(order))
+    if cyclic:
+        actual = f"{', '.join(repr(names[k]) for k in cyclic[:5])} are their own ancestors"
         refuse(document.path, "nodes that form a tree", actual, "The file is damaged: export it again")
     return tuple(order)
 
 
 def _scene_nodes(document: Document, nodes: list[Tree]) -> tuple[int, ...] | None:
-    """Nodes of the scene, the last child of each first."""
+    """Return the nodes of the scene, the last child of each first."""
     if "scenes" not in document.tree:
         return None
-    waiting = list(document.item("scenes", document.tree.get("scene", 0)).get("nodes", []))
-    found: dict[int, None] = {}
-    while waiting:
-        index = checked_index(waiting.pop(), len(nodes), "nodes")
-        if index not in found:
-            found[index] = None
-            waiting.extend(nodes[index].get("children", []))
-    return tuple(found)
+    pending = list(document.item("scenes", document.tree.get("scene", 0)).get("nodes", []))
+    visited: dict[int, None] = {}
+    while pending:
+        index = checked_index(pending.pop(), len(nodes), "nodes")
+        if index not in visited:
+            visited[index] = None
+            pending.extend(nodes[index].get("children", []))
+    return tuple(visited)
 
 
 def _local_matrix(node: Tree) -> Doubles:
-    """(4, 4) from a node's space to its parent's: its matrix, or translation, rotation and scale."""
+    """Return the matrix (4, 4) from a node's space to its parent's."""
     matrix = np.eye(4)
     if "matrix" in node:
         matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     if "translation" in node:
-        moved = np.eye(4)
-        moved[:3, 3] = np.reshape(node["translation"], 3)
-        matrix = matrix @ moved
+        translation = np.eye(4)
+        translation[:3, 3] = np.reshape(node["translation"], 3)
+        matrix = matrix @ translation
     if "rotation" in node:
         matrix = matrix @ quaternion_matrix(np.reshape(np.asarray(node["rotation"], np.float64), 4))
     if "scale" in node:

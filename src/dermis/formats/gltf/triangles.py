@@ -1,4 +1,4 @@
-"""Triangles of the scene of a glTF file, with what moves them."""
+"""Triangles of a glTF scene, with targets, bones and weights."""
 
 from __future__ import annotations
 
@@ -33,13 +33,19 @@ _MAX_COUNTS = {
     "vertices": MAX_VERTICES,
     "displacements by targets": MAX_DISPLACEMENTS,
 }
-_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization")
+_SUPPORTED_EXTENSIONS = (
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "KHR_lights_",
+    "KHR_mesh_quantization",
+)
 
 
 def read_gltf(path: Path) -> MeshFile:
-    """The scene of a .glb or .gltf file as it rests: joints at their nodes, targets at their default weights.
+    """Read the scene of a .glb or .gltf file at rest: joints at their nodes, targets at default weights.
 
-    A mesh with a skin lies where its joints take it, whatever its own node says.
+    A mesh with a skin is transformed by its joints, independently of its own node.
     """
     document = read_document(path)
     _refuse_extensions(document)
@@ -50,16 +56,20 @@ def read_gltf(path: Path) -> MeshFile:
 
 
 def _refuse_extensions(document: Document) -> None:
-    """Refuse geometry in an encoding that would be read wrongly."""
-    foreign = [name for name in document.items("extensionsRequired") if not str(name).startswith(_HARMLESS)]
-    if foreign:
-        actual = f"the file requires {', '.join(map(str, foreign))}"
+    """Refuse files that require extensions with encoded geometry."""
+    unsupported = [
+        name
+        for name in document.items("extensionsRequired")
+        if not str(name).startswith(_SUPPORTED_EXTENSIONS)
+    ]
+    if unsupported:
+        actual = f"the file requires {', '.join(map(str, unsupported))}"
         refuse(document.path, "plain glTF geometry", actual, "Export without compression")
 
 
 @dataclass
 class _Reader:
-    """Reads one part after the other."""
+    """Reader of the primitives of a scene."""
 
     document: Document
     nodes: Nodes
@@ -67,85 +77,90 @@ class _Reader:
     weights: dict[str, float]
 
     def parts(self) -> Iterator[MeshPart]:
+        """Yield the parts of the scene while checking their total size."""
         counts = {"primitives": 0, "triangles": 0, "vertices": 0, "displacements by targets": 0}
-        for part in self._all():
-            moved = sum(len(vertex) for vertex, _ in part.targets.values())
-            for name, count in zip(counts, (1, len(part.triangles), len(part.positions), moved), strict=True):
+        for part in self._all_parts():
+            displaced = sum(len(vertex) for vertex, _ in part.targets.values())
+            for name, count in zip(
+                counts, (1, len(part.triangles), len(part.positions), displaced), strict=True
+            ):
                 counts[name] += count
-                self._check_most(name, counts[name])
+                self._check_count(name, counts[name])
             yield part
 
-    def _check_most(self, name: str, count: int) -> None:
-        """Refuse a scene before all of it is built; instances count as often as they are shown."""
+    def _check_count(self, name: str, count: int) -> None:
+        """Refuse a scene that is too large before all of it is built; each instance of a mesh counts."""
         if count > _MAX_COUNTS[name]:
             actual, advice = "it has more", "Export the head alone, or decimated"
             refuse(self.document.path, f"a scene of at most {_MAX_COUNTS[name]:,} {name}", actual, advice)
 
-    def _all(self) -> Iterator[MeshPart]:
-        nodes, shown = self.document.items("nodes"), self.nodes.scene_nodes or ()
-        meshes = [k for k in shown if "mesh" in nodes[k]]
+    def _all_parts(self) -> Iterator[MeshPart]:
+        nodes, scene_nodes = self.document.items("nodes"), self.nodes.scene_nodes or ()
+        meshes = [k for k in scene_nodes if "mesh" in nodes[k]]
         for node in meshes:
             yield from self._mesh(self.document.item("meshes", nodes[node]["mesh"]), node)
-        if not meshes:  # a file of meshes alone
+        if not meshes:  # a file with meshes but without nodes
             for mesh in self.document.items("meshes"):
                 yield from self._mesh(mesh, None)
 
     def _mesh(self, mesh: Tree, node: int | None) -> Iterator[MeshPart]:
         names = target_names(mesh)
         for primitive in mesh["primitives"]:
-            drawn = primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
-            if drawn and _own_extras(primitive).get("hair") is not True:
+            has_triangles = primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
+            if has_triangles and _own_extras(primitive).get("hair") is not True:
                 yield self._part(mesh, names, primitive, node)
 
     def _part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> MeshPart:
-        """A primitive where its node, or the joints of its skin, take it."""
-        part, targets = self._unplaced(mesh, names, primitive)
+        """Return a primitive transformed by its node or by the joints of its skin."""
+        part, targets = self._untransformed(mesh, names, primitive)
         if node is None:
             return _transformed(part, targets, np.eye(4))
         if "skin" in self.document.tree["nodes"][node] and self.armature:
-            followed, resting = read_influences(self.document, self.nodes, self.armature, node, primitive)
-            return _skin_part(part, targets, followed, resting)
-        placed = _transformed(part, targets, _nearest_rigid(self.nodes.world[node]))
+            skin_influences, matrices = read_influences(
+                self.document, self.nodes, self.armature, node, primitive
+            )
+            return _skin_part(part, targets, skin_influences, matrices)
+        transformed = _transformed(part, targets, _nearest_rigid(self.nodes.world[node]))
         bone = self.armature.bone_for_node(self.nodes, node) if self.armature else None
         if bone is None:
-            return placed
+            return transformed
         count = len(part.positions)
-        return replace(placed, bone=np.full((count, 1), bone), weight=np.ones((count, 1)))
+        return replace(transformed, bone=np.full((count, 1), bone), weight=np.ones((count, 1)))
 
-    def _unplaced(
+    def _untransformed(
         self, mesh: Tree, names: tuple[str, ...], primitive: Tree
     ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
-        """A primitive in its mesh's space, with targets at their default weights, and all its targets."""
-        given = primitive["attributes"]
-        self._check_most("vertices", self.document.item("accessors", given["POSITION"])["count"])
-        positions = self.document.read_floats(given["POSITION"]).reshape(-1, 3)
+        """Return a primitive in mesh space with targets at default weights, and all its targets."""
+        attributes = primitive["attributes"]
+        self._check_count("vertices", self.document.item("accessors", attributes["POSITION"])["count"])
+        positions = self.document.read_floats(attributes["POSITION"]).reshape(-1, 3)
         uv, normals = (
-            to_floats(self.document.read_values(given[name])) if name in given else None
+            to_floats(self.document.read_values(attributes[name])) if name in attributes else None
             for name in ("TEXCOORD_0", "NORMAL")
         )
         targets = read_targets(self.document, mesh, names, primitive, len(positions))
-        moved = apply_targets(positions, targets, self.weights)
-        if moved is not positions:
-            normals = None  # they belong to another shape
+        displaced = apply_targets(positions, targets, self.weights)
+        if displaced is not positions:
+            normals = None  # they are those of the undisplaced shape
         triangles = self._triangles(primitive, len(positions))
-        own = _own_extras(primitive)
-        sides = np.full(len(triangles) // 2 if own.get("quads") is True else 0, 4)
+        extras = _own_extras(primitive)
+        corner_counts = np.full(len(triangles) // 2 if extras.get("quads") is True else 0, 4)
         return MeshPart(
             self._group(mesh, primitive),
-            moved,
+            displaced,
             uv,
             normals,
             triangles,
-            quads=find_quads(sides, triangles),
-            alone=own.get("alone") is True,
+            quads=find_quads(corner_counts, triangles),
+            separate=extras.get("alone") is True,
         ), targets
 
     def _triangles(self, primitive: Tree, count: int) -> Index:
-        """(f, 3) the corners of a primitive's triangles."""
+        """Return the corners of a primitive's triangles, (f, 3)."""
         index = np.arange(count)
         if "indices" in primitive:
             corners = self.document.item("accessors", primitive["indices"])["count"]
-            self._check_most("triangles", corners // 3)
+            self._check_count("triangles", corners // 3)
             index = self.document.read_values(primitive["indices"]).ravel().astype(np.int64)
         mode = primitive.get("mode", _TRIANGLES)
         if mode == _TRIANGLES:
@@ -165,28 +180,28 @@ class _Reader:
 
 
 def _own_extras(primitive: Tree) -> Tree:
-    """What this package wrote beside a primitive."""
+    """Return what this package stored in the extras of a primitive."""
     extras = primitive.get("extras")
-    told = extras.get("dermis") if isinstance(extras, dict) else None
-    return told if isinstance(told, dict) else {}
+    own = extras.get("dermis") if isinstance(extras, dict) else None
+    return own if isinstance(own, dict) else {}
 
 
 def _transformed(part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles) -> MeshPart:
-    """A part moved by `matrix` (4, 4); a mirror turns its triangles round."""
+    """Return a part transformed by `matrix` (4, 4); reflections flip the orientation of triangles."""
     linear = matrix[:3, :3]
     return replace(
         part,
         positions=part.positions @ linear.T + matrix[:3, 3],
         normals=None if part.normals is None else part.normals @ _normal_matrix(linear).T,
         triangles=part.triangles[:, ::-1] if np.linalg.det(linear) < 0 else part.triangles,
-        targets={name: (one.vertex, one.delta @ linear.T) for name, one in targets.items()},
+        targets={name: (own.vertex, own.delta @ linear.T) for name, own in targets.items()},
     )
 
 
 def _nearest_rigid(matrix: Doubles) -> Doubles:
-    """The nearest rigid matrix where it misses one by rounding alone, as with scales of 1.0000001."""
-    missed = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
-    if not 1e-13 < missed < 1e-5:
+    """Return the nearest rigid matrix if the deviation is only rounding, as with scales of 1.0000001."""
+    deviation = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
+    if not 1e-13 < deviation < 1e-5:
         return matrix
     left, _, right = np.linalg.svd(matrix[:3, :3])
     rigid = matrix.copy()
@@ -195,11 +210,11 @@ def _nearest_rigid(matrix: Doubles) -> Doubles:
 
 
 def _skin_part(
-    part: MeshPart, targets: dict[str, VertexDisplacements], followed: SkinInfluences, matrices: Doubles
+    part: MeshPart, targets: dict[str, VertexDisplacements], influences: SkinInfluences, matrices: Doubles
 ) -> MeshPart:
-    """A part of which each vertex is moved by its own one of `matrices` (v, 4, 4)."""
-    if len(followed.bone) != len(part.positions):
-        raise ValueError(f"{len(part.positions)} vertices have {len(followed.bone)} joints")
+    """Return a part whose vertices are transformed by one matrix each, (v, 4, 4)."""
+    if len(influences.bone) != len(part.positions):
+        raise ValueError(f"{len(part.positions)} vertices have {len(influences.bone)} joints")
     linear = matrices[:, :3, :3]
     mirrored = np.linalg.det(linear) < 0
     return replace(
@@ -210,22 +225,23 @@ def _skin_part(
         else np.einsum("vij,vj->vi", _normal_matrix(linear), part.normals),
         triangles=part.triangles[:, ::-1] if mirrored.mean() > 0.5 else part.triangles,
         targets={
-            name: (one.vertex, np.einsum("vij,vj->vi", linear[one.vertex], one.delta))
-            for name, one in targets.items()
+            name: (own.vertex, np.einsum("vij,vj->vi", linear[own.vertex], own.delta))
+            for name, own in targets.items()
         },
-        bone=followed.bone,
-        weight=followed.weight,
+        bone=influences.bone,
+        weight=influences.weight,
     )
 
 
 def _normal_matrix(linear: Doubles) -> Doubles:
-    """(..., 3, 3) that turns normals as `linear` turns the surface: they keep their length.
+    """Return the matrices (..., 3, 3) that transform normals for the linear part of transforms.
 
-    Normals turn with the cofactors, for flat transforms too.
+    They are scaled to preserve the length of normals. Cofactors are used because they are also valid for
+    singular transforms.
     """
     rows = [linear[..., k, :] for k in range(3)]
     cofactors = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)
     determinant = np.asarray(np.linalg.det(linear))
-    mirror = np.where(determinant < 0, -1.0, 1.0)
-    size = np.where(determinant == 0, 1.0, np.abs(determinant) ** (2 / 3))
-    return np.asarray((mirror / size)[..., None, None] * cofactors)
+    sign = np.where(determinant < 0, -1.0, 1.0)
+    scale = np.where(determinant == 0, 1.0, np.abs(determinant) ** (2 / 3))
+    return np.asarray((sign / scale)[..., None, None] * cofactors)

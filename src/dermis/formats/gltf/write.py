@@ -1,4 +1,4 @@
-"""A head written as one .glb file with all that moves it."""
+"""Encoding of a head with its rig as one .glb file."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from dermis.formats.gltf.materials import (
     surface_material,
 )
 from dermis.formats.gltf.primitives import FibreTubes, HairPrimitive, PrimitiveSource, SurfacePrimitive
-from dermis.mesh.eyeball import EyePictures
+from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
 from dermis.mesh.skeleton import Skeleton
 
 BROWS, HAIR = "brows and lashes", "hair"
-"""Names of the materials of hairs, and of their pictures."""
+"""Names of the materials and pictures of hairs."""
 _KNOTS = {BROWS: 5, HAIR: 4}
-_MAX_HAIRS = 16_000  # fewer stand for all, wider
-_M = 1e-3  # of a millimetre
+_MAX_HAIRS = 16_000  # more hairs are represented by fewer, wider ones
+_METRES_PER_MM = 1e-3
 
 
 def encode_head(
@@ -39,43 +39,44 @@ def encode_head(
     weights: Mapping[str, float] | None = None,
     slopes: Floats | None = None,
     notes: FrozenTree | None = None,
-    eyes: EyePictures | None = None,
-    added: SkinAdditions | None = None,
+    eyes: EyeTextures | None = None,
+    additions: SkinAdditions | None = None,
 ) -> bytes:
-    """The bytes of a .glb file: metres, a primitive for each material, morph targets, a skin of four bones.
+    """Encode a head as a .glb file in metres, with one primitive per material, targets and a skin.
 
-    Hairs are thin tubes, of which this package reads none back.
+    Hairs become thin tubes, which this package does not read back. The result is deterministic.
 
-    roughness : Beckmann's m of skin without a map of it [-]
-    weights : of morph targets at rest, beside the head's own
+    roughness : Beckmann's m of skin without a roughness map [-]
+    weights : of morph targets at rest, in addition to the head's own
     slopes : (n, n, 2) of the relief for programs that read no height map
-    notes : what goes into the file's extras
-    eyes : what its eyes look like; of one colour where None
-    added : to the materials of skin
-
-    The same head gives the same bytes.
+    notes : extras of the file
+    eyes : pictures of the eyes; None for a uniform colour
+    additions : to the material of skin
     """
     binary, points = BufferBuilder(), DeformableMesh(head)
     pictures, roles = skin_pictures(head.maps, slopes)
-    pictures |= {} if added is None else added.pictures
-    parts, kinds = _parts(points, pictures, roles, roughness, eyes)
-    if added is not None:
-        kinds = [added.applied_to(kind) if "dermis" in kind.get("extras", {}) else kind for kind in kinds]
+    pictures |= {} if additions is None else additions.pictures
+    parts, materials = _parts(points, pictures, roles, roughness, eyes)
+    if additions is not None:
+        materials = [
+            additions.applied_to(material) if "dermis" in material.get("extras", {}) else material
+            for material in materials
+        ]
     images = [
         {"bufferView": binary.add_view(data), "mimeType": "image/png", "name": name}
         for name, data in pictures.items()
     ]
-    places = {name: index for index, name in enumerate(pictures)}
-    nodes, roots, bound = _nodes(head, binary)
+    textures = {name: index for index, name in enumerate(pictures)}
+    nodes, roots, skins = _nodes(head, binary)
     tree = {
         "asset": _asset(head, notes),
-        "extensionsUsed": sorted({name for kind in kinds for name in kind.get("extensions", {})}),
+        "extensionsUsed": sorted({name for material in materials for name in material.get("extensions", {})}),
         "scene": 0,
         "scenes": [{"nodes": roots}],
         "nodes": nodes,
         "meshes": [_mesh(points, binary, parts, weights or {})],
-        "skins": bound,
-        "materials": [resolve_textures(kind, places) for kind in kinds],
+        "skins": skins,
+        "materials": [resolve_textures(material, textures) for material in materials],
         "textures": [{"source": index, "sampler": 0} for index in range(len(images))],
         "samplers": [CLAMPED_SAMPLER] if images else [],
         "images": images,
@@ -91,26 +92,26 @@ def _parts(
     pictures: dict[str, bytes],
     roles: FrozenTree,
     roughness: float,
-    eyes: EyePictures | None,
+    eyes: EyeTextures | None,
 ) -> tuple[list[PrimitiveSource], list[Tree]]:
-    """What becomes primitives, and the material of each; adds the pictures of eyes and hairs."""
+    """Return sources of primitives and their materials, and add pictures of eyes and hairs."""
     head = points.head
-    painted = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
-    if eyes is not None and painted:
+    eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
+    if eyes is not None and eye_materials:
         pictures |= eye_pictures(eyes)
-    parts, kinds = list[PrimitiveSource](), list[Tree]()
-    for kind in np.unique(head.mesh.material).tolist():
-        eye = painted.index(kind) if kind in painted else -1
-        parts.append(SurfacePrimitive(points, np.flatnonzero(head.mesh.material == kind), eye))
-        one = head.mesh.materials[kind]
-        kinds.append(surface_material(one, pictures, roles, roughness) if eye < 0 else eye_material(one))
+    parts, materials = list[PrimitiveSource](), list[Tree]()
+    for index in np.unique(head.mesh.material).tolist():
+        eye = eye_materials.index(index) if index in eye_materials else -1
+        parts.append(SurfacePrimitive(points, np.flatnonzero(head.mesh.material == index), eye))
+        own = head.mesh.materials[index]
+        materials.append(surface_material(own, pictures, roles, roughness) if eye < 0 else eye_material(own))
     for name, strands in ((BROWS, head.strands), (HAIR, head.hair)):
         if strands is not None and len(strands):
             fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_HAIRS, _KNOTS[name])
             parts.append(HairPrimitive(points, fibres))
-            kinds.append(hair_material(name))
+            materials.append(hair_material(name))
             pictures[name] = colours_png(fibres.colours()[0])
-    return parts, kinds
+    return parts, materials
 
 
 def _asset(head: Head, notes: FrozenTree | None) -> Tree:
@@ -123,7 +124,7 @@ def _asset(head: Head, notes: FrozenTree | None) -> Tree:
 def _mesh(
     points: DeformableMesh, binary: BufferBuilder, parts: list[PrimitiveSource], weights: Mapping[str, float]
 ) -> Tree:
-    """A primitive for each part; its material has the same number."""
+    """Return the glTF mesh, with one primitive per part whose material has the same index."""
     primitives = [part.primitive(binary) | {"material": number} for number, part in enumerate(parts)]
     mesh: Tree = {"name": _name(points.head), "primitives": primitives}
     names, rest = points.rig.targets.names, points.rig.targets.rest
@@ -133,49 +134,49 @@ def _mesh(
         for primitive, part in zip(primitives, parts, strict=True):
             primitive.setdefault("targets", []).append(part.target(binary, target))
     resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))
-    told = [float({**resting, **weights}.get(name, 0.0)) for name in names]
-    return mesh | {"weights": told, "extras": {"targetNames": list(names)}}
+    values = [float({**resting, **weights}.get(name, 0.0)) for name in names]
+    return mesh | {"weights": values, "extras": {"targetNames": list(names)}}
 
 
 def _name(head: Head) -> str:
-    """The head's name, apart from those of its bones."""
+    """Return the name of the mesh, which must differ from the names of bones."""
     name = Path(head.name).stem or "head"
     return f"{name} mesh" if name in head.bones else name
 
 
 def _nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
-    """All nodes, those at the top, and the skin; bones first, the mesh last."""
+    """Return all nodes, the indices of root nodes, and the skin; bones first, the mesh last."""
     skeleton = head.control.skeleton
     if skeleton is None:
         return [{"name": _name(head), "mesh": 0}], [0], []
-    nodes, bound = _bones(skeleton)
-    tops = np.flatnonzero(skeleton.parent < 0).tolist()
-    if len(tops) > 1:  # a skin's joints have one node above them
-        nodes.append({"name": f"{_name(head)} bones", "children": tops})
-        tops = [len(nodes) - 1]
-    skin = {"joints": list(range(len(skeleton.names))), "skeleton": tops[0]}
-    rows = bound.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
+    nodes, inverse_bind = _bones(skeleton)
+    roots = np.flatnonzero(skeleton.parent < 0).tolist()
+    if len(roots) > 1:  # the joints of a skin need a common root
+        nodes.append({"name": f"{_name(head)} bones", "children": roots})
+        roots = [len(nodes) - 1]
+    skin = {"joints": list(range(len(skeleton.names))), "skeleton": roots[0]}
+    rows = inverse_bind.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
     skin["inverseBindMatrices"] = binary.add_accessor(rows)
     nodes.append({"name": _name(head), "mesh": 0, "skin": 0})
-    return nodes, [*tops, len(nodes) - 1], [skin]
+    return nodes, [*roots, len(nodes) - 1], [skin]
 
 
 def _bones(skeleton: Skeleton) -> tuple[list[Tree], Doubles]:
-    """Nodes in metres, and (b, 4, 4) from the file's space to each bone's, where its points are bound."""
-    to_file = np.diag([_M, _M, _M, 1.0]) @ skeleton.to_head
+    """Return bone nodes in metres, and the inverse bind matrices (b, 4, 4)."""
+    to_file = np.diag([_METRES_PER_MM] * 3 + [1.0]) @ skeleton.to_head
     size = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
-    grown, shrunk = (np.diag([one, one, one, 1.0]) for one in (size, 1.0 / size))
+    scaled_up, scaled_down = (np.diag([factor] * 3 + [1.0]) for factor in (size, 1.0 / size))
     nodes: list[Tree] = []
     for bone, (name, parent) in enumerate(zip(skeleton.names, skeleton.parent.tolist(), strict=True)):
-        above = to_file if parent < 0 else grown
+        parent_space = to_file if parent < 0 else scaled_up
         children = np.flatnonzero(skeleton.parent == bone).tolist()
-        node = {"name": name, **_node_transform(above @ skeleton.local[bone] @ shrunk)}
+        node = {"name": name, **_node_transform(parent_space @ skeleton.local[bone] @ scaled_down)}
         nodes.append(node | ({"children": children} if children else {}))
-    return nodes, np.asarray(grown @ skeleton.inverse_bind @ np.linalg.inv(to_file))
+    return nodes, np.asarray(scaled_up @ skeleton.inverse_bind @ np.linalg.inv(to_file))
 
 
 def _node_transform(matrix: Doubles) -> Tree:
-    """A node's place: a translation where it is no more."""
+    """Return the transform of a node, as a translation if it is one."""
     if np.abs(matrix[:3, :3] - np.eye(3)).max() < 1e-9:
         return {"translation": [float(x) for x in matrix[:3, 3]]}
     return {"matrix": [float(x) for x in matrix.T.ravel()]}

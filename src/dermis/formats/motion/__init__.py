@@ -1,1 +1,1 @@
-"""Motion from files: animation clips, captures of faces, sequences of meshes."""
+"""Motion from files: animation clips, facial captures and mesh sequences."""

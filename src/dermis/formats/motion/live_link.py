@@ -1,4 +1,4 @@
-"""Captures of Live Link Face: a CSV of ARKit's blend shapes and the angles of head and eyes."""
+"""Captures of Live Link Face: CSV files of ARKit blend shapes and angles of head and eyes."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ _DAY_S, _MIDNIGHT_S = 86400.0, 82800.0
 
 
 class _Timecode(NamedTuple):
-    """Whole seconds, and frames after them."""
+    """Timecode as whole seconds and additional frames."""
 
     seconds: int
     frames: float
 
 
 class _Table(NamedTuple):
-    """names of the columns, times [s] and numbers (k, n) of the rows."""
+    """Names of the columns, times [s] and values (k, n) of the rows."""
 
     names: list[str]
     times_s: Doubles
@@ -55,22 +55,22 @@ class _Table(NamedTuple):
 
 
 def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
-    """The clip that a CSV of Live Link Face is for a head.
+    """Load a CSV file of Live Link Face as a clip for a head.
 
-    Columns count by their names, in any order: Timecode, blend shapes, and angles [rad] HeadPitch, HeadYaw
-    and HeadRoll, about the head's x, y and z, likewise LeftEye... and RightEye..., for which
-    `find_rotation_bones` tells the bones.
+    Columns are identified by name, in any order: Timecode, blend shapes, and angles [rad] HeadPitch, HeadYaw
+    and HeadRoll about the head's x, y and z axes, likewise LeftEye... and RightEye.... They rotate the bones
+    found by `find_rotation_bones`.
 
-    fps : frames a second of the timecode; when left out, what the largest of its frames tells
+    fps : frame rate of the timecode; by default estimated from its largest frame number
 
-    Raises DermisError for a file with other columns or broken lines, which it names.
+    Raises DermisError for a file with other columns or invalid lines, which it names.
     """
     table = _read(path, fps)
     shapes = [k for k, name in enumerate(table.names) if name.casefold() not in _ANGLES]
     bones = find_rotation_bones(head.control.skeleton)
-    angles, lost = _bone_angles(table, bones)
+    angles, unused = _bone_angles(table, bones)
     names = tuple(table.names[k] for k in shapes)
-    samples = CaptureSamples(table.times_s, names, table.values[:, shapes], angles, lost)
+    samples = CaptureSamples(table.times_s, names, table.values[:, shapes], angles, unused)
     return capture_clip(path, path.stem, samples, head)
 
 
@@ -83,7 +83,7 @@ def _read(path: Path, fps: float | None) -> _Table:
             refuse(path, f"{expected} with a header and rows", "it is empty", "Export it again")
         _check_header(f"{path}, line {reader.line_num}", header)
         folded = [name.casefold() for name in header]
-        kept = [k for k, name in enumerate(folded) if name not in (_TIME, _COUNT, "")]
+        columns = [k for k, name in enumerate(folded) if name not in (_TIME, _COUNT, "")]
         lines: list[int] = []
         codes: list[_Timecode] = []
         rows: list[Doubles] = []
@@ -92,12 +92,12 @@ def _read(path: Path, fps: float | None) -> _Table:
             _check_row(culprit, header, row)
             lines.append(reader.line_num)
             codes.append(_timecode(culprit, row[folded.index(_TIME)]))
-            rows.append(_numbers(culprit, header, row, kept))
-            check_size(path, len(rows), len(kept))
+            rows.append(_numbers(culprit, header, row, columns))
+            check_size(path, len(rows), len(columns))
     if not rows:
         refuse(path, f"{expected} with a header and rows", "it has only its header", "Export it again")
     times = _row_times(path, lines, codes, fps)
-    return _Table([header[k] for k in kept], times, np.array(rows))
+    return _Table([header[k] for k in columns], times, np.array(rows))
 
 
 def _has_text(row: Sequence[str]) -> bool:
@@ -115,22 +115,22 @@ def _check_header(culprit: str, header: Sequence[str]) -> None:
     if _TIME not in folded:
         actual = f"the columns are {', '.join(header[:5])}{' ...' if len(header) > 5 else ''}"
         refuse(culprit, "a column Timecode", actual, "Export it from Live Link Face as it is")
-    twice = [name for name in header if name and folded.count(name.casefold()) > 1]
-    if twice:
-        refuse(culprit, "each column once", f"{twice[0]} comes twice", "Remove one of them")
+    repeated = [name for name in header if name and folded.count(name.casefold()) > 1]
+    if repeated:
+        refuse(culprit, "each column once", f"{repeated[0]} occurs twice", "Remove one of them")
     if not set(folded) - {_TIME, _COUNT}:
         refuse(culprit, "columns of blend shapes", "there are none", "Export it from Live Link Face as it is")
 
 
-def _numbers(culprit: str, header: Sequence[str], row: Sequence[str], kept: Sequence[int]) -> Doubles:
-    values = np.zeros(len(kept))
-    for place, column in enumerate(kept):
+def _numbers(culprit: str, header: Sequence[str], row: Sequence[str], columns: Sequence[int]) -> Doubles:
+    values = np.zeros(len(columns))
+    for index, column in enumerate(columns):
         try:
-            values[place] = float(row[column])
+            values[index] = float(row[column])
         except ValueError:
             actual = f"{header[column]} is {row[column]!r}"
             refuse(culprit, "numbers", actual, "Correct or remove the line")
-    check_weights(culprit, [header[column] for column in kept], values)
+    check_weights(culprit, [header[column] for column in columns], values)
     return values
 
 
@@ -143,18 +143,18 @@ def _timecode(culprit: str, cell: str) -> _Timecode:
 
 
 def _row_times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps: float | None) -> Doubles:
-    """Seconds of each row; a timecode that goes from 23 to 0 hours goes on."""
+    """Return the time of each row [s]; timecodes continue after midnight."""
     rate = fps or _rate(codes)
-    times = np.array([one.seconds + one.frames / rate for one in codes])
+    times = np.array([code.seconds + code.frames / rate for code in codes])
     days = np.cumsum(np.diff(times, prepend=times[0]) < -_MIDNIGHT_S)
     times += _DAY_S * days
-    back = np.flatnonzero(np.diff(times) < 0)
-    if len(back):
-        row = int(back[0]) + 1
-        actual = f"this line is {times[row - 1] - times[row]:.3f} s before the last"
+    backwards = np.flatnonzero(np.diff(times) < 0)
+    if len(backwards):
+        row = int(backwards[0]) + 1
+        actual = f"this line is {times[row - 1] - times[row]:.3f} s before the previous one"
         refuse(
             f"{path}, line {lines[row]}",
-            "a Timecode that goes on",
+            "increasing Timecodes",
             actual,
             "Sort the lines, or remove this one",
         )
@@ -162,29 +162,31 @@ def _row_times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps
 
 
 def _rate(codes: Sequence[_Timecode]) -> float:
-    """Frames a second: the least usual rate beyond the largest frame, once a whole second went by."""
-    largest = max(int(one.frames) for one in codes)
-    turned = any(after.seconds > before.seconds for before, after in pairwise(codes))
+    """Return the lowest common frame rate above the largest frame number, if a full second was recorded."""
+    largest = max(int(code.frames) for code in codes)
+    seconds_advance = any(after.seconds > before.seconds for before, after in pairwise(codes))
     fitting = [rate for rate in _RATES if rate > largest] or [float(largest + 1)]
-    return fitting[0] if turned else max(_APP_RATE, fitting[0])
+    return fitting[0] if seconds_advance else max(_APP_RATE, fitting[0])
 
 
 def _bone_angles(table: _Table, bones: RotationBones) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Angles (k, 3) [degrees] of bones, and names of columns for which the head has no bone."""
+    """Return angles (k, 3) by bone [degrees], and names of columns for which the head has no bone."""
     columns = {name.casefold(): k for k, name in enumerate(table.names)}
     angles: dict[str, Doubles] = {}
-    lost: list[str] = []
+    unused: list[str] = []
     for part in _PARTS:
-        own = {angle: columns.get(f"{part}{angle}") for angle in ("pitch", "yaw", "roll")}
-        if all(column is None for column in own.values()):
+        part_columns = {angle: columns.get(f"{part}{angle}") for angle in ("pitch", "yaw", "roll")}
+        if all(column is None for column in part_columns.values()):
             continue
-        rows = np.degrees([[0.0 if k is None else row[k] for k in own.values()] for row in table.values])
+        rows = np.degrees(
+            [[0.0 if k is None else row[k] for k in part_columns.values()] for row in table.values]
+        )
         eye = bones.eyes.get(part.removesuffix("eye")) if part != "head" else None
         if eye is not None:
             angles[eye] = unwrap_degrees(rows)
         elif part == "head" and bones.head:
-            turns = matrix_quaternion(np.array([angles_matrix(row) for row in rows.tolist()]))
-            angles |= head_bone_angles(bones, turns)
+            rotations = matrix_quaternion(np.array([angles_matrix(row) for row in rows.tolist()]))
+            angles |= head_bone_angles(bones, rotations)
         elif rows.any():
-            lost += [table.names[k] for k in own.values() if k is not None]
-    return angles, tuple(lost)
+            unused += [table.names[k] for k in part_columns.values() if k is not None]
+    return angles, tuple(unused)

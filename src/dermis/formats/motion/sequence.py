@@ -1,4 +1,4 @@
-"""Sequences of mesh files with one topology, a file for each frame."""
+"""Sequences of mesh files with the same topology, one file per frame."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from dermis.formats.read import Up, join_parts, read_mesh_file, to_y_up
 from dermis.formats.rig_from_file import SPLIT_TOLERANCE_MM
 from dermis.formats.size_limits import MAX_FILE_BYTES
 from dermis.mesh.clip import Clip
-from dermis.mesh.geometry import compacted
+from dermis.mesh.geometry import compact_vertices
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 
@@ -37,7 +37,7 @@ _NORMAL_LINE = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
 
 
 def is_sequence(path: Path) -> bool:
-    """Whether a name is a folder, a pattern, or a mesh that could be one frame."""
+    """Return whether a path is a folder, a pattern, or a mesh file that could be one frame."""
     return (
         _is_folder(path)
         or bool(_NUMBER.search(path.name))
@@ -47,40 +47,45 @@ def is_sequence(path: Path) -> bool:
 
 
 def frame_files(path: Path) -> list[Path]:
-    """The files of a folder, of a pattern as face_%05d.obj or of face_*.obj, in the order of their numbers.
+    """Return the files of a folder, or of a pattern such as face_%05d.obj or face_*.obj, by number.
 
-    Raises DermisError when there are none, or of several kinds.
+    Raises DermisError when there are none, or of several formats.
     """
     if _is_folder(path):
-        found = [one for one in path.iterdir() if one.suffix.lower() in SUFFIXES]
+        files = [one for one in path.iterdir() if one.suffix.lower() in SUFFIXES]
     elif _NUMBER.search(path.name):
         before, after = _NUMBER.split(path.name, maxsplit=1)
         shape = re.compile(rf"{re.escape(before)}\d+{re.escape(after)}")
-        found = [one for one in _listed(path.parent) if shape.fullmatch(one.name)]
+        files = [one for one in _listed(path.parent) if shape.fullmatch(one.name)]
     elif "*" in path.name:
         shape = re.compile(fnmatch.translate(path.name))
-        found = [one for one in _listed(path.parent) if shape.fullmatch(one.name)]
+        files = [one for one in _listed(path.parent) if shape.fullmatch(one.name)]
     else:
-        found = [path]
-    kinds = sorted({one.suffix.lower() for one in found})
-    if not found:
+        files = [path]
+    kinds = sorted({file.suffix.lower() for file in files})
+    if not files:
         refuse(path, f"frames as {' or '.join(SUFFIXES)} files", "there are none", "Check the name")
     if len(kinds) > 1 or kinds[0] not in SUFFIXES:
         actual = f"there are {', '.join(kinds)}"
-        refuse(path, f"frames of one kind ({' or '.join(SUFFIXES)})", actual, "Name one, as in face_%05d.obj")
-    return sorted(found, key=_by_number)
+        refuse(
+            path,
+            f"frames of one kind ({' or '.join(SUFFIXES)})",
+            actual,
+            "Use a pattern for one of them, such as face_%05d.obj",
+        )
+    return sorted(files, key=_by_number)
 
 
 def load_sequence(
     path: Path, head: Head, fps: float | None = None, unit_mm: float | None = None, up: Up = "y"
 ) -> Clip:
-    """The clip of a sequence for a head of the same topology, its vertices in the same order.
+    """Load mesh files as a clip for a head with the same topology and vertex order.
 
-    fps : frames a second, 30 when left out
+    fps : frame rate, by default 30
     unit_mm, up : of the files, see `load_head`
 
-    Raises DermisError for files that are no frames of that head; the first, the middle and the last are read
-    at once, the others when they are wanted.
+    Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
+    read immediately, the others on demand.
     """
     files, rate = frame_files(path), DEFAULT_RATE if fps is None else fps
     frames = _FrameCache(tuple(files), head, FrameReader(unit_mm, up))
@@ -89,11 +94,12 @@ def load_sequence(
 
     def sample(seconds: float) -> Pose:
         index = min(int(seconds * rate + _FRAME_TOLERANCE), len(files) - 1)
-        share = min(max(seconds * rate - index, 0.0), 1.0)
-        places = frames.positions(index)
-        if share > _FRAME_TOLERANCE and index + 1 < len(files):
-            places = ((1 - share) * places + share * frames.positions(index + 1)).astype(np.float32)
-        return Pose(positions_mm=places)
+        fraction = min(max(seconds * rate - index, 0.0), 1.0)
+        positions = frames.positions(index)
+        if fraction > _FRAME_TOLERANCE and index + 1 < len(files):
+            following = frames.positions(index + 1)
+            positions = ((1 - fraction) * positions + fraction * following).astype(np.float32)
+        return Pose(positions_mm=positions)
 
     name = path.name or str(path)
     return Clip(name, (len(files) - 1) / rate, fps, (), (), (), sample)
@@ -101,7 +107,7 @@ def load_sequence(
 
 @dataclass(eq=False)
 class _FrameCache:
-    """The points of each file; of the last few files they are kept."""
+    """Positions of the head's points in each file, with a cache of the last few files."""
 
     files: Sequence[Path]
     head: Head
@@ -109,45 +115,47 @@ class _FrameCache:
     _first: FrameVertices | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
+        """Create the cache."""
         self.positions = lru_cache(maxsize=3)(self._read_positions)
 
     def _read_positions(self, index: int) -> Floats:
-        """(n, 3) the places of the head's points in a frame [mm]."""
+        """Return the positions of the head's points in a frame, (n, 3) [mm]."""
         file = self.files[index]
         vertices = self.reader.read(file)
         self._first = self._first or vertices
         self._check_topology(file, vertices)
         control = self.head.control
-        point = self.head.mesh.point if control.corner is None else control.corner
-        places = np.empty_like(self.head.positions_mm)
-        places[point] = vertices.positions_mm
-        apart = np.abs(places[point] - vertices.positions_mm).max(axis=1)
-        if apart.max() > SPLIT_TOLERANCE_MM:
-            actual = f"{np.count_nonzero(apart > SPLIT_TOLERANCE_MM)} part by up to {apart.max():.3g} mm"
+        point = self.head.mesh.point if control.vertex_point is None else control.vertex_point
+        positions = np.empty_like(self.head.positions_mm)
+        positions[point] = vertices.positions_mm
+        difference = np.abs(positions[point] - vertices.positions_mm).max(axis=1)
+        if difference.max() > SPLIT_TOLERANCE_MM:
+            count = np.count_nonzero(difference > SPLIT_TOLERANCE_MM)
+            actual = f"{count} separate by up to {difference.max():.3g} mm"
             advice = "Load the head from a frame in which nothing touches, such as an open mouth"
-            refuse(file, "vertices that are one place in the head to stay together", actual, advice)
-        self._check_size(file, places)
-        return places
+            refuse(file, "vertices that coincide in the head to stay together", actual, advice)
+        self._check_size(file, positions)
+        return positions
 
     def _check_topology(self, file: Path, vertices: FrameVertices) -> None:
         assert self._first is not None
         control, mesh = self.head.control, self.head.mesh
-        count = len(mesh.point if control.corner is None else control.corner)
-        same = np.array_equal(vertices.triangles, self._first.triangles)
-        whole = control.corner is not None or np.array_equal(vertices.triangles, mesh.triangles)
-        if len(vertices.positions_mm) != count or not whole:
+        count = len(mesh.point if control.vertex_point is None else control.vertex_point)
+        same_triangles = np.array_equal(vertices.triangles, self._first.triangles)
+        matches_head = control.vertex_point is not None or np.array_equal(vertices.triangles, mesh.triangles)
+        if len(vertices.positions_mm) != count or not matches_head:
             actual = f"it has {len(vertices.positions_mm)} and {len(vertices.triangles)} triangles"
-            expected = f"the head's topology, {count} vertices joined as they are in its file"
+            expected = f"the topology of the head, {count} vertices connected as in its file"
             refuse(file, expected, actual, "Load the head from one of the frames")
-        if not same or not np.array_equal(vertices.uv, self._first.uv):
+        if not same_triangles or not np.array_equal(vertices.uv, self._first.uv):
             actual = f"its faces or uv differ from those of {self.files[0].name}"
             refuse(file, "frames of one topology", actual, "Export all of them from the same mesh")
 
-    def _check_size(self, file: Path, places: Floats) -> None:
-        sizes = [float(np.linalg.norm(np.ptp(one, axis=0))) for one in (places, self.head.positions_mm)]
+    def _check_size(self, file: Path, positions: Floats) -> None:
+        sizes = [float(np.linalg.norm(np.ptp(one, axis=0))) for one in (positions, self.head.positions_mm)]
         if not _SIZE_RANGE[0] <= sizes[0] / sizes[1] <= _SIZE_RANGE[1]:
             actual = f"it is {sizes[0] / sizes[1]:.3g} times as large"
-            refuse(file, "a frame about as large as the head", actual, "Set the files' unit (unit_mm)")
+            refuse(file, "a frame of about the size of the head", actual, "Set the files' unit (unit_mm)")
 
 
 def _listed(folder: Path) -> list[Path]:
@@ -157,18 +165,18 @@ def _listed(folder: Path) -> list[Path]:
 def _is_folder(path: Path) -> bool:
     try:
         return path.is_dir()
-    except (OSError, ValueError):  # names that none can have, or that are out of reach
+    except (OSError, ValueError):  # invalid or inaccessible names
         return False
 
 
 def _by_number(file: Path) -> tuple[int, str]:
-    """Files by the last number in their names."""
+    """Return the sort key of a file by the last number in its name."""
     numbers = re.findall(r"\d+", file.stem)
     return int(numbers[-1]) if numbers else -1, file.name
 
 
 class FrameVertices(NamedTuple):
-    """A file's vertices, in the order in which its `Mesh` has them.
+    """Vertices of a file in the order of its `Mesh`.
 
     positions_mm : (v, 3)
     triangles : (f, 3)
@@ -181,7 +189,7 @@ class FrameVertices(NamedTuple):
 
 
 class _ObjPattern(NamedTuple):
-    """An OBJ file without its places: the hash of its other lines, and which `v` line each vertex is."""
+    """OBJ file without its positions: hash of all other lines, and the `v` line of each vertex."""
 
     digest: bytes
     lines: int
@@ -190,13 +198,13 @@ class _ObjPattern(NamedTuple):
 
 @dataclass
 class FrameReader:
-    """Reads files of one topology.
+    """Reader of mesh files with the same topology.
 
-    An OBJ file that differs from the first one in its places alone is read by these: parsing its faces again
-    takes twenty times as long.
+    Of OBJ files that differ from the first one only in positions, only the positions are parsed, which is 20
+    times as fast.
 
-    unit_mm : length of the files' unit [mm], None for the format's own
-    up : the files' axis that points up
+    unit_mm : length of the files' unit [mm], None for that of the format
+    up : up axis of the files
     """
 
     unit_mm: float | None = None
@@ -205,15 +213,15 @@ class FrameReader:
     _pattern: _ObjPattern | None = field(default=None, init=False)
 
     def read(self, path: Path) -> FrameVertices:
-        """The vertices of a file.
+        """Return the vertices of a file.
 
         Raises `DermisError` when it is missing, damaged or not a mesh, or has no uv.
         """
         unit = default_unit_mm(path) if self.unit_mm is None else float(self.unit_mm)
         if self._pattern is not None and self._first is not None and is_file(path):
-            places = _parse_positions(read_file(path, "an OBJ file", MAX_FILE_BYTES), self._pattern)
-            if places is not None:
-                moved = self._in_head(unit * places)
+            positions = _parse_positions(read_file(path, "an OBJ file", MAX_FILE_BYTES), self._pattern)
+            if positions is not None:
+                moved = self._in_head(unit * positions)
                 check_arrays(moved, self._first.uv, self._first.triangles, path)
                 return self._first._replace(positions_mm=moved)
         vertices = self._parsed(path, unit)
@@ -225,42 +233,42 @@ class FrameReader:
     def _parsed(self, path: Path, unit: float) -> FrameVertices:
         with np.errstate(all="ignore"), parsing(path, "a mesh", *MALFORMED_DATA_ERRORS):
             part = join_parts(read_mesh_file(path).parts, path)
-            place = self._in_head(unit * part.positions)
+            positions = self._in_head(unit * part.positions)
             assert part.uv is not None
-            check_arrays(place, part.uv, part.triangles, path)
-        used, corners = compacted(part.triangles)
-        return FrameVertices(place[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
+            check_arrays(positions, part.uv, part.triangles, path)
+        used, corners = compact_vertices(part.triangles)
+        return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
-    def _in_head(self, places: Doubles) -> Floats:
-        with np.errstate(over="ignore"):  # what is infinite then is refused
-            return to_y_up(places, self.up).astype(np.float32)
+    def _in_head(self, positions: Doubles) -> Floats:
+        with np.errstate(over="ignore"):  # infinite positions are refused later
+            return to_y_up(positions, self.up).astype(np.float32)
 
 
 def _split_vertex_lines(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:
-    """Numbers of the `v` lines, and a hash of all others but the normals."""
+    """Return the numbers of the `v` lines, and a hash of all other lines except normals."""
     others = _NORMAL_LINE.sub(b"", _VERTEX_LINE.sub(b"", data))
     return _VERTEX_LINE.findall(data), hashlib.sha256(others).digest()
 
 
 def _read_pattern(path: Path) -> _ObjPattern:
-    """What an OBJ file has besides its places: it is parsed with the numbers of its lines as places."""
+    """Return the pattern of an OBJ file, by parsing it with line numbers as positions."""
     data = read_file(path, "an OBJ file", MAX_FILE_BYTES)
-    places, digest = _split_vertex_lines(data)
-    count = iter(range(len(places)))
+    positions, digest = _split_vertex_lines(data)
+    count = iter(range(len(positions)))
     numbered = _VERTEX_LINE.sub(lambda match: b"v %d 0 0\n" % next(count), data)
     model = parse_obj(path, numbered.decode("utf-8", errors="replace"))
     part = join_parts([part for part in model.parts if len(part.triangles)], path)
     used = np.unique(part.triangles)
-    return _ObjPattern(digest, len(places), part.positions[used, 0].astype(np.int64))
+    return _ObjPattern(digest, len(positions), part.positions[used, 0].astype(np.int64))
 
 
 def _parse_positions(data: bytes, pattern: _ObjPattern) -> Doubles | None:
-    """(v, 3) places of the vertices in the file's units; None for a file that differs in more than these."""
+    """Return the vertex positions (v, 3) in file units, or None if other lines differ from the pattern."""
     rows, digest = _split_vertex_lines(data)
     if len(rows) != pattern.lines or digest != pattern.digest:
         return None
     try:
-        places = np.array(rows, dtype=bytes).astype(np.float64)[pattern.line]
-    except ValueError:  # the parser knows what to say
+        positions = np.array(rows, dtype=bytes).astype(np.float64)[pattern.line]
+    except ValueError:  # the parser raises a better error
         return None
-    return places if np.isfinite(places).all() else None
+    return positions if np.isfinite(positions).all() else None

@@ -14,9 +14,9 @@ from dermis.base.tables import read_rows
 from dermis.human.hair.root_finder import Index, RootFinder
 from dermis.human.skin.face import HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, hairline_heights, zone_table
 from dermis.human.skin.surface import BORDER_FIELDS, average_surface
-from dermis.mesh.geometry import crosses, dots
+from dermis.mesh.geometry import cross_columns, dot_columns
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, between, corners
+from dermis.mesh.strands import Roots, interpolate_quads, quad_corners
 
 HEAD_AXIS_Z = -72.0
 """Position of the vertical axis around which the hairline is defined [mm]."""
@@ -55,7 +55,7 @@ def sample_roots(
     per_cm2 : density where the relative density is 1 [1/cm2]
     """
     quad = _hairy_quads(control_mesh)
-    corner_points = corners(control_mesh, quad)
+    corner_points = quad_corners(control_mesh, quad)
     counts = np.floor(per_cm2 * quad_areas_cm2(control_mesh, quad) + rng.random(len(quad))).astype(np.int64)
     starts, chance = rng.random((len(quad), 2)), rng.random(int(counts.sum()))
     near = hair_density.candidates[corner_points].any(axis=1)
@@ -66,7 +66,7 @@ def sample_roots(
     place = starts.take(which, axis=0) + step[:, None] * _SEQUENCE_STEPS
     place -= np.floor(place)
     values = average_points().T.take(corner_points.T.take(which, axis=1), axis=1)
-    kept = np.flatnonzero(chance.take(number) < hair_density.relative(between(place, values).T))
+    kept = np.flatnonzero(chance.take(number) < hair_density.relative(interpolate_quads(place, values).T))
     return Roots(quad.take(which.take(kept)).astype(np.int32), place.take(kept, axis=0).astype(np.float32))
 
 
@@ -129,10 +129,10 @@ def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
 
 def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
     """Return the areas (n,) of quads [cm2]."""
-    corner_points = control_mesh.points_mm.T.take(corners(control_mesh, quad).T, axis=1)
+    corner_points = control_mesh.points_mm.T.take(quad_corners(control_mesh, quad).T, axis=1)
     a, b, c, d = corner_points.swapaxes(0, 1)
-    across = crosses(c - a, d - b)
-    return np.asarray(np.sqrt(dots(across, across)) / 200.0)
+    across = cross_columns(c - a, d - b)
+    return np.asarray(np.sqrt(dot_columns(across, across)) / 200.0)
 
 
 def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
@@ -151,10 +151,10 @@ def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
     from scipy.spatial import cKDTree
 
     mesh = root_finder.mesh
-    corner_points = corners(mesh, _hairy_quads(mesh))
+    corner_points = quad_corners(mesh, _hairy_quads(mesh))
     near = np.zeros(len(root_finder.subdivided_mesh.positions), bool)
     hairy = _scalp_candidates() | _beard_candidates() if bearded else _scalp_candidates()
-    points = corner_points[hairy[corner_points].any(axis=1)], corners(mesh, root_finder.brow_grid_roots.quad)
+    points = corner_points[hairy[corner_points].any(axis=1)], quad_corners(mesh, root_finder.brow_grid_roots.quad)
     for subset, reach in zip(points, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
         tree = cKDTree(root_finder.points_mm[np.unique(subset)])
         near |= tree.query(root_finder.subdivided_mesh.positions, distance_upper_bound=reach)[0] < reach

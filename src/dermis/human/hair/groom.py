@@ -16,7 +16,7 @@ from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import SIDES, RootFinder, eye_centres
 from dermis.human.hair.skin_surface import GrowthSurface, HairGroup, RootFrames, SkinSurface
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Roots, Strands, seen_in
+from dermis.mesh.strands import Roots, Strands, to_frames
 from dermis.specular.hair import absorption_per_mm
 
 _LASH_PIGMENT_FACTOR = 1.6
@@ -56,7 +56,7 @@ def add_hair(
 def _shuffle(strands: Strands, seed: int) -> Strands:
     """Return the strands in random order, so that the first few represent all."""
     order = np.random.default_rng((seed, 5)).permutation(len(strands))
-    roots = Roots(strands.roots.quad.take(order), strands.roots.place.take(order, axis=0))
+    roots = Roots(strands.roots.quad.take(order), strands.roots.position.take(order, axis=0))
     names = "knots_mm", "radius_mm", "absorption", "cover"
     arrays = {name: getattr(strands, name).take(order, axis=0) for name in names}
     return replace(strands, roots=roots, **arrays)
@@ -71,7 +71,7 @@ def _brows(
         u, v, x, y = brows.sample_positions(rng)
         found, hit = root_finder.front_roots(side * x, y)
         index = np.flatnonzero(hit)[: brows.hair_count(look)]
-        roots.append(Roots(found.quad[index], found.place[index]))
+        roots.append(Roots(found.quad[index], found.position[index]))
         shape = brows.sample_shapes(u[index], v[index], rng, look)
         parameters.append(np.vstack([np.full(len(index), side), x[index], y[index], shape]))
     frames, hair = surface.root_frames(_concatenate(roots)), np.concatenate(parameters, axis=1)
@@ -106,7 +106,7 @@ def _split(group: HairGroup, counts: list[int]) -> Iterator[HairGroup]:
     """Yield consecutive parts of a group with these numbers of hairs."""
     for end, count in zip(np.cumsum(counts).tolist(), counts, strict=True):
         part = slice(end - count, end)
-        roots = Roots(group.roots.quad[part], group.roots.place[part])
+        roots = Roots(group.roots.quad[part], group.roots.position[part])
         yield group._replace(roots=roots, knots=group.knots[part], radius=group.radius[part])
 
 
@@ -114,7 +114,7 @@ def _hair_group(
     frames: RootFrames, knots_mm: Doubles, radius_mm: Doubles, pigment_factor: float
 ) -> HairGroup:
     """Return hairs from knots (n, k, 3) in the coordinates of the head [mm]."""
-    offsets = seen_in(frames.frame, knots_mm - frames.positions_mm[:, None])
+    offsets = to_frames(frames.frame, knots_mm - frames.positions_mm[:, None])
     return HairGroup(frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)
 
 

@@ -20,8 +20,8 @@ from dermis.human.hair.skin_surface import (
     SkinSurface,
     tangent_component,
 )
-from dermis.mesh.geometry import compacted, crosses, dots
-from dermis.mesh.strands import Roots, corners, weights
+from dermis.mesh.geometry import compact_vertices, cross_columns, dot_columns
+from dermis.mesh.strands import Roots, quad_corners, quad_weights
 
 # Artist's values on the average person [mm].
 _WHORL_CENTRE = np.array([9.0, 86.0, -131.0])
@@ -162,18 +162,18 @@ def grow_hair(
     In all arrays the hair index comes last, which suits vectorised operations. For results that are equal on
     all machines, sines are computed in float64, and float32 values are only added and multiplied.
     """
-    hair, around = surface.root_frames(roots), corners(surface.control_mesh, roots.quad)
-    point, near = compacted(around)
+    hair, around = surface.root_frames(roots), quad_corners(surface.control_mesh, roots.quad)
+    point, near = compact_vertices(around)
     root_mm = surface.points_mm[point]
     base_mm, normals = surface.skin.project(root_mm)
     offsets = _trace_guides(
         surface.skin, root_mm, base_mm, normals, comb(average_points()[point, :3], normals), knots
     )
     t, normal = np.linspace(0.0, 1.0, knots)[:, None], hair.frame_vectors[2]
-    found = _vary_directions(_interpolate_guides(weights(roots.place), near, offsets), normal, variation, rng)
+    found = _vary_directions(_interpolate_guides(quad_weights(roots.position), near, offsets), normal, variation, rng)
     _form_tufts(found, hair.positions_mm, t, variation.tuft_strength, rng)
     tips = found[-1]
-    size = np.asarray(variation.frizz * np.sqrt(dots(tips, tips)), np.float32)
+    size = np.asarray(variation.frizz * np.sqrt(dot_columns(tips, tips)), np.float32)
     for fade, part in _waves(size, t, rng):
         found += fade[..., None].astype(np.float32) * part
     if variation.coil_mm:
@@ -226,8 +226,8 @@ def _vary_directions(
     length = np.clip(1.0 + variation.length_deviation * rng.normal(size=n), 0.35, 1.2)
     along, aside = length * np.cos(angle), length * np.sin(angle)
     along, aside, rise = (one.astype(np.float32) for one in (along, aside, length * lean - along))
-    found: Floats = aside * crosses(normal, offsets)
-    found += (rise * dots(offsets, normal))[:, None] * normal
+    found: Floats = aside * cross_columns(normal, offsets)
+    found += (rise * dot_columns(offsets, normal))[:, None] * normal
     found += along * offsets
     return found
 
@@ -268,15 +268,15 @@ def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple
 def _coils(tips: Floats, t: Doubles, variation: HairVariation, rng: np.random.Generator) -> Floats:
     """Return the offsets (k, 3, n) of helices around the line from the root to the tip (3, n)."""
     n = tips.shape[-1]
-    along = np.asarray(tips / np.maximum(np.sqrt(dots(tips, tips)), _EPSILON), np.float32)
+    along = np.asarray(tips / np.maximum(np.sqrt(dot_columns(tips, tips)), _EPSILON), np.float32)
     side: Floats = rng.normal(size=tips.shape).astype(np.float32)
-    side -= dots(side, along) * along
-    side /= np.maximum(np.sqrt(dots(side, side)), _EPSILON)
+    side -= dot_columns(side, along) * along
+    side /= np.maximum(np.sqrt(dot_columns(side, side)), _EPSILON)
     step = 2 * np.pi * t[1] * variation.coils * rng.uniform(0.8, 1.2, n)
     phase = np.asarray(2 * np.pi * rng.random(n))
     radius = variation.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
     x, y = ((radius * one)[:, None].astype(np.float32) for one in _sine_sequence(phase, step, len(t)))
-    return np.asarray(x * side + y * crosses(along, side))
+    return np.asarray(x * side + y * cross_columns(along, side))
 
 
 def _sine_sequence(angle: Doubles, step: Doubles, knots: int) -> tuple[Doubles, Doubles]:
@@ -291,8 +291,8 @@ def _sine_sequence(angle: Doubles, step: Doubles, knots: int) -> tuple[Doubles, 
 
 def _lift_above_skin(offsets: Floats, normal: Floats, t: Floats) -> Floats:
     """Return offsets with knots lifted above the skin, which is approximated by a sphere."""
-    height = dots(offsets, normal)
-    flat2 = dots(offsets, offsets) - height**2
+    height = dot_columns(offsets, normal)
+    flat2 = dot_columns(offsets, offsets) - height**2
     min_height = _MIN_HEIGHT_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_RADIUS_MM)
     offsets += np.maximum(min_height - height, 0.0)[:, None] * normal
     return offsets
@@ -348,13 +348,13 @@ def _hair_group(
     radius = np.tile((hairs_per_strand * radius_mm * rng.uniform(0.8, 1.2, (n, 1))).astype(np.float32), knots)
     radius[:, -1] *= np.float32(_TIP_RADIUS_FACTOR)
     steps = np.diff(offsets, axis=0)
-    length = np.sqrt(dots(steps, steps)).sum(axis=0, dtype=np.float64)
+    length = np.sqrt(dot_columns(steps, steps)).sum(axis=0, dtype=np.float64)
     area = float(
         np.mean(2.0 * radius.mean(axis=1) * length)
     )  # of one strand from the side; halved below, as hair is inclined
     local = np.empty((n, knots, 3), np.float32)
     for c in range(3):
-        local[..., c] = dots(offsets, hair.frame_vectors[c]).T
+        local[..., c] = dot_columns(offsets, hair.frame_vectors[c]).T
     cover = 0.5 * area * strands_per_cm2 / 100.0
     return HairGroup(hair.roots, local, radius, 1.0, hairs_per_strand, cover)
 

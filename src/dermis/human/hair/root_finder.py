@@ -13,7 +13,7 @@ from dermis.base.arrays import Doubles
 from dermis.human.hair import lashes
 from dermis.human.hair.brows import grid_points
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, corners
+from dermis.mesh.strands import Roots, quad_corners
 
 Index = NDArray[np.int64]
 SIDES = 1.0, -1.0
@@ -134,7 +134,7 @@ class RootFinder:
     @cached_property
     def _quad_points(self) -> NDArray[np.int32]:
         """Return the points (q, 4) of all quads."""
-        return corners(self.mesh, np.arange(len(self.mesh.quads)))
+        return quad_corners(self.mesh, np.arange(len(self.mesh.quads)))
 
     @cached_property
     def _front(self) -> _FrontTriangles:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles, Floats
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, finer_roots, frames
+from dermis.mesh.strands import Roots, refine_roots, root_frames
 
 _NEIGHBOURS = 6  # vertices whose tangent planes are averaged
 
@@ -82,8 +82,8 @@ class GrowthSurface:
 
     def root_frames(self, roots: Roots) -> RootFrames:
         """Return the positions and frames of roots on quads of the control mesh."""
-        finer = finer_roots(self.control_mesh, roots, self._levels)
-        return RootFrames(finer, *frames(self._mesh, finer, self.points_mm))
+        finer = refine_roots(self.control_mesh, roots, self._levels)
+        return RootFrames(finer, *root_frames(self._mesh, finer, self.points_mm))
 
 
 class HairGroup(NamedTuple):

@@ -22,7 +22,7 @@ from dermis.human.skin.surface import BORDER_FIELDS, average_surface, lid_rings
 from dermis.mesh.eyeball import LIMBUS_MM
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material
-from dermis.mesh.strands import corners
+from dermis.mesh.strands import quad_corners
 
 Doubles = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
 def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return the classes (q,) of fine and of coarse hairs on each quad of the human."""
     mesh = average_head().mesh
-    around = corners(mesh, np.arange(len(mesh.quads)))
+    around = quad_corners(mesh, np.arange(len(mesh.quads)))
     middle = average_head().positions_mm.astype(np.float64)[around].mean(axis=1)
     lids = np.isin(around, lid_rings()).any(axis=1)
     right, left, lashes, hair, beard = map(
@@ -115,7 +115,7 @@ def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
 def _ear_field() -> Doubles:
     """Return a field (p,) that is positive where most quads around a control point belong to an ear."""
     mesh = average_head().mesh
-    around = corners(mesh, np.arange(len(mesh.quads)))
+    around = quad_corners(mesh, np.arange(len(mesh.quads)))
     within = np.zeros(len(around))
     within[part_quads()["ears"]] = 1.0
     count = len(average_head().positions_mm)

@@ -17,7 +17,7 @@ from dermis.base.tables import Rows, parse_rows, read_rows
 from dermis.human.landmarks.sets import SETS
 from dermis.human.regions.average import average_head, is_human
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Roots, corners, finer_roots, weights
+from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 _MAX_LANDMARKS = 10_000
 _EXPECTED = "landmarks in CSV: rows of name,vertex"
@@ -88,8 +88,8 @@ def _rows(name: str) -> Rows:
 def _human_landmarks(head: Head, rows: Rows) -> LandmarkPoints:
     quad = np.array([int(row["quad"]) for row in rows], np.int32)
     position = np.array([[float(row["along"]), float(row["across"])] for row in rows], np.float32)
-    fine = finer_roots(average_head().mesh, Roots(quad, position), head.levels)
-    point, weight = corners(head.mesh, fine.quad), weights(fine.place).astype(np.float32)
+    fine = refine_roots(average_head().mesh, Roots(quad, position), head.levels)
+    point, weight = quad_corners(head.mesh, fine.quad), quad_weights(fine.position).astype(np.float32)
     material = np.full(len(rows), -1, np.int32)
     for k in np.flatnonzero([float(row["sunk"]) > 0 for row in rows]):
         assert head.eyes is not None

@@ -153,7 +153,7 @@ def with_default_regions(head: Head) -> Head:
     A head whose regions are unknown or that has a roughness map stays the same, and an existing specular map
     is kept. The strengths are relative; the skin's rho_s is their mean.
     """
-    if head.maps.rough or known_landmarks(head) is None:
+    if head.maps.has_roughness or known_landmarks(head) is None:
         return head
     table = load_region_table(DEFAULT_TABLE)
     missing = ["roughness"] if head.maps.specular is not None else ["roughness", "specular"]

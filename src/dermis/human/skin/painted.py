@@ -54,10 +54,10 @@ class PaintedMaps(Maps):
     """
 
     look: SkinLook = field(default_factory=SkinLook)
-    painted: ClassVar[bool] = True
+    is_painted: ClassVar[bool] = True
 
     @property
-    def rough(self) -> bool:
+    def has_roughness(self) -> bool:
         """Return whether there is a roughness map, which is always painted."""
         return True
 

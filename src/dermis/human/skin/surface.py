@@ -82,7 +82,7 @@ def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
 
     stencils : of the subdivision of its points, if any
     """
-    key = mesh.layout_key
+    key = mesh.topology_key
     with _LOCK:
         if key not in _CACHE:
             while len(_CACHE) >= _CACHE_SIZE:

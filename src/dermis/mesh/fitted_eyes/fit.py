@@ -11,19 +11,26 @@ from dermis.base.arrays import Doubles, Index
 from dermis.base.progress import logged_step
 from dermis.mesh import eyeball
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, globe, plane_mm
+from dermis.mesh.eyeball import (
+    CORNEA_MM,
+    LIMBUS_MM,
+    SCLERA_MM,
+    build_eyeball,
+    cornea_centre_mm,
+    limbus_plane_mm,
+)
 from dermis.mesh.eyes import Eyes
 from dermis.mesh.fitted_eyes.balls import Ball, Sphere, find_balls
-from dermis.mesh.fitted_eyes.globe_rig import Globe, with_globes
-from dermis.mesh.fitted_eyes.lids import axes_along, lids_before
-from dermis.mesh.geometry import halves
+from dermis.mesh.fitted_eyes.globe_rig import Eyeball, with_eyeballs
+from dermis.mesh.fitted_eyes.lids import eye_axes, lids_before
+from dermis.mesh.geometry import split_quads
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 
-_SIDE = 2 * eyeball.SIDE  # as fine as the human's own once it is subdivided
+_SIDE = 2 * eyeball.SIDE  # as fine as the human model's after a level of subdivision
 _NAMES = "left eye", "right eye"
-_INWARDS = np.radians(2.5)  # an iris lies nearer to the nose than the middle of what is seen of the white
+_INWARDS = np.radians(2.5)  # the iris is closer to the nose than the centre of the eye's opening
 
 
 class _Shape(NamedTuple):
@@ -38,8 +45,8 @@ class _Shape(NamedTuple):
     """
 
     axis: Doubles
-    ball_mm: float
-    middle_mm: float
+    radius_mm: float
+    centre_offset_mm: float
     scale: float
 
 
@@ -48,36 +55,40 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     """The head with the package's eyes where its file calls something eyes that is two balls.
 
     The new balls have the radius and the place of those, look along their corneas or straight ahead, and
-    follow their bones and targets rigidly. Where they cannot be fitted, the head stays as it is, and its
+    follow their bones and targets rigidly. Where they cannot be fitted, the head remains as it is, and its
     `note` says why.
 
     coarse : the mesh of a head that is subdivided, as it was before, when the lids lay on the balls
     look : of the eyes
     """
     mesh, control = head.mesh, head.control
-    found, why = find_balls(coarse or mesh)
-    if found is None:
-        return replace(head, note=why)
-    those = _of_balls(mesh, control.stencils, found)
-    shapes = _shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(those), axis=0), found)
-    points, quads = globe(_SIDE)
-    places = [_placed(ball.sphere, shape) for ball, shape in zip(found, shapes, strict=True)]
-    balls = [Globe(ball.sphere.middle, own, ball.points) for ball, own in zip(found, places, strict=True)]
-    corner = mesh.point if control.corner is None else control.corner
-    rig = with_globes(replace(control, corner=corner), balls)
+    balls, reason = find_balls(coarse or mesh)
+    if balls is None:
+        return replace(head, note=reason)
+    replaced = _ball_triangles(mesh, control.stencils, balls)
+    shapes = _shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(replaced), axis=0), balls)
+    points, quads = build_eyeball(_SIDE)
+    positions = [_eyeball_points(ball.sphere, shape) for ball, shape in zip(balls, shapes, strict=True)]
+    eyeballs = [
+        Eyeball(ball.sphere.centre, own, ball.points) for ball, own in zip(balls, positions, strict=True)
+    ]
+    vertex_point = mesh.point if control.vertex_point is None else control.vertex_point
+    rig = with_eyeballs(replace(control, vertex_point=vertex_point), eyeballs)
     begin, count = len(control.positions_mm), len(points)
     if control.stencils is not None:
-        rig = replace(rig, stencils=_with_rows(control.stencils, begin, 2 * count))
-    made = _with_meshes(mesh, those, places, quads)
-    apex, back, side = (np.array([begin + k, begin + count + k], np.int32) for k in eyeball.marks(_SIDE))
-    material = np.arange(-2, 0, dtype=np.int32) + len(made.materials)
-    balls_mm, middles_mm = np.array([(shape.ball_mm, shape.middle_mm) for shape in shapes]).T
-    sight = np.stack([axes_along(shape.axis) @ ball.sight for ball, shape in zip(found, shapes, strict=True)])
-    eyes = Eyes(apex, back, side, material, look or EyeLook(), balls_mm, middles_mm, sight)
-    return replace(head, mesh=made, rig=rig, eyes=eyes)
+        rig = replace(rig, stencils=_extended(control.stencils, begin, 2 * count))
+    new_mesh = _replace_eyeballs(mesh, replaced, positions, quads)
+    apex, back, side = (
+        np.array([begin + k, begin + count + k], np.int32) for k in eyeball.axis_points(_SIDE)
+    )
+    material = np.arange(-2, 0, dtype=np.int32) + len(new_mesh.materials)
+    radii, offsets = np.array([(shape.radius_mm, shape.centre_offset_mm) for shape in shapes]).T
+    gaze = np.stack([eye_axes(shape.axis) @ ball.gaze for ball, shape in zip(balls, shapes, strict=True)])
+    eyes = Eyes(apex, back, side, material, look or EyeLook(), radii, offsets, gaze)
+    return replace(head, mesh=new_mesh, rig=rig, eyes=eyes)
 
 
-def _of_balls(mesh: Mesh, stencils: Stencils | None, balls: tuple[Ball, Ball]) -> tuple[Index, Index]:
+def _ball_triangles(mesh: Mesh, stencils: Stencils | None, balls: tuple[Ball, Ball]) -> tuple[Index, Index]:
     """The triangles of each ball in the mesh, which may be subdivided."""
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:
@@ -91,41 +102,43 @@ def _shapes(corners_mm: Doubles, balls: tuple[Ball, Ball]) -> list[_Shape]:
 
     corners_mm : (f, 3, 3) of all other triangles
     """
-    lids = [lids_before(corners_mm, ball.sphere, ball.sight) for ball in balls]
+    lids = [lids_before(corners_mm, ball.sphere, ball.gaze) for ball in balls]
     (left, a), (right, b) = (one.iris for one in lids)
     outwards, up = (left - right) / 2 - _INWARDS * (left != right), (a + b) / 2
-    found = []
-    for ball, before, side in zip(balls, lids, (1.0, -1.0), strict=True):
-        scale, sunk, axis = min(1.0, ball.sphere.radius / SCLERA_MM), 0.0, ball.sight
+    shapes = []
+    for ball, lid, side in zip(balls, lids, (1.0, -1.0), strict=True):
+        scale, sunk, axis = min(1.0, ball.sphere.radius / SCLERA_MM), 0.0, ball.gaze
         if not ball.cornea:
-            axis = before.looking(side * outwards, up)
-            sunk = before.sunk_mm(axis, scale) / scale
+            axis = lid.direction(side * outwards, up)
+            sunk = lid.sunk_mm(axis, scale) / scale
         radius = ball.sphere.radius / scale
-        found.append(_Shape(axis, radius, plane_mm(SCLERA_MM) - plane_mm(radius) + sunk, scale))
-    return found
+        shapes.append(_Shape(axis, radius, limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(radius) + sunk, scale))
+    return shapes
 
 
-def _placed(ball: Sphere, shape: _Shape) -> Doubles:
+def _eyeball_points(ball: Sphere, shape: _Shape) -> Doubles:
     """(n, 3) points of an eyeball in the head [mm]."""
-    return np.asarray(ball.middle + shape.scale * _points(shape) @ axes_along(shape.axis))
+    return np.asarray(ball.centre + shape.scale * _shape_points(shape) @ eye_axes(shape.axis))
 
 
-def _points(shape: _Shape) -> Doubles:
+def _shape_points(shape: _Shape) -> Doubles:
     """(n, 3) points of an eyeball around its middle, of any radius, with a usual cornea [mm]."""
-    points, _ = globe(_SIDE)
-    along = points / np.linalg.norm(points, axis=1, keepdims=True)
-    angle, turn = np.arccos(np.clip(along[:, 2], -1.0, 1.0)), np.arctan2(along[:, 1], along[:, 0])
-    centre = cornea_centre_mm() - shape.middle_mm
-    meeting = (shape.ball_mm**2 - CORNEA_MM**2 + centre**2) / (2 * centre)  # along the axis
-    white, edge = float(np.arccos(meeting / shape.ball_mm)), float(np.arcsin(LIMBUS_MM / SCLERA_MM))
-    clear = float(np.arccos((meeting - centre) / CORNEA_MM)) * angle / edge
-    behind = white + (angle - edge) * (np.pi - white) / (np.pi - edge)
-    off = np.where(angle < edge, CORNEA_MM * np.sin(clear), shape.ball_mm * np.sin(behind))
-    far = np.where(angle < edge, centre + CORNEA_MM * np.cos(clear), shape.ball_mm * np.cos(behind))
-    return np.stack([off * np.cos(turn), off * np.sin(turn), far], axis=1)
+    points, _ = build_eyeball(_SIDE)
+    x, y, z = (points / np.linalg.norm(points, axis=1, keepdims=True)).T
+    angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
+    centre = cornea_centre_mm() - shape.centre_offset_mm
+    limbus = (shape.radius_mm**2 - CORNEA_MM**2 + centre**2) / (2 * centre)  # distance along the axis
+    sclera_edge, edge = float(np.arccos(limbus / shape.radius_mm)), float(np.arcsin(LIMBUS_MM / SCLERA_MM))
+    on_cornea = float(np.arccos((limbus - centre) / CORNEA_MM)) * angle / edge
+    on_sclera = sclera_edge + (angle - edge) * (np.pi - sclera_edge) / (np.pi - edge)
+    across = np.where(angle < edge, CORNEA_MM * np.sin(on_cornea), shape.radius_mm * np.sin(on_sclera))
+    along = np.where(
+        angle < edge, centre + CORNEA_MM * np.cos(on_cornea), shape.radius_mm * np.cos(on_sclera)
+    )
+    return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), along], axis=1)
 
 
-def _with_rows(stencils: Stencils, begin: int, count: int) -> Stencils:
+def _extended(stencils: Stencils, begin: int, count: int) -> Stencils:
     """The stencils with control points more that are points themselves, from one number on."""
     own = np.arange(count, dtype=np.int32)
     return Stencils(
@@ -135,40 +148,44 @@ def _with_rows(stencils: Stencils, begin: int, count: int) -> Stencils:
     )
 
 
-def _with_meshes(mesh: Mesh, balls: tuple[Index, Index], places: list[Doubles], quads: Index) -> Mesh:
+def _replace_eyeballs(
+    mesh: Mesh, balls: tuple[Index, Index], positions: list[Doubles], quads: Index
+) -> Mesh:
     """The mesh with eyeballs in the place of those of some triangles; its points keep their numbers."""
-    stays = np.ones(len(mesh.triangles), bool)
-    stays[np.concatenate(balls)] = False
-    vertex, triangles = np.unique(mesh.triangles[stays], return_inverse=True)
-    used, material = np.unique(mesh.material[stays], return_inverse=True)
+    remains = np.ones(len(mesh.triangles), bool)
+    remains[np.concatenate(balls)] = False
+    vertex, triangles = np.unique(mesh.triangles[remains], return_inverse=True)
+    used, material = np.unique(mesh.material[remains], return_inverse=True)
     colours = [mesh.materials[mesh.material[ball[0]]].colour for ball in balls]
-    made = [Material(name, "opaque", colour, eye=True) for name, colour in zip(_NAMES, colours, strict=True)]
-    new = _meshes(places, quads, tuple(made))
-    pairs = np.full(len(mesh.triangles), -1)
-    pairs[stays] = np.arange(np.count_nonzero(stays))
-    kept = pairs[mesh.quads][(pairs[mesh.quads] >= 0).all(axis=1)]
-    faces = np.count_nonzero(stays)
-    both = {
+    new_materials = [
+        Material(name, "opaque", colour, eye=True) for name, colour in zip(_NAMES, colours, strict=True)
+    ]
+    new = _eyeball_meshes(positions, quads, tuple(new_materials))
+    new_index = np.full(len(mesh.triangles), -1)
+    new_index[remains] = np.arange(np.count_nonzero(remains))
+    old_quads = new_index[mesh.quads][(new_index[mesh.quads] >= 0).all(axis=1)]
+    faces = np.count_nonzero(remains)
+    vertex_arrays = {
         name: np.concatenate([getattr(mesh, name)[vertex], getattr(new, name)])
         for name in ("positions", "normals", "uv")
     }
     return Mesh(
-        **both,
+        **vertex_arrays,
         point=np.concatenate([mesh.point[vertex], int(mesh.point.max()) + 1 + new.point]).astype(np.int32),
         triangles=np.concatenate([triangles.reshape(-1, 3), len(vertex) + new.triangles]).astype(np.int32),
         material=np.concatenate([material.reshape(-1), len(used) + new.material]).astype(np.int32),
-        materials=(*(mesh.materials[k] for k in used), *made),
-        quads=np.concatenate([kept, faces + new.quads]).astype(np.int32),
+        materials=(*(mesh.materials[k] for k in used), *new_materials),
+        quads=np.concatenate([old_quads, faces + new.quads]).astype(np.int32),
     )
 
 
-def _meshes(places: list[Doubles], quads: Index, materials: tuple[Material, ...]) -> Mesh:
+def _eyeball_meshes(positions: list[Doubles], quads: Index, materials: tuple[Material, ...]) -> Mesh:
     """Eyeballs alone, a material each."""
-    count, faces = len(places[0]), len(quads)
+    count, faces = len(positions[0]), len(quads)
     return build_mesh(
-        np.concatenate(places),
-        np.tile(eyeball.layout(_SIDE), (2, 1)),
-        halves(np.concatenate([quads, count + quads])),
+        np.concatenate(positions),
+        np.tile(eyeball.eyeball_uv(_SIDE), (2, 1)),
+        split_quads(np.concatenate([quads, count + quads])),
         np.repeat([0, 1], 2 * faces),
         materials,
         point=np.arange(2 * count),

@@ -1,7 +1,7 @@
-"""RenderMan's PxrSurface, by its published meanings: a table of values, as nobody here has run it.
+"""Export to RenderMan: parameters of PxrSurface by its published documentation, not tested in RenderMan.
 
-Subsurface DMFP is the diffuse mean free path in mm times the unit length; by [ChristensenBurley2015], which
-is by the same people, its lobe has d = dmfp / s(A) with s for diffuse mean free paths.
+The subsurface DMFP is the diffuse mean free path in mm times the unit length. In [ChristensenBurley2015], by
+the authors of the material, the lobe has the width d = dmfp / s(A), with s for diffuse mean free paths.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _MIN_ALBEDO = 1e-3
 
 
 class RenderMan(JsonTarget):
-    """Burley's model of PxrSurface (subsurfaceType 4), for a scene in millimetres."""
+    """Export of the parameters of PxrSurface with Burley's model (subsurfaceType 4), for scenes in mm."""
 
     name = "renderman"
     title = "RenderMan"
@@ -32,16 +32,16 @@ class RenderMan(JsonTarget):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Diffuse mean free paths of the fitted lobes."""
+        """Return the diffuse mean free paths of Burley profiles fitted to the skin."""
         albedo = subject.clipped_albedo(_MIN_ALBEDO)
         return _parameters(albedo, fit_burley_width(subject.curve) * shape_factor_diffuse(albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """The width of the lobe as if it were the diffuse mean free path."""
+        """Return the width of the Burley profiles used as the diffuse mean free path."""
         return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """The lobe of the paper."""
+        """Return the cumulative profile of the paper's lobe."""
         path, path_colour, unit, colour = (
             np.array(get_numbers(parameters, name)) for name in (_PATH, _PATH_COLOUR, _UNIT, _COLOUR)
         )

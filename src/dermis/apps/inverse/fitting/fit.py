@@ -13,13 +13,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.apps.inverse.fitting.frames import Frames
-from dermis.apps.inverse.fitting.inputs import Photograph, read_photograph, subject_of
-from dermis.apps.inverse.fitting.light_basis import BASIS, fault_by, strengths_by
-from dermis.apps.inverse.fitting.placement import place_by_landmarks
+from dermis.apps.inverse.fitting.frames import FaceRenderer
+from dermis.apps.inverse.fitting.inputs import Photograph, read_photograph, fit_subject
+from dermis.apps.inverse.fitting.light_basis import BASIS, squared_residual, solve_normal_equations
+from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
-from dermis.apps.inverse.fitting.solve import ROBUST, Problem, certainty_of, solve, tint
-from dermis.apps.inverse.fitting.unknowns import UNKNOWNS, Point, tangents, usual_point
+from dermis.apps.inverse.fitting.solve import ROBUST_LIMIT, FitProblem, fit_uncertainty, solve_fit, light_tint
+from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, FitPoint, tangents, prior_point
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_array, checked_integer, checked_number
 from dermis.frame.renderer import Renderer
@@ -28,31 +28,31 @@ from dermis.mesh.geometry import fibonacci_sphere
 from dermis.optics.media import Floats
 from dermis.scene.settings import Settings
 
-_AROUND = 28
-_BEHIND = -0.35  # along z: suns farther behind leave the face dark
-_MELANIN, _BLOOD = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
-_STRENGTH = 0.5, 0.75, 1.0
-_RINGS, _RING = (9.0, 18.0), 6  # degrees, and directions on each; those tried first are 35 degrees apart
-NOISE = 0.02
-SIDE, ATLAS, SHADOWS = 128, 256, 512
-_LEAST_PIXELS = 200
-White = Sequence[float] | Literal["specular"]
+_SUN_COUNT = 28
+_MIN_SUN_COSINE = -0.35  # along z: suns farther behind leave the face dark
+_MELANIN_GRID, _BLOOD_GRID = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
+_STRENGTH_GRID = 0.5, 0.75, 1.0
+_RING_DEGREES, _RING_DIRECTIONS = (9.0, 18.0), 6  # degrees, and directions on each; those tried first are 35 degrees apart
+DEFAULT_NOISE = 0.02
+DEFAULT_SIDE, DEFAULT_ATLAS, SHADOW_SIZE = 128, 256, 512
+_MIN_PIXELS = 200
+WhitePoint = Sequence[float] | Literal["specular"]
 
 
-def suns_to_try(towards_camera: Floats) -> Floats:
+def candidate_suns(towards_camera: Floats) -> Floats:
     """Return directions (k, 3) around a camera from which a sun lights the face.
 
     towards_camera : (3,) unit vector
     """
-    every = fibonacci_sphere(_AROUND)
-    return every[every @ towards_camera > _BEHIND]
+    every = fibonacci_sphere(_SUN_COUNT)
+    return every[every @ towards_camera > _MIN_SUN_COSINE]
 
 
-def suns_around(towards: Floats) -> Floats:
+def neighbouring_suns(towards: Floats) -> Floats:
     """Return directions (k, 3) and others around them, at half the distance of those tried first."""
-    turn = np.linspace(0.0, 2.0 * np.pi, _RING, endpoint=False)
+    turn = np.linspace(0.0, 2.0 * np.pi, _RING_DIRECTIONS, endpoint=False)
     ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    off = np.concatenate([[[0.0, 0.0]], *(np.tan(np.radians(angle)) * ring for angle in _RINGS)])
+    off = np.concatenate([[[0.0, 0.0]], *(np.tan(np.radians(angle)) * ring for angle in _RING_DEGREES)])
     found = towards[:, None] + np.einsum("nt,ktc->knc", off, tangents(towards))
     return np.asarray((found / np.linalg.norm(found, axis=2, keepdims=True)).reshape(-1, 3))
 
@@ -65,7 +65,7 @@ class InitialGuess:
     weight : (p, 3)
     """
 
-    def __init__(self, frames: Frames, point: Point, target: Floats, weight: Floats) -> None:
+    def __init__(self, frames: FaceRenderer, point: FitPoint, target: Floats, weight: Floats) -> None:
         self.point = point
         below, off = frames.parts(point)
         both = np.concatenate([below, off]) * weight
@@ -79,9 +79,9 @@ class InitialGuess:
         held = pigments.overrides()
         self._table = skin_colour_table(held["eumelanin"], held["oxygen"], held["epidermis_mm"])
 
-    def best(self, count: int) -> Point:
+    def best(self, count: int) -> FitPoint:
         """Return the best point with `count` suns."""
-        every = list(product(np.log(_MELANIN), np.log(_BLOOD), np.log(_STRENGTH)))
+        every = list(product(np.log(_MELANIN_GRID), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID)))
         at, suns = self.point.logs, self._nearest(self.point.logs, count)
         for _ in range(2):
             trials = [np.array([m, b, at[2], s]) for m, b, s in every]
@@ -111,11 +111,11 @@ class InitialGuess:
             across = G[np.ix_(chosen, n + chosen)]
             gram += s**2 * G[below] + s * strength * (across + across.T) + strength**2 * G[off]
             right += s * r[chosen] + strength * r[n + chosen]
-        return fault_by(gram, right, self._total, strengths_by(gram, right))
+        return squared_residual(gram, right, self._total, solve_normal_equations(gram, right))
 
     def _colour(self, logs: Floats) -> Floats:
-        shares = np.exp(logs[: len(UNKNOWNS)])
-        return np.asarray(self._table.read(shares[:1], shares[1:2])[0], np.float64)
+        shares = np.exp(logs[: len(SKIN_UNKNOWNS)])
+        return np.asarray(self._table.lookup(shares[:1], shares[1:2])[0], np.float64)
 
 
 def fit(
@@ -126,11 +126,11 @@ def fit(
     landmarks: str | Path | None = None,
     suns: int = 1,
     exposure: float = 1.0,
-    white: White = (1.0, 1.0, 1.0),
-    noise: float = NOISE,
-    robust: float = ROBUST,
-    side: int = SIDE,
-    atlas: int = ATLAS,
+    white: WhitePoint = (1.0, 1.0, 1.0),
+    noise: float = DEFAULT_NOISE,
+    robust: float = ROBUST_LIMIT,
+    side: int = DEFAULT_SIDE,
+    atlas: int = DEFAULT_ATLAS,
     adapter: str = "auto",
     told: Callable[[int, int], None] = lambda done, of: None,
 ) -> FitResult:
@@ -159,32 +159,32 @@ def fit(
     checked_integer("suns", suns, 0, 2)
     exposure = checked_number("exposure", exposure, 1e-6, 1e6, "20 stops either way")
     noise, robust = checked_number("noise", noise, 1e-4, 1.0), checked_number("robust", robust, 0.5, 1e12)
-    given = _white(white)
+    given = _checked_white(white)
     scale = given * exposure
     whole = read_photograph(photo)
     small = whole.within(checked_integer("side", side, 32, 1024, "pixels"))
-    subject = subject_of(head, camera)
+    subject = fit_subject(head, camera)
     if landmarks is not None:
-        subject = place_by_landmarks(subject, landmarks, whole.size)
+        subject = align_to_landmarks(subject, landmarks, whole.size)
     settings = Settings(
-        size=small.size, atlas=atlas, shadow_size=SHADOWS, samples=4, strands=False, technique="texture-space"
+        size=small.size, atlas=atlas, shadow_size=SHADOW_SIZE, samples=4, strands=False, technique="texture-space"
     )
     with TemporaryDirectory() as folder:
-        frames = Frames(Renderer(adapter, cache_size=2), subject.scene, settings, Path(folder))
+        frames = FaceRenderer(Renderer(adapter, cache_size=2), subject.scene, settings, Path(folder))
         tried = _find_skin(frames, small)
-        problem = Problem(frames, small.linear[frames.mask] / scale, noise, white == "specular", robust)
-        state, slopes = solve(problem, _start(problem, tried, suns), told)
+        problem = FitProblem(frames, small.linear[frames.mask] / scale, noise, white == "specular", robust)
+        state, slopes = solve_fit(problem, _initial_point(problem, tried, suns), told)
         scene = frames.lit(state.point, state.strengths)
-        picture = frames.picture(scene) * scale * tint(state.point)
+        picture = frames.picture(scene) * scale * light_tint(state.point)
     off = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
     return FitResult(
         subject,
         state.point,
         state.strengths,
-        given * tint(state.point),
+        given * light_tint(state.point),
         exposure,
         whole.size,
-        certainty_of(problem, state, slopes),
+        fit_uncertainty(problem, state, slopes),
         small.linear,
         picture,
         frames.mask,
@@ -194,30 +194,30 @@ def fit(
     )
 
 
-def _find_skin(frames: Frames, photo: Photograph) -> Point:
+def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
     """Find the pixels of lit skin, and return the usual point with the suns to try."""
     camera = frames.scene.camera
     way = np.subtract(camera.position, camera.target)
-    tried = usual_point(suns_to_try(way / np.linalg.norm(way)))
+    tried = prior_point(candidate_suns(way / np.linalg.norm(way)))
     frames.find_mask(tried, photo.trusted)
     frames.mask &= photo.linear.max(axis=2) > 0.0
-    if frames.mask.sum() < _LEAST_PIXELS:
+    if frames.mask.sum() < _MIN_PIXELS:
         actual = f"{int(frames.mask.sum())} pixels of it are neither clipped nor black"
         refuse("photo", "skin where the head is", actual, "Check camera and exposure, or take a larger side")
     return tried
 
 
-def _start(problem: Problem, tried: Point, suns: int) -> Point:
+def _initial_point(problem: FitProblem, tried: FitPoint, suns: int) -> FitPoint:
     """Return the point at which the fit starts: a coarse search, then a finer one around its suns."""
     frames, target, weight = problem.frames, problem.target, problem.even_weights()
     start = InitialGuess(frames, tried, target, weight).best(suns)
     if suns:
-        nearer = replace(start, suns=suns_around(start.suns))
+        nearer = replace(start, suns=neighbouring_suns(start.suns))
         start = InitialGuess(frames, nearer, target, weight).best(suns)
     return start
 
 
-def _white(white: White) -> Floats:
+def _checked_white(white: WhitePoint) -> Floats:
     """Return the given white (3,), green 1."""
     if isinstance(white, str):
         if white != "specular":

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.light_basis import BASIS, panorama
-from dermis.apps.inverse.fitting.unknowns import Point, suns_of, with_skin
+from dermis.apps.inverse.fitting.unknowns import FitPoint, sun_lights, with_skin
 from dermis.base.atomic_write import atomic_file
 from dermis.frame.rendered_frame import RenderedFrame
 from dermis.frame.renderer import Renderer
@@ -21,15 +21,15 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Mask = NDArray[np.bool_]
-_SKIN = 1, 2  # classes of labels: face and scalp, nose
-_GRAZING = 0.3
+_SKIN_LABELS = 1, 2  # classes of labels: face and scalp, nose
+_MIN_VIEW_COSINE = 0.3
 """Cosine between normal and view below which pixels do not count: what skin and its surface do there is where
 the frame is least right."""
-_COVERED = 0.999
+_FULL_COVERAGE = 0.999
 
 
 @dataclass(eq=False)
-class Frames:
+class FaceRenderer:
     """Renders a scene's head in any light with any skin, and keeps the pixels that count.
 
     scene : head, camera and pose; its lights and environment are none
@@ -44,21 +44,21 @@ class Frames:
     mask: Mask = field(init=False)
     drawn: int = 0
 
-    def find_mask(self, point: Point, trusted: Floats) -> None:
+    def find_mask(self, point: FitPoint, trusted: Floats) -> None:
         """Find the pixels of skin at which the photograph can be trusted (h, w)."""
         scene = with_skin(self._lit(()), point)
-        scene = replace(scene, lights=suns_of(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))
+        scene = replace(scene, lights=sun_lights(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))
         shown = self._draw(scene, "mask", ("label", "normal_camera", "alpha"))
         label, alpha = shown.output("label"), shown.output("alpha")
         towards = np.abs(shown.output("normal_camera")[..., 2])
-        skin = np.isin(label, _SKIN) & (alpha > _COVERED) & (towards > _GRAZING)
-        self.mask = _within(skin) & (trusted > _COVERED)
+        skin = np.isin(label, _SKIN_LABELS) & (alpha > _FULL_COVERAGE) & (towards > _MIN_VIEW_COSINE)
+        self.mask = _eroded(skin) & (trusted > _FULL_COVERAGE)
 
-    def basis(self, point: Point) -> Floats:
+    def basis(self, point: FitPoint) -> Floats:
         """Return the radiance (9 + k, p, 3) in each lobe of radiance 1 and each sun of irradiance 1."""
         return np.stack([self._image(scene, view) for scene, view in self._apart(point)])
 
-    def parts(self, point: Point) -> tuple[Floats, Floats]:
+    def parts(self, point: FitPoint) -> tuple[Floats, Floats]:
         """Return the same separately: from below the skin, and off its surface."""
         found = []
         for scene, view in self._apart(point):
@@ -67,7 +67,7 @@ class Frames:
         both = np.asarray(found, np.float64)
         return both[:, 0], both[:, 1]
 
-    def together(self, point: Point, strengths: Floats, name: str) -> Floats:
+    def together(self, point: FitPoint, strengths: Floats, name: str) -> Floats:
         """Return the radiance (p, 3) in all lights at once.
 
         strengths : (9 + k,)
@@ -75,9 +75,9 @@ class Frames:
         """
         return self._image(self.lit(point, strengths, name), "together")
 
-    def lit(self, point: Point, strengths: Floats, name: str = "light") -> Scene:
+    def lit(self, point: FitPoint, strengths: Floats, name: str = "light") -> Scene:
         """Return the scene with the skin of a point in lights, whose panorama is in the folder."""
-        suns = suns_of(point.suns, strengths[BASIS:], np.ones(3))
+        suns = sun_lights(point.suns, strengths[BASIS:], np.ones(3))
         radiance = panorama(strengths[:BASIS])
         lights = [one for one in suns if max(one.irradiance) > 0.0]
         around = self._environment(name, radiance) if radiance.max() > 0.0 else None
@@ -87,7 +87,7 @@ class Frames:
         """Return the radiance (h, w, 3) of a frame."""
         return np.asarray(self._draw(scene, "together").linear(), np.float64)
 
-    def _apart(self, point: Point) -> list[tuple[Scene, str]]:
+    def _apart(self, point: FitPoint) -> list[tuple[Scene, str]]:
         """Return a scene for each light, with the name of its view."""
         base = with_skin(self._lit(()), point)
         found = []
@@ -96,7 +96,7 @@ class Frames:
             known = Environment(name=str(path)) if path.exists() else None
             around = known or self._environment(path.stem, panorama(np.eye(BASIS)[k]))
             found.append((replace(base, environment=around), f"lobe {k}"))
-        for k, sun in enumerate(suns_of(point.suns, np.ones(len(point.suns)), np.ones(3))):
+        for k, sun in enumerate(sun_lights(point.suns, np.ones(len(point.suns)), np.ones(3))):
             found.append((replace(base, lights=(sun,)), f"sun {k}"))
         return found
 
@@ -117,7 +117,7 @@ class Frames:
         return self.renderer.draw(scene, self.settings, timed=False, view=view, outputs=outputs)
 
 
-def _within(mask: Mask) -> Mask:
+def _eroded(mask: Mask) -> Mask:
     """Return the pixels whose neighbours are in the mask too."""
     padded = np.pad(mask, 1)
     rows = padded[:-2] & padded[1:-1] & padded[2:]

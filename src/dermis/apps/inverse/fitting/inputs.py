@@ -25,8 +25,8 @@ from dermis.scene.heads import is_person_name, load_person
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-_CLIPPED = 0.985  # of what bytes can show, in the picture's own encoding
-_LEAST_SIDE = 16
+_CLIP_LEVEL = 0.985  # of what bytes can show, in the picture's own encoding
+_MIN_SIDE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Photograph:
             return self
         scale = side / max(width, height)
         size = max(1, round(width * scale)), max(1, round(height * scale))
-        return Photograph(_averaged(self.linear, size), _averaged(self.trusted[..., None], size)[..., 0])
+        return Photograph(_area_average(self.linear, size), _area_average(self.trusted[..., None], size)[..., 0])
 
 
 def read_photograph(given: str | Path | EmbeddedPicture | ArrayLike) -> Photograph:
@@ -64,8 +64,8 @@ def read_photograph(given: str | Path | EmbeddedPicture | ArrayLike) -> Photogra
     """
     image = read_image(given) if isinstance(given, str | Path | EmbeddedPicture) else np.asarray(given)
     name = given if isinstance(given, str | Path | EmbeddedPicture) else "photo"
-    if image.ndim != 3 or image.shape[2] not in (3, 4) or min(image.shape[:2]) < _LEAST_SIDE:
-        expected = f"a picture (h, w, 3) in colour of {_LEAST_SIDE} pixels a side at least"
+    if image.ndim != 3 or image.shape[2] not in (3, 4) or min(image.shape[:2]) < _MIN_SIDE:
+        expected = f"a picture (h, w, 3) in colour of {_MIN_SIDE} pixels a side at least"
         refuse(name, expected, f"got shape {image.shape}", "Save it as RGB")
     if image.dtype.kind != "f" and image.dtype not in (np.uint8, np.uint16):
         refuse(name, "sRGB bytes or linear floats", f"got {image.dtype}", "Convert it")
@@ -76,11 +76,11 @@ def read_photograph(given: str | Path | EmbeddedPicture | ArrayLike) -> Photogra
         return Photograph(image.astype(np.float64), np.ones(image.shape[:2]))
     levels: NDArray[np.uint8] | NDArray[np.uint16] = np.asarray(image)
     most = np.iinfo(levels.dtype).max
-    trusted = (levels.max(axis=2) < _CLIPPED * most).astype(np.float64)
+    trusted = (levels.max(axis=2) < _CLIP_LEVEL * most).astype(np.float64)
     return Photograph(decode_srgb_levels(levels).astype(np.float64), trusted)
 
 
-def _averaged(image: Floats, size: tuple[int, int]) -> Floats:
+def _area_average(image: Floats, size: tuple[int, int]) -> Floats:
     """Return a picture (h, w, c) downsampled by area; pixels on edges count by their shares."""
     for axis, count in ((0, size[1]), (1, size[0])):
         sums = np.cumsum(image, axis=axis)
@@ -93,11 +93,11 @@ def _averaged(image: Floats, size: tuple[int, int]) -> Floats:
     return image
 
 
-_SAME_MM = 0.01
+_POSITION_TOLERANCE_MM = 0.01
 
 
 @dataclass(frozen=True)
-class Subject:
+class FitSubject:
     """Subject of a photograph: a scene without light.
 
     person : whose skin is painted, None for other heads
@@ -109,7 +109,7 @@ class Subject:
     table: Mapping[str, object]
 
 
-def subject_of(given: object, camera: object = None) -> Subject:
+def fit_subject(given: object, camera: object = None) -> FitSubject:
     """Return the subject with the head, camera, pose and surface of what is given.
 
     given : a scene or its file (.toml), a head or what `load_head` takes, or a `Human`
@@ -124,15 +124,15 @@ def subject_of(given: object, camera: object = None) -> Subject:
     else:
         scene = given if isinstance(given, Scene) else Scene(as_head(given))
     if camera is not None:
-        scene = replace(scene, camera=_camera(camera, scene.head))  # type: ignore[arg-type]
-    person = given if isinstance(given, Human) else _person(scene.head)
+        scene = replace(scene, camera=_as_camera(camera, scene.head))  # type: ignore[arg-type]
+    person = given if isinstance(given, Human) else _painted_person(scene.head)
     name = scene.head.name
     if not table and (person is not None or not is_person_name(name)):
         table = {"name": str(Path(name).resolve()) if Path(name).is_file() else name}
-    return Subject(_plain(scene), person, table)
+    return FitSubject(_without_light(scene), person, table)
 
 
-def _camera(given: object, head: Head) -> Camera | Callable[[Head], Camera]:
+def _as_camera(given: object, head: Head) -> Camera | Callable[[Head], Camera]:
     if isinstance(given, str | os.PathLike):
         return load_camera(str(given), head)
     if not (isinstance(given, Camera) or callable(given)):
@@ -141,7 +141,7 @@ def _camera(given: object, head: Head) -> Camera | Callable[[Head], Camera]:
     return given
 
 
-def _person(head: Head) -> Human | None:
+def _painted_person(head: Head) -> Human | None:
     """Return the person of a painted head, with the skin that is painted on it."""
     if (
         not isinstance(head.maps, PaintedMaps)
@@ -151,11 +151,11 @@ def _person(head: Head) -> Human | None:
         return None
     person = replace(load_person(head.name), skin=head.maps.look)
     own, there = person.positions_mm, head.control.positions_mm
-    same = own.shape == there.shape and np.allclose(own, there, atol=_SAME_MM)
+    same = own.shape == there.shape and np.allclose(own, there, atol=_POSITION_TOLERANCE_MM)
     return person if same else None
 
 
-def _plain(scene: Scene) -> Scene:
+def _without_light(scene: Scene) -> Scene:
     """Return the scene without light, with the pigments that are held."""
     own = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):

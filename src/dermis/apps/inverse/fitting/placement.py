@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.fitting.inputs import Subject, subject_of
+from dermis.apps.inverse.fitting.inputs import FitSubject, fit_subject
 from dermis.base.errors import refuse
 from dermis.base.reading import parse_json, parsing, read_text
 from dermis.base.tables import parse_rows
@@ -23,21 +23,21 @@ from dermis.mesh.head import Head
 from dermis.optics.media import Floats
 from dermis.scene.camera import Camera
 
-_NOISE = 0.004
+_LANDMARK_NOISE = 0.004
 """Of landmarks, of the photograph's height: how well they are placed."""
-_FOCAL_SPREAD = 0.3
+_FOCAL_SD = 0.3
 """Of the logarithm of the focal length, around that of a portrait."""
-_MACRO = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
-_MACRO_SPREAD = 0.3
-_TARGET_SPREAD = 0.15
-_FOLDERS = ("head/", "forehead/", "eyes/", "nose/", "mouth/", "cheek/", "chin/")
-_ENDS = ("-incr", "-up", "-out", "-forward", "-convex")
-_ROUNDS = 2
-_BEFORE_MM = 1100.0
+_MACRO_NAMES = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
+_MACRO_SD = 0.3
+_TARGET_SD = 0.15
+_TARGET_FOLDERS = ("head/", "forehead/", "eyes/", "nose/", "mouth/", "cheek/", "chin/")
+_TARGET_SUFFIXES = ("-incr", "-up", "-out", "-forward", "-convex")
+_ITERATIONS = 2
+_DISTANCE_MM = 1100.0
 _FRAME_MM = 300.0
 
 
-def place_by_landmarks(subject: Subject, landmarks: str | Path, size: tuple[int, int]) -> Subject:
+def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[int, int]) -> FitSubject:
     """Return the subject with the camera, and the identity, that project its landmarks into the photograph.
 
     A human gets ancestry, sex, age, weight, muscle and details of the face with priors at the given person.
@@ -47,24 +47,24 @@ def place_by_landmarks(subject: Subject, landmarks: str | Path, size: tuple[int,
     """
     name, seen = read_landmarks(landmarks, size)
     person, head = subject.person, subject.scene.head
-    shape = _Shape.of(person, head, name, seen)
+    shape = _LandmarkModel.of(person, head, name, seen)
     pixels = np.array([seen[one] for one in shape.names])
-    found = np.concatenate([np.zeros(6), [np.log(size[1] * _BEFORE_MM / _FRAME_MM)], np.zeros(shape.count)])
-    found[:3], found[5] = (np.pi, 0.0, 0.0), _BEFORE_MM
-    for _ in range(_ROUNDS if person else 1):
-        found = _solved(shape, pixels, size, found)
+    found = np.concatenate([np.zeros(6), [np.log(size[1] * _DISTANCE_MM / _FRAME_MM)], np.zeros(shape.count)])
+    found[:3], found[5] = (np.pi, 0.0, 0.0), _DISTANCE_MM
+    for _ in range(_ITERATIONS if person else 1):
+        found = _solve(shape, pixels, size, found)
         if person is not None:
             person = shape.person(found[7:])
-            shape = _Shape.of(person, head, name, seen)
+            shape = _LandmarkModel.of(person, head, name, seen)
             found[7:] = 0.0
     if person is not None:
-        subject = subject_of(person)
-        found = _solved(replace(shape, slopes=shape.slopes[:0]), pixels, size, found[:7])
-    return replace(subject, scene=replace(subject.scene, camera=_camera(found, size)))
+        subject = fit_subject(person)
+        found = _solve(replace(shape, slopes=shape.slopes[:0]), pixels, size, found[:7])
+    return replace(subject, scene=replace(subject.scene, camera=_fitted_camera(found, size)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Shape:
+class _LandmarkModel:
     """Places of landmarks on a head, and their derivatives by its identity.
 
     places : (n, 3) from the head's centre [mm]
@@ -78,24 +78,24 @@ class _Shape:
     details: tuple[str, ...]
 
     @classmethod
-    def of(cls, person: Human | None, head: Head, name: str, seen: dict[str, Floats]) -> _Shape:
+    def of(cls, person: Human | None, head: Head, name: str, seen: dict[str, Floats]) -> _LandmarkModel:
         """Return the shape of a person, or of a head without unknowns."""
         plain = head if person is None else replace(person, targets={}).head(subdivide=0)
         points = landmark_points(plain, name)
         chosen = np.array([k for k, one in enumerate(points.names) if one in seen])
         names = tuple(points.names[k] for k in chosen)
         if person is None:
-            places = _at(points, chosen, plain.positions_mm.astype(np.float64)) - plain.centre_mm
+            places = _interpolate(points, chosen, plain.positions_mm.astype(np.float64)) - plain.centre_mm
             return cls(names, places, np.zeros((0, *places.shape)), None, ())
         centre = np.array(person.head(subdivide=0).centre_mm)
-        details = tuple(one for one in human_targets() if one.startswith(_FOLDERS) and one.endswith(_ENDS))
+        details = tuple(one for one in human_targets() if one.startswith(_TARGET_FOLDERS) and one.endswith(_TARGET_SUFFIXES))
         own = cls(names, np.zeros((0, 3)), np.zeros((0, 0, 3)), person, details)
 
         def places_of(other: Human) -> Floats:
-            return np.asarray(_at(points, chosen, other.positions_mm.astype(np.float64)) - centre)
+            return np.asarray(_interpolate(points, chosen, other.positions_mm.astype(np.float64)) - centre)
 
-        base, count = places_of(person), len(_MACRO) + len(details)
-        slopes = np.stack([_slope(own, places_of, base, k, count) for k in range(count)])
+        base, count = places_of(person), len(_MACRO_NAMES) + len(details)
+        slopes = np.stack([_derivative(own, places_of, base, k, count) for k in range(count)])
         return replace(own, places=base, slopes=slopes)
 
     @property
@@ -107,16 +107,16 @@ class _Shape:
         """Return the given person changed by the identity, in units of the priors."""
         assert self.given is not None
         macro: dict[str, Any] = {
-            name: float(np.clip(getattr(self.given, name) + _prior_spread(name) * step, *_limits(name)))
-            for name, step in zip(_MACRO, identity, strict=False)
+            name: float(np.clip(getattr(self.given, name) + _prior_sd(name) * step, *_limits(name)))
+            for name, step in zip(_MACRO_NAMES, identity, strict=False)
         }
         targets = dict(self.given.targets)
-        for name, step in zip(self.details, identity[len(_MACRO) :], strict=True):
-            targets[name] = float(np.clip(targets.get(name, 0.0) + _TARGET_SPREAD * step, -1.0, 1.0))
+        for name, step in zip(self.details, identity[len(_MACRO_NAMES) :], strict=True):
+            targets[name] = float(np.clip(targets.get(name, 0.0) + _TARGET_SD * step, -1.0, 1.0))
         return replace(self.given, **macro, targets=targets, skin=self.given.look)
 
 
-def _slope(shape: _Shape, places_of: Callable[[Human], Floats], base: Floats, k: int, count: int) -> Floats:
+def _derivative(shape: _LandmarkModel, places_of: Callable[[Human], Floats], base: Floats, k: int, count: int) -> Floats:
     """Return the derivative (n, 3) by one number of the identity, away from its limit."""
     step = np.zeros(count)
     step[k] = 0.2
@@ -127,34 +127,34 @@ def _slope(shape: _Shape, places_of: Callable[[Human], Floats], base: Floats, k:
     return np.asarray(change / step[k])
 
 
-def _prior_spread(name: str) -> float:
-    return _MACRO_SPREAD * (OLD - YOUNG if name == "age" else 1.0)
+def _prior_sd(name: str) -> float:
+    return _MACRO_SD * (OLD - YOUNG if name == "age" else 1.0)
 
 
 def _limits(name: str) -> tuple[float, float]:
     return {"age": (YOUNG, OLD), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(name, (0.01, 1.0))
 
 
-def _at(points: LandmarkPoints, chosen: NDArray[np.int64], places: Floats) -> Floats:
-    return np.asarray(np.einsum("nk,nkc->nc", points.share[chosen], places[points.corner[chosen]]))
+def _interpolate(points: LandmarkPoints, chosen: NDArray[np.int64], places: Floats) -> Floats:
+    return np.asarray(np.einsum("nk,nkc->nc", points.weight[chosen], places[points.point[chosen]]))
 
 
-def _solved(shape: _Shape, pixels: Floats, size: tuple[int, int], start: Floats) -> Floats:
+def _solve(shape: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: Floats) -> Floats:
     """Return rotation, translation, logarithm of the focal length and identity by least squares."""
     from scipy.optimize import least_squares
 
-    usual = np.log(size[1] * _BEFORE_MM / _FRAME_MM)
+    usual = np.log(size[1] * _DISTANCE_MM / _FRAME_MM)
 
     def faults(x: Floats) -> Floats:
         places = shape.places + np.einsum("u,unc->nc", x[7:], shape.slopes)
-        off = (_seen(x, places, size) - pixels) / (_NOISE * size[1])
-        return np.concatenate([off.ravel(), [(x[6] - usual) / _FOCAL_SPREAD], x[7:]])
+        off = (_project(x, places, size) - pixels) / (_LANDMARK_NOISE * size[1])
+        return np.concatenate([off.ravel(), [(x[6] - usual) / _FOCAL_SD], x[7:]])
 
     scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(shape.count)])
     return np.asarray(least_squares(faults, start, x_scale=scale, loss="soft_l1").x, np.float64)
 
 
-def _seen(x: Floats, places: Floats, size: tuple[int, int]) -> Floats:
+def _project(x: Floats, places: Floats, size: tuple[int, int]) -> Floats:
     """Return the pixels of places (n, 2)."""
     from scipy.spatial.transform import Rotation
 
@@ -162,7 +162,7 @@ def _seen(x: Floats, places: Floats, size: tuple[int, int]) -> Floats:
     return np.asarray(np.exp(x[6]) * there[:, :2] / there[:, 2:] + (np.array(size) - 1.0) / 2.0)
 
 
-def _camera(x: Floats, size: tuple[int, int]) -> Camera:
+def _fitted_camera(x: Floats, size: tuple[int, int]) -> Camera:
     from scipy.spatial.transform import Rotation
 
     focal, (cx, cy) = float(np.exp(x[6])), (np.array(size) - 1.0) / 2.0
@@ -173,7 +173,7 @@ def _camera(x: Floats, size: tuple[int, int]) -> Camera:
 _EXPECTED = "landmarks: CSV rows of name,x,y in pixels, or JSON by MediaPipe or dermis render"
 _BY_COUNT = {68: "ibug-68", 70: "face-synthetics-70", 468: "mediapipe", 478: "mediapipe"}
 _MEDIAPIPE = "face_landmarks", "faceLandmarks", "multi_face_landmarks", "landmarks", "landmark"
-_LEAST = 6
+_MIN_LANDMARKS = 6
 
 
 def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
@@ -185,21 +185,21 @@ def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[s
     """
     text = read_text(path, _EXPECTED)
     if Path(path).suffix.lower() == ".json":
-        name, found = _of_json(path, parse_json(text, path, _EXPECTED), size)
+        name, found = _parse_landmarks(path, parse_json(text, path, _EXPECTED), size)
     else:
         with parsing(path, _EXPECTED, KeyError, TypeError, csv.Error):
             rows = [(row["name"], float(row["x"]), float(row["y"])) for row in parse_rows(text)]
         found = {str(one): np.array([x, y]) for one, x, y in rows}
         name = _BY_COUNT.get(len(found), "")
-    if len(found) < _LEAST or not all(np.isfinite(one).all() for one in found.values()):
-        refuse(path, f"{_LEAST} landmarks at least", f"got {len(found)}", "Correct the file")
+    if len(found) < _MIN_LANDMARKS or not all(np.isfinite(one).all() for one in found.values()):
+        refuse(path, f"{_MIN_LANDMARKS} landmarks at least", f"got {len(found)}", "Correct the file")
     if name not in SETS:
         expected = f"as many landmarks as {', '.join(map(str, _BY_COUNT))}, or JSON that names their set"
         refuse(path, expected, f"got {len(found)}", "Give all of a set")
     return name, found
 
 
-def _of_json(path: str | Path, data: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
+def _parse_landmarks(path: str | Path, data: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
     """Return the landmarks of `dermis render --landmarks`, or of MediaPipe as shares of width and height."""
     with parsing(path, _EXPECTED, KeyError, TypeError, IndexError):
         if isinstance(data, Mapping) and isinstance(data.get("landmarks"), Mapping):

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.fitting.inputs import Subject
+from dermis.apps.inverse.fitting.inputs import FitSubject
 from dermis.apps.inverse.fitting.light_basis import BASIS, panorama
-from dermis.apps.inverse.fitting.solve import Certainty
+from dermis.apps.inverse.fitting.solve import Uncertainty
 from dermis.apps.inverse.fitting.unknowns import (
-    TURN_SPREAD,
-    UNKNOWNS,
-    WHITE_SPREAD,
-    Point,
-    suns_of,
+    SUN_SD,
+    SKIN_UNKNOWNS,
+    WHITE_SD,
+    FitPoint,
+    sun_lights,
     with_skin,
 )
 from dermis.base.atomic_write import atomic_file
@@ -33,7 +33,7 @@ from dermis.scene.saving import save_scene
 from dermis.scene.settings import Settings
 
 SUMMARY = "fit.json"
-_GREY = 0.5
+_NO_DIFFERENCE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +51,13 @@ class FitResult:
     frames, seconds : that it took
     """
 
-    subject: Subject
-    point: Point
+    subject: FitSubject
+    point: FitPoint
     strengths: Floats
     white: Floats
     exposure: float
     size: tuple[int, int]
-    certainty: Certainty
+    certainty: Uncertainty
     photo: Floats
     picture: Floats
     mask: NDArray[np.bool_]
@@ -89,7 +89,7 @@ class FitResult:
                 "usual": one.usual,
                 "believed_relative_sd": one.spread,
             }
-            for one in UNKNOWNS
+            for one in SKIN_UNKNOWNS
         }
         suns = []
         for k, (way, strength) in enumerate(self.suns):
@@ -116,12 +116,12 @@ class FitResult:
         """Describe priors and given numbers."""
         skin = self.subject.scene.skin.pigments
         assert skin is not None
-        sun = f"directions of suns: within {np.degrees(TURN_SPREAD):.0f} degrees of where the search began"
-        white = f"neutral within {100 * WHITE_SPREAD:.0f} %"
+        sun = f"directions of suns: within {np.degrees(SUN_SD):.0f} degrees of where the search began"
+        white = f"neutral within {100 * WHITE_SD:.0f} %"
         if "white red" not in self.certainty.sd:
             white = f"given, {', '.join(f'{one:.3g}' for one in self.white)}"
         held = f"eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm"
-        spreads = {one: f"{one.usual:g} within a factor of {np.exp(one.spread):.2g}" for one in UNKNOWNS}
+        spreads = {one: f"{one.usual:g} within a factor of {np.exp(one.spread):.2g}" for one in SKIN_UNKNOWNS}
         return [
             *(f"{one.name}: around {spread}" for one, spread in spreads.items()),
             *([sun] if self.suns else []),
@@ -153,7 +153,7 @@ def save_fit(folder: Path, found: FitResult) -> list[Path]:
         table = {"name": "person.json"}
     written.append(folder / "scene.toml")
     settings = Settings(size=found.size, exposure=found.exposure)
-    save_scene(written[-1], scene_of(found, folder), settings, table)
+    save_scene(written[-1], fitted_scene(found, folder), settings, table)
     for name, image in pictures(found).items():
         written.append(folder / f"{name}.png")
         write_image(written[-1], image)
@@ -163,9 +163,9 @@ def save_fit(folder: Path, found: FitResult) -> list[Path]:
     return written
 
 
-def scene_of(found: FitResult, folder: Path) -> Scene:
+def fitted_scene(found: FitResult, folder: Path) -> Scene:
     """Return the fitted scene, whose ambient light is a file of the folder."""
-    suns = suns_of(found.point.suns, found.strengths[BASIS:], found.white)
+    suns = sun_lights(found.point.suns, found.strengths[BASIS:], found.white)
     has_sky = panorama(found.strengths[:BASIS]).max() > 0.0
     around = Environment(name=str(folder / "light.exr")) if has_sky else None
     lights = [one for one in suns if max(one.irradiance) > 0.0]
@@ -178,4 +178,4 @@ def pictures(found: FitResult) -> dict[str, Floats]:
     off = np.where(found.mask[..., None], (found.photo - found.picture) / peak, 0.0)
     shown = {"photo": found.photo / max(peak, 1.0), "fit": found.picture / max(peak, 1.0)}
     shown = {name: np.clip(image, 0.0, 1.0) for name, image in shown.items()}
-    return shown | {"difference": np.clip(_GREY + off, 0.0, 1.0) ** 2.2}
+    return shown | {"difference": np.clip(_NO_DIFFERENCE + off, 0.0, 1.0) ** 2.2}

@@ -13,12 +13,12 @@ from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-SUN_DEGREES = 0.53
+SUN_DIAMETER_DEGREES = 0.53
 """Angle that the sun spans, for shadows."""
 
 
 @dataclass(frozen=True)
-class Unknown:
+class SkinUnknown:
     """Number of the skin, fitted as its logarithm.
 
     usual, spread : prior: median, and standard deviation of the logarithm
@@ -34,25 +34,25 @@ class Unknown:
     step: float
 
 
-UNKNOWNS = (
-    Unknown("melanin", 0.03, 2.0, 0.0005, 0.6, 0.1),
-    Unknown("blood", 0.01, 0.7, 0.0005, 0.2, 0.15),
-    Unknown("roughness", 0.3, 0.35, 0.05, 1.0, 0.06),
-    Unknown("rho_s", 0.7, 0.5, 0.02, 1.0, 0.1),
+SKIN_UNKNOWNS = (
+    SkinUnknown("melanin", 0.03, 2.0, 0.0005, 0.6, 0.1),
+    SkinUnknown("blood", 0.01, 0.7, 0.0005, 0.2, 0.15),
+    SkinUnknown("roughness", 0.3, 0.35, 0.05, 1.0, 0.06),
+    SkinUnknown("rho_s", 0.7, 0.5, 0.02, 1.0, 0.1),
 )
 """Artist's beliefs, wide ones: the spread of melanin is that of all peoples, roughness that of the face's
 regions; strength is between a dry skin's and a smooth boundary's. `rho_s` is what oil changes."""
-_COARSE = 0.25
+_PROFILE_STEP = 0.25
 """Steps of the logarithms of pigments between which widths do not change: profiles take long."""
-TURN_STEP = 0.02
+SUN_STEP = 0.02
 """Of finite differences of a sun's direction [rad]."""
-TURN_SPREAD = 1.0
-WHITE_SPREAD = 0.2
+SUN_SD = 1.0
+WHITE_SD = 0.2
 """Of the logarithm of red and of blue over green, where the light's colour is looked for."""
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class FitPoint:
     """Values of all unknowns except the strengths of lights.
 
     logs : (4,) logarithms of `SKIN`
@@ -66,27 +66,27 @@ class Point:
 
     def values(self) -> dict[str, float]:
         """Return the numbers of the skin by name."""
-        return {one.name: float(np.exp(log)) for one, log in zip(UNKNOWNS, self.logs, strict=True)}
+        return {one.name: float(np.exp(log)) for one, log in zip(SKIN_UNKNOWNS, self.logs, strict=True)}
 
-    def moved(self, step: Floats) -> Point:
+    def moved(self, step: Floats) -> FitPoint:
         """Return another point within the limits.
 
         step : (4 + 2 k + 2,) of the logarithms, of the suns' directions along their tangents, of the white
         """
-        skin, count = len(UNKNOWNS), len(self.suns)
-        low, high = np.log([one.low for one in UNKNOWNS]), np.log([one.high for one in UNKNOWNS])
+        skin, count = len(SKIN_UNKNOWNS), len(self.suns)
+        low, high = np.log([one.low for one in SKIN_UNKNOWNS]), np.log([one.high for one in SKIN_UNKNOWNS])
         turns = step[skin : skin + 2 * count].reshape(count, 2)
         moved = self.suns + np.einsum("kt,ktc->kc", turns, tangents(self.suns))
-        return Point(
+        return FitPoint(
             np.clip(self.logs + step[:skin], low, high),
             moved / np.linalg.norm(moved, axis=1, keepdims=True),
             self.white + step[skin + 2 * count :],
         )
 
 
-def usual_point(suns: Floats) -> Point:
+def prior_point(suns: Floats) -> FitPoint:
     """Return the means of the priors."""
-    return Point(np.log([one.usual for one in UNKNOWNS]), suns, np.zeros(2))
+    return FitPoint(np.log([one.usual for one in SKIN_UNKNOWNS]), suns, np.zeros(2))
 
 
 def tangents(towards: Floats) -> Floats:
@@ -97,7 +97,7 @@ def tangents(towards: Floats) -> Floats:
     return np.stack([first, np.cross(towards, first)], axis=1)
 
 
-def with_skin(scene: Scene, point: Point) -> Scene:
+def with_skin(scene: Scene, point: FitPoint) -> Scene:
     """Return the scene with the skin of a point.
 
     Painted people are painted with these pigments, and light spreads below as far as pigments near them let
@@ -110,7 +110,7 @@ def with_skin(scene: Scene, point: Point) -> Scene:
     if isinstance(maps := scene.head.maps, PaintedMaps):
         look = replace(maps.look, melanin=found["melanin"], blood=found["blood"])
         head = replace(scene.head, maps=replace(maps, look=look))
-        melanin, blood = np.exp(_COARSE * np.rint(point.logs[:2] / _COARSE))
+        melanin, blood = np.exp(_PROFILE_STEP * np.rint(point.logs[:2] / _PROFILE_STEP))
     else:
         head, melanin, blood = scene.head, found["melanin"], found["blood"]
         changed["albedo"] = "profile"
@@ -119,9 +119,9 @@ def with_skin(scene: Scene, point: Point) -> Scene:
     return replace(scene, head=head, skin=Skin(**(scene.skin.model_dump() | changed | {"pigments": own})))
 
 
-def suns_of(towards: Floats, strengths: Sequence[float] | Floats, white: Floats) -> list[DirectionalLight]:
+def sun_lights(towards: Floats, strengths: Sequence[float] | Floats, white: Floats) -> list[DirectionalLight]:
     """Return suns of a colour (3,) and strengths (k,), irradiance at normal incidence."""
     return [
-        DirectionalLight(direction=tuple(-way), irradiance=tuple(float(s) * white), angle_degrees=SUN_DEGREES)
+        DirectionalLight(direction=tuple(-way), irradiance=tuple(float(s) * white), angle_degrees=SUN_DIAMETER_DEGREES)
         for way, s in zip(towards, strengths, strict=True)
     ]

@@ -14,17 +14,17 @@ from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.skin_colours import colour_table
 
-Third = Literal["none", "oxygen", "shade"]
-DARKEST = 1e-4
+ThirdUnknown = Literal["none", "oxygen", "shade"]
+MIN_REFLECTANCE = 1e-4
 """What darker colours are taken for: no skin is [-]."""
-USUAL_BLOOD, BLOOD_SPREAD = 0.1, 0.1
+BLOOD_ROOT_MEAN, BLOOD_ROOT_SD = 0.1, 0.1
 """What the root of the share of blood is believed to be, mean and standard deviation: it decides where
 melanin hides the blood, and nowhere else.
 """
 _NODES = 129  # along melanin and along blood
-_OXYGENS = 5
-_OXYGEN_SPREAD, _SHADE_SPREAD, _HELD = 0.1, 0.3, 1e-3
-_SHADES = -3.0, 1.5  # logarithms
+_OXYGEN_COUNT = 5
+_OXYGEN_SD, _SHADE_SD, _FIXED_SD = 0.1, 0.3, 1e-3
+_SHADE_RANGE = -3.0, 1.5  # logarithms
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class SkinModel:
     """
 
     logs: Floats
-    third: Third
+    third: ThirdUnknown
     span: tuple[float, float]
     usual: float
     spread: float
@@ -61,10 +61,10 @@ class SkinModel:
         along_q = across - near
         u, w = u[:, None], w[:, None]
         faces = rows[0::2] + u * (rows[1::2] - rows[0::2])
-        by_p = _mixed(rows[1::2] - rows[0::2], w) * (nodes - 1)
-        by_q = _mixed(along_q[0::2] + u * (along_q[1::2] - along_q[0::2]), w) * (nodes - 1)
+        by_p = _lerp(rows[1::2] - rows[0::2], w) * (nodes - 1)
+        by_q = _lerp(along_q[0::2] + u * (along_q[1::2] - along_q[0::2]), w) * (nodes - 1)
         by_t = (faces[1] - faces[0]) * max(thirds - 1, 1) / (self.span[1] - self.span[0])
-        found = _mixed(faces, w)
+        found = _lerp(faces, w)
         if self.third == "shade":
             found, by_t = found + x[:, 2:], np.ones_like(found)
         return found, np.stack([by_p, by_q, by_t], axis=-1)
@@ -83,47 +83,47 @@ def _cell(share: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
     return before, place - before
 
 
-def _mixed(pair: Floats, share: Floats) -> Floats:
+def _lerp(pair: Floats, share: Floats) -> Floats:
     return np.asarray(pair[0] + share * (pair[1] - pair[0]))
 
 
-def skin_model(skin: SkinParameters = DEFAULT_SKIN, third: Third = "none") -> SkinModel:
+def skin_model(skin: SkinParameters = DEFAULT_SKIN, third: ThirdUnknown = "none") -> SkinModel:
     """The colours of all skins like this one, by layered diffusion; its own melanin and blood are ignored.
 
     third : what colour is to tell beside melanin and blood; "none" holds the skin's own oxygen
 
     Raises DermisError for another third.
     """
-    if third not in get_args(Third):
-        refuse("third", ", ".join(get_args(Third)), f"got {format_value(third)}", "Take one of them")
+    if third not in get_args(ThirdUnknown):
+        refuse("third", ", ".join(get_args(ThirdUnknown)), f"got {format_value(third)}", "Take one of them")
     return _model(replace(skin, melanin=0.0, blood=0.0, epidermal_blood=0.0), third)
 
 
 @lru_cache(maxsize=8)
-def _model(skin: SkinParameters, third: Third) -> SkinModel:
+def _model(skin: SkinParameters, third: ThirdUnknown) -> SkinModel:
     if third == "oxygen":
-        oxygens = np.linspace(0.0, 1.0, _OXYGENS)
-        return SkinModel(_logs(skin, oxygens), third, (0.0, 1.0), skin.oxygen, _OXYGEN_SPREAD)
-    logs = _logs(skin, [skin.oxygen])
+        oxygens = np.linspace(0.0, 1.0, _OXYGEN_COUNT)
+        return SkinModel(_log_table(skin, oxygens), third, (0.0, 1.0), skin.oxygen, _OXYGEN_SD)
+    logs = _log_table(skin, [skin.oxygen])
     if third == "shade":
-        return SkinModel(logs, third, _SHADES, 0.0, _SHADE_SPREAD)
-    return SkinModel(logs, third, (-1.0, 1.0), 0.0, _HELD)
+        return SkinModel(logs, third, _SHADE_RANGE, 0.0, _SHADE_SD)
+    return SkinModel(logs, third, (-1.0, 1.0), 0.0, _FIXED_SD)
 
 
-def _logs(skin: SkinParameters, oxygens: Floats | list[float]) -> Floats:
+def _log_table(skin: SkinParameters, oxygens: Floats | list[float]) -> Floats:
     tables = [colour_table(replace(skin, oxygen=float(one)), _NODES).colours for one in oxygens]
-    return np.log(np.maximum(np.stack(tables), DARKEST))
+    return np.log(np.maximum(np.stack(tables), MIN_REFLECTANCE))
 
 
-STEPS = 40  # at most; colours of skin take four to six
-_DONE = 1e-10
-_CURVED = 1e-9  # added to curvatures, for nodes where a number does not show
-FLOOR = 2e-4
+MAX_STEPS = 40  # at most; colours of skin take four to six
+_TOLERANCE = 1e-10
+_MIN_CURVATURE = 1e-9  # added to curvatures, for nodes where a number does not show
+COLOUR_FLOOR = 2e-4
 """Half a step of 8-bit sRGB near black, which no colour is known better than, in linear light [-]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class PigmentEstimate:
     """What a colour is made of, for each of t colours.
 
     melanin, blood : (t,) shares of volume [-]
@@ -141,12 +141,12 @@ class Estimate:
     residual: Floats
 
 
-def weights_of(colours: Floats, noise: float) -> Floats:
+def inverse_variances(colours: Floats, noise: float) -> Floats:
     """(t, 3) one over the variance of each colour's logarithm."""
-    return np.asarray(1.0 / (noise**2 + (FLOOR / np.maximum(colours, DARKEST)) ** 2))
+    return np.asarray(1.0 / (noise**2 + (COLOUR_FLOOR / np.maximum(colours, MIN_REFLECTANCE)) ** 2))
 
 
-def solve(model: SkinModel, colours: Floats, noise: float = 0.01, start: Floats | None = None) -> Estimate:
+def solve_pigments(model: SkinModel, colours: Floats, noise: float = 0.01, start: Floats | None = None) -> PigmentEstimate:
     """Melanin, blood and the third number of greatest probability, in float64.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709
@@ -157,24 +157,24 @@ def solve(model: SkinModel, colours: Floats, noise: float = 0.01, start: Floats 
     what is usual, are made least by Gauss and Newton's steps, damped by Levenberg's rule; numbers at a limit
     are held there.
     """
-    logs = np.log(np.maximum(colours, DARKEST))
-    weights = weights_of(colours, noise)
-    x = _coarse_start(model, logs) if start is None else start.copy()
+    logs = np.log(np.maximum(colours, MIN_REFLECTANCE))
+    weights = inverse_variances(colours, noise)
+    x = _initial_guess(model, logs) if start is None else start.copy()
     damping = np.full(len(x), 1e-3)
     cost = _cost(model, x, logs, weights)
-    for _ in range(STEPS):
-        step = _step(model, x, logs, weights, damping)
-        trial = _limited(model, x + step)
+    for _ in range(MAX_STEPS):
+        step = _damped_step(model, x, logs, weights, damping)
+        trial = _clipped(model, x + step)
         there = _cost(model, trial, logs, weights)
         better = there <= cost
         x[better], cost = trial[better], np.minimum(cost, there)
         damping = np.where(better, 0.2 * damping, 8.0 * damping)
-        if np.max(np.abs(step[better]), initial=0.0) < _DONE:
+        if np.max(np.abs(step[better]), initial=0.0) < _TOLERANCE:
             break
     return _estimate(model, x, logs, weights)
 
 
-def _coarse_start(model: SkinModel, logs: Floats) -> Floats:
+def _initial_guess(model: SkinModel, logs: Floats) -> Floats:
     """The nearest of a coarse grid of usual skins."""
     from scipy.spatial import cKDTree
 
@@ -186,45 +186,45 @@ def _coarse_start(model: SkinModel, logs: Floats) -> Floats:
 
 def _cost(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> Floats:
     fault = weights * (logs - model.read(x)[0]) ** 2
-    believed = ((x[:, 1] - USUAL_BLOOD) / BLOOD_SPREAD) ** 2 + ((x[:, 2] - model.usual) / model.spread) ** 2
+    believed = ((x[:, 1] - BLOOD_ROOT_MEAN) / BLOOD_ROOT_SD) ** 2 + ((x[:, 2] - model.usual) / model.spread) ** 2
     return np.asarray(fault.sum(axis=1) + believed)
 
 
-def _limited(model: SkinModel, x: Floats) -> Floats:
+def _clipped(model: SkinModel, x: Floats) -> Floats:
     return np.clip(x, (0.0, 0.0, model.span[0]), (1.0, 1.0, model.span[1]))
 
 
-def _step(model: SkinModel, x: Floats, logs: Floats, weights: Floats, damping: Floats) -> Floats:
+def _damped_step(model: SkinModel, x: Floats, logs: Floats, weights: Floats, damping: Floats) -> Floats:
     """A step of each estimate; a number at a limit is held there, and the others go on without it."""
-    H, g = _system(model, x, logs, weights)
+    H, g = _normal_equations(model, x, logs, weights)
     diagonal = np.einsum("tii->ti", H)
     diagonal *= 1.0 + damping[:, None]
     step = np.linalg.solve(H, g[..., None])[..., 0]
-    held = (x + step != _limited(model, x + step)) & (_limited(model, x + 1e-12 * np.sign(step)) == x)
+    held = (x + step != _clipped(model, x + step)) & (_clipped(model, x + 1e-12 * np.sign(step)) == x)
     H = np.where(held[:, :, None] | held[:, None, :], np.eye(3), H)
     step = np.linalg.solve(H, np.where(held, 0.0, g)[..., None])[..., 0]
     return np.asarray(np.where(held, 0.0, step))
 
 
-def _system(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> tuple[Floats, Floats]:
+def _normal_equations(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> tuple[Floats, Floats]:
     """Curvature (t, 3, 3) and downward slope (t, 3) of half the cost."""
     found, J = model.read(x)
     weighed = weights[:, :, None] * J
     H = np.einsum("tci,tcj->tij", weighed, J)
     g = np.einsum("tci,tc->ti", weighed, logs - found)
-    H[:, [0, 1], [0, 1]] += _CURVED
-    H[:, 1, 1] += BLOOD_SPREAD**-2
-    g[:, 1] -= (x[:, 1] - USUAL_BLOOD) / BLOOD_SPREAD**2
+    H[:, [0, 1], [0, 1]] += _MIN_CURVATURE
+    H[:, 1, 1] += BLOOD_ROOT_SD**-2
+    g[:, 1] -= (x[:, 1] - BLOOD_ROOT_MEAN) / BLOOD_ROOT_SD**2
     H[:, 2, 2] += model.spread**-2
     g[:, 2] -= (x[:, 2] - model.usual) / model.spread**2
     return H, g
 
 
-def _estimate(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> Estimate:
-    covariance = np.linalg.inv(_system(model, x, logs, weights)[0])
+def _estimate(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> PigmentEstimate:
+    covariance = np.linalg.inv(_normal_equations(model, x, logs, weights)[0])
     p, q = x[:, 0], x[:, 1]
     sd = np.sqrt(np.maximum(np.einsum("tii->ti", covariance)[:, :2], 0.0))
     residual = np.exp(logs - model.read(x)[0])
     # A share is the square of its root: its deviation is twice the root times the root's, and that squared.
     melanin_sd, blood_sd = (2.0 * root * one + one**2 for root, one in zip((p, q), sd.T, strict=True))
-    return Estimate(p**2, q**2, x[:, 2], melanin_sd, blood_sd, residual)
+    return PigmentEstimate(p**2, q**2, x[:, 2], melanin_sd, blood_sd, residual)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.inverse.unmixing.device_unmixer import Unmixer, recolour, shading_of
-from dermis.apps.inverse.unmixing.skin_model import SkinModel, Third, skin_model
+from dermis.apps.inverse.unmixing.device_unmixer import Unmixer, recolour, estimate_shading
+from dermis.apps.inverse.unmixing.skin_model import SkinModel, ThirdUnknown, skin_model
 from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_number
@@ -26,19 +26,19 @@ from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 Pixels = NDArray[np.float32]
-NOISE = 0.01
-SKIN = 5.0
+DEFAULT_NOISE = 0.01
+MAX_SKIN_DELTA_E = 5.0
 """CIEDE2000 from the model's nearest colour up to which a texel counts as skin."""
-_LIMITS = 1.0, 2.0, SKIN
-_JUDGED = 512  # texels along the longer side, for the table
-_NOISE = 1e-4, 0.5
-_BLACK = 1e-3  # as between the charts of a map
-_LIKE_SKIN = 0.15  # largest logarithm of a residual that counts for medians
-_FACTORS = 0.0, 100.0
+_DELTA_E_LIMITS = 1.0, 2.0, MAX_SKIN_DELTA_E
+_SUMMARY_SIDE = 512  # texels along the longer side, for the table
+_NOISE_RANGE = 1e-4, 0.5
+_BLACK_LEVEL = 1e-3  # as between the charts of a map
+_MAX_LOG_RESIDUAL = 0.15  # largest logarithm of a residual that counts for medians
+_FACTOR_RANGE = 0.0, 100.0
 
 
 @dataclass(frozen=True)
-class Share:
+class FractionChange:
     """Change of a map of shares: a factor, or another median.
 
     A larger median adds a constant, because a factor would multiply the noise of pale skin; a smaller one
@@ -58,14 +58,14 @@ class Share:
 
 
 @dataclass(frozen=True)
-class Change:
+class PigmentChange:
     """Change of the pigments of a skin; None keeps one.
 
     oxygen, eumelanin : shares, as of `SkinParameters` [-]
     """
 
-    melanin: Share = Share()
-    blood: Share = Share()
+    melanin: FractionChange = FractionChange()
+    blood: FractionChange = FractionChange()
     oxygen: float | None = None
     eumelanin: float | None = None
 
@@ -80,7 +80,7 @@ class Change:
         return np.array(factors), np.array(added)
 
 
-def parse_share(option: str, words: str) -> Share:
+def parse_fraction_change(option: str, words: str) -> FractionChange:
     """Parse x2 as a factor, 0.1 as a median.
 
     Raises DermisError for anything else.
@@ -91,12 +91,12 @@ def parse_share(option: str, words: str) -> Share:
     except ValueError:
         refuse(option, "a factor, such as x2, or a median, such as 0.1", f"got {words!r}", "Correct it")
     if factor:
-        return Share(factor=checked_number(option, value, *_FACTORS, "a factor"))
-    return Share(median=checked_number(option, value, 0.0, 1.0, "a share of the volume"))
+        return FractionChange(factor=checked_number(option, value, *_FACTOR_RANGE, "a factor"))
+    return FractionChange(median=checked_number(option, value, 0.0, 1.0, "a share of the volume"))
 
 
 @dataclass(frozen=True, eq=False)
-class Unmixed:
+class UnmixResult:
     """Pigments of a picture of skin. All maps are (h, w), row 0 at the top.
 
     melanin, blood : shares of the volume of epidermis and dermis [-]
@@ -130,23 +130,23 @@ class Unmixed:
 
         Of every n-th texel, so that 512 are taken along the longer side; black is no skin.
         """
-        apart = max(1, max(self.melanin.shape) // _JUDGED)
+        apart = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
         maps = {name: one[::apart, ::apart].astype(np.float64) for name, one in self.maps().items()}
         shares = {name: maps[name].ravel() for name in ("melanin", "blood", "oxygen") if name in maps}
         back = self.model.colours(shares["melanin"], shares["blood"], shares.get("oxygen"))
         colours = back * maps["residual"].reshape(-1, 3)
         off = delta_e_2000(back, colours)
-        skin = (off <= SKIN) & (colours.max(axis=-1) > _BLACK)
+        skin = (off <= MAX_SKIN_DELTA_E) & (colours.max(axis=-1) > _BLACK_LEVEL)
         found: dict[str, Any] = {"texels": int(off.size), "skin": float(skin.mean())}
         if skin.any():
-            above = {f"above_{limit:g}": float((off > limit).mean()) for limit in _LIMITS}
-            found["delta_e"] = _spread(off[skin]) | above
+            above = {f"above_{limit:g}": float((off > limit).mean()) for limit in _DELTA_E_LIMITS}
+            found["delta_e"] = _percentiles(off[skin]) | above
             for name, share in shares.items():
                 sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
-                found[name] = _spread(share[skin]) | sd
+                found[name] = _percentiles(share[skin]) | sd
         return found
 
-    def recoloured(self, change: Change = Change(), adapter: str = "auto") -> Pixels:
+    def recoloured(self, change: PigmentChange = PigmentChange(), adapter: str = "auto") -> Pixels:
         """Return the colours (h, w, 3), linear Rec. 709, of the same skin with other pigments.
 
         The residual stays, as does shading that was not removed.
@@ -156,7 +156,7 @@ class Unmixed:
         kept = self.devices.setdefault(adapter, LazyDevice(adapter))
         return kept.run(lambda device: self._recoloured(device, change))
 
-    def _recoloured(self, device: Device, change: Change) -> Pixels:
+    def _recoloured(self, device: Device, change: PigmentChange) -> Pixels:
         fixed = self.third is None or change.oxygen is not None
         target = skin_model(change.of(self.skin), "none") if fixed else self.model
         usual = np.broadcast_to(np.float32(target.usual), self.melanin.shape)
@@ -167,7 +167,7 @@ class Unmixed:
 
     def skin_texels(self) -> NDArray[np.bool_]:
         """Return a mask (h, w) of texels whose colour is near one of the model's."""
-        return np.asarray(np.abs(np.log(np.maximum(self.residual, _BLACK))).max(axis=-1) < _LIKE_SKIN)
+        return np.asarray(np.abs(np.log(np.maximum(self.residual, _BLACK_LEVEL))).max(axis=-1) < _MAX_LOG_RESIDUAL)
 
     def _median(self, share: Pixels) -> float:
         """Return the median over the skin."""
@@ -175,7 +175,7 @@ class Unmixed:
         return float(np.median(share[skin] if skin.any() else share))
 
 
-def _spread(values: Floats) -> dict[str, float]:
+def _percentiles(values: Floats) -> dict[str, float]:
     low, middle, high = np.percentile(values, (5.0, 50.0, 95.0))
     return {"p5": float(low), "median": float(middle), "p95": float(high)}
 
@@ -184,12 +184,12 @@ def unmix(
     picture: str | Path | EmbeddedPicture | ArrayLike,
     *,
     skin: SkinParameters = DEFAULT_SKIN,
-    third: Third = "none",
-    noise: float = NOISE,
+    third: ThirdUnknown = "none",
+    noise: float = DEFAULT_NOISE,
     shading: bool = False,
     adapter: str = "auto",
     told: Callable[[int, int], None] = lambda done, of: None,
-) -> Unmixed:
+) -> UnmixResult:
     """Return melanin and blood of a picture of skin colour: an albedo map of a scan or by an artist.
 
     picture : a file (PNG or JPEG in sRGB, EXR linear), or (h, w, 3) diffuse reflectance, linear Rec. 709
@@ -203,25 +203,25 @@ def unmix(
     Raises DermisError for what is no picture of colours, numbers that cannot be, and as
     `dermis.gpu.open_device`.
     """
-    noise = checked_number("noise", noise, *_NOISE, "relative to each channel")
+    noise = checked_number("noise", noise, *_NOISE_RANGE, "relative to each channel")
     model = skin_model(skin, third)
     if third == "shade":
         refuse("third", '"none" or "oxygen"', "got 'shade'", "Set shading=True instead")
-    colours = colour_map(picture) if isinstance(picture, str | Path | EmbeddedPicture) else _array(picture)
+    colours = colour_map(picture) if isinstance(picture, str | Path | EmbeddedPicture) else _checked_colours(picture)
 
-    def job(device: Device) -> Unmixed:
-        light = shading_of(device, colours, skin, noise) if shading else None
+    def job(device: Device) -> UnmixResult:
+        light = estimate_shading(device, colours, skin, noise) if shading else None
         even = colours if light is None else colours / light[..., None]
         made, sd, residual = Unmixer(device, model, noise).unmix(even, told)
         found = made[..., 2] if third == "oxygen" else None
         maps = (made[..., 0], made[..., 1], sd[..., 0], sd[..., 1])
-        return Unmixed(*maps, residual, found, light, skin, model, {adapter: kept})
+        return UnmixResult(*maps, residual, found, light, skin, model, {adapter: kept})
 
     kept = LazyDevice(adapter)
     return kept.run(job)
 
 
-def _array(colours: ArrayLike) -> Pixels:
+def _checked_colours(colours: ArrayLike) -> Pixels:
     found = np.asarray(colours)
     if found.ndim != 3 or found.shape[2] != 3 or not found.size or found.dtype.kind != "f":
         actual = f"got shape {found.shape} and type {found.dtype}"
@@ -236,7 +236,7 @@ SUMMARY = "unmixed.json"
 
 
 def save_maps(
-    folder: Path, found: Unmixed, recoloured: NDArray[np.float32] | None = None, linear: bool = False
+    folder: Path, found: UnmixResult, recoloured: NDArray[np.float32] | None = None, linear: bool = False
 ) -> list[Path]:
     """Write each map as EXR, the summary, and the recoloured picture if any; each file whole or not at all.
 

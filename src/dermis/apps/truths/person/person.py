@@ -103,7 +103,7 @@ def posed_person(scene: Scene, textures: SkinTextures) -> Person:
         quads=mesh.quads,
     )
     hairs = tuple(
-        HairFibres(strands.places_mm(mesh, points), strands.radius_mm, strands.absorption)
+        HairFibres(strands.knot_positions_mm(mesh, points), strands.radius_mm, strands.absorption)
         for strands in (head.strands, head.hair)
         if strands is not None and len(strands)
     )

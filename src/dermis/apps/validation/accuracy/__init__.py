@@ -1,1 +1,1 @@
-"""Errors of the package's approximations against truths, for the pages of docs."""
+"""Errors of the package's approximations against references, for pages of the documentation."""

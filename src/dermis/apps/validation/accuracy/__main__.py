@@ -1,4 +1,4 @@
-"""Measure how wrong the package's approximations are, and write the pages that say so.
+"""Commands that measure errors of the package's approximations and write the pages about them.
 
 Most commands need the sample data (DERMIS_DATA, or a network).
 """
@@ -13,8 +13,8 @@ COMMANDS = {
     f"{HERE}.techniques:techniques": "Write docs/techniques.md; needs Mitsuba and the folder tests.",
     f"{HERE}.motion:motion": "Write docs/motion.md; needs MakeHuman's published heads and the folder tests.",
     f"{HERE}.person:person": "Write docs/path_traced.md; needs Mitsuba.",
-    f"{HERE}.beside_cycles:highlights": "Measure highlights for docs/accuracy.md; needs Blender's Python.",
-    f"{HERE}.beside_cycles:looks": "Draw skins for docs/accuracy.md; needs Blender's Python.",
+    f"{HERE}.cycles_comparison:highlights": "Measure highlights for docs/accuracy.md; needs bpy.",
+    f"{HERE}.cycles_comparison:looks": "Render skins for docs/accuracy.md; needs bpy.",
     f"{HERE}.blur:blur": "Print the tables of the blur on the atlas; needs the folder tests.",
     f"{HERE}.light:light": "Print the tables of environments, furnaces, area lights and occlusion.",
     f"{HERE}.optics:optics": "Print the tables of diffusion models, fits and light through thin parts.",
@@ -23,7 +23,7 @@ COMMANDS = {
     f"{HERE}.thin:thin": "Print the tables of light through slabs, wedges and ears.",
     f"{HERE}.half_space:half_space": "Print the table of reflection by direction.",
 }
-"""Functions that are commands, with what the list of commands says of them."""
+"""Functions that are commands, with their descriptions."""
 
 if __name__ == "__main__":
     run_script(COMMANDS, f"python -m {HERE}")

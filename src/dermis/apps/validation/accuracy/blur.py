@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import zoom
 
 import dermis
-from dermis.apps.validation.pages import data_file, print_tables, add_tests_to_path
+from dermis.apps.validation.pages import add_tests_to_path, data_file, print_tables
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas, cached_atlas
 from dermis.frame.features.atlas import passes as stretched
@@ -36,18 +36,18 @@ from dermis.scene import Scene, Settings, Skin
 from dermis.scene.lights import DirectionalLight, Light, StripeLight
 
 if TYPE_CHECKING:
-    from atlas_reading import Points  # of the folder tests, as other names are that functions import
+    from atlas_reading import Points  # in the folder tests, like other modules that functions import
 
 PROFILE = load_profile("gpu-gems-3")
 Array = NDArray[np.floating]
 Flags = NDArray[np.bool_]
 PointFilter = Callable[[Array], Flags]
-SIZE = 256  # texels along the side, of flat patches
+SIZE = 256  # side of flat patches [texels]
 HUMAN = "heads/makehuman/head_young_male_light.obj"
 RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
 BALL_SIDE, HEAD_SIDE = 320, 1024
-SPACING_MM, WIDTH_MM = 12.0, 6.0  # of bands of light across seams
-MIN_FACING = 0.4  # cosine between a seam and the light
+SPACING_MM, WIDTH_MM = 12.0, 6.0  # of stripes of light across seams
+MIN_FACING = 0.4  # least cosine between the normal at a seam and the light
 
 
 def blur(adapter: str = "auto") -> None:
@@ -67,7 +67,7 @@ def point_tables(device: Device) -> dict[str, object]:
 
 
 def blurred_levels(device: Device, mesh: Mesh, light: Array, stretch: str = "full") -> list[Array]:
-    """Return all levels (n, n) of light (n, n) that is blurred on a mesh's atlas."""
+    """Return all pyramid levels (n, n) of light (n, n) blurred on the atlas of a mesh."""
     levels, blur = blur_light(device, mesh, build_atlas(mesh, len(light)), light[..., None], stretch)
     return [resampled_level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
 
@@ -84,35 +84,35 @@ def point_row(device: Device, texels_per_mm: float) -> str:
     blurred = GaussianSum("blurred levels", profile.variance_mm2[1:], profile.weight[1:])
     exact = blurred.radiant_exitance(np.sqrt(r2))[..., 0] / texels_per_mm**2
     total = np.tensordot(blurred.weight[:, 0], levels, axes=1)
-    beyond = x**2 + y**2 > 1.5**2
-    shape = np.abs(total - exact)[beyond].max() / exact.max()
+    outside = x**2 + y**2 > 1.5**2
+    shape = np.abs(total - exact)[outside].max() / exact.max()
     energy = total.sum() / blurred.albedo[0] - 1
     return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
 
 
 def sheared_row(device: Device, degrees: float) -> str:
-    """Return principal widths of a point of light where uv axes meet at `degrees`, over the width wanted."""
+    """Return principal widths of a point of light over the true width, for uv axes at this angle."""
     flat = plane(SIZE / 3.0)
-    lean = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    shear = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     positions = flat.positions.copy()
-    positions[:, 0] += lean[0] * positions[:, 1]
-    positions[:, 1] *= lean[1]
+    positions[:, 0] += shear[0] * positions[:, 1]
+    positions[:, 1] *= shear[1]
     mesh = build_mesh(positions, flat.uv, flat.triangles, flat.material, flat.materials)
     light = np.zeros((SIZE, SIZE), np.float32)
     light[SIZE // 2, SIZE // 2] = 1.0
     y, x = np.mgrid[:SIZE, :SIZE] - SIZE // 2
-    place = np.stack([x - lean[0] * y, -lean[1] * y]) / 3.0  # v points down
-    wanted = load_profile("gpu-gems-3").variance_mm2[-1]
+    place = np.stack([x - shear[0] * y, -shear[1] * y]) / 3.0  # v points down
+    target_variance = load_profile("gpu-gems-3").variance_mm2[-1]
     cells = []
     for stretch in ("axes", "full"):
         spot = blurred_levels(device, mesh, light, stretch)[-1].astype(float)
         covariance = np.einsum("iyx,jyx,yx->ij", place, place, spot) / spot.sum()
-        cells += [f"{width:.3f}" for width in np.sqrt(np.linalg.eigvalsh(covariance) / wanted)]
+        cells += [f"{width:.3f}" for width in np.sqrt(np.linalg.eigvalsh(covariance) / target_variance)]
     return f"| {degrees:g}° | {' | '.join(cells)} |"
 
 
 def constant_light_error(device: Device) -> float:
-    """Return the largest deviation of a constant light on a sphere's atlas after all levels."""
+    """Return the largest deviation of constant light on the atlas of a sphere, over all levels."""
     atlas = build_atlas(uv_sphere(100.0), SIZE)
     levels = blurred_levels(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
     return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
@@ -127,30 +127,30 @@ def surface_tables(adapter: str) -> dict[str, str]:
 
 
 def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
-    """Return how much the widest Gaussian keeps of light proportional to x on a sphere: map, heat, chords."""
+    """Return the damping of the first harmonic on a sphere by the widest Gaussian: atlas, heat, chords."""
     from atlas_reading import shown
     from cut_meshes import cut_sphere
 
     mesh = cut_sphere(radius_mm, 20)
     atlas = build_atlas(mesh, BALL_SIDE, "stitched")
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
-    left = widest_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
+    remaining = widest_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     area = atlas.lit[..., None] / density
-    map_share = (area * left * light).sum() / (area * light**2).sum()
+    map_fraction = (area * remaining * light).sum() / (area * light**2).sum()
     v = PROFILE.variance_mm2[-1] / radius_mm**2
-    whole = np.exp(-2 / v)
-    chords = (1 - whole) - v * (1 - (1 + 2 / v) * whole)
-    return f"| {radius_mm:g} | {map_share:.3f} | {np.exp(-v):.3f} | {chords:.3f} |"
+    decay = np.exp(-2 / v)
+    chords = (1 - decay) - v * (1 - (1 + 2 / v) * decay)
+    return f"| {radius_mm:g} | {map_fraction:.3f} | {np.exp(-v):.3f} | {chords:.3f} |"
 
 
 def blur_light(
     device: Device, mesh: Mesh, atlas: Atlas, light: Array, stretch: str = "full"
 ) -> tuple[PyramidLevels, Blur]:
-    """Blur grey light (n, n, 1) on a mesh's atlas by all Gaussians of PROFILE but the narrowest."""
+    """Blur grey light (n, n, 1) on the atlas of a mesh by all Gaussians of PROFILE but the narrowest."""
     textures, variance = upload_atlas(device, atlas, stretch), PROFILE.variance_mm2[1:]
-    most = len(textures.mips_for("repeated")) - 1
-    halvings = choose_halvings(variance, textures.median_texels_per_mm, most)
+    max_halvings = len(textures.mips_for("repeated")) - 1
+    halvings = choose_halvings(variance, textures.median_texels_per_mm, max_halvings)
     blur = Blur(variance, PROFILE.weight[1:], halvings)
     levels = make_levels(device, len(light), (halvings,), level_format(device))
     upload(device, levels.stacks[0], np.dstack([light, light, light, np.ones_like(light)]))
@@ -164,7 +164,7 @@ def blur_light(
 
 
 def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, k: int) -> Array:
-    """Return level k (n, n), read between the texels of its own resolution."""
+    """Return pyramid level k (n, n), resampled bilinearly to full resolution."""
     halvings = blur.halvings[k]
     layer = download(device, levels.stacks[halvings], layer=k - levels.first[halvings])[..., 0]
     return (
@@ -173,19 +173,21 @@ def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, k: int) -
 
 
 def widest_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
-    """Return (n, n, 1) of the widest level."""
+    """Return the widest level, (n, n, 1)."""
     return resampled_level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
 
 
 def seam_rows(renderer: Renderer) -> list[str]:
-    """Return rows of jumps of scattered light across seams [% of it]: mean and 95th percentile."""
+    """Return rows of relative jumps of scattered light across seams: mean and 95th percentile [%]."""
     from cut_meshes import cut_sphere
 
     ball = cut_sphere(30.0, 20)
     rows = seam_row(renderer, "sphere in six charts", Head("sphere", ball, Maps()), BALL_SIDE, all_points)
-    own = dermis.load_head("human")
-    rows += seam_row(renderer, "human, neck and back of the head", own, HEAD_SIDE, visible_points)
-    rows += seam_row(renderer, "human, eye sockets and inside of the mouth", own, HEAD_SIDE, hidden_points)
+    human_head = dermis.load_head("human")
+    rows += seam_row(renderer, "human, neck and back of the head", human_head, HEAD_SIDE, visible_points)
+    rows += seam_row(
+        renderer, "human, eye sockets and inside of the mouth", human_head, HEAD_SIDE, hidden_points
+    )
     human = dermis.load_head(data_file(HUMAN), unit_mm=100, subdivide=0)
     human = replace(human, maps=Maps())
     rows += seam_row(renderer, "MakeHuman, neck", human, HEAD_SIDE, neck_points)
@@ -193,77 +195,81 @@ def seam_rows(renderer: Renderer) -> list[str]:
 
 
 def all_points(places: Array) -> Flags:
-    """Choose all places (n, 3) [mm from the head's centre]."""
+    """Return the mask of all points (n, 3) [mm from the head's centre]."""
     return np.ones(len(places), bool)
 
 
 def neck_points(places: Array) -> Flags:
-    """Choose places on the neck and below it."""
+    """Return the mask of points on the neck and below it."""
     return np.asarray((places[:, 1] < -90.0) & (places[:, 2] < 60.0))
 
 
 def back_points(places: Array) -> Flags:
-    """Choose places on the back of the head."""
+    """Return the mask of points on the back of the head."""
     return np.asarray((places[:, 1] > -90.0) & (places[:, 2] < -30.0))
 
 
 def visible_points(places: Array) -> Flags:
-    """Choose places of the human's seams that can be seen."""
+    """Return the mask of points on visible seams of the human."""
     return np.asarray(neck_points(places) | back_points(places))
 
 
 def hidden_points(places: Array) -> Flags:
-    """Choose places of the human's other seams."""
+    """Return the mask of points on hidden seams of the human."""
     return ~visible_points(places)
 
 
 def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointFilter) -> list[str]:
-    """Return one line of the table, a column for each remedy."""
-    one, other = seam_sides(head, where)
+    """Return one line of the table, with a column for each seam method."""
+    first_side, second_side = seam_sides(head, where)
     cells = []
-    for advice in SEAM_METHODS:
-        found = seam_jumps(renderer, striped_scene(head), advice, side, one, other)
-        cells.append(f"{100 * found.mean():.1f} / {100 * np.percentile(found, 95):.1f}")
-    return [f"| {name} | {len(one.triangle)} | {' | '.join(cells)} |"]
+    for method in SEAM_METHODS:
+        jumps = seam_jumps(renderer, striped_scene(head), method, side, first_side, second_side)
+        cells.append(f"{100 * jumps.mean():.1f} / {100 * np.percentile(jumps, 95):.1f}")
+    return [f"| {name} | {len(first_side.triangle)} | {' | '.join(cells)} |"]
 
 
 def seam_sides(head: Head, where: PointFilter) -> tuple[Points, Points]:
-    """Return both sides of the places along seams that face the lights."""
+    """Return the points on both sides of seams that face the lights."""
     from atlas_reading import Points, seam_points
 
     mesh = head.mesh
-    one, other = seam_points(mesh)
-    places = one.on(mesh.positions[mesh.triangles]) - head.centre_mm
-    kept = where(places) & (np.abs(one.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING)
+    first_side, second_side = seam_points(mesh)
+    places = first_side.on(mesh.positions[mesh.triangles]) - head.centre_mm
+    is_kept = where(places) & (np.abs(first_side.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING)
     for size in (BALL_SIDE, HEAD_SIDE):
         for layout in ("mesh", "stitched"):
             mapped = cached_atlas(head.topology.mesh, size, layout).mapped
-            kept &= mapped[one.triangle] & mapped[other.triangle]
-    return Points(one.triangle[kept], one.weights[kept]), Points(other.triangle[kept], other.weights[kept])
+            is_kept &= mapped[first_side.triangle] & mapped[second_side.triangle]
+    return Points(first_side.triangle[is_kept], first_side.weights[is_kept]), Points(
+        second_side.triangle[is_kept], second_side.weights[is_kept]
+    )
 
 
 def striped_scene(head: Head) -> Scene:
-    """Return a scene with bands of light with sharp ends from front and back, and a little even light."""
+    """Return a scene with sharp stripes of light from front and back, and a little uniform light."""
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
     places = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), SPACING_MM)
     stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=WIDTH_MM, shadows=False)
     lights: list[Light] = []
-    for away in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
-        lights += [stripe(direction=away, position=(place, 0, 0)) for place in places]
-        lights.append(DirectionalLight(direction=away, irradiance=(1, 1, 1), shadows=False))
+    for light_direction in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
+        lights += [stripe(direction=light_direction, position=(place, 0, 0)) for place in places]
+        lights.append(DirectionalLight(direction=light_direction, irradiance=(1, 1, 1), shadows=False))
     skin = Skin(profile="gpu-gems-3", albedo="profile", specular="none", direction="lambertian")
     return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
 
 
-def seam_jumps(renderer: Renderer, scene: Scene, advice: str, side: int, one: Points, other: Points) -> Array:
-    """Return the change of red light from one side of each seam to the other, of the light there."""
+def seam_jumps(
+    renderer: Renderer, scene: Scene, method: str, side: int, first_side: Points, second_side: Points
+) -> Array:
+    """Return the relative change of red light from one side of each seam to the other."""
     from atlas_reading import lit_at
 
-    asked = {"size": (16, 16), "atlas": side, "seams": advice, "transmission": "none"}
-    settings = Settings.model_validate(asked | {"interreflection": False})
+    values = {"size": (16, 16), "atlas": side, "seams": method, "transmission": "none"}
+    settings = Settings.model_validate(values | {"interreflection": False})
     renderer.draw(scene, settings)
     scattered = renderer.prepare(scene, settings).resources.scattered
     light = download(renderer.device, scattered).astype(float)[..., :3]
-    atlas = cached_atlas(scene.head.topology.mesh, side, SEAM_METHODS[advice].layouts[0])
-    a, b = (lit_at(light, atlas, points)[:, 0] for points in (one, other))
+    atlas = cached_atlas(scene.head.topology.mesh, side, SEAM_METHODS[method].layouts[0])
+    a, b = (lit_at(light, atlas, points)[:, 0] for points in (first_side, second_side))
     return np.abs(a - b) / np.maximum((a + b) / 2, 1e-9)

@@ -1,6 +1,6 @@
-"""Highlights and whole skins beside Cycles, with the share of light that the surface reflects.
+"""Highlights and skins beside those of Cycles, with the fraction of light that the surface reflects.
 
-Both need Blender's Python, so docs/accuracy.md shows what was measured last (benchmarks/results).
+Both need Blender's Python, so docs/accuracy.md shows the last measurement (benchmarks/results).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 import dermis
 from dermis.apps.truths.cycles import BeckmannSurface, PrincipledSkin, cycles_passes
 from dermis.apps.validation.accuracy.person import sheet_bytes
-from dermis.apps.validation.pages import DOCS, RESULTS, require_in_checkout, read_results, write_results
+from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_results, write_results
 from dermis.atlas.build import build_atlas
 from dermis.base.console import print_lines
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
@@ -36,8 +36,8 @@ ROUGHNESS, PATHS = 0.3, 64
 LIGHT = PointLight(position=(-300, 250, 600), irradiance=(3, 3, 3))
 ONE_LOBE = ((1.0, ROUGHNESS),)
 TWO_LOBES = ((NARROW_WEIGHT, NARROW_FACTOR * ROUGHNESS), (1.0 - NARROW_WEIGHT, WIDE_FACTOR * ROUGHNESS))
-LIT_QUANTILE = 0.6  # share of the lit pixels that are darker than those that count
-GRAIN_BLUR_PX = 6.0  # standard deviation of what counts as the picture without its grain [pixel]
+LIT_QUANTILE = 0.6  # quantile of the lit pixels above which they are compared
+GRAIN_BLUR_PX = 6.0  # standard deviation of the blur that removes the grain [pixel]
 
 HEADS = {"scan": "lee_perry_smith", "human": "human"}
 LOOK_VIEWS = ("portrait", "three-quarter", "cheek", "profile")
@@ -48,103 +48,104 @@ Picture = NDArray[np.float32]
 
 
 class HighlightRow(TypedDict):
-    """Energy over Cycles', contrasts and correlation of a model's highlights."""
+    """Energy relative to Cycles, contrasts and correlation of a model's highlights."""
 
     view: str
     model: str
     energy: float
-    grain_contrast: float
+    grain: float
     grain_of_cycles: float
     correlation: float
 
 
 class SkinRender(NamedTuple):
-    """A picture in linear light, and the share of its light that the surface reflects [-]."""
+    """Picture in linear light, and the fraction of its light that the surface reflects [-]."""
 
     picture: Picture
     share: float
 
 
 def highlights(adapter: str = "auto") -> None:
-    """Measure highlights beside those of Cycles; writes benchmarks/results/highlights.json."""
-    require_in_checkout(RESULTS)
+    """Measure highlights beside those of Cycles and write benchmarks/results/highlights.json."""
+    in_checkout(RESULTS)
     renderer, head = dermis.Renderer(adapter), scan_with_normal_map()
     rows = [row for view in HIGHLIGHT_VIEWS for row in highlight_rows(renderer, head, view)]
     write_results(HIGHLIGHTS, {"paths": PATHS, "rows": rows})
 
 
 def looks(adapter: str = "auto") -> None:
-    """Draw skins beside Cycles; writes benchmarks/results/look.json and docs/images/look.webp."""
-    require_in_checkout(PICTURE.parent)
+    """Render skins beside Cycles and write benchmarks/results/look.json and docs/images/look.webp."""
+    in_checkout(PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
-    found = {head: skin_renders(renderer, head) for head in HEADS}
+    renders = {head: skin_renders(renderer, head) for head in HEADS}
     for view in LOOK_VIEWS:
         for head in HEADS:
-            rows.append({"head": head, "view": view, "shares": [one.share for one in found[head][view]]})
-            for column, one in zip(COLUMNS, found[head][view], strict=True):
+            rows.append({"head": head, "view": view, "shares": [one.share for one in renders[head][view]]})
+            for column, one in zip(COLUMNS, renders[head][view], strict=True):
                 panels[f"{head} {view}, {column}: {100 * one.share:.1f} %"] = one.picture
     write_results(LOOKS, {"paths": PATHS, "rows": rows})
     PICTURE.write_bytes(sheet_bytes(panels, 2 * len(COLUMNS)))
 
 
 def tables() -> dict[str, object]:
-    """Return the rows of docs/accuracy.md by their names in its template, from what was measured last."""
-    found, seen = read_results(HIGHLIGHTS)["rows"], read_results(LOOKS)["rows"]
-    shares = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in seen)
+    """Return the rows of docs/accuracy.md by their names in its template, from the last measurement."""
+    renders, look_rows = read_results(HIGHLIGHTS)["rows"], read_results(LOOKS)["rows"]
+    shares = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in look_rows)
     return {
         "highlights": "\n".join(
             f"| {row['view']} | {row['model']} | {row['energy']:.3f} | {row['grain']:.2f} "
             f"| {row['grain_of_cycles']:.2f} | {row['correlation']:.3f} |"
-            for row in found
+            for row in renders
         ),
         "highlight_paths": PATHS,
         "looks": "\n".join(
-            f"| {row['head']} | {row['view']} | {cells} |" for row, cells in zip(seen, shares, strict=True)
+            f"| {row['head']} | {row['view']} | {cells} |"
+            for row, cells in zip(look_rows, shares, strict=True)
         ),
         "look_paths": PATHS,
     }
 
 
 def scan_with_normal_map() -> Head:
-    """Return the scan with its relief as a normal map, which both programs take, and no other map."""
+    """Return the scanned head with its relief as a normal map and without other maps."""
     head = dermis.load_head("lee_perry_smith", subdivide=1, regions="none")
     assert head.maps.height is not None
     return replace(head, maps=Maps(normal=slopes(head.mesh, head.maps.height)))
 
 
 def slopes(mesh: Mesh, height: Picture) -> Picture:
-    """Return (n, n, 2) slopes of a height map (n, n) on a mesh, a normal map."""
+    """Return (n, n, 2) slopes of a height map (n, n) on a mesh, as a normal map."""
     down, right = np.gradient(height)
     stretch = build_atlas(mesh, len(height)).stretch.astype(np.float32)
     return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)
 
 
 def grain_contrast(picture: Picture, lit: NDArray[np.bool_]) -> float:
-    """Return the contrast of fine detail: root mean square of picture less its blur, over the mean."""
+    """Return the contrast of fine detail, the relative RMS difference between a picture and its blur."""
     smooth = gaussian_filter(picture, GRAIN_BLUR_PX)
     return float(np.sqrt((((picture - smooth) / np.maximum(smooth, 1e-9))[lit] ** 2).mean()))
 
 
-def traced_highlights(scene: Scene, settings: Settings, kinds: tuple[tuple[float, float], ...]) -> Picture:
-    """Return the green light that facets reflect, path-traced.
+def traced_highlights(scene: Scene, settings: Settings, lobes: tuple[tuple[float, float], ...]) -> Picture:
+    """Return the green light that the facets of all lobes reflect, path-traced.
 
-    kinds : share and roughness of each kind of facets
+    lobes : weight and roughness of each lobe
     """
     picture = np.zeros(settings.size[::-1], np.float32)
-    for share, roughness in kinds:
-        (passed,) = cycles_passes(scene, BeckmannSurface(roughness), [PATHS], settings)
-        picture += share * passed.image[..., 1]
+    for share, roughness in lobes:
+        (image_pass,) = cycles_passes(scene, BeckmannSurface(roughness), [PATHS], settings)
+        picture += share * image_pass.image[..., 1]
     return picture
 
 
 def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[HighlightRow]:
-    """Return a row for each model of the surface."""
+    """Return a row for each model of surface reflection."""
     camera = load_camera(view, head)
     settings = Settings(size=(384, 384), atlas=512, samples=16, parts="specular", transmission="none")
     scene, rows = Scene(head, [LIGHT], camera), list[HighlightRow]()
-    alike, mixed = (traced_highlights(scene, settings, kinds) for kinds in (ONE_LOBE, TWO_LOBES))
+    one_lobe, two_lobes = (traced_highlights(scene, settings, lobes) for lobes in (ONE_LOBE, TWO_LOBES))
     for model in MODELS:
-        truth = mixed if model == "two-lobe" else alike
+        truth = two_lobes if model == "two-lobe" else one_lobe
         lit = truth > np.quantile(truth[truth > 0], LIT_QUANTILE)
         skin = Skin.model_validate(
             {"specular": model, "fresnel": "exact", "rho_s": 1.0, "roughness": ROUGHNESS}
@@ -164,24 +165,24 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
 
 
 def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
-    """Return the scene as the frame draws it."""
-    how = {"size": (SIDE, SIDE), "atlas": 1024, "strands": False}
-    settings = Settings.model_validate(how), Settings.model_validate(how | {"parts": "specular"})
-    picture, surface = (renderer.draw(scene, one).linear() for one in settings)
-    return SkinRender(picture, float(surface.sum() / picture.sum()))
+    """Return the scene as the frame renders it."""
+    options = {"size": (SIDE, SIDE), "atlas": 1024, "strands": False}
+    settings = Settings.model_validate(options), Settings.model_validate(options | {"parts": "specular"})
+    picture, surface_pass = (renderer.draw(scene, one).linear() for one in settings)
+    return SkinRender(picture, float(surface_pass.sum() / picture.sum()))
 
 
 def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
-    """Return the scene by Cycles; a second pass with black skin shows what the surface reflects."""
+    """Return the scene as Cycles renders it, with a second pass of black skin for the surface's light."""
     settings = Settings(size=(SIDE, SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
-    (whole,) = cycles_passes(scene, skin, [PATHS], settings)
-    (surface,) = cycles_passes(scene, black, [SURFACE_PATHS], settings)
-    return SkinRender(whole.image, float(surface.image.sum() / whole.image.sum()))
+    (image_pass,) = cycles_passes(scene, skin, [PATHS], settings)
+    (surface_pass,) = cycles_passes(scene, black, [SURFACE_PATHS], settings)
+    return SkinRender(image_pass.image, float(surface_pass.image.sum() / image_pass.image.sum()))
 
 
 def downsampled(values: Picture) -> Picture:
-    """Return a map (h, w, ...) as means over squares of texels, at most `MAP_SIDE` rows."""
+    """Return a map (h, w, ...) averaged over squares of texels, with at most `MAP_SIDE` rows."""
     step = max(1, len(values) // MAP_SIDE)
     blocks = values.reshape(len(values) // step, step, values.shape[1] // step, step, *values.shape[2:])
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
@@ -196,28 +197,29 @@ def with_normal_map(head: Head) -> Head:
 
 
 def principled_skin(head: Head) -> PrincipledSkin:
-    """Return Cycles' skin of a head: its colours, and the mean offset of exit points of the frame's profile.
+    """Return Cycles' skin of a head, with its colours and the mean offset of the frame's profile.
 
-    By Burley's profile that is 2.5 d, d the mean free path over a factor of the colour.
+    The mean offset of exit points by Burley's profile is 2.5 d, where d is the mean free path over a factor
+    of the colour.
     """
     assert head.maps.colour is not None and head.maps.mean_colour is not None
     profile, colour = load_profile(Skin().profile), head.maps.mean_colour
-    spread_mm = (profile.weight * np.sqrt(0.5 * np.pi * profile.variance_mm2[:, None])).sum(axis=0)
-    walk_mm = spread_mm / 2.5 * (1.9 - colour + 3.5 * (colour - 0.8) ** 2)
-    red, green, blue = (float(part) for part in 4.0 * np.pi * walk_mm)
+    offset_mm = (profile.weight * np.sqrt(0.5 * np.pi * profile.variance_mm2[:, None])).sum(axis=0)
+    mean_free_path_mm = offset_mm / 2.5 * (1.9 - colour + 3.5 * (colour - 0.8) ** 2)
+    red, green, blue = (float(part) for part in 4.0 * np.pi * mean_free_path_mm)
     return PrincipledSkin(downsampled(head.maps.colour), (red, green, blue), ROUGHNESS)
 
 
 def skin_renders(renderer: dermis.Renderer, title: str) -> dict[str, list[SkinRender]]:
-    """Return the columns of a head's views."""
+    """Return the renders of all columns for each view of a head."""
     name = HEADS[title]
-    usual, alike = (dermis.load_head(name, subdivide=1, regions=regions) for regions in ("auto", "none"))
-    plain = with_normal_map(with_painted_maps(renderer.device, usual, MAP_SIDE))
-    skin, found = principled_skin(plain), dict[str, list[SkinRender]]()
+    painted, one_lobe = (dermis.load_head(name, subdivide=1, regions=regions) for regions in ("auto", "none"))
+    mapped = with_normal_map(with_painted_maps(renderer.device, painted, MAP_SIDE))
+    skin, renders = principled_skin(mapped), dict[str, list[SkinRender]]()
     for view in LOOK_VIEWS:
-        camera = PRESETS[view](usual)
-        deck = render_skin(renderer, Scene(alike, camera=camera, skin=Skin.preset("deck-2007")))
-        ours = render_skin(renderer, Scene(usual, camera=camera))
-        found[view] = [deck, ours, render_cycles_skin(Scene(plain, camera=camera), skin)]
-        print_lines(f"{title} {view} {' '.join(f'{one.share:.3f}' for one in found[view])}")
-    return found
+        camera = PRESETS[view](painted)
+        preset_2007 = render_skin(renderer, Scene(one_lobe, camera=camera, skin=Skin.preset("deck-2007")))
+        ours = render_skin(renderer, Scene(painted, camera=camera))
+        renders[view] = [preset_2007, ours, render_cycles_skin(Scene(mapped, camera=camera), skin)]
+        print_lines(f"{title} {view} {' '.join(f'{one.share:.3f}' for one in renders[view])}")
+    return renders

@@ -1,4 +1,4 @@
-"""Reflection of a half-space by direction under a surface of index 1.4, for docs/techniques.md."""
+"""Angular reflection of a half-space under a boundary of index 1.4, for docs/techniques.md."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from dermis.scene import Scene, Settings, Skin
 from dermis.scene.heads import load_head
 
 Floats = NDArray[np.float64]
-ETA, OBLIQUE_COSINE = 1.4, 0.15  # the cosine of 81 degrees
+ETA, OBLIQUE_COSINE = 1.4, 0.15  # cosine of 81 degrees
 PHOTONS = 200_000
-FORWARD_G = 0.8  # mean cosine of real skin's scattering
+FORWARD_G = 0.8  # mean cosine of scattering in real skin
 _MIN_WEIGHT = 0.01
 _NODE_COUNT = 48
 
@@ -36,24 +36,23 @@ def half_space(adapter: str = "auto") -> None:
 
 
 def direction_table(head: Head, adapter: str) -> str:
-    """Return rows for skin1's channels, and for the default skin in the studio."""
+    """Return rows for the channels of skin1, and for the default skin in the studio."""
     layer = media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
-    usual, most = _studio_ratios(head, adapter)
-    aslant = f"light from 81° over light from above, index {ETA:g}"
+    median, high = _studio_ratios(head, adapter)
+    oblique, errors = "light from 81° over light from above", "relative RMSE over all pairs of directions"
+    photons = f"photons of mean cosine {FORWARD_G:g}"
     rows: dict[str, Sequence[float]] = {
-        "light from 81° over light from above, index-matched": [_oblique_ratio(one, 1.0) for one in albedo],
-        aslant: [_oblique_ratio(one, ETA) for one in albedo],
+        f"{oblique}, index-matched": [_oblique_ratio(one, 1.0) for one in albedo],
+        f"{oblique}, index {ETA:g}": [_oblique_ratio(one, ETA) for one in albedo],
         "the same, photons": [_monte_carlo_ratio(one, 0.0, ETA) for one in albedo],
-        f"the same, photons of mean cosine {FORWARD_G:g}": [_monte_carlo_ratio(one, FORWARD_G, ETA) for one in forward],
-        f"index-matched, photons of mean cosine {FORWARD_G:g}": [
-            _monte_carlo_ratio(one, FORWARD_G, 1.0) for one in forward
-        ],
-        "relative RMSE over all pairs of directions, lambertian": [_direction_errors(one)[0] for one in albedo],
-        "relative RMSE over all pairs of directions, half-space": [_direction_errors(one)[1] for one in albedo],
-        "default skin in the studio over lambertian, median": usual,
-        "the same, a hundredth of it more than": most,
+        f"the same, {photons}": [_monte_carlo_ratio(one, FORWARD_G, ETA) for one in forward],
+        f"index-matched, {photons}": [_monte_carlo_ratio(one, FORWARD_G, 1.0) for one in forward],
+        f"{errors}, lambertian": [_direction_errors(one)[0] for one in albedo],
+        f"{errors}, half-space": [_direction_errors(one)[1] for one in albedo],
+        "default skin in the studio over lambertian, median": median,
+        "the same, a hundredth of it more than": high,
     }
     lines = ["|  | red | green | blue |", "|---|---|---|---|"]
     for name, row in rows.items():
@@ -62,78 +61,78 @@ def direction_table(head: Head, adapter: str) -> str:
 
 
 def _oblique_ratio(albedo: float, eta: float) -> float:
-    aslant, above = directional_reflectance([OBLIQUE_COSINE, 1.0], albedo, eta)
-    return float(aslant / above)
+    oblique, above = directional_reflectance([OBLIQUE_COSINE, 1.0], albedo, eta)
+    return float(oblique / above)
 
 
 def _direction_errors(albedo: float) -> tuple[float, float]:
-    """Return errors of lambertian and of half-space skin over all directions of light and view in air.
+    """Return errors of Lambertian and of half-space skin over all directions of light and view in air.
 
-    The exact radiance below the surface is that of the matched half-space and what the surface throws back,
-    again and again.
+    The exact radiance below the surface is that of the index-matched half-space with all internal
+    reflections.
     """
     critical = float(np.sqrt(1.0 - 1.0 / ETA**2))
-    caught, escaping = _gauss_legendre(0.0, critical), _gauss_legendre(critical, 1.0)
-    mu, weight = (np.concatenate(both) for both in zip(caught, escaping, strict=True))
-    back, flux = _fresnel(mu, ETA), 2.0 * weight * mu
-    matched = np.pi * reflected_radiance(mu[None], mu[:, None], albedo)
-    inside = np.linalg.solve(np.eye(len(mu)) - matched * flux * back, matched)
-    free = slice(_NODE_COUNT, None)  # of both light and view
-    through, area = (1.0 - back)[free], flux[free] / flux[free].sum()
-    exact = inside[free, free] * through[:, None] / ETA**2
+    trapped, escaping = _gauss_legendre(0.0, critical), _gauss_legendre(critical, 1.0)
+    mu, weight = (np.concatenate(both) for both in zip(trapped, escaping, strict=True))
+    internal_reflectance, flux = _fresnel(mu, ETA), 2.0 * weight * mu
+    index_matched = np.pi * reflected_radiance(mu[None], mu[:, None], albedo)
+    inside = np.linalg.solve(np.eye(len(mu)) - index_matched * flux * internal_reflectance, index_matched)
+    free = slice(_NODE_COUNT, None)  # nodes of directions that leave, of both light and view
+    transmittance, area = (1.0 - internal_reflectance)[free], flux[free] / flux[free].sum()
+    exact = inside[free, free] * transmittance[:, None] / ETA**2
     above = float(directional_reflectance(1.0, albedo, ETA))
-    usual = np.outer(through / (area @ through), np.full(_NODE_COUNT, above))
-    law = angular_response([above], ETA)
+    lambertian = np.outer(transmittance / (area @ transmittance), np.full(_NODE_COUNT, above))
+    response = angular_response([above], ETA)
     cosine = np.sqrt(1.0 - ETA**2 * (1.0 - mu[free] ** 2))
     entering = directional_reflectance(cosine, albedo, ETA) / above
-    once = 1.0 / (mu[free, None] + mu[free]) - mean_single_scattering_kernel(cosine, ETA)
-    made = usual * (entering + law.single_scattering[0] * once)
+    single = 1.0 / (mu[free, None] + mu[free]) - mean_single_scattering_kernel(cosine, ETA)
+    half_space = lambertian * (entering + response.single_scattering[0] * single)
     importance = np.outer(area, area)
 
     def error(one: Floats) -> float:
         return float(np.sqrt((importance * (one - exact) ** 2).sum() / (importance * exact**2).sum()))
 
-    return error(usual), error(made)
+    return error(lambertian), error(half_space)
 
 
 def _monte_carlo_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
-    """Return the share of photons from 81 degrees that come back, over the share of those from above."""
-    aslant, above = (_reflected_fraction(cosine, albedo, mean_cosine, eta) for cosine in (OBLIQUE_COSINE, 1.0))
-    return aslant / above
+    """Return the reflectance for light from 81 degrees over that for normal incidence, by Monte Carlo."""
+    oblique = _reflected_fraction(OBLIQUE_COSINE, albedo, mean_cosine, eta)
+    return oblique / _reflected_fraction(1.0, albedo, mean_cosine, eta)
 
 
 def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: float) -> float:
-    """Return the share of photons that enter a half-space at a cosine in the air that leave it."""
+    """Return the fraction of photons that a half-space reflects, by their cosine in air."""
     rng = np.random.default_rng(1)
-    depth, weight, given = np.zeros(PHOTONS), np.ones(PHOTONS), 0.0
+    depth, weight, reflected = np.zeros(PHOTONS), np.ones(PHOTONS), 0.0
     down = np.full(PHOTONS, float(refracted_cosine(cosine, eta)))
     while len(depth):
         depth = depth - np.log(rng.random(len(depth))) * down
-        through = (depth < 0.0) & (rng.random(len(depth)) > _fresnel(np.abs(down), eta))
-        given += float(weight[through].sum())
-        down = np.where(depth < 0.0, -down, down)  # thrown back, the way goes on below
-        keep = ~through
-        depth, down, weight = np.abs(depth[keep]), down[keep], albedo * weight[keep]
+        leaves = (depth < 0.0) & (rng.random(len(depth)) > _fresnel(np.abs(down), eta))
+        reflected += float(weight[leaves].sum())
+        down = np.where(depth < 0.0, -down, down)  # reflected internally
+        inside = ~leaves
+        depth, down, weight = np.abs(depth[inside]), down[inside], albedo * weight[inside]
         down = _scattered_cosines(down, mean_cosine, rng)
-        lucky = (weight > _MIN_WEIGHT) | (rng.random(len(weight)) < 0.1)
+        survives = (weight > _MIN_WEIGHT) | (rng.random(len(weight)) < 0.1)
         weight = np.where(weight > _MIN_WEIGHT, weight, 10.0 * weight)
-        depth, down, weight = depth[lucky], down[lucky], weight[lucky]
-    return given / PHOTONS
+        depth, down, weight = depth[survives], down[survives], weight[survives]
+    return reflected / PHOTONS
 
 
 def _scattered_cosines(down: Floats, g: float, rng: np.random.Generator) -> Floats:
     """Return cosines after scattering, by the phase function of [HenyeyGreenstein1941]."""
-    chance = rng.random(len(down))
+    uniform = rng.random(len(down))
     if g == 0.0:
-        return 2.0 * chance - 1.0
-    cosine = (1.0 + g**2 - ((1.0 - g**2) / (1.0 - g + 2.0 * g * chance)) ** 2) / (2.0 * g)
+        return 2.0 * uniform - 1.0
+    cosine = (1.0 + g**2 - ((1.0 - g**2) / (1.0 - g + 2.0 * g * uniform)) ** 2) / (2.0 * g)
     sines = np.sqrt(np.maximum((1.0 - cosine**2) * (1.0 - down**2), 0.0))
-    turned = down * cosine + sines * np.cos(2.0 * np.pi * rng.random(len(down)))
-    return np.asarray(np.clip(turned, -1.0, 1.0))
+    deflected = down * cosine + sines * np.cos(2.0 * np.pi * rng.random(len(down)))
+    return np.asarray(np.clip(deflected, -1.0, 1.0))
 
 
 def _fresnel(cosine: Floats, eta: float) -> Floats:
-    """Return the reflectance of unpolarised light from inside, 1 where none leaves."""
+    """Return the internal Fresnel reflectance of unpolarised light, 1 for total reflection."""
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
     across = (eta * cosine - outside) / np.maximum(eta * cosine + outside, 1e-12)
     along = (cosine - eta * outside) / np.maximum(cosine + eta * outside, 1e-12)
@@ -141,15 +140,15 @@ def _fresnel(cosine: Floats, eta: float) -> Floats:
 
 
 def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return half-space skin over lambertian in the studio: median and 99th percentile of pixels."""
+    """Return half-space over Lambertian skin in the studio: median and 99th percentile of pixels."""
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 
     def picture(direction: Literal["lambertian", "half-space"]) -> Floats:
         return renderer.draw(Scene(head, skin=Skin(direction=direction)), settings).linear().astype(float)
 
-    usual, turned = picture("lambertian"), picture("half-space")
-    seen = usual.min(axis=-1) > 0.02
-    middle, high = np.percentile(turned[seen] / usual[seen], (50.0, 99.0), axis=0)
+    lambertian, half_space = picture("lambertian"), picture("half-space")
+    visible = lambertian.min(axis=-1) > 0.02
+    middle, high = np.percentile(half_space[visible] / lambertian[visible], (50.0, 99.0), axis=0)
     return middle.tolist(), high.tolist()
 
 

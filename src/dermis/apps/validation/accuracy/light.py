@@ -14,13 +14,7 @@ from dermis.atlas.build import cached_atlas
 from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES, ROUGHNESS_COUNT, VIEW_COUNT
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import directions, load_panorama, resample, solid_angles, split_suns
-from dermis.environment.prefilter import (
-    ROUGHEST,
-    ROUGHNESSES,
-    SMOOTHEST,
-    Prefiltered,
-    prefilter,
-)
+from dermis.environment.prefilter import ROUGHEST, ROUGHNESSES, SMOOTHEST, Prefiltered, prefilter
 from dermis.frame.features.occlusion.baked import DIRECTIONS, bake_occlusion
 from dermis.frame.lights.rectangle import facing_irradiance
 from dermis.frame.projection import view_axes_array
@@ -33,8 +27,8 @@ from dermis.specular.cosines import Cosines
 from dermis.specular.kelemen import kelemen
 
 PANORAMAS = ("royal_esplanade", "lebombo")
-ANGLES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # degrees
-FINE_ROUGHNESS = 0.25  # roughness below which lobes are summed over finer texels
+ANGLES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # of the view from the normal [degrees]
+FINE_ROUGHNESS = 0.25  # below this roughness, lobes are summed over smaller texels
 Array = NDArray[np.floating]
 UP = np.array([0.0, 1.0, 0.0])
 
@@ -44,13 +38,13 @@ def light(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def sample_panorama(layer: Array, towards: Array) -> Array:
-    """Return (n, 3) of a layer (h, w, 3) in n directions, interpolated as in the shader."""
+def sample_panorama(layer: Array, directions_out: Array) -> Array:
+    """Return (n, 3) values of a panorama (h, w, 3) in n directions, interpolated as by the shader."""
     height, width = layer.shape[:2]
-    x = (0.5 + np.arctan2(towards[:, 0], -towards[:, 2]) / (2 * np.pi)) * width - 0.5
-    y = np.arccos(np.clip(towards[:, 1], -1, 1)) / np.pi * height - 0.5
+    x = (0.5 + np.arctan2(directions_out[:, 0], -directions_out[:, 2]) / (2 * np.pi)) * width - 0.5
+    y = np.arccos(np.clip(directions_out[:, 1], -1, 1)) / np.pi * height - 0.5
     left, top = np.floor(x).astype(int), np.floor(y).astype(int)
-    total = np.zeros((len(towards), 3))
+    total = np.zeros((len(directions_out), 3))
     for i in (0, 1):
         for j in (0, 1):
             weight = np.abs(1 - i - (y - top)) * np.abs(1 - j - (x - left))
@@ -65,7 +59,7 @@ def unit(v: Array) -> Array:
 
 @cache
 def panorama(name: str, rows: int = 256) -> tuple[Array, Array, Prefiltered]:
-    """Return directions and light of a panorama's texels without its suns, and what the frame reads."""
+    """Return directions and light of a panorama's texels without its suns, and its prefiltered form."""
     radiance = resample(split_suns(load_panorama(name))[0], rows)
     light = radiance * solid_angles(*radiance.shape[:2])[..., None]
     return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
@@ -73,45 +67,50 @@ def panorama(name: str, rows: int = 256) -> tuple[Array, Array, Prefiltered]:
 
 def irradiance_error(name: str, count: int = 200) -> float:
     """Return the largest relative error of the irradiance over random normals."""
-    towards, light, made = panorama(name)
+    directions_out, light, prefiltered = panorama(name)
     normals = unit(np.random.default_rng(1).normal(size=(count, 3)))
-    exact = np.array([np.maximum(towards @ normal, 0) @ light for normal in normals])
-    return float(np.abs(sample_panorama(made.layers[0], normals) / exact - 1).max())
+    exact = np.array([np.maximum(directions_out @ normal, 0) @ light for normal in normals])
+    return float(np.abs(sample_panorama(prefiltered.layers[0], normals) / exact - 1).max())
 
 
 def reflection_error(name: str, m: float, angle: float, count: int = 320) -> float:
-    """Return the root mean square error of reflected radiance over random normals and views, over its mean.
+    """Return the relative RMS error of reflected radiance over random normals and views.
 
     angle : of the view from the normal [degrees]
     """
     cosine = float(np.cos(np.radians(angle)))
-    towards, light, made = panorama(name, 512 if m < FINE_ROUGHNESS else 256)
+    directions_out, light, prefiltered = panorama(name, 512 if m < FINE_ROUGHNESS else 256)
     rng = np.random.default_rng(2)
     normals = unit(rng.normal(size=(count, 3)))
     along = unit(np.cross(normals, rng.normal(size=(count, 3))))
     views = cosine * normals - np.sqrt(1 - cosine**2) * along
-    exact = [lobe_sum(towards, light, normal, view, m) for normal, view in zip(normals, views, strict=True)]
-    ahead, away = 2 * cosine * normals - views, cosine * along - np.sqrt(1 - cosine**2) * normals
-    aside, seen = np.cross(normals, along), np.zeros((count, 3))
+    exact = [
+        lobe_sum(directions_out, light, normal, view, m) for normal, view in zip(normals, views, strict=True)
+    ]
+    mirror_direction, tangent = (
+        2 * cosine * normals - views,
+        cosine * along - np.sqrt(1 - cosine**2) * normals,
+    )
+    bitangent, sampled = np.cross(normals, along), np.zeros((count, 3))
     for x, y, wide, weight in lobe_parameters(cosine, m):
-        to = unit(2 * (x * away + y * aside) + (1 - x**2 - y**2) * ahead)
-        seen += weight * lobe_radiance(made.layers, to, wide)
-    error = directional_albedo(cosine, m) * seen - np.array(exact)
+        direction = unit(2 * (x * tangent + y * bitangent) + (1 - x**2 - y**2) * mirror_direction)
+        sampled += weight * lobe_radiance(prefiltered.layers, direction, wide)
+    error = directional_albedo(cosine, m) * sampled - np.array(exact)
     return float(np.sqrt((error**2).mean()) / np.mean(exact))
 
 
-def lobe_sum(towards: Array, light: Array, normal: Array, view: Array, m: float) -> Array:
-    """Return reflected radiance, a sum over texels in reach of the lobe (to 1e-10 of its peak)."""
-    n_l, n_v, v_l = towards @ normal, float(normal @ view), towards @ view
+def lobe_sum(directions_out: Array, light: Array, normal: Array, view: Array, m: float) -> Array:
+    """Return reflected radiance, summed over the texels where the lobe is above 1e-10 of its peak."""
+    n_l, n_v, v_l = directions_out @ normal, float(normal @ view), directions_out @ view
     n_h = (n_l + n_v) / np.sqrt(np.maximum(2 + 2 * v_l, 1e-12))
-    near = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * m) ** 2)))
-    v_h = np.sqrt(0.5 + 0.5 * v_l[near])
-    angles = Cosines(n_l[near], np.full(len(near), n_v), n_h[near], v_h)
-    return np.asarray((kelemen(angles, m) * n_l[near]) @ light[near])
+    in_reach = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * m) ** 2)))
+    v_h = np.sqrt(0.5 + 0.5 * v_l[in_reach])
+    angles = Cosines(n_l[in_reach], np.full(len(in_reach), n_v), n_h[in_reach], v_h)
+    return np.asarray((kelemen(angles, m) * n_l[in_reach]) @ light[in_reach])
 
 
 def lobe_parameters(cosine: float, m: float) -> Array:
-    """Return directions, roughness and weight of the round lobes, between the table's nodes."""
+    """Return directions, roughness and weights of the isotropic lobes, interpolated in their table."""
     x = np.sqrt(cosine) * (VIEW_COUNT - 1)
     y = np.interp(np.log(m), np.log(LOBE_TABLE_ROUGHNESSES), np.arange(ROUGHNESS_COUNT))
     j, i = min(int(x), VIEW_COUNT - 2), min(int(y), ROUGHNESS_COUNT - 2)
@@ -119,25 +118,25 @@ def lobe_parameters(cosine: float, m: float) -> Array:
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
 
 
-def lobe_radiance(layers: Array, towards: Array, m: float) -> Array:
-    """Return the mean radiance under round lobes."""
-    place = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
-    low = int(np.clip(place, 0, len(ROUGHNESSES) - 2))
-    f = float(np.clip(place - low, 0, 1))
-    near, far = (sample_panorama(layers[1 + k], towards) for k in (low, low + 1))
-    return np.asarray((1 - f) * near + f * far)
+def lobe_radiance(layers: Array, directions_out: Array, m: float) -> Array:
+    """Return the mean radiance under isotropic lobes."""
+    table_position = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
+    low = int(np.clip(table_position, 0, len(ROUGHNESSES) - 2))
+    f = float(np.clip(table_position - low, 0, 1))
+    in_reach, far = (sample_panorama(layers[1 + k], directions_out) for k in (low, low + 1))
+    return np.asarray((1 - f) * in_reach + f * far)
 
 
 def furnace_extremes(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -> Array:
-    """Return least, mean and largest outgoing over incoming radiance of a white head under uniform light."""
-    white = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
+    """Return least, mean and largest outgoing over incoming radiance of a white head in uniform light."""
+    white_head = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
     skin = Skin.preset("deck-2007").replace(energy=energy)
-    scene = Scene(white, environment=Environment(name="uniform"), skin=skin)
+    scene = Scene(white_head, environment=Environment(name="uniform"), skin=skin)
     settings = Settings.model_validate({"size": (384, 384), "atlas": 1024, "samples": 1, **chosen})
-    shown = renderer.draw(scene, settings)
-    made = shown.linear_rgba()
-    inside = made[made[..., 3] == 1][:, 1]
-    return np.array([inside.min(), inside.mean(), inside.max()])
+    rendered = renderer.draw(scene, settings)
+    prefiltered = rendered.linear_rgba()
+    covered = prefiltered[prefiltered[..., 3] == 1][:, 1]
+    return np.array([covered.min(), covered.mean(), covered.max()])
 
 
 def furnace_rows(renderer: dermis.Renderer) -> str:
@@ -164,7 +163,7 @@ def furnace_rows(renderer: dermis.Renderer) -> str:
 
 
 def as_point_lights(light: RectangleLight, side: int = 8) -> list[PointLight]:
-    """Return a rectangle as side x side points, each with a shadow map of its own."""
+    """Return a rectangle light as side x side point lights with shadow maps of their own."""
     position, target = np.array(light.position), np.array(light.target)
     distance = float(np.linalg.norm(target - position))
     right, up, forward = view_axes_array(target - position, UP)
@@ -173,37 +172,40 @@ def as_point_lights(light: RectangleLight, side: int = 8) -> list[PointLight]:
     points = []
     for index in range(side**2):
         x, y = ((2 * k + 1) / side - 1 for k in divmod(index, side))
-        place = position + 0.5 * (x * light.width_mm * right + y * light.height_mm * up)
-        away = target - place
-        given = radiance * area * (unit(away) @ forward) / (away @ away)
-        points.append(PointLight(position=tuple(place), irradiance=tuple(given), softness_mm=2.0))
+        table_position = position + 0.5 * (x * light.width_mm * right + y * light.height_mm * up)
+        tangent = target - table_position
+        point_irradiance = radiance * area * (unit(tangent) @ forward) / (tangent @ tangent)
+        points.append(
+            PointLight(position=tuple(table_position), irradiance=tuple(point_irradiance), softness_mm=2.0)
+        )
     return points
 
 
 def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float]:
-    """Return bias and root mean square difference from 64 point lights, over the mean radiance."""
+    """Return bias and RMS difference from 64 point lights, over the mean radiance."""
     light = load_lights(rig)[0]
     assert isinstance(light, RectangleLight)
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     settings = Settings(size=(384, 384), atlas=256, samples=1, technique="none", shadow_size=1024)
-    made, exact = (
-        renderer.draw(Scene(head, lights=lights), settings).linear() for lights in ([light], as_point_lights(light))
+    prefiltered, exact = (
+        renderer.draw(Scene(head, lights=lights), settings).linear()
+        for lights in ([light], as_point_lights(light))
     )
     lit = exact.max(axis=-1) > 0
-    error = (made - exact)[lit]
+    error = (prefiltered - exact)[lit]
     return float(error.mean() / exact[lit].mean()), float(np.sqrt((error**2).mean()) / exact[lit].mean())
 
 
 def occlusion_error(renderer: dermis.Renderer) -> float:
-    """Return the root mean square error of the open share of the sky against 1024 directions, on the scan."""
+    """Return the RMS error of the visible fraction of the sky on the scan, against 1024 directions."""
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")
-    few, many = (
+    rendered_map, reference_map = (
         bake_occlusion(renderer.device, head, atlas, inputs.bindings, texels, 512, count)[:512]
         for count in (DIRECTIONS, 1024)
     )
-    return float(np.sqrt(np.nanmean((few - many) ** 2)))
+    return float(np.sqrt(np.nanmean((rendered_map - reference_map) ** 2)))
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:

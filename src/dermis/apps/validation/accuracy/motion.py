@@ -1,4 +1,4 @@
-"""Posed heads against heads loaded in the same shape: docs/motion.md."""
+"""Posed heads against heads loaded in the same shape, for docs/motion.md."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import dermis
 from dermis.apps.validation.accuracy import blur
-from dermis.apps.validation.pages import DOCS, data_file, fill_page, require_in_checkout, add_tests_to_path
+from dermis.apps.validation.pages import DOCS, add_tests_to_path, data_file, fill_page, in_checkout
 from dermis.atlas.build import cached_atlas
 from dermis.formats.maps import load_maps
 from dermis.frame.features.occlusion.baked import bake_occlusion
@@ -50,35 +50,35 @@ VIEWS = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
 SETTINGS = Settings(size=(384, 384), atlas=1024, samples=4)
 SIDE = 512
 BAKE_SETTINGS = Settings(size=(16, 16), atlas=SIDE, samples=1)
-_REFERENCE_SIZE = 1024  # directions, and texels along the side of their depth maps
+_REFERENCE_SIZE = 1024  # number of directions, and side of their depth maps [texels]
 _MIN_CHANGE = 0.02
 
 
 def motion(adapter: str = "auto") -> None:
-    """Compare posed heads with heads loaded in the same shape and write docs/motion.md, in some minutes.
+    """Compare posed heads with heads loaded in the same shape and write docs/motion.md.
 
-    Needs the published heads of MakeHuman in DERMIS_DATA, and the folder tests of a checkout.
+    Takes some minutes. Needs the published heads of MakeHuman in DERMIS_DATA, and the folder tests of a
+    checkout.
     """
-    require_in_checkout(PAGE)
+    in_checkout(PAGE)
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)
     head = Human(age=25).head(load_maps(colour=data_file(SKIN)), "hm08", 0)
-    people = {name: person.positions_mm for name, person in PEOPLE.items()}
+    persons = {name: person.positions_mm for name, person in PEOPLE.items()}
     fill_page(
         PAGE,
-        expressions="\n".join(expression_rows(renderer, head, people)),
-        seams="\n".join(seam_rows(renderer, head, people)),
+        expressions="\n".join(expression_rows(renderer, head, persons)),
+        seams="\n".join(seam_rows(renderer, head, persons)),
         occlusions="\n".join(occlusion_table(renderer, head)),
         adapter=renderer.device.adapter.name,
     )
 
 
 def rebuilt_head(head: Head, points: Points) -> Head:
-    """Return the head as if it had been loaded in this shape."""
+    """Return a head as if it had been loaded in this shape."""
     mesh = head.mesh
-    places, kinds = points[mesh.point], (mesh.material, mesh.materials)
-    made = build_mesh(places, mesh.uv, mesh.triangles, *kinds, point=mesh.point, quads=mesh.quads)
-    return Head("rebuilt", made, head.maps)
+    arrays = points[mesh.point], mesh.uv, mesh.triangles, mesh.material, mesh.materials
+    return Head("rebuilt", build_mesh(*arrays, point=mesh.point, quads=mesh.quads), head.maps)
 
 
 def posed_points(head: Head, person: Points, weights: Mapping[str, float]) -> Points:
@@ -90,53 +90,56 @@ def posed_points(head: Head, person: Points, weights: Mapping[str, float]) -> Po
 def picture_error(
     renderer: Renderer, head: Head, person: Points, weights: Mapping[str, float], view: str
 ) -> float:
-    """Return the relative RMSE of the posed head's picture from that of the rebuilt head."""
-    other = rebuilt_head(head, posed_points(head, person, weights))
+    """Return the relative RMSE between pictures of the posed head and of the rebuilt one."""
+    rebuilt = rebuilt_head(head, posed_points(head, person, weights))
     lights, camera = VIEWS[view]
-    scene = Scene(other, load_lights(lights), load_camera(camera, other))
-    here = replace(head)
-    vars(here)["centre_mm"] = other.centre_mm  # which lights and cameras stand around
+    scene = Scene(rebuilt, load_lights(lights), load_camera(camera, rebuilt))
+    posed_head = replace(head)
+    vars(posed_head)["centre_mm"] = rebuilt.centre_mm  # lights and cameras are relative to it
     pose = Pose(weights, positions_mm=person)
-    posed = renderer.draw(replace(scene, head=here, pose=pose), SETTINGS).linear()
+    posed = renderer.draw(replace(scene, head=posed_head, pose=pose), SETTINGS).linear()
     truth = renderer.draw(scene, SETTINGS).linear()
     return float(np.sqrt(((posed - truth) ** 2).mean() / (truth**2).mean()))
 
 
-def expression_rows(renderer: Renderer, head: Head, people: Mapping[str, Points]) -> Iterator[str]:
+def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
     """Yield lines of the table of expressions: the worst person from the front and from behind."""
     worst = dict.fromkeys(VIEWS, 0.0)
     for name, weights in EXPRESSIONS.items():
-        found = {
-            view: max(picture_error(renderer, head, person, weights, view) for person in people.values())
+        errors = {
+            view: max(picture_error(renderer, head, person, weights, view) for person in persons.values())
             for view in VIEWS
         }
-        worst = {view: max(worst[view], found[view]) for view in VIEWS}
-        yield f"| {name} | {100 * found['front']:.2f} | {100 * found['back']:.2f} |"
+        worst = {view: max(worst[view], errors[view]) for view in VIEWS}
+        yield f"| {name} | {100 * errors['front']:.2f} | {100 * errors['back']:.2f} |"
     yield f"| **worst** | **{100 * worst['front']:.2f}** | **{100 * worst['back']:.2f}** |"
 
 
-def seam_rows(renderer: Renderer, head: Head, people: Mapping[str, Points]) -> Iterator[str]:
-    """Yield lines of the table of seams: at rest, in expressions, and of other people, posed and rebuilt."""
-    resting = head.positions_mm
+def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
+    """Yield lines of the table of seams: in the rest pose, in expressions, and of other people."""
+    rest_points = head.positions_mm
     yield _seam_row(renderer, "at rest", head, head, None)
     for name in ("open jaw", "smile", "puffed cheeks"):
-        shape = rebuilt_head(head, posed_points(head, resting, EXPRESSIONS[name]))
+        shape = rebuilt_head(head, posed_points(head, rest_points, EXPRESSIONS[name]))
         yield _seam_row(renderer, name, head, shape, Pose(EXPRESSIONS[name]))
-    for name, person in people.items():
+    for name, person in persons.items():
         shape = rebuilt_head(head, person)
         yield _seam_row(renderer, f"{name}, by positions", head, shape, Pose(positions_mm=person))
-        yield _seam_row(renderer, f"{name}, built anew", shape, shape, None)
+        yield _seam_row(renderer, f"{name}, rebuilt", shape, shape, None)
 
 
 def _seam_row(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose | None) -> str:
-    """Return a line: jumps of light across the seams of a posed head; `shape` has the places of its seams."""
+    """Return a line with the jumps of light across the seams of a posed head.
+
+    shape : head in the same pose, whose points define the seams
+    """
     cells = []
     for where in (blur.neck_points, blur.back_points):
         sides = blur.seam_sides(shape, where)
         scene = replace(blur.striped_scene(head), pose=pose)
-        vars(scene.head)["centre_mm"] = shape.centre_mm  # which the bands of light stand around
-        found = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
-        cells.append(f"{100 * found.mean():.1f} / {100 * np.percentile(found, 95):.1f}")
+        vars(scene.head)["centre_mm"] = shape.centre_mm  # the bands of light are relative to it
+        errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
+        cells.append(f"{100 * errors.mean():.1f} / {100 * np.percentile(errors, 95):.1f}")
     return f"| {name} | {' | '.join(cells)} |"
 
 
@@ -153,7 +156,7 @@ def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
 
 
 def occlusion_rows(renderer: Renderer, head: Head, shapes: Mapping[str, tuple[Pose, Head]]) -> Iterator[str]:
-    """Yield lines of RMS errors: over all texels, and over those whose truth differs from that at rest.
+    """Yield lines of RMS errors, over all texels and over those that change between rest and pose.
 
     shapes : poses by name, each with the head rebuilt in it
     """
@@ -161,32 +164,31 @@ def occlusion_rows(renderer: Renderer, head: Head, shapes: Mapping[str, tuple[Po
     rest = baked_occlusion(renderer, head, head, *fine)
     for name, (pose, shape) in shapes.items():
         truth, posed = baked_occlusion(renderer, head, shape, *fine), replace(scene, pose=pose)
-        made = [frame_occlusion(renderer, posed, which) for which in ("rest", "baked")] + [
-            baked_occlusion(renderer, head, shape)
-        ]
-        own = np.isfinite(truth) & np.isfinite(rest)
-        changed = own & (np.abs(np.where(own, truth - rest, 0.0)) > _MIN_CHANGE)
-        cells = [f"{rms((one - truth)[own]):.3f} / {rms((one - truth)[changed]):.3f}" for one in made]
-        yield f"| {name} | {changed.sum() / own.sum():.1%} | {' | '.join(cells)} |"
+        maps = [frame_occlusion(renderer, posed, mode) for mode in ("rest", "baked")]
+        errors = [one - truth for one in (*maps, baked_occlusion(renderer, head, shape))]
+        surface = np.isfinite(truth) & np.isfinite(rest)
+        changed = surface & (np.abs(np.where(surface, truth - rest, 0.0)) > _MIN_CHANGE)
+        cells = (f"{rms(error[surface]):.3f} / {rms(error[changed]):.3f}" for error in errors)
+        yield f"| {name} | {changed.sum() / surface.sum():.1%} | {' | '.join(cells)} |"
 
 
-def baked_occlusion(renderer: Renderer, head: Head, shape: Head, *exactness: int) -> Floats:
-    """Return (n, n) open shares of the head in another shape on its atlas, NaN where there is no surface.
+def baked_occlusion(renderer: Renderer, head: Head, shape: Head, *sampling: int) -> Floats:
+    """Return the (n, n) visible fraction of the sky on a head's atlas for another shape; NaN off the surface.
 
-    exactness : number of directions and side of depth maps, those of frames when left out
+    sampling : number of directions and side of depth maps; those of frames by default
     """
     inputs = renderer.prepare(Scene(head), BAKE_SETTINGS)
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, SIDE, "stitched")
-    made = bake_occlusion(renderer.device, shape, atlas, inputs.bindings, texels, SIDE, *exactness)
-    return made[:SIDE].astype(float)
+    occlusion = bake_occlusion(renderer.device, shape, atlas, inputs.bindings, texels, SIDE, *sampling)
+    return occlusion[:SIDE].astype(float)
 
 
-def frame_occlusion(renderer: Renderer, scene: Scene, which: str) -> Floats:
-    """Return (n, n) open shares that a frame of the scene reads."""
-    settings = BAKE_SETTINGS.model_copy(update={"occlusion": which})
+def frame_occlusion(renderer: Renderer, scene: Scene, mode: str) -> Floats:
+    """Return the (n, n) visible fraction of the sky that a frame of the scene uses."""
+    settings = BAKE_SETTINGS.model_copy(update={"occlusion": mode})
     renderer.draw(scene, settings)
-    made = cast(Texture, renderer.prepare(scene, settings).bindings["occlusion_map"])
-    return download(renderer.device, made)[:SIDE].astype(float)
+    texture = cast(Texture, renderer.prepare(scene, settings).bindings["occlusion_map"])
+    return download(renderer.device, texture)[:SIDE].astype(float)
 
 
 def rms(error: Floats) -> float:

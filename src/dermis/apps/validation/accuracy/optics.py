@@ -1,4 +1,4 @@
-"""Errors of the diffusion models and of fits against photons that are counted one by one."""
+"""Errors of the diffusion models and of fits against Monte Carlo."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def optics() -> None:
 
 
 def tissue_by_name(name: str) -> Tissue:
-    """Return a tissue; homogeneous skin under the index of its measurement [Jensen2001]."""
+    """Return a tissue; homogeneous skin with the index of refraction of its measurement [Jensen2001]."""
     tissue = load_tissue(name)
     return Tissue(media()[name].with_eta(1.3)) if name.startswith("skin") else tissue
 
@@ -54,10 +54,11 @@ def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
     photons = PHOTONS if tissue.rgb is None else SPECTRAL_PHOTONS
     truth = monte_carlo_profile(tissue.medium, tissue.rgb, photons, seed=1)
     assert truth.total_error is not None
-    certain = " ".join(f"{value:.4f}" for value in truth.total)
-    doubt = float((truth.total_error / truth.total).max())
-    yield f"| **{name}** | Monte Carlo | {certain} | ± {doubt:.2%} |"
-    thin = any(np.any(layer.thickness_mm < layer.mean_free_path_mm) for layer in tissue.medium.layers)
+    totals = " ".join(f"{value:.4f}" for value in truth.total)
+    relative_error = float((truth.total_error / truth.total).max())
+    yield f"| **{name}** | Monte Carlo | {totals} | ± {relative_error:.2%} |"
+    layers = tissue.medium.layers
+    thin = any(np.any(layer.thickness_mm < layer.mean_free_path_mm) for layer in layers)
     for model, clamp in MODELS:
         one_layer = len(tissue.medium.layers) == 1
         if (model.endswith("dipole") and not one_layer) or (model == "multipole" and one_layer):
@@ -73,7 +74,7 @@ def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
 
 
 def counted_table() -> str:
-    """Return errors of tables of photons and of layered diffusion for homogeneous skin."""
+    """Return errors of the tabulated Monte Carlo profiles and of layered diffusion for homogeneous skin."""
     rows = []
     for name in ("skin1", "skin2"):
         for eta in (1.0, SKIN_ETA):
@@ -88,7 +89,7 @@ def counted_table() -> str:
 
 
 def fits_table() -> str:
-    """Return errors of fits of each kind to the layered profiles, through rings."""
+    """Return errors of fits of each kind to ring energies of the layered profiles."""
     rows = []
     for name in TISSUES:
         profile = tissue_by_name(name).profile()
@@ -100,7 +101,7 @@ def fits_table() -> str:
 
 
 def pointwise_table() -> str:
-    """Return E and energy error of six shared Gaussians for profiles that are finite at their centre."""
+    """Return shape and energy errors of six shared Gaussians, for profiles with a finite centre."""
     rows = []
     for name, model, clamp in (
         ("skin1", "dipole", "layer"),
@@ -110,57 +111,59 @@ def pointwise_table() -> str:
         ("dj3", "layered-point", "layer"),
     ):
         profile = tissue_by_name(name).profile(model, clamp)  # type: ignore[arg-type]
-        free, kept = (fit_gaussians(profile.points(), 6, keep_energy=keep) for keep in (False, True))
+        points = profile.points()
+        free, conserved = (fit_gaussians(points, 6, keep_energy=keep) for keep in (False, True))
         label = f"{name}, {model}" + (", source as printed" if clamp == "none" else "")
         cells = [
             _percent(free.error, sign=False),
             _percent(free.energy_error),
-            _percent(kept.error, sign=False),
+            _percent(conserved.error, sign=False),
         ]
         rows.append(f"| {label} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
 
 def transmission_table() -> str:
-    """Return light through a thickness, by Gaussians, slabs and photons."""
+    """Return the light through a thickness by Monte Carlo, slabs and Gaussians."""
     rows = []
     for name in ("skin1", "dj3"):
         tissue = tissue_by_name(name)
-        sum_ = fit_gaussians(tissue.profile().rings(), 6).profile
+        gaussian_sum = fit_gaussians(tissue.profile().rings(), 6).profile
         for thickness in THICKNESSES_MM:
             slab = truncated_medium(tissue.medium, thickness)
             runs = trace_medium(slab, PHOTONS // 4, seed=2)
             truth = np.array([run.total_transmittance + run.unscattered_transmittance for run in runs])
             truth = truth / (1.0 - runs[0].specular)
-            ways = [
+            variants = [
                 truth,
                 slab_transmittance(tissue.medium, [thickness])[0],
                 slab_transmittance(tissue.medium, [thickness], "multipole")[0],
-                gaussian_transmittance(sum_, [thickness])[0],
+                gaussian_transmittance(gaussian_sum, [thickness])[0],
             ]
-            rows.append(f"| {name} | {thickness:g} mm | {' | '.join(map(_cells, ways))} |")
+            rows.append(f"| {name} | {thickness:g} mm | {' | '.join(map(_cells, variants))} |")
     return "\n".join(rows)
 
 
 def error_against_published_sum(profile: RadialProfile) -> Floats:
-    """Return E between a white-normalised profile and the published six Gaussians, per channel."""
+    """Return the shape error of a white-normalised profile against the published Gaussians, by channel."""
     r, log_r = profile.radius_mm[:, None], np.log(profile.radius_mm)
     table = load_profile("gpu-gems-3").radiant_exitance(profile.radius_mm)
-    miss = np.trapezoid((r * (profile.reflectance / profile.total - table)) ** 2, log_r, axis=0)
-    return np.sqrt(miss / np.trapezoid((r * table) ** 2, log_r, axis=0))
+    squared_error = np.trapezoid((r * (profile.reflectance / profile.total - table)) ** 2, log_r, axis=0)
+    return np.sqrt(squared_error / np.trapezoid((r * table) ** 2, log_r, axis=0))
 
 
 def published_errors() -> str:
-    """Return the errors of the printed layers against the published sum."""
-    ways: tuple[tuple[str, Model, Clamp], ...] = (
+    """Return the errors of models of the published layers against the published sum of Gaussians."""
+    variants: tuple[tuple[str, Model, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),
         ("layered diffusion of a point source", "layered-point", "layer"),
     )
-    errors = [error_against_published_sum(load_tissue("dj3").profile(model, clamp)) for _, model, clamp in ways]
-    return ", ".join(
-        f"{way[0]} {_percent(error, sign=False)}" for way, error in zip(ways, errors, strict=True)
-    )
+    cells = []
+    for label, model, clamp in variants:
+        error = error_against_published_sum(load_tissue("dj3").profile(model, clamp))
+        cells.append(f"{label} {_percent(error, sign=False)}")
+    return ", ".join(cells)
 
 
 def tables() -> dict[str, str]:

@@ -1,8 +1,8 @@
-"""Writes docs/accuracy.md from docs/templates/accuracy.md."""
+"""Command that writes docs/accuracy.md from docs/templates/accuracy.md."""
 
 from __future__ import annotations
 
-from dermis.apps.validation.accuracy import cycles_comparison as beside_cycles, blur, light, optics, slabs, specular, thin
+from dermis.apps.validation.accuracy import blur, cycles_comparison, light, optics, slabs, specular, thin
 from dermis.apps.validation.pages import DOCS, fill_page
 from dermis.gpu import open_device
 
@@ -16,7 +16,7 @@ def page(adapter: str = "auto") -> None:
         PAGE,
         adapter=f"{device.adapter.name}, {device.adapter.backend}",
         **blur.point_tables(device),
-        **beside_cycles.tables(),
+        **cycles_comparison.tables(),
         **specular.tables(),
         **light.tables(adapter),
         **optics.tables(),

@@ -1,6 +1,6 @@
 """Errors of light through slabs far from their rim, by direction of entry.
 
-The truth is adding and doubling (`optics/slabs.py`), which tests compare with photons.
+The reference is adding and doubling (`optics/slabs.py`), which tests compare with Monte Carlo.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 DEGREES = (0.0, 40.0, 60.0, 80.0)
 PHOTONS = 100_000
-FORWARD_G = 0.8  # mean cosine of real flesh
+FORWARD_G = 0.8  # mean cosine of scattering in real skin
 MEDIA = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
 
 
@@ -43,43 +43,42 @@ def slabs(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def exact_response(body: Medium, thickness: float, g: float = 0.0) -> Array:
-    """Return (2, angles, 3) shares of entering light that leave scattered, on the near side and the far one.
+def exact_response(medium: Medium, thickness: float, g: float = 0.0) -> Array:
+    """Return (2, angles, 3) fractions of entering light that leave on the near and on the far side.
 
-    g : mean cosine of scattering; the body's coefficients are reduced
+    g : mean cosine of scattering; the medium's coefficients are reduced ones
     """
-    layer, made = body.layers[0], np.empty((2, len(DEGREES), 3))
-    below = refracted_cosine(np.cos(np.radians(DEGREES)), body.eta)
+    layer, response = medium.layers[0], np.empty((2, len(DEGREES), 3))
+    inner_cosine = refracted_cosine(np.cos(np.radians(DEGREES)), medium.eta)
     for c in range(3):
-        cut = adding_doubling.solve_slabs(
-            float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness, body.eta, g=g
-        )
-        made[..., c] = [np.interp(below, cut.cosine, part[0]) for part in (cut.reflected, cut.transmitted)]
-    return made
+        albedo, depth = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness
+        slab = adding_doubling.solve_slabs(albedo, depth, medium.eta, g=g)
+        sides = slab.reflected[0], slab.transmitted[0]
+        response[..., c] = [np.interp(inner_cosine, slab.cosine, side) for side in sides]
+    return response
 
 
 def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
-    """Return the same (2, angles, 3) of the frame."""
-    mesh, made = wedge(60.0, thickness, thickness), np.empty((2, len(DEGREES), 3))
+    """Return the fractions (2, angles, 3) of `exact_response` as rendered by the frame."""
+    mesh, response = wedge(60.0, thickness, thickness), np.empty((2, len(DEGREES), 3))
     for k, angle in enumerate(np.radians(DEGREES)):
-        way = np.array([np.sin(angle), 0.0, np.cos(angle)])
-        places, normals, leaving = scattered_light(renderer, mesh, way, skin, 256)
-        inner = np.abs(places[:, :2]).max(axis=1) < 8.0
+        beam = np.array([np.sin(angle), 0.0, np.cos(angle)])
+        places, normals, exitance = scattered_light(renderer, mesh, beam, skin, 256)
+        central = np.abs(places[:, :2]).max(axis=1) < 8.0
         for side in (0, 1):
-            facing = inner & ((2 * side - 1) * normals[:, 2] > 0.9)
-            made[side, k] = leaving[facing].mean(axis=0) / np.cos(angle)
-    return made
+            facing = central & ((2 * side - 1) * normals[:, 2] > 0.9)
+            response[side, k] = exitance[facing].mean(axis=0) / np.cos(angle)
+    return response
 
 
-def skins_by_direction(body: Medium, folder: str) -> dict[str, Skin]:
-    """Return lambertian skin and half-spaces of a medium, in its own colour."""
-    file = Path(folder) / f"{body.name}_{body.eta:g}.toml"
-    write_profile(
-        file, fit_gaussians(diffusion_profile(body).rings(), GAUSSIAN_TERMS, name=body.name).profile, {}
-    )
-    usual = {"profile": str(file), "albedo": "profile", "energy": "none", "rho_s": 0.0}
-    usual |= {"specular": "none"} if body.eta == 1.0 else {}
-    return {way: Skin(direction=way, **usual) for way in ("lambertian", "half-space")}  # type: ignore[arg-type]
+def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
+    """Return Lambertian and half-space skin of a medium, in its own colour."""
+    file = Path(folder) / f"{medium.name}_{medium.eta:g}.toml"
+    fit = fit_gaussians(diffusion_profile(medium).rings(), GAUSSIAN_TERMS, name=medium.name)
+    write_profile(file, fit.profile, {})
+    values = {"profile": str(file), "albedo": "profile", "energy": "none", "rho_s": 0.0}
+    values |= {"specular": "none"} if medium.eta == 1.0 else {}
+    return {name: Skin.model_validate(values | {"direction": name}) for name in ("lambertian", "half-space")}
 
 
 def error_rows(renderer: dermis.Renderer) -> str:
@@ -87,31 +86,33 @@ def error_rows(renderer: dermis.Renderer) -> str:
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in MEDIA:
-            body = media()[name].with_eta(eta)
-            for way, skin in skins_by_direction(body, folder).items():
+            medium = media()[name].with_eta(eta)
+            for direction, skin in skins_by_direction(medium, folder).items():
                 for thickness in THICKNESSES_MM:
-                    cells = _error_cells(rendered_response(renderer, skin, thickness), exact_response(body, thickness))
-                    rows.append(f"| {name}, index {eta:g} | {way} | {thickness:g} mm | {cells} |")
+                    rendered = rendered_response(renderer, skin, thickness)
+                    cells = _error_cells(rendered, exact_response(medium, thickness))
+                    rows.append(f"| {name}, index {eta:g} | {direction} | {thickness:g} mm | {cells} |")
     return "\n".join(rows)
 
 
 def forward_error_rows(renderer: dermis.Renderer) -> str:
-    """Return rows of half-space skin against slabs of forward scattering, without and with `anisotropy`."""
+    """Return rows of half-space skin against forward-scattering slabs, without and with `anisotropy`."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in MEDIA:
-            body = media()[name].with_eta(eta)
-            plain = skins_by_direction(body, folder)["half-space"]
+            medium = media()[name].with_eta(eta)
+            plain = skins_by_direction(medium, folder)["half-space"]
             for g in (0.0, FORWARD_G):
                 skin = plain.model_copy(update={"anisotropy": g})
                 for thickness in THICKNESSES_MM:
-                    cells = _error_cells(rendered_response(renderer, skin, thickness), exact_response(body, thickness, FORWARD_G))
+                    rendered = rendered_response(renderer, skin, thickness)
+                    cells = _error_cells(rendered, exact_response(medium, thickness, FORWARD_G))
                     rows.append(f"| {name}, index {eta:g} | {g:g} | {thickness:g} mm | {cells} |")
     return "\n".join(rows)
 
 
 def forward_direction_rows() -> str:
-    """Return errors of radiance below skin1's surface over all pairs of directions, forward scattering."""
+    """Return errors of radiance below the surface of forward-scattering skin1 over all directions."""
     rows = []
     for g in (0.0, FORWARD_G):
         cells = []
@@ -123,30 +124,29 @@ def forward_direction_rows() -> str:
 
 
 def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
-    a, share, exact = adding_doubling.half_space_radiance(albedo, eta, adding_doubling.NODES, FORWARD_G)
+    a, weights, exact = adding_doubling.half_space_radiance(albedo, eta, adding_doubling.NODES, FORWARD_G)
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
-    law = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, g)
-    table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, DIRECTION_ROWS), law.relative_reflectance[:, 0])
-    made = table + law.single_scattering[0] * (
-        1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta)
-    )
-    made *= (share @ exact @ share) / (table @ share)
-    weight = np.outer(share, share)
-    return float(np.sqrt((weight * (made - exact) ** 2).sum() / (weight * exact**2).sum()))
+    angular = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, g)
+    table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, DIRECTION_ROWS), angular.relative_reflectance[:, 0])
+    single = 1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta)
+    response = table + angular.single_scattering[0] * single
+    response *= (weights @ exact @ weights) / (table @ weights)
+    weight = np.outer(weights, weights)
+    return float(np.sqrt((weight * (response - exact) ** 2).sum() / (weight * exact**2).sum()))
 
 
-def _error_cells(made: Array, truth: Array) -> str:
-    """Return error and red light by direction, of the far side and of the near one."""
+def _error_cells(response: Array, truth: Array) -> str:
+    """Return the error and the ratio of red light by direction, of the far side and of the near one."""
     flux, cells = np.sqrt(np.cos(np.radians(DEGREES)))[:, None], []
     for side in (1, 0):
-        error = np.linalg.norm(flux * (made[side] - truth[side])) / np.linalg.norm(flux * truth[side])
-        red = made[side][:, 0] / truth[side][:, 0]
+        error = np.linalg.norm(flux * (response[side] - truth[side])) / np.linalg.norm(flux * truth[side])
+        red = response[side][:, 0] / truth[side][:, 0]
         cells.append(f"{error:.3f} | {' '.join(f'{one:.2f}' for one in red)}")
     return " | ".join(cells)
 
 
 def forward_rows() -> str:
-    """Return rows of red light from above through slabs of forward and isotropic scattering, by photons."""
+    """Return rows of red light at normal incidence through forward and isotropic slabs, by Monte Carlo."""
     rows = []
     for eta in (1.0, 1.4):
         layer = media()["skin1"].layers[0]

@@ -1,4 +1,4 @@
-"""Errors of the surface's tables against their functions, and the white furnace."""
+"""Errors of the tables of surface reflection, and the white furnace."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ REFERENCE_NODES = (96, 96)
 
 
 def specular() -> None:
-    """Print the tables of the surface's albedo and of the furnace."""
+    """Print the tables of directional albedos and of the furnace."""
     print_tables(tables())
 
 
 def read_albedo(model: str, cosine: Floats, m: Floats) -> Floats:
-    """Return the albedo and its mean (..., 2) between the table's texels, as the shader reads them."""
+    """Return the directional and the mean albedo (..., 2), interpolated in the table as by the shader."""
     axes = np.sqrt(TABLE_ROUGHNESSES), np.sqrt(TABLE_COSINES)
     places = np.stack(np.broadcast_arrays(np.sqrt(m), np.sqrt(cosine)), axis=-1)
     return np.asarray(RegularGridInterpolator(axes, albedo_table(model).astype(float))(places))
 
 
 def albedo_rows() -> str:
-    """Return rows of the models: errors of the quadrature and of the table between texels, and its time."""
+    """Return rows of the models: errors of quadrature and of the interpolated table, and its time."""
     m, c = np.linspace(0.1, 0.5, 17)[:, None], np.linspace(0.05, 1.0, 39)
     rows = []
     for name, model in MODELS.items():
@@ -55,18 +55,18 @@ def albedo_rows() -> str:
 
 
 def peak_error() -> float:
-    """Return the largest relative error of the Beckmann table, interpolated, where the lobe can be seen."""
+    """Return the largest relative error of the interpolated Beckmann table where the lobe is visible."""
     m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 1.0, 61), indexing="ij")
     rows, columns = beckmann_table().shape
     axes = [(np.arange(rows) + 0.5) / rows, np.arange(columns) / (columns - 1)]
     peak = (2 * RegularGridInterpolator(axes, beckmann_table())(np.stack([m, c], axis=-1))) ** 10
     truth = beckmann(c, m)
-    seen = truth > 1e-3  # below that the lobe adds nothing that could be seen
+    seen = truth > 1e-3  # smaller values of the lobe are not visible
     return float(np.abs(peak[seen] / truth[seen] - 1).max())
 
 
 def furnace_cell(law: EnergyModel, m: float, rho_s: float) -> str:
-    """Return least, mean and largest outgoing over incoming light on a white sphere under uniform light."""
+    """Return least, mean and largest outgoing over incoming light of a white sphere in uniform light."""
     albedo, mean = (read_albedo("kelemen", VIEWS, np.array(m))[..., k] for k in (0, 1))
     exact = directional_albedo(VIEWS, m)
     entered = law.entering_fraction(mean, rho_s)

@@ -1,4 +1,4 @@
-"""Scattering techniques on the scanned head against truths: docs/techniques.md."""
+"""Scattering techniques on the scanned head against references, for docs/techniques.md."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from dermis.apps.truths.half_space import directional_albedo
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.validation.accuracy import blur, half_space, texture_space
 from dermis.apps.validation.comparisons.compare import Comparison, ComparisonRow, compare
+from dermis.apps.validation.comparisons.references import ReferenceImage
 from dermis.apps.validation.comparisons.report import cells
 from dermis.apps.validation.comparisons.scenes import ModelName, comparison_scene, default_region
-from dermis.apps.validation.comparisons.references import ReferenceImage
-from dermis.apps.validation.pages import DOCS, fill_page, require_in_checkout, add_tests_to_path
+from dermis.apps.validation.pages import DOCS, add_tests_to_path, fill_page, in_checkout
 from dermis.frame.surface_points import irradiance_at, surface_points
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -25,38 +25,41 @@ from dermis.scene.techniques import TECHNIQUES
 
 PAGE = DOCS / "techniques.md"
 Floats = NDArray[np.floating]
-SAMPLES_BY_LIGHT = {"front": 64, "back": 256, "laser": 256}  # paths through each pixel
+SAMPLES_BY_LIGHT = {"front": 64, "back": 256, "laser": 256}  # paths per pixel
 SETTINGS = Settings(size=(256, 256), atlas=1024)
 TABLE_HEADER = "|  | technique | relative RMSE | FLIP | energy ratio | ms |\n|---|---|---|---|---|---|"
 
-DIRECTION_HEADER = """|  |  |  | relative RMSE | in red, green, blue | FLIP | energy ratio | in red, green, blue |
-|---|---|---|---|---|---|---|---|"""
+DIRECTION_HEADER = (
+    "|  |  |  | relative RMSE | in red, green, blue | FLIP | energy ratio | in red, green, blue |\n"
+    "|---|---|---|---|---|---|---|---|"
+)
 BALL = Head("ball", uv_sphere(100.0, 512, 256), Maps())
-BALL_SAMPLES = {"front": 64, "back": 64}  # paths through each pixel
+BALL_SAMPLES = {"front": 64, "back": 64}  # paths per pixel
 
 
 def techniques(adapter: str = "auto") -> None:
-    """Compare the techniques with the truths and write docs/techniques.md.
+    """Compare the techniques with the references and write docs/techniques.md.
 
-    Needs the sample data, Mitsuba and the folder tests of a checkout. Traced paths are kept on disk, so only
-    the first run takes long.
+    Needs the sample data, Mitsuba and the folder tests of a checkout. Traced paths are cached on disk, so
+    only the first run takes long.
     """
-    require_in_checkout(PAGE)
+    in_checkout(PAGE)
     add_tests_to_path()
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     parts: dict[str, str] = {}
-    traced: dict[str, dict[str, Comparison]] = {}
+    path_traced: dict[str, dict[str, Comparison]] = {}
     for medium in ("skin1", "skin2"):
-        parts[f"traced_{medium}"], made = table(head, "path-traced", medium, adapter)
-        parts[f"floor_{medium}"], traced[medium] = albedo_rows(head, medium, made["front"], adapter), made
+        parts[f"traced_{medium}"], comparison = table(head, "path-traced", medium, adapter)
+        parts[f"floor_{medium}"] = albedo_rows(head, medium, comparison["front"], adapter)
+        path_traced[medium] = comparison
     parts["direction"] = by_direction(head, SAMPLES_BY_LIGHT, SETTINGS, adapter)
-    parts["counted"] = profile_model_rows(head, traced, adapter)
+    parts["counted"] = profile_model_rows(head, path_traced, adapter)
     parts["half_space"] = half_space.direction_table(head, adapter)
     parts["integral"], _ = table(head, "surface-integral", "skin1", adapter, "layered")
     parts["heat"], _ = table(head, "heat", "skin1", adapter, "layered")
     parts["heat"] += "\n" + fine_atlas_row(head, adapter)
     parts |= texture_space.tables(head, SETTINGS, adapter) | blur.surface_tables(adapter)
-    fill_page(PAGE, adapter=made["front"].adapter, **parts)
+    fill_page(PAGE, adapter=comparison["front"].adapter, **parts)
 
 
 def table_line(first: str, row: ComparisonRow) -> str:
@@ -67,15 +70,15 @@ def table_line(first: str, row: ComparisonRow) -> str:
 def table(
     head: Head, against: str, medium: str, adapter: str, model: ModelName | None = None
 ) -> tuple[str, dict[str, Comparison]]:
-    """Return rows of all techniques under each light, and the comparisons behind them.
+    """Return rows of all techniques under each light, and the comparisons by light.
 
-    model : of the medium's profile
+    model : scattering model of the medium's profile
     """
-    rows, made = [TABLE_HEADER], {}
+    rows, comparison = [TABLE_HEADER], {}
     for light, samples in SAMPLES_BY_LIGHT.items():
         region = "ear" if against == "heat" else default_region(light)
         techniques = ("none", "gpu-gems-3", "texture-space") if against == "heat" else TECHNIQUES.names
-        made[light] = compare(
+        comparison[light] = compare(
             head,
             against,
             techniques,
@@ -87,27 +90,27 @@ def table(
             samples=samples,
             adapter=adapter,
         )
-        rows += [table_line(light, row) for row in made[light].rows]
-    return "\n".join(rows), made
+        rows += [table_line(light, row) for row in comparison[light].rows]
+    return "\n".join(rows), comparison
 
 
 def fine_atlas_row(head: Head, adapter: str) -> str:
-    """Return a row of the laser's stripe against heat on an atlas of 2048."""
+    """Return a row of the laser's stripe against heat, on an atlas of 2048."""
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
-    made = compare(
+    comparison = compare(
         head, "heat", only, light="laser", region="ear", settings=settings, model="layered", adapter=adapter
     )
-    return table_line("laser, atlas 2048", made.rows[0])
+    return table_line("laser, atlas 2048", comparison.rows[0])
 
 
-def profile_model_rows(head: Head, traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
-    """Return rows against path tracing, by the model of the medium's profile.
+def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
+    """Return rows of errors against path tracing, by the model of the medium's profile.
 
-    traced : comparisons with counted photons' profiles, by medium and light
+    path_traced : comparisons with Monte Carlo profiles, by medium and light
     """
     rows, techniques = [], ("texture-space", "screen-space")
     for light, samples in SAMPLES_BY_LIGHT.items():
-        for medium, by_photons in traced.items():
+        for medium, by_photons in path_traced.items():
             layered = compare(
                 head,
                 "path-traced",
@@ -120,66 +123,66 @@ def profile_model_rows(head: Head, traced: dict[str, dict[str, Comparison]], ada
                 samples=samples,
                 adapter=adapter,
             )
-            for model, made in (("layered", layered), ("counted", by_photons[light])):
-                by_technique = [
-                    _error_and_energy(made, row) for row in made.rows if row.technique in techniques
-                ]
-                rows.append(f"| {light} | {medium} | {model} | {' | '.join(by_technique)} |")
+            for model, comparison in (("layered", layered), ("counted", by_photons[light])):
+                compared = (row for row in comparison.rows if row.technique in techniques)
+                cells = " | ".join(_error_and_energy(comparison, row) for row in compared)
+                rows.append(f"| {light} | {medium} | {model} | {cells} |")
     return "\n".join(rows)
 
 
-def _error_and_energy(made: Comparison, row: ComparisonRow) -> str:
-    """Return the error, and energy in red, green and blue."""
-    _, energy = errors_by_channel(made.images[row.technique], made.truth, made.truth.mask)
+def _error_and_energy(comparison: Comparison, row: ComparisonRow) -> str:
+    """Return the error, and the energy ratio in red, green and blue."""
+    reference = comparison.reference
+    _, energy = errors_by_channel(comparison.images[row.technique], reference, reference.mask)
     return f"{row.relrmse:.4f} | {energy}"
 
 
-def albedo_rows(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
-    """Return errors under the front light of lambertian skin with a half-space's albedo by direction."""
+def albedo_rows(head: Head, medium: str, path_traced: Comparison, adapter: str) -> str:
+    """Return errors of Lambertian skin with a half-space's directional albedo, under the front light."""
     renderer = dermis.Renderer(adapter)
     scene = comparison_scene(head, "front", default_region("front"), "gpu-gems-3")
     seen = surface_points(renderer, scene, SETTINGS)
     mesh = head.mesh
 
-    def at(values: Floats) -> Floats:
-        return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, values[mesh.triangles[seen.triangle]]))
+    def interpolate(values: Floats) -> Floats:
+        corners = values[mesh.triangles[seen.triangle]]
+        return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))
 
-    normal, place = at(mesh.normals), at(mesh.positions) - np.array(head.centre_mm)
+    normal, position = interpolate(mesh.normals), interpolate(mesh.positions) - np.array(head.centre_mm)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     (light,) = scene.lights
     assert not isinstance(light, DirectionalLight)
-    towards = np.array(light.position) - place
-    cosine = np.clip((normal * towards).sum(axis=1) / np.linalg.norm(towards, axis=1), 0.0, 1.0)
+    to_light = np.array(light.position) - position
+    cosine = np.clip((normal * to_light).sum(axis=1) / np.linalg.norm(to_light, axis=1), 0.0, 1.0)
     layer = media()[medium].layers[0]
-    single = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
-    albedo = np.stack([directional_albedo(cosine, one) for one in single], axis=-1)
-    entered = irradiance_at(renderer, scene, SETTINGS, seen.triangle, seen.barycentric)
+    single_albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
+    albedo = np.stack([directional_albedo(cosine, one) for one in single_albedo], axis=-1)
+    irradiance = irradiance_at(renderer, scene, SETTINGS, seen.triangle, seen.barycentric)
     image = np.zeros((*seen.mask.shape, 3))
-    image[seen.mask] = entered * albedo / np.pi
-    error, energy = errors_by_channel(image, traced.truth, traced.truth.mask & seen.mask)
+    image[seen.mask] = irradiance * albedo / np.pi
+    error, energy = errors_by_channel(image, path_traced.reference, path_traced.reference.mask & seen.mask)
     return f"relative RMSE {error} and energy {energy} in red, green and blue"
 
 
 def by_direction(head: Head, lights: dict[str, int], settings: Settings, adapter: str) -> str:
-    """Return the table of texture space with lambertian and half-space skin, on a head and on a ball."""
+    """Return the table of texture space with Lambertian and half-space skin, on a head and on a ball."""
     lines = [DIRECTION_HEADER]
     for light, samples in lights.items():
         lines += _direction_rows(head, light, default_region(light), samples, settings, adapter)
     for light, samples in BALL_SAMPLES.items():
-        lines += _direction_rows(
-            BALL, light, "ear", samples, settings.model_copy(update={"size": (96, 96)}), adapter
-        )
+        small = settings.model_copy(update={"size": (96, 96)})
+        lines += _direction_rows(BALL, light, "ear", samples, small, adapter)
     return "\n".join(lines)
 
 
 def _direction_rows(
     head: Head, light: str, region: str, samples: int, settings: Settings, adapter: str
 ) -> list[str]:
-    place = "ball, " if head is BALL else ""
+    prefix = "ball, " if head is BALL else ""
     lines = []
     for medium in ("skin1", "skin2"):
         for direction in ("lambertian", "half-space"):
-            made = compare(
+            comparison = compare(
                 head,
                 "path-traced",
                 ("texture-space",),
@@ -192,15 +195,16 @@ def _direction_rows(
                 samples=samples,
                 adapter=adapter,
             )
-            _, error, flip, energy, _ = cells(made.rows[0])
-            errors, energies = errors_by_channel(made.images["texture-space"], made.truth, made.truth.mask)
+            _, error, flip, energy, _ = cells(comparison.rows[0])
+            image, reference = comparison.images["texture-space"], comparison.reference
+            errors, energies = errors_by_channel(image, reference, reference.mask)
             figures = (error, errors, flip, energy, energies)
-            lines.append(f"| {place}{light} | {medium} | {direction} | " + " | ".join(figures) + " |")
+            lines.append(f"| {prefix}{light} | {medium} | {direction} | " + " | ".join(figures) + " |")
     return lines
 
 
 def errors_by_channel(image: Floats, truth: ReferenceImage, mask: NDArray[np.bool_]) -> list[str]:
-    """Return relative RMSE and energy ratio, in red, green and blue."""
+    """Return the relative RMSE and the energy ratio, each in red, green and blue."""
     parts = [(image[..., c], truth.image[..., c], mask, truth.variance[..., c]) for c in range(3)]
     measures = (relative_rmse, energy_ratio)
     return [" / ".join(f"{measure(*part).value:.3f}" for part in parts) for measure in measures]

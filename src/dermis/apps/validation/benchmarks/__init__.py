@@ -1,1 +1,1 @@
-"""How fast the frame is on this machine, stage by stage, compared with what its memory allows."""
+"""Frame times on this machine, stage by stage, compared with the limit by memory bandwidth."""

@@ -1,4 +1,4 @@
-"""The frames that are measured, a usual one and others that each differ in one thing, and their scenes."""
+"""Benchmark cases: a base frame, others that each vary one parameter, and their scenes."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from dermis.scene.skin import Skin
 
 GPU_GEMS_3 = "gpu-gems-3"
 FRAGMENT_TECHNIQUE = "published-fragments"
-"""The passes of 2007 in the graphics pipeline; `GPU_GEMS_3` has the same in compute."""
+"""Passes of GPU Gems 3 in the graphics pipeline; `GPU_GEMS_3` has the same as compute passes."""
 _SHIFT_MM = 2.0
 _MIN_WEIGHT = 1e-3
-_RIG_ROTATION_DEGREES = 25.0  # between one round of the studio's lights and the next
+_RIG_ROTATION_DEGREES = 25.0  # between two copies of the studio's lights
 
 
 @dataclass(frozen=True)
 class Case:
-    """One frame to measure.
+    """Frame to measure.
 
     image : (width, height) [pixel]
     atlas : side of the irradiance map [texel]
-    gaussians : of the profile
-    lights : spots with shadows
+    gaussians : number of Gaussians of the profile
+    lights : number of spot lights with shadows
     environment : name of a panorama, "" for none
-    subdivide : levels of subdivision of the head, each with four times the triangles
-    targets : morph targets that all move in each frame, with four bones; 0 for a head that stands still
-    samples : of a pixel
-    technique : of `Settings`, or `FRAGMENTS`
-    varies : how it differs from the usual frame, "" for that itself
+    subdivide : subdivision level of the head, each with four times the triangles
+    targets : morph targets that all move in each frame, with four bones; 0 for a static head
+    samples : samples per pixel
+    technique : of `Settings`, or `FRAGMENT_TECHNIQUE`
+    varies : parameter that differs from the base frame, "" for the base frame
     """
 
     image: tuple[int, int] = (1920, 1080)
@@ -59,7 +59,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Preset:
-    """A usual frame, and the values that each of its fields takes in turn."""
+    """Base frame, and the values that each of its parameters takes in turn."""
 
     usual: Case
     image: tuple[tuple[int, int], ...]
@@ -72,7 +72,7 @@ class Preset:
     technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENT_TECHNIQUE)
 
     def cases(self) -> list[Case]:
-        """Return the usual frame, then the others."""
+        """Return the base frame, then the others."""
         found = [self.usual]
         sizes = "image", "atlas", "gaussians", "lights", "environment", "targets", "subdivide"
         for name in ("technique", *sizes):
@@ -112,16 +112,11 @@ PRESETS: dict[str, Preset] = {
 
 def case_settings(case: Case) -> Settings:
     """Return the settings of a case."""
-    return Settings(
-        size=case.image,
-        atlas=case.atlas,
-        samples=case.samples,
-        technique=case.technique,
-    )
+    return Settings(size=case.image, atlas=case.atlas, samples=case.samples, technique=case.technique)
 
 
 def case_scenes(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
-    """Return the case at `count` moments: camera, lights and a moving head are never in the same place twice.
+    """Return `count` scenes of a case, in which camera, lights and a moving head change each time.
 
     folder : for the profile's file
     """
@@ -134,7 +129,7 @@ def case_scenes(case: Case, head: Head, folder: Path, count: int) -> list[Scene]
         sway = _SHIFT_MM * math.sin(1.0 + k)
         moved = [light.model_copy(update={"position": _shifted(light.position, sway)}) for light in lights]
         eye = camera.model_copy(update={"position": _shifted(camera.position, sway)})
-        pose = test_pose(head, k) if case.targets else None
+        pose = pose_at_moment(head, k) if case.targets else None
         scenes.append(Scene(head, tuple(moved), eye, skin, around, pose))
     return scenes
 
@@ -144,7 +139,7 @@ def _shifted(place: tuple[float, float, float], sway: float) -> tuple[float, flo
 
 
 def _lights(count: int) -> list[PointLight]:
-    """Return the studio's spots, then the same ones turned about the head."""
+    """Return the studio's spot lights, then the same ones rotated about the head."""
     rig = [light for light in studio() if isinstance(light, PointLight)]
     return [_rotated(rig[k % len(rig)], _RIG_ROTATION_DEGREES * (k // len(rig))) for k in range(count)]
 
@@ -165,7 +160,7 @@ def _profile_file(count: int, folder: Path) -> Path:
 
 
 def with_gaussian_count(profile: GaussianSum, count: int) -> GaussianSum:
-    """Return a stand-in with `count` Gaussians, the same albedo and the same widest Gaussian."""
+    """Return a profile with `count` Gaussians, the same albedo and the same widest Gaussian."""
     if count == len(profile.variance_mm2):
         return profile
     known = np.log(profile.variance_mm2)
@@ -177,7 +172,7 @@ def with_gaussian_count(profile: GaussianSum, count: int) -> GaussianSum:
 
 
 BONE_COUNT = 4
-_TARGET_FRACTION = 1 / 6  # of the points that a target moves, as faces' own targets do
+_TARGET_FRACTION = 1 / 6  # of the points that a target moves, as in targets of faces
 _LIFT_MM = 2.0
 _BONE_ROTATION_DEGREES = 4.0
 
@@ -185,14 +180,14 @@ Doubles = NDArray[np.float64]
 
 
 def with_test_rig(head: Head, targets: int) -> Head:
-    """Return the head with morph targets all over it, and bones one above the other instead of its own."""
+    """Return the head with `targets` morph targets, and a column of bones in place of its own."""
     points = head.positions_mm.astype(np.float64)
     rig = replace(head.control, targets=_targets(points, targets), skeleton=_skeleton(points))
     return replace(head, rig=rig)
 
 
-def test_pose(head: Head, moment: int) -> Pose:
-    """Return a pose in which every target and every bone has moved since the moment before."""
+def pose_at_moment(head: Head, moment: int) -> Pose:
+    """Return a pose in which every target and every bone differs from the moment before."""
     weights = {name: 0.5 + 0.5 * math.sin(k + 0.3 * moment) for k, name in enumerate(head.targets)}
     turn = [_BONE_ROTATION_DEGREES * math.sin(0.2 * moment + k) for k in range(BONE_COUNT)]
     bones = {name: (0.3 * angle, angle, 0.0) for name, angle in zip(head.bones, turn, strict=True)}
@@ -200,7 +195,7 @@ def test_pose(head: Head, moment: int) -> Pose:
 
 
 def _targets(points: Doubles, count: int) -> MorphTargets:
-    """Return smooth lifts, each of a sixth of the points around one of them."""
+    """Return smooth displacements, each of a sixth of the points around one of them."""
     middles = points[np.linspace(0, len(points) - 1, count).astype(int)]
     nearest = max(1, int(_TARGET_FRACTION * len(points)))
     moved, deltas = [], []
@@ -217,7 +212,7 @@ def _targets(points: Doubles, count: int) -> MorphTargets:
 
 
 def _skeleton(points: Doubles) -> Skeleton:
-    """Return bones in a row upwards; a point follows the two beside it."""
+    """Return a vertical chain of bones; each point is weighted between the two beside it."""
     low, high = points[:, 1].min(), points[:, 1].max()
     step = (high - low) / BONE_COUNT
     local, bind = np.tile(np.eye(4), (2, BONE_COUNT, 1, 1))
@@ -230,4 +225,6 @@ def _skeleton(points: Doubles) -> Skeleton:
     weight[:, 1] = place - below
     weight[:, 0] = 1.0 - weight[:, 1]
     parent = np.arange(-1, BONE_COUNT - 1, dtype=np.int32)
-    return Skeleton(tuple(f"bone {k}" for k in range(BONE_COUNT)), parent, local, bind, np.eye(4), bone, weight)
+    return Skeleton(
+        tuple(f"bone {k}" for k in range(BONE_COUNT)), parent, local, bind, np.eye(4), bone, weight
+    )

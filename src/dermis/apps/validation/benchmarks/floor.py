@@ -1,4 +1,4 @@
-"""The bytes that each stage must move, and how fast memory moves them: a lower bound of its time."""
+"""Lower bounds of stage times: the bytes that each stage must move, at the rate of a copy."""
 
 from __future__ import annotations
 
@@ -20,121 +20,124 @@ from dermis.gpu import CommandList, ComputeProgram, Device, Texture, download, m
 from dermis.gpu.textures import FORMAT_BYTES, texel_bytes
 
 _MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
-_TRIANGLE_BYTES, _VERTEX_BYTES = 16, 16  # bytes of a triangle's corners and of a vertex' position in the tables
-_GUTTER_ENTRY_BYTES = 16  # bytes of a texel in the list of a gutter
-_INDEX_BYTES = 4  # bytes of where a source is
-_BILINEAR_TEXELS = 4  # texels that a lookup between texels reads
-_SIDE, _SIDE_ON_CPU = 4096, 1024  # beyond what caches hold
+_TRIANGLE_BYTES, _VERTEX_BYTES = 16, 16  # in the buffers of triangles and of positions
+_GUTTER_ENTRY_BYTES = 16
+_INDEX_BYTES = 4  # of a source's index
+_BILINEAR_TEXELS = 4  # texels read by bilinear interpolation
+_SIDE, _SIDE_ON_CPU = 4096, 1024  # larger than caches
 _COPIES, _REPEATS, _WARMUP_REPEATS = 8, 5, 20
 
 
 @dataclass(frozen=True)
 class FrameTraffic:
-    """A frame's inputs, and how much of them there is.
+    """Inputs of a frame, and counts that determine its memory traffic.
 
-    texels : of the atlas that show the surface
-    seen : pixels that show the head
-    shadowing : texels of all shadow maps that show it
-    vertices : of the mesh
+    texels : atlas texels that show the surface
+    head_pixels : pixels that show the head
+    shadow_texels : texels of all shadow maps that show the head
+    vertices : vertices of the mesh
     """
 
     inputs: FrameInputs
     texels: int
-    seen: int
-    shadowing: int
+    head_pixels: int
+    shadow_texels: int
     vertices: int
 
 
 def frame_traffic(device: Device, inputs: FrameInputs, vertices: int) -> FrameTraffic:
-    """Return the counts after a frame was drawn."""
+    """Return the counts of a frame that was drawn."""
     texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
-    seen = np.count_nonzero(download(device, inputs.resources.post.picture.bytes)[..., 3])
+    head_pixels = np.count_nonzero(download(device, inputs.resources.post.picture.bytes)[..., 3])
     maps, layers = inputs.resources.shadow_maps.texture, range(len(inputs.shadow_views.clips))
-    shadowing = sum(int(np.count_nonzero(download(device, maps, layer=layer))) for layer in layers)
-    return FrameTraffic(inputs, int(texels), int(seen), shadowing, vertices)
+    shadow_texels = sum(int(np.count_nonzero(download(device, maps, layer=layer))) for layer in layers)
+    return FrameTraffic(inputs, int(texels), int(head_pixels), shadow_texels, vertices)
 
 
-def stage_bytes(moved: FrameTraffic) -> dict[str, float]:
+def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
     """Return bytes by stage: inputs read once and results written once, in the formats in use.
 
-    Where others are not needed, only texels with surface and pixels that show the head count. Repeated reads
-    within a stage or a blur, scratch space between two passes, and tables that fit in caches do not count.
+    Only texels with a surface and pixels of the head count where others are not needed. Repeated reads within
+    a stage or a blur, scratch space between two passes, and tables that fit in caches are not counted.
     """
-    inputs, picture = moved.inputs, moved.inputs.resources.post.picture
+    inputs, picture = traffic.inputs, traffic.inputs.resources.post.picture
     pixels, shadow = picture.size[0] * picture.size[1], inputs.resources.shadow_maps.texture
     samples = inputs.settings.samples * texel_bytes(inputs.resources.visibility.texture)
-    geometry = _TRIANGLE_BYTES * inputs.resources.head.triangles + _VERTEX_BYTES * moved.vertices
-    looked_up = len(inputs.shadow_views.clips) * texel_bytes(shadow)
+    geometry = _TRIANGLE_BYTES * inputs.resources.head.triangles + _VERTEX_BYTES * traffic.vertices
+    shadow_bytes = len(inputs.shadow_views.clips) * texel_bytes(shadow)
     radiance = texel_bytes(picture.radiance)
-    shaded = moved.seen * (looked_up + texel_bytes(inputs.resources.scattered)) + _map_bytes(inputs, moved.seen)
-    found: dict[str, float] = {
-        "shadows": moved.shadowing * texel_bytes(shadow) + geometry,
-        "visibility": moved.seen * samples + geometry,
+    shaded = traffic.head_pixels * (shadow_bytes + texel_bytes(inputs.resources.scattered))
+    shaded += _map_bytes(inputs, traffic.head_pixels)
+    stages: dict[str, float] = {
+        "shadows": traffic.shadow_texels * texel_bytes(shadow) + geometry,
+        "visibility": traffic.head_pixels * samples + geometry,
         "shade": pixels * samples + shaded + pixels * radiance,
         "post": pixels * (radiance + texel_bytes(picture.exposed) + texel_bytes(picture.bytes)),
     }
     if between := inputs.layouts[0].interreflection:
-        found["interreflection"] = float(between.buffers.nbytes)
-    return (found | _scattering_bytes(moved, looked_up)) if inputs.blurs else found
+        stages["interreflection"] = float(between.buffers.nbytes)
+    return (stages | _scattering_bytes(traffic, shadow_bytes)) if inputs.blurs else stages
 
 
-def _scattering_bytes(moved: FrameTraffic, looked_up: int) -> dict[str, float]:
-    """Return bytes of the stages that light the atlas and spread the light."""
-    inputs, texels, levels = moved.inputs, moved.texels, moved.inputs.resources.diffusion.levels
+def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, float]:
+    """Return bytes of the stages that light the atlas and diffuse the light."""
+    inputs, texels, levels = traffic.inputs, traffic.texels, traffic.inputs.resources.diffusion.levels
     blur = inputs.blurs[0]
     entered = texels * FORMAT_BYTES[levels.texel]
-    blurred = [texels * FORMAT_BYTES[levels.texel] / 4**halved for halved in blur.halvings[1:]]
-    found: dict[str, float] = {
-        "irradiance": texels * (SURFACE_BYTES + looked_up) + entered,
+    blurred = [texels * FORMAT_BYTES[levels.texel] / 4**halving for halving in blur.halvings[1:]]
+    stages: dict[str, float] = {
+        "irradiance": texels * (SURFACE_BYTES + shadow_bytes) + entered,
         "diffuse": entered + sum(blurred[:-1]) + sum(blurred) + _blur_surface_bytes(inputs, texels),
         "combine": sum(blurred) + texels * texel_bytes(inputs.resources.scattered),
     }
     if thin := inputs.layouts[0].translucency:
-        found["translucency"] = _translucency_bytes(thin, levels, blur)
-        found["combine"] += thin.pairs.transmitted.size[0] * thin.pairs.transmitted.size[1] * texel_bytes(thin.pairs.transmitted)
-    return found
+        stages["translucency"] = _translucency_bytes(thin, levels, blur)
+        transmitted = thin.pairs.transmitted
+        stages["combine"] += transmitted.size[0] * transmitted.size[1] * texel_bytes(transmitted)
+    return stages
 
 
 def _blur_surface_bytes(inputs: FrameInputs, texels: int) -> float:
-    """Return bytes that blurs read of the surface: stretch, the extent of the chart, and gutters.
+    """Return bytes that blurs read of the surface: stretch, extent of the chart, and gutters.
 
-    The passes of 2007 blur the stretch map along with the light instead.
+    The passes of GPU Gems 3 blur the stretch map along with the light instead.
     """
     levels, finest, blur = inputs.resources.diffusion.levels, inputs.layouts[0].atlas, inputs.blurs[0]
     if isinstance(levels, StretchedLevels):
         stretch = texel_bytes(finest.resources["stretch_map"])
         return 2.0 * stretch * texels * len(blur.halvings[1:])
-    sheets = (finest, *finest.coarser)
-    moved = 0.0
-    for source, halved in pairwise(blur.halvings):
-        maps = (sheets[halved].resources[name] for name in ("stretch_map", "reach_map"))
-        moved += sum(map(texel_bytes, maps)) * texels / 4**halved
-        if blur.edge == "repeated" and (gutter := sheets[source].gutter):
-            moved += gutter.size * (1 + 2 * FORMAT_BYTES[levels.texel] / _GUTTER_ENTRY_BYTES)
-    return moved
+    atlases = (finest, *finest.coarser)
+    traffic = 0.0
+    for source, halving in pairwise(blur.halvings):
+        maps = (atlases[halving].resources[name] for name in ("stretch_map", "reach_map"))
+        traffic += sum(map(texel_bytes, maps)) * texels / 4**halving
+        if blur.edge == "repeated" and (gutter := atlases[source].gutter):
+            traffic += gutter.size * (1 + 2 * FORMAT_BYTES[levels.texel] / _GUTTER_ENTRY_BYTES)
+    return traffic
 
 
 def _translucency_bytes(thin: Translucency, levels: PyramidLevels, blur: Blur) -> float:
-    """Bytes of translucency: pairs and their texels, the light of the sources, and the light that leaves.
+    """Return bytes of translucency: pairs with their texels, light of the sources, transmitted light.
 
-    Slabs ask for the light at the sources by its direction too, so for the surface there.
+    Tables of slabs depend on the direction of the light at the sources, so they also read the surface there.
     """
-    pairs, halved = thin.pairs, blur.halvings[blur.profile_levels[1 + thin.source_level]]
+    pairs, halving = thin.pairs, blur.halvings[blur.profile_levels[1 + thin.source_level]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
-    lists = thin.weights.size + pairs.receiver_ranges.size + (_INDEX_BYTES + SURFACE_BYTES * thin.uses_tables) * sources
-    level = (levels.size >> halved) ** 2
-    read = min(_BILINEAR_TEXELS * sources, level) * FORMAT_BYTES[levels.texel]
-    return float(lists + read + receivers * texel_bytes(thin.pairs.transmitted))
+    lists = thin.weights.size + pairs.receiver_ranges.size
+    lists += (_INDEX_BYTES + SURFACE_BYTES * thin.uses_tables) * sources
+    level = (levels.size >> halving) ** 2
+    source_texels = min(_BILINEAR_TEXELS * sources, level) * FORMAT_BYTES[levels.texel]
+    return float(lists + source_texels + receivers * texel_bytes(thin.pairs.transmitted))
 
 
-def _map_bytes(inputs: FrameInputs, most: int) -> int:
-    """Return bytes of the head's maps that `most` points read, a texel each."""
+def _map_bytes(inputs: FrameInputs, point_count: int) -> int:
+    """Return bytes of the head's maps that this number of points reads, one texel each."""
     textures = [cast(Texture, inputs.bindings[name]) for name in _MAPS]
-    return sum(texel_bytes(one) * min(most, one.size[0] * one.size[1]) for one in textures)
+    return sum(texel_bytes(one) * min(point_count, one.size[0] * one.size[1]) for one in textures)
 
 
 def copy_rate(device: Device) -> float:
-    """Return the median rate of reading and writing in a pass that copies a texture [byte/s].
+    """Return the median rate of reads and writes in a pass that copies a texture [byte/s].
 
     Raises DermisError when the device has no timestamps.
     """
@@ -143,15 +146,15 @@ def copy_rate(device: Device) -> float:
     program = ComputeProgram(device, Path(__file__).parent / "copy.wgsl")
     textures = [make_texture(device, (side, side), "rgba32float") for _ in range(2)]
     times = [_copy(device, program, textures) for _ in range(_REPEATS + (0 if software else _WARMUP_REPEATS))]
-    moved = 2 * _COPIES * side * side * texel_bytes(textures[0])
-    return moved / (1e-3 * statistics.median(times[-_REPEATS:]))
+    traffic = 2 * _COPIES * side * side * texel_bytes(textures[0])
+    return traffic / (1e-3 * statistics.median(times[-_REPEATS:]))
 
 
 def _copy(device: Device, program: ComputeProgram, textures: list[Any]) -> float:
-    """Return the time of copying back and forth [ms]."""
-    frame, (one, other) = CommandList(device), textures
-    for source, copied in ((one, other), (other, one)) * (_COPIES // 2):
-        frame.compute("copy", program, {"source": source, "copied": copied}, one.size[:2])
+    """Return the time of copies back and forth [ms]."""
+    frame = CommandList(device)
+    for source, target in (textures, textures[::-1]) * (_COPIES // 2):
+        frame.compute("copy", program, {"source": source, "destination": target}, source.size[:2])
     frame.submit()
     frame.wait()
     times = frame.stage_ms()

@@ -1,4 +1,4 @@
-"""The passes of 2007 in the graphics pipeline, as they were drawn then: a baseline to measure against."""
+"""Passes of GPU Gems 3 (2007) in the graphics pipeline, as a baseline to measure against."""
 
 from __future__ import annotations
 
@@ -35,10 +35,13 @@ _FOLDER = Path(__file__).parent
 
 
 class FragmentPasses(GpuGems3):
-    """Lights the atlas, blurs and adds up in render passes; the same up to the rounding of halves."""
+    """Technique that lights the atlas, blurs it and sums the levels in render passes.
+
+    Its results differ from those of `GpuGems3` by rounding to half precision only.
+    """
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
-        """Return space for the light that enters and the blurred levels, all of it halves."""
+        """Return textures for the irradiance and the blurred levels, all in half precision."""
         count = max(map(len, halvings))
         stack = make_texture(device, (side, side), HALVES, layers=count, use="raster")
         scratch, *stretch = (make_texture(device, (side, side), HALVES, use="raster") for _ in range(3))
@@ -46,11 +49,11 @@ class FragmentPasses(GpuGems3):
         return StretchedLevels((stack,), (0,), scratch, side, HALVES, stretch=(first, second))
 
     def make_sum(self, device: Device, side: int) -> Texture:
-        """Return space for the sum."""
+        """Return the texture of the sum."""
         return make_texture(device, (side, side), FLOATS, use="raster")
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Light the atlas, let the light spread, and add it up."""
+        """Light the atlas, blur the light and sum the levels."""
         made = inputs.resources
         for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
             graph.repeat(stretch.draw_stretch, layout.head, layout.atlas)

@@ -1,4 +1,4 @@
-"""How long a device takes to evaluate each surface lobe."""
+"""Device time per evaluation of each lobe of surface reflection."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from dermis.specular.fresnel import FRESNEL, SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
 
 _REPEATS = 5
-_WARMUP_S = 0.5  # a GPU that was idle runs at a fraction of its clock rate
+_WARMUP_S = 0.5  # because an idle GPU has a reduced clock rate
 _SHADER = Path(__file__).with_suffix(".wgsl")
 
 
-_SIDE, _LIGHTS = 1024, 64  # points along each side, and lights for each: evaluations of one pass
+_SIDE, _LIGHTS = 1024, 64  # points along each side, and lights per point
 _SIDE_ON_CPU, _LIGHTS_ON_CPU = 256, 16
 
 
 def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
-    """Return device time of one evaluation by model and Fresnel curve, as named in MODELS and FRESNEL [ns].
+    """Return device time per evaluation by model and Fresnel term, as named in MODELS and FRESNEL [ns].
 
-    The inverse throughput of the whole device, less the cost of the loop without the lobe.
+    It is the inverse throughput of the whole device, less the cost of the loop without the lobe.
     """
     on_cpu = device.adapter.kind == "CPU"
     side, lights = (_SIDE_ON_CPU, _LIGHTS_ON_CPU) if on_cpu else (_SIDE, _LIGHTS)
@@ -48,16 +48,16 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     started = time.perf_counter()
     while time.perf_counter() - started < _WARMUP_S:
         _pass_ms(device, programs[0], bound, side)
-    rounds = [[_pass_ms(device, one, bound, side) for one in programs] for _ in range(_REPEATS)]
-    loop, *taken = (statistics.median(times) for times in zip(*rounds, strict=True))
+    repeats = [[_pass_ms(device, one, bound, side) for one in programs] for _ in range(_REPEATS)]
+    loop, *lobe_times = (statistics.median(times) for times in zip(*repeats, strict=True))
     return {
         (skin.specular, skin.fresnel): 1e6 * max(0.0, ms - loop) / (side**2 * lights)
-        for skin, ms in zip(skins, taken, strict=True)
+        for skin, ms in zip(skins, lobe_times, strict=True)
     }
 
 
 def _pass_ms(device: Device, program: ComputeProgram, bound: JsonObject, side: int) -> float:
-    """Return the time of one pass by the device's clock, or by the wall's without timestamps [ms]."""
+    """Return the time of one pass by timestamps, or elapsed time without them [ms]."""
     frame = CommandList(device)
     started = time.perf_counter()
     frame.compute("lobe", program, bound, (side, side))

@@ -1,4 +1,4 @@
-"""One frame, measured: its stages on the device, its time by the clock, Python's part, and memory."""
+"""Measurement of one case: device time by stage, elapsed time, host time and memory."""
 
 from __future__ import annotations
 
@@ -24,42 +24,44 @@ from dermis.scene.techniques import TECHNIQUES
 
 @dataclass(frozen=True)
 class FrameCounts:
-    """How many frames are drawn.
+    """Numbers of frames to draw.
 
-    warming : before any is measured: a GPU that was idle runs at a fraction of its clock rate
-    between : between two whose stages are timed, so that its clock does not fall
-    timed : whose stages are timed
-    row : in a row, for the mean time of one
+    warmup : before any measurement, because an idle GPU has a reduced clock rate
+    between : between two frames whose stages are timed, to keep the clock rate up
+    timed : frames whose stages are timed
+    sequence : consecutive frames, for the mean time of one
     """
 
-    warming: int = 100
+    warmup: int = 100
     between: int = 5
     timed: int = 9
-    row: int = 100
+    sequence: int = 100
 
     def within(self, seconds: float, frame_ms: float) -> FrameCounts:
-        """Return the same with fewer frames, where these would take longer at `frame_ms` each."""
-        frames = self.warming + 2 * self.row + 2 * self.timed * (1 + self.between)
-        share = min(1.0, 1e3 * seconds / (frame_ms * frames))
-        wanted = asdict(self).items()
-        return FrameCounts(**{name: min(count, max(1, int(share * count))) for name, count in wanted})
+        """Return fewer frames where these would take longer than `seconds` at `frame_ms` each."""
+        frames = self.warmup + 2 * self.sequence + 2 * self.timed * (1 + self.between)
+        fraction = min(1.0, 1e3 * seconds / (frame_ms * frames))
+        counts_by_name = asdict(self).items()
+        return FrameCounts(
+            **{name: min(count, max(1, int(fraction * count))) for name, count in counts_by_name}
+        )
 
 
-CPU_FRAME_COUNTS = FrameCounts(warming=0, between=0, timed=3, row=3)
-_MAX_CASE_S = 30.0  # for the frames of one case
+CPU_FRAME_COUNTS = FrameCounts(warmup=0, between=0, timed=3, sequence=3)
+_MAX_CASE_S = 30.0  # time limit for the frames of one case
 
 
 @dataclass(frozen=True)
 class BenchmarkRow:
-    """The measurements of one case; medians.
+    """Measurements of one case; medians.
 
     triangles : of the head
-    frame_ms : by the clock, of a frame in a row of them, with several in flight
+    frame_ms : elapsed time of a frame in a sequence, with several in flight
     gpu_ms : device time by stage, each in a pass of its own, and "total"; on GPUs the total is that of other
-        frames, whose stages share one pass as they usually do, and less than the sum
+        frames, whose stages share one pass as usual, and less than the sum
     floor_ms : the stage's bytes at the rate of a copy, and "total"
-    python_ms : preparing, recording and submitting a frame while the device is idle
-    image_ms : from the end of a frame to its bytes in NumPy
+    python_ms : time to prepare, record and submit a frame while the device is idle
+    image_ms : time from the end of a frame to its bytes in NumPy
     memory_mb : textures and buffers
     """
 
@@ -75,39 +77,43 @@ class BenchmarkRow:
 
     @property
     def floor_ratio(self) -> float:
-        """Device time of the whole frame over its floor."""
+        """Return the device time of the whole frame over its floor."""
         return self.gpu_ms["total"] / self.floor_ms["total"]
 
 
-def measure_case(renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, effort: FrameCounts) -> BenchmarkRow:
-    """Draw the case many times, camera and lights moved each time; fewer times when that would take long.
+def measure_case(
+    renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, counts: FrameCounts
+) -> BenchmarkRow:
+    """Draw a case many times, with a moving camera and lights; fewer times where that would take long.
 
-    rate : bytes per second that a copy moves
+    rate : rate of a copy [byte/s]
 
     Raises DermisError for frames that the device cannot hold.
     """
     with gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
-        return _measure_case(renderer, case, head, folder, rate, effort)
+        return _measure_case(renderer, case, head, folder, rate, counts)
 
 
-def _measure_case(renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, effort: FrameCounts) -> BenchmarkRow:
+def _measure_case(
+    renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, counts: FrameCounts
+) -> BenchmarkRow:
     settings = case_settings(case)
-    first, *others = case_scenes(case, head, folder, max(effort.row, effort.timed, 2))
-    scenes = cycle([*others, first])
+    first, *other_scenes = case_scenes(case, head, folder, max(counts.sequence, counts.timed, 2))
+    scenes = cycle([*other_scenes, first])
     renderer.draw(first, settings)
-    effort = effort.within(_MAX_CASE_S, sequence_ms(renderer, scenes, 1, settings))
-    sequence_ms(renderer, scenes, effort.warming, settings)
-    frame_ms = sequence_ms(renderer, scenes, effort.row, settings) / effort.row
-    gpu_ms = stage_ms(renderer, scenes, settings, effort)
-    python_ms, image_ms = _host_times_ms(renderer, scenes, settings, effort)
-    moved = frame_traffic(renderer.device, renderer.prepare(first, settings), len(head.mesh.positions))
+    counts = counts.within(_MAX_CASE_S, sequence_ms(renderer, scenes, 1, settings))
+    sequence_ms(renderer, scenes, counts.warmup, settings)
+    frame_ms = sequence_ms(renderer, scenes, counts.sequence, settings) / counts.sequence
+    gpu_ms = stage_ms(renderer, scenes, settings, counts)
+    python_ms, image_ms = _host_times_ms(renderer, scenes, settings, counts)
+    traffic = frame_traffic(renderer.device, renderer.prepare(first, settings), len(head.mesh.positions))
     return BenchmarkRow(
         case,
         renderer.device.adapter.name,
         len(head.mesh.triangles),
         frame_ms,
         gpu_ms,
-        _floor_ms(stage_bytes(moved), gpu_ms, rate),
+        _floor_ms(stage_bytes(traffic), gpu_ms, rate),
         python_ms,
         image_ms,
         allocated_bytes() / 1e6,
@@ -115,9 +121,9 @@ def _measure_case(renderer: Renderer, case: Case, head: Head, folder: Path, rate
 
 
 def sequence_ms(renderer: Renderer, scenes: Iterator[Scene], count: int, settings: Settings) -> float:
-    """Return the time of frames that follow each other without a pause, until the last one is done [ms].
+    """Return the time of consecutive frames until the last one is done [ms].
 
-    scenes : each differs from the one before, so that nothing is kept that camera and lights change
+    scenes : each differs from the one before, so that nothing that depends on camera and lights is reused
     """
 
     def draw() -> None:
@@ -129,31 +135,34 @@ def sequence_ms(renderer: Renderer, scenes: Iterator[Scene], count: int, setting
 
 
 def stage_ms(
-    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: FrameCounts
+    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, counts: FrameCounts
 ) -> dict[str, float]:
-    """Median device time of each stage, and of the whole frame as "total" [ms]; scenes as in `row_ms`."""
+    """Return the median device time of each stage, and of the whole frame as "total" [ms].
+
+    scenes : as in `sequence_ms`
+    """
     software = renderer.device.adapter.kind == "CPU"
-    ways: tuple[Timing, ...] = (True,) if software else (True, "whole")
-    drawn: dict[Timing, list[dict[str, float]]] = {way: [] for way in ways}
-    for _ in range(effort.timed):
-        for way in ways:
-            sequence_ms(renderer, scenes, effort.between, settings)
-            drawn[way].append(renderer.draw(next(scenes), settings, timed=way).gpu_ms or {})
-    found = {stage: statistics.median(one[stage] for one in drawn[True]) for stage in drawn[True][0]}
-    return found | {"total": statistics.median(one["total"] for one in drawn[ways[-1]])}
+    timings: tuple[Timing, ...] = (True,) if software else (True, "whole")
+    times: dict[Timing, list[dict[str, float]]] = {timing: [] for timing in timings}
+    for _ in range(counts.timed):
+        for timing in timings:
+            sequence_ms(renderer, scenes, counts.between, settings)
+            times[timing].append(renderer.draw(next(scenes), settings, timed=timing).gpu_ms or {})
+    found = {stage: statistics.median(one[stage] for one in times[True]) for stage in times[True][0]}
+    return found | {"total": statistics.median(one["total"] for one in times[timings[-1]])}
 
 
 def _host_times_ms(
-    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: FrameCounts
+    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, counts: FrameCounts
 ) -> tuple[float, float]:
-    """Return medians of Python's time before a frame, and of fetching its image [ms]."""
+    """Return medians of the host's time before a frame, and of the transfer of its image [ms]."""
     before, after = [], []
-    for k in range(max(effort.row, effort.timed)):
+    for k in range(max(counts.sequence, counts.timed)):
         renderer.device.wait()
         started, scene = time.perf_counter(), next(scenes)
         rendered = renderer.draw(scene, settings, timed=False)
         before.append(1e3 * (time.perf_counter() - started))
-        if k < effort.timed:
+        if k < counts.timed:
             renderer.device.wait()
             after.append(_elapsed_ms(rendered.srgb8))
     return statistics.median(before), statistics.median(after)
@@ -165,7 +174,7 @@ def _elapsed_ms(work: Callable[[], object]) -> float:
     return 1e3 * (time.perf_counter() - started)
 
 
-def _floor_ms(moved: dict[str, float], gpu_ms: dict[str, float], rate: float) -> dict[str, float]:
-    """Return floor of each stage that was drawn, and "total" [ms]."""
-    floor = {stage: 1e3 * moved[stage] / rate for stage in gpu_ms if stage in moved}
+def _floor_ms(traffic: dict[str, float], gpu_ms: dict[str, float], rate: float) -> dict[str, float]:
+    """Return the floor of each stage that was drawn, and "total" [ms]."""
+    floor = {stage: 1e3 * traffic[stage] / rate for stage in gpu_ms if stage in traffic}
     return floor | {"total": sum(floor.values())}

@@ -1,4 +1,4 @@
-"""A benchmark as JSON, as lines of text, and as an HTML file with plots."""
+"""Report of a benchmark as JSON, as lines of text, and as an HTML file with plots."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def as_json(made: Benchmark) -> JsonObject:
+def as_json(benchmark: Benchmark) -> JsonObject:
     """Return the benchmark as one JSON-ready object; times in ms."""
     return {
-        "head": made.head,
-        "adapter": made.adapter,
-        "driver": made.driver,
-        "versions": made.versions,
-        "date": made.date,
-        "seconds": made.seconds,
-        "copy_gb_s": made.copied / 1e9,
-        "published_ratio": made.ratio(GPU_GEMS_3),
-        "published_fragments_ratio": made.ratio(FRAGMENT_TECHNIQUE),
-        "rows": [_row_json(row) for row in made.rows],
-        "left_out": [{**_case_json(one.case), "reason": one.reason} for one in made.left_out],
+        "head": benchmark.head,
+        "adapter": benchmark.adapter,
+        "driver": benchmark.driver,
+        "versions": benchmark.versions,
+        "date": benchmark.date,
+        "seconds": benchmark.seconds,
+        "copy_gb_s": benchmark.copy_bytes_s / 1e9,
+        "published_ratio": benchmark.ratio(GPU_GEMS_3),
+        "published_fragments_ratio": benchmark.ratio(FRAGMENT_TECHNIQUE),
+        "rows": [_row_json(row) for row in benchmark.rows],
+        "left_out": [{**_case_json(one.case), "reason": one.reason} for one in benchmark.skipped],
     }
 
 
@@ -46,9 +46,9 @@ def _case_json(case: Case) -> JsonObject:
 
 
 def _row_json(row: BenchmarkRow) -> JsonObject:
-    told = {**_case_json(row.case), **asdict(row), "floor_ratio": row.floor_ratio}
-    del told["case"]
-    return told
+    parts = {**_case_json(row.case), **asdict(row), "floor_ratio": row.floor_ratio}
+    del parts["case"]
+    return parts
 
 
 _PUBLISHED_COLUMNS = {GPU_GEMS_3: "2007, compute [ms]", FRAGMENT_TECHNIQUE: "2007, fragments [ms]"}
@@ -58,7 +58,7 @@ COLUMNS = (*_CASE_COLUMNS, *_TIME_COLUMNS, "memory [MB]")
 
 
 def cells(row: BenchmarkRow) -> tuple[str, ...]:
-    """Return a row's figures as text, in the order of COLUMNS."""
+    """Return the figures of a row as text, in the order of COLUMNS."""
     case, device = row.case, (row.gpu_ms["total"], row.floor_ms["total"], row.floor_ratio)
     return (
         f"{case.image[0]}x{case.image[1]}",
@@ -74,68 +74,72 @@ def cells(row: BenchmarkRow) -> tuple[str, ...]:
     )
 
 
-def stage_table(made: Benchmark) -> list[tuple[str, ...]]:
-    """Return rows of the usual frame by stage, titles first: device time, floor, ratio, passes of 2007."""
-    if made.usual is None:
+def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
+    """Return rows of the base frame by stage, titles first: device time, floor, ratio, GPU Gems 3."""
+    if benchmark.base_row is None:
         return []
-    usual = made.usual
-    others = {title: row.gpu_ms for name, title in _PUBLISHED_COLUMNS.items() if (row := made.row_of(name))}
-    table = [("stage", "device [ms]", "floor [ms]", "ratio", *others)]
-    for stage, ms in usual.gpu_ms.items():
-        floor = usual.floor_ms.get(stage)
-        known = (three_digits(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
-        theirs = (three_digits(times[stage]) if stage in times else "-" for times in others.values())
-        table.append((stage, three_digits(ms), *known, *theirs))
+    base_row = benchmark.base_row
+    other_times = {
+        title: row.gpu_ms for name, title in _PUBLISHED_COLUMNS.items() if (row := benchmark.row_of(name))
+    }
+    table = [("stage", "device [ms]", "floor [ms]", "ratio", *other_times)]
+    for stage, ms in base_row.gpu_ms.items():
+        floor = base_row.floor_ms.get(stage)
+        floor_cells = (three_digits(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
+        other_cells = (
+            three_digits(times[stage]) if stage in times else "-" for times in other_times.values()
+        )
+        table.append((stage, three_digits(ms), *floor_cells, *other_cells))
     return table
 
 
-def published_text(made: Benchmark) -> str:
-    """Return a sentence with the relative time of the passes of 2007, if that was measured."""
+def published_text(benchmark: Benchmark) -> str:
+    """Return a sentence with the relative time of the passes of GPU Gems 3, if they were measured."""
     names = {GPU_GEMS_3: "as compute", FRAGMENT_TECHNIQUE: "as fragments"}
-    found = {said: made.ratio(name) for name, said in names.items()}
-    told = [f"{ratio:.2f} times as long {said}" for said, ratio in found.items() if ratio is not None]
-    return f"With the passes of 2007 it takes {' and '.join(told)}." if told else ""
+    found = {form: benchmark.ratio(name) for name, form in names.items()}
+    parts = [f"{ratio:.2f} times as long {form}" for form, ratio in found.items() if ratio is not None]
+    return f"With the passes of 2007 it takes {' and '.join(parts)}." if parts else ""
 
 
-def skipped_lines(made: Benchmark) -> list[str]:
+def skipped_lines(benchmark: Benchmark) -> list[str]:
     """Return lines about cases that could not be measured, with reasons."""
-    return [f"left out: {_case_text(one.case)}: {one.reason}" for one in made.left_out]
+    return [f"left out: {_case_text(one.case)}: {one.reason}" for one in benchmark.skipped]
 
 
 def _case_text(case: Case) -> str:
     width, height = case.image
     sizes = f"{width}x{height}, atlas {case.atlas}, {case.gaussians} Gaussians, {case.lights} lights"
-    around = f", environment {case.environment}" if case.environment else ""
-    moving = f", {case.targets} targets" if case.targets else ""
-    return f"{sizes}{around}{moving}, subdivided {case.subdivide} times, {case.technique}"
+    environment_text = f", environment {case.environment}" if case.environment else ""
+    target_text = f", {case.targets} targets" if case.targets else ""
+    return f"{sizes}{environment_text}{target_text}, subdivided {case.subdivide} times, {case.technique}"
 
 
-def summary(made: Benchmark) -> str:
+def summary(benchmark: Benchmark) -> str:
     """Return the machine, the head, the date and the versions, in one line."""
-    versions = ", ".join(f"{name} {number}" for name, number in made.versions.items())
+    versions = ", ".join(f"{name} {number}" for name, number in benchmark.versions.items())
     return (
-        f"{made.adapter} ({made.driver}), {made.head}, {made.date}; {versions}; "
-        f"a copy moves {made.copied / 1e9:.4g} GB/s"
+        f"{benchmark.adapter} ({benchmark.driver}), {benchmark.head}, {benchmark.date}; {versions}; "
+        f"a copy moves {benchmark.copy_bytes_s / 1e9:.4g} GB/s"
     )
 
 
-def write_report(path: Path, made: Benchmark) -> None:
-    """Write tables and plots; the file is complete or not there.
+def write_report(path: Path, benchmark: Benchmark) -> None:
+    """Write tables and plots to an HTML file, atomically.
 
     Raises DermisError when it cannot be written.
     """
     text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
     page = text.substitute(
-        summary=html.escape(summary(made)),
-        published=published_text(made),
-        rows=_table([COLUMNS, *(cells(row) for row in made.rows)]),
-        left_out="".join(f"<p>{html.escape(line)}</p>" for line in skipped_lines(made)),
-        stages=_table(stage_table(made)),
-        bars=stage_bars(made.usual) if made.usual else "",
-        scaling=scaling(made),
+        summary=html.escape(summary(benchmark)),
+        published=published_text(benchmark),
+        rows=_table([COLUMNS, *(cells(row) for row in benchmark.rows)]),
+        skipped="".join(f"<p>{html.escape(line)}</p>" for line in skipped_lines(benchmark)),
+        stages=_table(stage_table(benchmark)),
+        bars=stage_bars(benchmark.base_row) if benchmark.base_row else "",
+        scaling=scaling(benchmark),
     )
-    with atomic_file(path) as trial:
-        trial.write_text(page, encoding="utf-8")
+    with atomic_file(path) as output:
+        output.write_text(page, encoding="utf-8")
 
 
 def _table(lines: Sequence[tuple[str, ...]]) -> str:
@@ -158,24 +162,24 @@ _AXES: dict[str, tuple[str, Callable[[BenchmarkRow], float]]] = {
 
 
 def three_digits(number: float) -> str:
-    """Return three significant digits without an exponent."""
+    """Return a number with three significant digits, without an exponent."""
     return f"{number:.0f}" if number >= 1000 else f"{number:.3g}"
 
 
-def scaling(made: Benchmark) -> str:
-    """Return the device time and floor over each size that was varied, as SVG text."""
-    varied = [name for name in _AXES if any(row.case.varies == name for row in made.rows)]
-    if not varied:
+def scaling(benchmark: Benchmark) -> str:
+    """Return plots of device time and floor over each size that varies, as SVG text."""
+    axes_names = [name for name in _AXES if any(row.case.varies == name for row in benchmark.rows)]
+    if not axes_names:
         return ""
-    figure, panels = _figure(width=3.4 * len(varied), height=2.9, columns=len(varied))
-    for axes, name in zip(panels, varied, strict=True):
+    figure, panels = _figure(width=3.4 * len(axes_names), height=2.9, columns=len(axes_names))
+    for axes, name in zip(panels, axes_names, strict=True):
         label, value = _AXES[name]
-        rows = sorted((row for row in made.rows if row.case.varies in ("", name)), key=value)
-        across = [value(row) for row in rows]
-        axes.plot(across, [row.gpu_ms["total"] for row in rows], "o-", color=_TOTAL, label="device", ms=4)
-        axes.plot(across, [row.floor_ms["total"] for row in rows], "s--", color=_FLOOR, label="floor", ms=3)
+        rows = sorted((row for row in benchmark.rows if row.case.varies in ("", name)), key=value)
+        x = [value(row) for row in rows]
+        axes.plot(x, [row.gpu_ms["total"] for row in rows], "o-", color=_TOTAL, label="device", ms=4)
+        axes.plot(x, [row.floor_ms["total"] for row in rows], "s--", color=_FLOOR, label="floor", ms=3)
         axes.set(xlabel=label, xscale="log", yscale="log")
-        _set_ticks(axes.xaxis, across)
+        _set_ticks(axes.xaxis, x)
         _set_ticks(axes.yaxis, None)
     panels[0].set_ylabel("ms a frame")
     panels[0].legend(frameon=False, labelcolor=_TEXT, fontsize=8)
@@ -183,13 +187,13 @@ def scaling(made: Benchmark) -> str:
 
 
 def stage_bars(row: BenchmarkRow) -> str:
-    """Return the device time of each stage and its floor as bars, as SVG text."""
+    """Return device time and floor of each stage as bars, as SVG text."""
     names = [stage for stage in row.gpu_ms if stage != "total"]
     figure, (axes,) = _figure(width=7.0, height=0.34 * len(names) + 0.9, columns=1)
-    places = range(len(names))
-    axes.barh(places, [row.gpu_ms[name] for name in names], 0.7, color=_TOTAL, label="device")
-    axes.barh(places, [row.floor_ms.get(name, 0.0) for name in names], 0.3, color=_FLOOR, label="floor")
-    axes.set_yticks(places, names)
+    positions = range(len(names))
+    axes.barh(positions, [row.gpu_ms[name] for name in names], 0.7, color=_TOTAL, label="device")
+    axes.barh(positions, [row.floor_ms.get(name, 0.0) for name in names], 0.3, color=_FLOOR, label="floor")
+    axes.set_yticks(positions, names)
     axes.invert_yaxis()
     axes.set_xlabel("ms")
     axes.legend(frameon=False, labelcolor=_TEXT, fontsize=8)
@@ -211,11 +215,11 @@ def _figure(width: float, height: float, columns: int) -> tuple[Figure, list[Axe
     return figure, panels
 
 
-def _set_ticks(axis: Axis, places: list[float] | None) -> None:
-    """Label an axis with plain numbers at the measured places, or at round ones."""
+def _set_ticks(axis: Axis, positions: list[float] | None) -> None:
+    """Label an axis with plain numbers at the given positions, or at round ones."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
-    axis.set_major_locator(FixedLocator(places) if places else LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_locator(FixedLocator(positions) if positions else LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _: three_digits(value)))
 
@@ -223,7 +227,7 @@ def _set_ticks(axis: Axis, places: list[float] | None) -> None:
 def _svg(figure: Figure) -> str:
     from matplotlib import rc_context
 
-    drawn = StringIO()
+    svg = StringIO()
     with rc_context({"svg.hashsalt": "dermis", "svg.fonttype": "none"}):
-        figure.savefig(drawn, format="svg", metadata={"Date": None})
-    return drawn.getvalue().partition("<svg")[2].join(("<svg", ""))
+        figure.savefig(svg, format="svg", metadata={"Date": None})
+    return svg.getvalue().partition("<svg")[2].join(("<svg", ""))

@@ -1,4 +1,4 @@
-"""A whole benchmark: all cases of a preset on one adapter."""
+"""Benchmark of all cases of a preset on one adapter."""
 
 from __future__ import annotations
 
@@ -15,7 +15,12 @@ from typing import Any
 
 from dermis.apps.validation.benchmarks.cases import Case
 from dermis.apps.validation.benchmarks.floor import copy_rate
-from dermis.apps.validation.benchmarks.measure import CPU_FRAME_COUNTS, FrameCounts, BenchmarkRow, measure_case
+from dermis.apps.validation.benchmarks.measure import (
+    CPU_FRAME_COUNTS,
+    BenchmarkRow,
+    FrameCounts,
+    measure_case,
+)
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
@@ -27,7 +32,7 @@ ProgressCallback = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class SkippedCase:
-    """A case that could not be measured, and why."""
+    """Case that could not be measured, and the reason."""
 
     case: Case
     reason: str
@@ -35,11 +40,11 @@ class SkippedCase:
 
 @dataclass(frozen=True)
 class Benchmark:
-    """What was measured and where.
+    """Measurements of all cases on one machine.
 
-    copied : bytes per second that a copy moves
+    copy_bytes_s : measured rate of a copy on the device [byte/s]
     seconds : duration of the whole run [s]
-    left_out : what could not be measured
+    skipped : cases that could not be measured
     """
 
     head: str
@@ -47,25 +52,25 @@ class Benchmark:
     driver: str
     versions: dict[str, str]
     date: str
-    copied: float
+    copy_bytes_s: float
     seconds: float
     rows: tuple[BenchmarkRow, ...]
-    left_out: tuple[SkippedCase, ...] = ()
+    skipped: tuple[SkippedCase, ...] = ()
 
     @property
-    def usual(self) -> BenchmarkRow | None:
-        """The frame from which all others differ in one thing; None when it could not be measured."""
+    def base_row(self) -> BenchmarkRow | None:
+        """Return the row of the base case, which all others vary; None when it was skipped."""
         return next((row for row in self.rows if not row.case.varies), None)
 
     def row_of(self, technique: str) -> BenchmarkRow | None:
-        """Return the usual frame by another technique; None when it was not measured."""
-        found = (row for row in self.rows if row.case.varies == "technique")
-        return next((row for row in found if row.case.technique == technique), None)
+        """Return the row of the base case with another technique; None when it was not measured."""
+        rows = (row for row in self.rows if row.case.varies == "technique")
+        return next((row for row in rows if row.case.technique == technique), None)
 
     def ratio(self, technique: str) -> float | None:
-        """Return the device time of another technique over that of our own, in the same frame."""
+        """Return the device time of another technique over that of ours, in the same frame."""
         other = self.row_of(technique)
-        return other.gpu_ms["total"] / self.usual.gpu_ms["total"] if other and self.usual else None
+        return other.gpu_ms["total"] / self.base_row.gpu_ms["total"] if other and self.base_row else None
 
 
 def run_benchmark(
@@ -77,8 +82,8 @@ def run_benchmark(
 ) -> Benchmark:
     """Measure the cases one after another.
 
-    options : of `load_head`, but for the levels of subdivision
-    progress : called with the number of cases done, and of all
+    options : of `load_head`, without the subdivision level
+    progress : called with the number of finished cases and the number of all cases
 
     Raises DermisError when none of them could be measured.
     """
@@ -86,11 +91,10 @@ def run_benchmark(
     renderer = Renderer(adapter)
     device = renderer.device
     rate = copy_rate(device)
-    rows, left_out = _measure_cases(
-        cases, partial(load_head, head, **options), renderer, rate, progress or (lambda done, of: None)
-    )
+    progress = progress or (lambda done, total: None)
+    rows, skipped = _measure_cases(cases, partial(load_head, head, **options), renderer, rate, progress)
     if not rows:
-        raise DermisError(left_out[0].reason)
+        raise DermisError(skipped[0].reason)
     return Benchmark(
         head,
         device.adapter.name,
@@ -100,25 +104,26 @@ def run_benchmark(
         rate,
         (datetime.now(UTC) - started).total_seconds(),
         tuple(rows),
-        tuple(left_out),
+        tuple(skipped),
     )
 
 
 def _measure_cases(
     cases: list[Case], load: Callable[..., Head], renderer: Renderer, rate: float, progress: ProgressCallback
 ) -> tuple[list[BenchmarkRow], list[SkippedCase]]:
-    """Return the cases that could be measured, and the others."""
-    effort = CPU_FRAME_COUNTS if renderer.device.adapter.kind == "CPU" else FrameCounts()
+    """Return the rows of measured cases, and the skipped cases."""
+    counts = CPU_FRAME_COUNTS if renderer.device.adapter.kind == "CPU" else FrameCounts()
     subdivided = lru_cache(1)(lambda levels: load(subdivide=levels))
     rows: list[BenchmarkRow] = []
-    left_out: list[SkippedCase] = []
-    subdivided(cases[0].subdivide)  # a missing head is an error of all cases
+    skipped: list[SkippedCase] = []
+    subdivided(cases[0].subdivide)  # a missing head fails all cases
     with tempfile.TemporaryDirectory() as folder:
-        for done, case in enumerate(cases):
-            progress(done, len(cases))
+        for index, case in enumerate(cases):
+            progress(index, len(cases))
             try:
-                rows.append(measure_case(renderer, case, subdivided(case.subdivide), Path(folder), rate, effort))
+                loaded = subdivided(case.subdivide)
+                rows.append(measure_case(renderer, case, loaded, Path(folder), rate, counts))
             except DermisError as fault:
-                left_out.append(SkippedCase(case, str(fault)))
-                renderer.clear_cache()  # frees what was made before it failed
-    return rows, left_out
+                skipped.append(SkippedCase(case, str(fault)))
+                renderer.clear_cache()  # frees the resources of the failed case
+    return rows, skipped

@@ -1,1 +1,1 @@
-"""Techniques against the truth: scenes, truths, figures and a report."""
+"""Comparison of scattering techniques, and of rendered people, with reference images."""

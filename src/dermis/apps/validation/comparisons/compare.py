@@ -1,16 +1,21 @@
-"""Techniques against one truth: figures and pictures."""
+"""Comparison of techniques with one reference image: errors and pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.validation.comparisons.references import (
+    REFERENCES,
+    ComparisonSubject,
+    ReferenceImage,
+    check_visible,
+)
 from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, ModelName, medium_scene
-from dermis.apps.validation.comparisons.references import REFERENCES, ComparisonSubject, ReferenceImage, check_visible
 from dermis.base.errors import refuse
 from dermis.frame.renderer import Renderer
 from dermis.frame.surface_points import surface_points
@@ -27,11 +32,11 @@ _WHITE_PERCENTILE = 99.0
 
 @dataclass(frozen=True)
 class ComparisonRow:
-    """A technique's figures, with standard errors where the truth is noisy.
+    """Errors of a technique, with standard errors where the reference has noise.
 
-    relrmse, relrmse_se : root mean square error over the root mean square of the truth [-]
+    relrmse, relrmse_se : root mean square error over the root mean square of the reference [-]
     flip : mean perceived difference [0..1]; None without the package flip-evaluator
-    energy_ratio, energy_ratio_se : light in the image over that in the truth [-]
+    energy_ratio, energy_ratio_se : sum of the image over that of the reference [-]
     ms : device time of a frame
     """
 
@@ -47,25 +52,25 @@ class ComparisonRow:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What was compared, and the results.
+    """Reference image, and the images and errors of the techniques compared with it.
 
     images : linear radiance (h, w, 3) by technique
     """
 
     title: str
     adapter: str
-    truth: ReferenceImage
+    reference: ReferenceImage
     against: str
     rows: tuple[ComparisonRow, ...]
     images: dict[str, Floats]
 
     @property
     def exposure(self) -> float:
-        """Factor that makes the truth's bright parts nearly white."""
-        bright = np.percentile(self.truth.image[self.truth.mask], _WHITE_PERCENTILE)
+        """Return the factor that makes bright parts of the reference nearly white."""
+        bright = np.percentile(self.reference.image[self.reference.mask], _WHITE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
-    def shown(self, image: Floats) -> Floats:
+    def tone_mapped(self, image: Floats) -> Floats:
         """Return sRGB (h, w, 3) in 0..1 at the comparison's exposure."""
         return np.asarray(encode_srgb(np.clip(self.exposure * image, 0.0, 1.0)))
 
@@ -83,40 +88,36 @@ def compare(
     model: ModelName | None = None,
     samples: int = 64,
     adapter: str = "auto",
-    report: Callable[[str], None] = lambda doing: None,
 ) -> Comparison:
-    """Compare techniques, with the profile's own colour and no surface reflection, with a truth.
+    """Compare techniques, in the profile's own colour without surface reflection, with a reference.
 
-    against : of TRUTHS
-    light, region : of `scenes.LIGHTS` and `scenes.REGIONS`
-    medium : a named medium, taken as index-matched
-    direction : of the techniques' skin; None for that of the truth's
-    model : of the medium's profile, as the techniques have it; see `gaussians_of` for the default
-    samples : paths through each pixel
-    report : called with what is being done
+    against : name in REFERENCES
+    light, region : names in `scenes.LIGHTS` and `scenes.REGIONS`
+    medium : name of a medium, used as index-matched
+    direction : angular distribution of the techniques' skin; None for that of the reference
+    model : scattering model of the medium's profile; see `medium_gaussians` for the default
+    samples : paths per pixel
 
-    Raises DermisError for unknown names, pictures without the head, and what the truth cannot do.
+    Raises DermisError for unknown names, pictures without the head, and what the reference does not support.
     """
     check_names(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
     with comparison_subject(head, light, region, medium, settings, adapter, model) as subject:
         check_visible(surface_points(subject.renderer, subject.scene, settings).mask)
-        report(f"truth: {against}")
-        truth = REFERENCES[against](subject, samples)
-        check_visible(truth.mask)
-        skin = Skin(**(subject.scene.skin.model_dump() | {"direction": direction or truth.direction}))
-        judged = replace(subject, scene=replace(subject.scene, skin=skin))
+        reference = REFERENCES[against](subject, samples)
+        check_visible(reference.mask)
+        skin = Skin(**(subject.scene.skin.model_dump() | {"direction": direction or reference.direction}))
+        compared = replace(subject, scene=replace(subject.scene, skin=skin))
         images, ms = {}, {}
         for technique in techniques:
-            report(technique)
-            images[technique], ms[technique] = _render(judged, technique, truth)
+            images[technique], ms[technique] = _render(compared, technique, reference)
         name = subject.renderer.device.adapter.name
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
-    title += (
-        f", {skin.direction} skin, profile by {'photons' if subject.profile.from_photons else 'diffusion'}"
-    )
-    made = Comparison(title, name, truth, against, (), images)
-    return replace(made, rows=tuple(_comparison_row(made, technique, ms[technique]) for technique in techniques))
+    model_name = "photons" if subject.profile.from_photons else "diffusion"
+    title += f", {skin.direction} skin, profile by {model_name}"
+    comparison = Comparison(title, name, reference, against, (), images)
+    rows = tuple(_comparison_row(comparison, technique, ms[technique]) for technique in techniques)
+    return replace(comparison, rows=rows)
 
 
 @contextmanager
@@ -129,14 +130,14 @@ def comparison_subject(
     adapter: str,
     model: ModelName | None = None,
 ) -> Iterator[ComparisonSubject]:
-    """Provide the subject of a comparison within the context; arguments as of `compare`."""
-    body = media()[medium].with_eta(1.0)
-    with medium_scene(head, light, region, body, model) as (scene, profile):
-        yield ComparisonSubject(Renderer(adapter), scene, profile, body, settings)
+    """Provide the subject of a comparison for a context; parameters as in `compare`."""
+    index_matched = media()[medium].with_eta(1.0)
+    with medium_scene(head, light, region, index_matched, model) as (scene, profile):
+        yield ComparisonSubject(Renderer(adapter), scene, profile, index_matched, settings)
 
 
 def check_names(against: str, light: str, region: str, medium: str) -> None:
-    """Raises DermisError for unknown names; cheap, so call it before long work."""
+    """Raise DermisError for unknown names, before any long computation."""
     choices: dict[str, tuple[str, Collection[str]]] = {
         "against": (against, REFERENCES),
         "light": (light, LIGHTS),
@@ -148,33 +149,33 @@ def check_names(against: str, light: str, region: str, medium: str) -> None:
             refuse(f"--{option}", f"one of {', '.join(known)}", f"got {chosen!r}", "Choose one of them")
 
 
-def _render(subject: ComparisonSubject, technique: str, truth: ReferenceImage) -> tuple[Floats, float]:
-    """Linear radiance of a technique, and the device time of its frame at four samples a pixel [ms]."""
-    without: dict[str, object] = {} if truth.through else {"transmission": "none"}
-    without |= {} if truth.between else {"interreflection": False}
-    chosen = subject.settings.model_dump() | {"technique": technique} | without
-    drawn = subject.renderer.draw(subject.scene, Settings(**(chosen | {"samples": truth.subpixels})))
+def _render(subject: ComparisonSubject, technique: str, reference: ReferenceImage) -> tuple[Floats, float]:
+    """Return the linear radiance of a technique, and the device time of its frame at 4 samples [ms]."""
+    disabled: dict[str, object] = {} if reference.has_translucency else {"transmission": "none"}
+    disabled |= {} if reference.has_interreflection else {"interreflection": False}
+    values = subject.settings.model_dump() | {"technique": technique} | disabled
+    drawn = subject.renderer.draw(subject.scene, Settings(**(values | {"samples": reference.samples})))
     image = drawn.linear().astype(np.float64)
-    timed = subject.renderer.draw_warm(subject.scene, Settings(**(chosen | {"samples": 4})))
+    timed = subject.renderer.draw_warm(subject.scene, Settings(**(values | {"samples": 4})))
     return image, (timed.gpu_ms or {"total": timed.frame_ms})["total"]
 
 
-def _comparison_row(made: Comparison, technique: str, ms: float) -> ComparisonRow:
+def _comparison_row(comparison: Comparison, technique: str, ms: float) -> ComparisonRow:
     from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 
-    truth, image = made.truth, made.images[technique]
-    error = relative_rmse(image, truth.image, truth.mask, truth.variance)
-    energy = energy_ratio(image, truth.image, truth.mask, truth.variance)
-    perceived = _flip(made.shown(image), made.shown(truth.image), truth.mask)
-    return ComparisonRow(technique, made.against, *error, perceived, *energy, ms)
+    reference, image = comparison.reference, comparison.images[technique]
+    error = relative_rmse(image, reference.image, reference.mask, reference.variance)
+    energy = energy_ratio(image, reference.image, reference.mask, reference.variance)
+    flip_error = _flip(comparison.tone_mapped(image), comparison.tone_mapped(reference.image), reference.mask)
+    return ComparisonRow(technique, comparison.against, *error, flip_error, *energy, ms)
 
 
-def _flip(image: Floats, truth: Floats, mask: NDArray[np.bool_]) -> float | None:
+def _flip(image: Floats, reference: Floats, mask: NDArray[np.bool_]) -> float | None:
     from importlib.util import find_spec
 
     from dermis.apps.truths.metrics import flip
 
-    return flip(image, truth, mask).mean if find_spec("flip_evaluator") else None
+    return flip(image, reference, mask).mean if find_spec("flip_evaluator") else None
 
 
 _REFERENCE_SOURCES = {
@@ -189,7 +190,7 @@ _FLIP_SOURCE = "Andersson2020"
 def comparison_sources(against: str, techniques: Iterable[str]) -> tuple[str, ...]:
     """Return keys of the bibliography, without duplicates.
 
-    against : of `truths.TRUTHS`
+    against : name in `references.REFERENCES`
     """
     keys = [*_REFERENCE_SOURCES[against], _FLIP_SOURCE]
     for technique in techniques:

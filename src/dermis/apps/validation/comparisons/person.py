@@ -1,4 +1,4 @@
-"""The package's human beside the same person path-traced: pictures and figures view by view."""
+"""Views of the package's human, rendered by the frame and by path tracing, with their errors."""
 
 from __future__ import annotations
 
@@ -21,49 +21,47 @@ from dermis.human.expressions import expression
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
-from dermis.scene.camera import PRESETS, Camera, side, three_quarter
-from dermis.scene.camera import cheek as at_cheek
-from dermis.scene.camera import portrait as from_front
+from dermis.scene.camera import PRESETS, Camera, cheek, portrait, side, three_quarter
 from dermis.scene.environment import Environment
 from dermis.scene.lights import Light, PointLight, RectangleLight, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
-_FULL_COVERAGE = 0.999  # share of a pixel
+_FULL_COVERAGE = 0.999  # of a pixel
 _WHITE_PERCENTILE = 98.0
 
 
 @dataclass(frozen=True, eq=False)
 class PersonComparison:
-    """A view of a person by the frame and by path tracing, and how far they are apart.
+    """View of a person by the frame and by path tracing, with the errors of the frame.
 
-    ours, truth : (h, w, 3) linear radiance
-    variance : (h, w, 3) of the truth's noise
-    mask : (h, w) pixels that are judged
-    relrmse, energy : over the mask
-    by_channel : energy of red, green and blue alone
+    ours, reference : (h, w, 3) linear radiance
+    variance : (h, w, 3) variance of the reference's noise
+    mask : (h, w) pixels that are compared
+    relrmse, energy : relative RMSE and energy ratio over the mask
+    energy_by_channel : energy ratio of red, green and blue
     """
 
     name: str
     ours: Floats
-    truth: Floats
+    reference: Floats
     variance: Floats
     mask: NDArray[np.bool_]
     relrmse: Estimate
     energy: Estimate
-    by_channel: tuple[Estimate, ...]
+    energy_by_channel: tuple[Estimate, ...]
     samples: int
     seconds: float
 
     @property
     def exposure(self) -> float:
-        """Factor that makes the truth's bright parts nearly white."""
-        bright = np.percentile(self.truth[self.mask], _WHITE_PERCENTILE)
+        """Return the factor that makes bright parts of the reference nearly white."""
+        bright = np.percentile(self.reference[self.mask], _WHITE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
-    def shown(self, image: Floats) -> NDArray[np.uint8]:
-        """Return (h, w, 3) sRGB bytes at the exposure of both."""
+    def tone_mapped(self, image: Floats) -> NDArray[np.uint8]:
+        """Return (h, w, 3) sRGB bytes at the exposure of the comparison."""
         encoded = encode_srgb(np.clip(self.exposure * image, 0.0, 1.0))
         return np.asarray(np.rint(255 * encoded), np.uint8)
 
@@ -71,7 +69,7 @@ class PersonComparison:
 def compare_person(
     renderer: Renderer,
     head: Head,
-    paint: SkinTextures,
+    textures: SkinTextures,
     name: str,
     *,
     side: int = 256,
@@ -80,32 +78,32 @@ def compare_person(
     use_cache: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> PersonComparison:
-    """Draw a view of a person by the frame and by path tracing.
+    """Render a view of a person by the frame and by path tracing.
 
-    paint : what the frame shows on it, see `paint_of`
-    name : of `VIEWS`
+    textures : as the frame paints them, see `person_textures`
+    name : key of `VIEWS`
     side : of the pictures [pixel]
-    samples : paths through each pixel, more in some views
+    samples : paths per pixel; some views use more
     atlas : side of the frame's atlas [texel]
-    use_cache, progress : as of `path_trace`
+    use_cache, progress : as in `path_trace`
 
-    Raises DermisError for other views, and for heads without eyes of true shape.
+    Raises DermisError for unknown views, and for heads without modelled eyes.
     """
     if name not in VIEWS:
         refuse("view", f"one of {', '.join(VIEWS)}", f"got {name!r}", "Choose one of them")
     settings = Settings(size=(side, side), atlas=atlas, samples=4)
-    scene, wanted = view_scene(head, VIEWS[name]), round(samples * VIEWS[name].times)
-    truth = trace_view(renderer, scene, paint, settings.size, wanted, use_cache, progress)
-    mask = truth.mask > _FULL_COVERAGE
+    scene, sample_count = view_scene(head, VIEWS[name]), round(samples * VIEWS[name].sample_factor)
+    reference = trace_view(renderer, scene, textures, settings.size, sample_count, use_cache, progress)
+    mask = reference.mask > _FULL_COVERAGE
     check_visible(mask)
-    return comparison_of(name, render_frame(renderer, scene, settings), truth, mask)
+    return comparison_of(name, render_frame(renderer, scene, settings), reference, mask)
 
 
 def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
-    """Return (h, w, 3) linear radiance by the frame, drawn twice as large and averaged.
+    """Return (h, w, 3) linear radiance of the frame, drawn at twice the size and averaged.
 
-    More samples of a pixel would do as well, but on software adapters many samples of many large lights end
-    the shading before its last pixels.
+    More samples per pixel would be equivalent, but on software adapters many samples with many large lights
+    exceed the time limit of a pass.
     """
     width, height = settings.size
     larger = settings.model_copy(update={"size": (2 * width, 2 * height)})
@@ -116,29 +114,39 @@ def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats
 def trace_view(
     renderer: Renderer,
     scene: Scene,
-    paint: SkinTextures,
+    textures: SkinTextures,
     size: tuple[int, int],
     samples: int,
     use_cache: bool = True,
     progress: Callable[[int, int], None] | None = None,
     variant: Variant = "scalar_rgb",
 ) -> PathTraced:
-    """Return a person path-traced; light below skin of the mean colour spreads as far as the profile says.
+    """Return the path-traced image of a person, with the profile's mean lateral offset of exit points.
 
-    variant : as of `path_trace`
+    variant : as in `path_trace`
     """
     profile, colour = renderer.skin_profile(scene.skin), scene.head.maps.mean_colour
-    assert colour is not None  # painted people have one
+    assert colour is not None  # painted maps always have one
     weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
     distance = (weight * width[:, None]).sum(axis=0) / weight.sum(axis=0)
     return path_trace_person(
-        scene, paint, distance, colour, size, samples, variant=variant, use_cache=use_cache, progress=progress
+        scene,
+        textures,
+        distance,
+        colour,
+        size,
+        samples,
+        variant=variant,
+        use_cache=use_cache,
+        progress=progress,
     )
 
 
-def comparison_of(name: str, ours: Floats, truth: PathTraced, mask: NDArray[np.bool_]) -> PersonComparison:
-    """Return both pictures with their figures."""
-    image, variance = truth.image.astype(np.float64), truth.variance.astype(np.float64)
+def comparison_of(
+    name: str, ours: Floats, reference: PathTraced, mask: NDArray[np.bool_]
+) -> PersonComparison:
+    """Return both pictures with the errors of ours."""
+    image, variance = reference.image.astype(np.float64), reference.variance.astype(np.float64)
     return PersonComparison(
         name,
         ours,
@@ -148,60 +156,60 @@ def comparison_of(name: str, ours: Floats, truth: PathTraced, mask: NDArray[np.b
         relative_rmse(ours, image, mask, variance),
         energy_ratio(ours, image, mask, variance),
         tuple(energy_ratio(ours[..., c], image[..., c], mask, variance[..., c]) for c in range(3)),
-        truth.samples,
-        truth.seconds,
+        reference.samples,
+        reference.seconds,
     )
 
 
 _SOFTBOX_MM = 500.0
 EYE_FRAME_MM = 30.0
-"""Height of the pictures of an eye."""
+"""Height of the field of view for pictures of an eye."""
 _LIPS_FRAME_MM, _EAR_FRAME_MM = 72.0, 120.0
 
 
 @dataclass(frozen=True)
 class View:
-    """What is looked at.
+    """View of a head.
 
-    camera : before a head
-    light : a preset's name, or a panorama's
+    camera : function of the head
+    light : name of a light preset or of a panorama
     pose : name of an expression
-    times : by how much more paths it takes than others
+    sample_factor : factor of the number of paths
     """
 
     camera: Callable[[Head], Camera]
     light: str
     pose: str | None = None
-    times: float = 1.0
+    sample_factor: float = 1.0
 
 
 def eye_camera(head: Head) -> Camera:
-    """Return the left eye from the front, 30 mm of it."""
+    """Return a camera in front of the left eye, with a field of view of 30 mm."""
     x, y, z = _eye_position_mm(head)
     return Camera(position=(x, y, z + 500.0), target=(x, y, z), frame_mm=EYE_FRAME_MM)
 
 
 def eye_side_camera(head: Head) -> Camera:
-    """Return the left eye from its outer side."""
+    """Return a camera on the outer side of the left eye."""
     x, y, z = _eye_position_mm(head)
     return Camera(position=(x + 380.0, y, z + 330.0), target=(x, y, z), frame_mm=EYE_FRAME_MM)
 
 
 def lips_camera(head: Head) -> Camera:
-    """Return the mouth from a little to the left."""
+    """Return a camera in front of the mouth, a little to its left."""
     x, y, z = head.frontmost(0.0, _mouth_height_mm(head))
     return Camera(position=(x + 120.0, y, z + 500.0), target=(x, y - 4.0, z), frame_mm=_LIPS_FRAME_MM)
 
 
 def behind_ear_camera(head: Head) -> Camera:
-    """Return the left ear from behind."""
-    usual = PRESETS["ear"](head)
-    x, y, z = usual.target
+    """Return a camera behind the left ear."""
+    preset = PRESETS["ear"](head)
+    x, y, z = preset.target
     return Camera(position=(x + 430.0, y + 10.0, z - 430.0), target=(x - 8.0, y, z), frame_mm=_EAR_FRAME_MM)
 
 
 def _eye_position_mm(head: Head) -> tuple[float, float, float]:
-    """Return the left eye's apex, from the head's centre."""
+    """Return the apex of the left eye, relative to the head's centre."""
     if head.eyes is None:
         return head.frontmost(30.0, 0.0)
     x, y, z = head.control.positions_mm[head.eyes.apex[0]] - np.array(head.centre_mm)
@@ -209,112 +217,107 @@ def _eye_position_mm(head: Head) -> tuple[float, float, float]:
 
 
 def _mouth_height_mm(head: Head) -> float:
-    """Return the height of the mouth: where upper and lower teeth meet, in the mean."""
+    """Return the height of the mouth relative to the head's centre: the mean height of the teeth."""
     names = [material.part for material in head.mesh.materials]
     teeth = [names.index(part) for part in ("upper teeth", "lower teeth") if part in names]
-    chosen = np.unique(head.mesh.triangles[np.isin(head.mesh.material, teeth)])
-    if not len(chosen):
+    vertices = np.unique(head.mesh.triangles[np.isin(head.mesh.material, teeth)])
+    if not len(vertices):
         return -60.0
-    return float(head.mesh.positions[chosen, 1].mean() - head.centre_mm[1])
+    return float(head.mesh.positions[vertices, 1].mean() - head.centre_mm[1])
 
 
 VIEWS: dict[str, View] = {
-    "portrait": View(from_front, "studio"),
+    "portrait": View(portrait, "studio"),
     "three-quarter": View(three_quarter, "studio"),
     "profile": View(side, "studio"),
-    "eye": View(eye_camera, "window", times=2.0),
-    "eye from its side": View(eye_side_camera, "window", times=2.0),
+    "eye": View(eye_camera, "window", sample_factor=2.0),
+    "eye from its side": View(eye_side_camera, "window", sample_factor=2.0),
     "lips and teeth": View(lips_camera, "studio", "smile-with-teeth"),
-    "cheek": View(at_cheek, "studio"),
+    "cheek": View(cheek, "studio"),
     "ear from behind": View(behind_ear_camera, "studio"),
-    "portrait, window": View(from_front, "window"),
-    "portrait, esplanade": View(from_front, "royal_esplanade"),
+    "portrait, window": View(portrait, "window"),
+    "portrait, esplanade": View(portrait, "royal_esplanade"),
     "three-quarter, lebombo": View(three_quarter, "lebombo"),
 }
 PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
 
 
 def view_scene(head: Head, view: View) -> Scene:
-    """Return a head in a view, in lights with a size: no path through a cornea finds a point light."""
-    given = {"camera": view.camera(head), "pose": None if view.pose is None else Pose(expression(view.pose))}
+    """Return the scene of a view, with area lights, since no path through a cornea hits a point light."""
+    pose = None if view.pose is None else Pose(expression(view.pose))
+    camera = view.camera(head)
     if view.light in PANORAMAS:
-        return Scene(head, environment=Environment(name=view.light), **given)  # type: ignore[arg-type]
+        return Scene(head, environment=Environment(name=view.light), camera=camera, pose=pose)
     lights = tuple(as_softbox(light) for light in preset_lights(view.light))
-    return Scene(head, lights=lights, **given)  # type: ignore[arg-type]
+    return Scene(head, lights=lights, camera=camera, pose=pose)
 
 
 def as_softbox(light: Light) -> Light:
-    """Return a light from a point as a softbox in its place; any other as it is."""
+    """Return a point light as a softbox in its position; any other light unchanged."""
     if type(light) is RectangleLight or not isinstance(light, PointLight) or hasattr(light, "radius_mm"):
         return light
-    return RectangleLight(
-        position=light.position,
-        target=light.target,
-        irradiance=light.irradiance,
-        width_mm=_SOFTBOX_MM,
-        height_mm=_SOFTBOX_MM,
-    )
+    shared = light.model_dump(include={"position", "target", "irradiance"})
+    return RectangleLight(**shared, width_mm=_SOFTBOX_MM, height_mm=_SOFTBOX_MM)
 
 
 Mask = NDArray[np.bool_]
-_PUPIL_RADIUS_MM = 4.0  # around the middle: what tells where the pupil is
+_PUPIL_RADIUS_MM = 4.0  # around the middle, for the position of the pupil
 _IRIS_INNER_MM, _IRIS_OUTER_MM = 2.6, 5.0  # ring of the iris, as seen from the front
-_HIGHLIGHT_FACTOR = 1.6  # over the median of the ring: highlights
+_HIGHLIGHT_FACTOR = 1.6  # brightness of highlights over the median of the ring
 
 
 class IrisErrors(NamedTuple):
-    """Of ours against the truth.
+    """Errors of an iris in the frame against the reference.
 
-    right, down : how far the truth's pupil lies from ours [pixel]
-    brightness : mean of ours over that of the truth on the ring of the iris, highlights aside [-]
-    left, beside : the same on the ring's left and right halves
+    right, down : shift of the reference's pupil against ours [pixel]
+    brightness : mean of ours over that of the reference on the ring of the iris, without highlights [-]
+    left_half, right_half : the same ratio on each half of the ring
     """
 
     right: Estimate
     down: Estimate
     brightness: Estimate
-    left: Estimate
-    beside: Estimate
+    left_half: Estimate
+    right_half: Estimate
 
 
 def iris_errors(pair: PersonComparison, frame_mm: float) -> IrisErrors:
-    """Return the figures of a picture with an eye in its middle, seen from the front.
+    """Return the errors of a picture with an eye in its middle, seen from the front.
 
-    frame_mm : height of the picture
+    frame_mm : height of the field of view
     """
-    ours, truth = pair.ours.mean(axis=2), pair.truth.mean(axis=2)
-    noise = pair.variance.mean(axis=2)  # channels may share paths: at most so much
+    ours, reference = pair.ours.mean(axis=2), pair.reference.mean(axis=2)
+    noise = pair.variance.mean(axis=2)  # an upper bound, since channels may share paths
     side = len(ours)
     along = (np.arange(side) + 0.5 - 0.5 * side) * frame_mm / side
     x, y = np.meshgrid(along, along)
-    off = np.hypot(x, y)
-    ring = (off > _IRIS_INNER_MM) & (off < _IRIS_OUTER_MM)
-    dull = _without_highlights(ours, ring) & _without_highlights(truth, ring)
-    right, down = _image_shift(ours, truth, noise, dull & (off < _PUPIL_RADIUS_MM))
-    ring &= dull
-    whole, left, beside = (_brightness_ratio(ours, truth, noise, ring & part) for part in (off > 0, x < 0, x >= 0))
-    return IrisErrors(right, down, whole, left, beside)
+    radius = np.hypot(x, y)
+    ring = (radius > _IRIS_INNER_MM) & (radius < _IRIS_OUTER_MM)
+    dull = _without_highlights(ours, ring) & _without_highlights(reference, ring)
+    right, down = _image_shift(ours, reference, noise, dull & (radius < _PUPIL_RADIUS_MM))
+    masks = (ring & dull & half for half in (radius > 0, x < 0, x >= 0))
+    return IrisErrors(right, down, *(_brightness_ratio(ours, reference, noise, mask) for mask in masks))
 
 
 def _without_highlights(image: Floats, ring: Mask) -> Mask:
-    """Return (h, w) pixels off highlights; a mean over neighbours tells them in a noisy picture."""
+    """Return the mask (h, w) of pixels without highlights, found in a blurred picture because of noise."""
     from scipy.ndimage import gaussian_filter
 
     smooth = gaussian_filter(image, 2.0)
     return np.asarray(smooth < _HIGHLIGHT_FACTOR * np.median(smooth[ring]))
 
 
-def _image_shift(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> tuple[Estimate, Estimate]:
-    """Return the shift of the truth to the right of and below ours, fitted along with its brightness."""
+def _image_shift(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> tuple[Estimate, Estimate]:
+    """Return the shift of the reference to the right of and below ours, fitted with its brightness."""
     down, right = (np.asarray(slope) for slope in np.gradient(ours))
-    columns = np.stack([ours[part], -right[part], -down[part], np.ones(int(part.sum()))], axis=-1)
+    columns = np.stack([ours[region], -right[region], -down[region], np.ones(int(region.sum()))], axis=-1)
     inverse = np.linalg.inv(columns.T @ columns) @ columns.T
-    gain, x, y, _ = (float(one) for one in inverse @ truth[part])
-    error: Floats = np.sqrt((inverse**2 * noise[part]).sum(axis=1)) / abs(gain)
+    gain, x, y, _ = (float(one) for one in inverse @ reference[region])
+    error: Floats = np.sqrt((inverse**2 * noise[region]).sum(axis=1)) / abs(gain)
     return Estimate(x / gain, float(error[1])), Estimate(y / gain, float(error[2]))
 
 
-def _brightness_ratio(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> Estimate:
-    total = float(truth[part].sum())
-    ratio = float(ours[part].sum()) / total
-    return Estimate(ratio, ratio * float(np.sqrt(noise[part].sum())) / total)
+def _brightness_ratio(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> Estimate:
+    total = float(reference[region].sum())
+    ratio = float(ours[region].sum()) / total
+    return Estimate(ratio, ratio * float(np.sqrt(noise[region].sum())) / total)

@@ -1,4 +1,4 @@
-"""What the frame paints on a person, as pictures for a path tracer."""
+"""Textures of a person as the frame paints them, for a path tracer."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float32]
 _TEXTURE_SIDE = 1024
-"""Of the pictures of eyes and teeth [texels]."""
-_PARTS = ("iris", "white", "upper teeth", "lower teeth")  # numbered as in person_paint.wgsl
+"""Side of the textures of eyes and teeth [texels]."""
+_PARTS = ("iris", "white", "upper teeth", "lower teeth")  # in the order of person_textures.wgsl
 _MIN_ROUGHNESS = 0.05
-_DENSITY_RANGE = 5.0, 14.0  # binary logarithms of mm in a unit of uv
+_DENSITY_RANGE = 5.0, 14.0  # binary logarithms of mm per unit of uv
 _SETTINGS = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
 
 
 def person_textures(renderer: Renderer, scene: Scene, side: int = 2048) -> SkinTextures:
-    """Return the colours, roughness and relief that frames of the scene show, at rest.
+    """Return the colours, roughness and relief that frames of the scene show in the rest pose.
 
-    side : of the maps of the skin, a power of two from 256 to 4096 [texels]
+    side : of the skin's maps, a power of two from 256 to 4096 [texels]
 
-    Raises DermisError for heads that are no painted people.
+    Raises DermisError for heads without painted skin.
     """
     head = scene.head
     if not isinstance(head.maps, PaintedMaps) or head.eyes is None:
@@ -51,55 +51,57 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, side: int)
     colour, gloss, rough, height = paint.paint_raw_arrays(device, surface, look, side)
     height = height + _detail_heights_mm(gloss[..., 1], rough[..., 1], gloss[..., 2])
     roughness = np.maximum(scene.skin.smoothing * rough[..., 0], _MIN_ROUGHNESS)
-    reach = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2))
-    iris, white, upper, lower = (_eye_texture(renderer, scene, part, reach) for part in range(len(_PARTS)))
-    return SkinTextures(np.ascontiguousarray(colour[..., :3]), roughness, height, iris, reach, white, (upper, lower))
+    radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2))
+    iris, white, *teeth = (_part_texture(renderer, scene, part, radius) for part in range(len(_PARTS)))
+    colour = np.ascontiguousarray(colour[..., :3])
+    return SkinTextures(colour, roughness, height, iris, radius, white, (teeth[0], teeth[1]))
 
 
 def _detail_heights_mm(pores: Floats, furrows: Floats, density: Floats) -> Floats:
-    """Return (n, n) heights of detail finer than the maps, tiled as skin.wgsl does [mm].
+    """Return (n, n) heights of detail finer than the maps, tiled as in skin.wgsl [mm].
 
-    pores, furrows : how much there is of each
-    density : binary logarithm of the mm in a unit of uv
+    pores, furrows : (n, n) weights of the two kinds of detail
+    density : (n, n) binary logarithm of mm per unit of uv
     """
     side = len(pores)
-    density = np.clip(density, *_DENSITY_RANGE)  # beside the charts it may be anything
+    density = np.clip(density, *_DENSITY_RANGE)  # undefined outside the charts
     level = density - np.log2(TILE_LENGTH_MM)
-    whole = np.floor(level)
-    part = np.clip((level - whole - 0.4) / 0.2, 0.0, 1.0)
-    part = part * part * (3.0 - 2.0 * part)
+    octave = np.floor(level)
+    blend = np.clip((level - octave - 0.4) / 0.2, 0.0, 1.0)
+    blend = blend * blend * (3.0 - 2.0 * blend)
     uv = (np.arange(side, dtype=np.float32) + 0.5) / side
-    found = np.zeros((side, side), np.float32)
-    for further, share in ((0, 1.0 - part), (1, part)):
-        tiles = np.exp2(whole + further)
-        # Heights keep their slopes: a tile that is laid smaller or larger is as much lower or higher.
+    heights = np.zeros((side, side), np.float32)
+    for offset, weight in ((0, 1.0 - blend), (1, blend)):
+        tiles = np.exp2(octave + offset)
+        # Slopes stay the same: the height of a tile is proportional to its length.
         mm = np.exp2(density) / tiles / TILE_LENGTH_MM
-        pits, nets = (
-            _sample_tile(tile - np.median(tile), tiles * uv, tiles * uv[:, None]) for tile in detail_heights_mm()
-        )
-        found += (share * mm * (pores * pits + furrows * nets)).astype(np.float32)
-    return found
+        u, v = tiles * uv, tiles * uv[:, None]
+        pits, nets = (_sample_tile(tile - np.median(tile), u, v) for tile in detail_heights_mm())
+        heights += (weight * mm * (pores * pits + furrows * nets)).astype(np.float32)
+    return heights
 
 
 def _sample_tile(tile: Floats, u: Any, v: Any) -> Floats:
-    """Return a periodic tile at (n, n) places, in units of tiles, interpolated bilinearly."""
+    """Return a periodic tile at (n, n) coordinates, in units of tiles, with bilinear interpolation."""
     from scipy.ndimage import map_coordinates
 
     rows, columns = tile.shape
-    places = np.stack([np.mod(v, 1.0) * rows - 0.5, np.mod(u, 1.0) * columns - 0.5])
-    return np.asarray(map_coordinates(tile, places, order=1, mode="grid-wrap"), np.float32)
+    coordinates = np.stack([np.mod(v, 1.0) * rows - 0.5, np.mod(u, 1.0) * columns - 0.5])
+    return np.asarray(map_coordinates(tile, coordinates, order=1, mode="grid-wrap"), np.float32)
 
 
-def _eye_texture(renderer: Renderer, scene: Scene, part: int, reach: float) -> Floats:
-    """Return the picture (n, n, 3) of eyes or teeth."""
+def _part_texture(renderer: Renderer, scene: Scene, part: int, iris_radius_mm: float) -> Floats:
+    """Return the texture (n, n, 3) of a part of the eyes or teeth."""
     inputs, device = renderer.prepare(scene, _SETTINGS), renderer.device
-    shader = program(device, Path(__file__).parent / "person_paint.wgsl")
-    painted = make_texture(device, (_TEXTURE_SIDE, _TEXTURE_SIDE), "rgba32float")
-    asked = shader.record("Asked", part=part, reach_mm=reach, ball_mm=SCLERA_MM)
+    shader = program(device, Path(__file__).parent / "person_textures.wgsl")
+    texture = make_texture(device, (_TEXTURE_SIDE, _TEXTURE_SIDE), "rgba32float")
+    radii = {"iris_radius_mm": iris_radius_mm, "eyeball_radius_mm": SCLERA_MM}
+    request = shader.record("PartRequest", part=part, **radii)
     eye = inputs.view["eyes"][0]
     for name in ("eumelanin", "pupil_mm", "redness", "seed"):
-        asked["eye"][name] = eye[name]
+        request["eye"][name] = eye[name]
     frame = CommandList(device, timed=False)
-    frame.compute("paint", shader, {**inputs.bindings, "asked": asked, "painted": painted}, (_TEXTURE_SIDE, _TEXTURE_SIDE))
+    bindings = {**inputs.bindings, "part_request": request, "part_texture": texture}
+    frame.compute("paint", shader, bindings, (_TEXTURE_SIDE, _TEXTURE_SIDE))
     frame.submit()
-    return np.ascontiguousarray(download(device, painted)[..., :3], np.float32)
+    return np.ascontiguousarray(download(device, texture)[..., :3], np.float32)

@@ -1,4 +1,4 @@
-"""Images to judge techniques by, each with its own assumptions."""
+"""Reference images for scattering techniques, each with its own assumptions."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_SPACING_MM, _FINEST_MM = 3.0, 0.2  # twice as coarse, a laser's stripe loses 1.5 % of its light
+_SPACING_MM, _FINEST_MM = 3.0, 0.2  # at twice the spacing, a laser's stripe loses 1.5 % of its light
 _HEAT_RADIUS_MM = 10.0
-_MIN_VARIANCE_MM2 = 0.25  # for narrower Gaussians the surface is as good as flat
-_FULL_COVERAGE = 0.999  # share of a pixel
-SAMPLES_PER_PIXEL = 16
+_MIN_VARIANCE_MM2 = 0.25  # for narrower Gaussians the surface is nearly flat
+_FULL_COVERAGE = 0.999  # of a pixel
+PIXEL_SAMPLES = 16
 
 
 @dataclass(frozen=True)
 class ComparisonSubject:
-    """What is judged: a scene, its skin's profile and medium, and the settings of its image."""
+    """Scene to compare, with its skin's profile and medium, and the settings of its image."""
 
     renderer: Renderer
     scene: Scene
@@ -45,119 +45,119 @@ class ComparisonSubject:
 
 @dataclass(frozen=True)
 class ReferenceImage:
-    """An image and how far it may be trusted.
+    """Reference image, its noise and its assumptions.
 
     image, variance : (h, w, 3) radiance and the variance of its noise
-    mask : (h, w) pixels to judge
-    subpixels : samples of each pixel that a technique's image needs for a fair comparison
-    seconds : that it took
-    notes : for the reader
-    through : whether it includes light through thin parts
-    between : whether it includes light from skin to skin through the air
-    direction : of `Skin`, by which light enters and leaves in it
+    mask : (h, w) pixels to compare
+    samples : per pixel, that a technique's image needs for a fair comparison
+    seconds : time that it took
+    notes : for the report
+    has_translucency : whether it includes light through thin parts
+    has_interreflection : whether it includes light from skin to skin through the air
+    direction : angular distribution of its skin, as in `Skin`
     """
 
     image: Floats
     variance: Floats
     mask: NDArray[np.bool_]
-    subpixels: int
+    samples: int
     seconds: float
     notes: tuple[str, ...] = ()
-    through: bool = True
-    between: bool = True
+    has_translucency: bool = True
+    has_interreflection: bool = True
     direction: DirectionName = "lambertian"
 
 
 def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Integrate the same profile of straight-line distance over the surface: shows the error of the map.
+    """Integrate the subject's profile of Euclidean distance over the surface, without an atlas.
 
     samples : ignored
     """
     started = time.perf_counter()
     seen = surface_points(subject.renderer, subject.scene, subject.settings)
-    lit = irradiance_samples(subject)
-    exitance = _euclidean_exitance(hit_positions(subject, seen), lit, subject.profile.weight, subject.profile.variance_mm2)
+    lit, profile = irradiance_samples(subject), subject.profile
+    exitance = _integrated(hit_positions(subject, seen), lit, profile.weight, profile.variance_mm2)
     return _image_of_points(seen, exitance, started, f"{len(lit.positions):,} samples of irradiance")
 
 
 def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Diffuse the same Gaussians along the surface like heat, around the camera's target.
+    """Diffuse the subject's Gaussians along the surface as heat, around the camera's target.
 
     samples : ignored
     """
-    return surface_heat_around(subject, subject.scene.camera.target, _HEAT_RADIUS_MM, irradiance_samples(subject))
+    target = subject.scene.camera.target
+    return surface_heat_around(subject, target, _HEAT_RADIUS_MM, irradiance_samples(subject))
 
 
 def surface_heat_around(
     subject: ComparisonSubject,
-    place: tuple[float, float, float],
+    target_mm: tuple[float, float, float],
     radius_mm: float,
     lit: IrradianceSamples,
-    least_mm2: float = _MIN_VARIANCE_MM2,
+    min_mm2: float = _MIN_VARIANCE_MM2,
 ) -> ReferenceImage:
-    """Diffuse the same Gaussians along the surface like heat, around the visible point nearest to a place.
+    """Diffuse the subject's Gaussians along the surface as heat, around a visible point.
 
-    place : from the head's centre [mm]
-    lit : of the whole head, see `irradiance_samples`
-    least_mm2 : variance below which Gaussians are integrated by straight-line distance
+    target_mm : relative to the head's centre; the nearest visible point is the centre of the patch
+    lit : irradiance on the whole head, see `irradiance_samples`
+    min_mm2 : variance below which Gaussians are integrated by Euclidean distance instead
     """
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface
     from dermis.apps.truths.surface_patch import mesh_patch
 
     started = time.perf_counter()
-    narrow = subject.profile.variance_mm2 < least_mm2
+    narrow = subject.profile.variance_mm2 < min_mm2
     variances, weight = subject.profile.variance_mm2, subject.profile.weight
     seen = surface_points(subject.renderer, subject.scene, subject.settings)
-    places = hit_positions(subject, seen)
-    middle = np.array(place) + subject.scene.head.centre_mm
-    centre = places[np.linalg.norm(places - middle, axis=1).argmin()]
+    points = hit_positions(subject, seen)
+    target = np.array(target_mm) + subject.scene.head.centre_mm
+    centre = points[np.linalg.norm(points - target, axis=1).argmin()]
     patch = mesh_patch(subject.scene.head.mesh, centre, radius_mm, variances[~narrow])
-    entered = _incident_irradiance(subject, *patch.vertex_barycentrics())
-    levels = diffuse_on_surface(patch.positions, patch.triangles, entered, variances[~narrow])
+    irradiance = _irradiance(subject, *patch.vertex_barycentrics())
+    levels = diffuse_on_surface(patch.positions, patch.triangles, irradiance, variances[~narrow])
     fine, weights = patch.locate(seen.triangle, seen.barycentric)
-    on = (fine >= 0) & patch.contains(places)
-    spread = np.einsum("knc,kc->nc", levels, weight[~narrow])
-    exitance = patch.interpolate(spread, fine[on], weights[on])
-    exitance += _euclidean_exitance(places[on], lit, weight[narrow], variances[narrow])
+    inside = (fine >= 0) & patch.contains(points)
+    diffused = np.einsum("knc,kc->nc", levels, weight[~narrow])
+    exitance = patch.interpolate(diffused, fine[inside], weights[inside])
+    exitance += _integrated(points[inside], lit, weight[narrow], variances[narrow])
     mask = seen.mask.copy()
-    mask[seen.mask] = on
-    judged = SurfacePoints(mask, seen.triangle[on], seen.barycentric[on])
-    straight = f"{narrow.sum()} Gaussians under {least_mm2:g} mm2 by straight lines"
-    made = _image_of_points(judged, exitance, started, f"{radius_mm:g} mm around the middle; {straight}")
-    return replace(made, through=False)
+    mask[seen.mask] = inside
+    compared = SurfacePoints(mask, seen.triangle[inside], seen.barycentric[inside])
+    note = f"{radius_mm:g} mm around the middle; "
+    note += f"{narrow.sum()} Gaussians under {min_mm2:g} mm2 by straight lines"
+    return replace(_image_of_points(compared, exitance, started, note), has_translucency=False)
 
 
 def irradiance_samples(subject: ComparisonSubject) -> IrradianceSamples:
-    """Return the light that enters all of the skin, sampled as finely as the truths need it."""
+    """Return samples of the irradiance on all of the skin, as fine as the references need."""
     from dermis.apps.truths.irradiance_samples import MeshPoints, sample_irradiance
 
-    def light(places: MeshPoints) -> Floats:
-        return _incident_irradiance(subject, places.face, places.barycentric)
+    def light(points: MeshPoints) -> Floats:
+        return _irradiance(subject, points.face, points.barycentric)
 
     return sample_irradiance(subject.scene.head.mesh, light, _SPACING_MM, _FINEST_MM)
 
 
 def path_traced_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Trace paths through the medium itself, free of errors of the profile and of diffuse surfaces.
+    """Path-trace the medium itself, without errors of a profile or of diffuse surfaces.
 
-    samples : paths through each pixel
+    samples : paths per pixel
     """
     from dermis.apps.truths.path_traced import path_trace
 
-    made = path_trace(subject.scene, subject.medium, samples, subject.settings)
-    truth = _reference_image(made, f"{made.samples} paths a pixel")
-    return replace(truth, direction="half-space")
+    traced = path_trace(subject.scene, subject.medium, samples, subject.settings)
+    return replace(_reference_image(traced, f"{traced.samples} paths a pixel"), direction="half-space")
 
 
 def cycles_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Render by Cycles with random walks through the medium: a peer, not the truth.
+    """Render by Cycles with random walks through the medium, as another renderer to compare with.
 
-    samples : paths through each pixel
+    samples : paths per pixel
     """
     from dermis.apps.truths.cycles import cycles_render
 
-    made = cycles_render(subject.scene, subject.medium, samples, subject.settings)
-    return _reference_image(made, f"{made.samples} paths a pixel, random walk")
+    traced = cycles_render(subject.scene, subject.medium, samples, subject.settings)
+    return _reference_image(traced, f"{traced.samples} paths a pixel, random walk")
 
 
 REFERENCES: dict[str, Callable[[ComparisonSubject, int], ReferenceImage]] = {
@@ -168,17 +168,18 @@ REFERENCES: dict[str, Callable[[ComparisonSubject, int], ReferenceImage]] = {
 }
 
 
-def _reference_image(made: PathTraced, *notes: str) -> ReferenceImage:
-    image, variance = made.image.astype(np.float64), made.variance.astype(np.float64)
-    return ReferenceImage(image, variance, made.mask > _FULL_COVERAGE, SAMPLES_PER_PIXEL, made.seconds, (*notes, *made.notes))
+def _reference_image(traced: PathTraced, *notes: str) -> ReferenceImage:
+    image, variance = traced.image.astype(np.float64), traced.variance.astype(np.float64)
+    mask, notes = traced.mask > _FULL_COVERAGE, (*notes, *traced.notes)
+    return ReferenceImage(image, variance, mask, PIXEL_SAMPLES, traced.seconds, notes)
 
 
-def _incident_irradiance(subject: ComparisonSubject, triangle: NDArray[np.int64], barycentric: Floats) -> Floats:
+def _irradiance(subject: ComparisonSubject, triangle: NDArray[np.int64], barycentric: Floats) -> Floats:
     return irradiance_at(subject.renderer, subject.scene, subject.settings, triangle, barycentric)
 
 
-def _euclidean_exitance(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
-    """Return (n, 3) radiant exitance at points by Gaussians of the straight-line distance."""
+def _integrated(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
+    """Return (n, 3) radiant exitance at points by Gaussians of the Euclidean distance."""
     from dermis.apps.truths.radial_table import GaussianSum as Profile
     from dermis.apps.truths.surface_integral import integrate_exitance
 
@@ -188,7 +189,7 @@ def _euclidean_exitance(points: Floats, lit: IrradianceSamples, weight: Floats, 
 
 
 def hit_positions(subject: ComparisonSubject, seen: SurfacePoints) -> Floats:
-    """Return (n, 3) where rays through the pixels' centres meet the head [mm]."""
+    """Return (n, 3) positions where rays through the pixels' centres meet the head [mm]."""
     mesh = subject.scene.head.mesh
     corners = mesh.positions[mesh.triangles[seen.triangle]].astype(np.float64)
     return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))
@@ -197,13 +198,12 @@ def hit_positions(subject: ComparisonSubject, seen: SurfacePoints) -> Floats:
 def _image_of_points(seen: SurfacePoints, exitance: Floats, started: float, note: str) -> ReferenceImage:
     image = np.zeros((*seen.mask.shape, 3))
     image[seen.mask] = exitance / np.pi
-    return ReferenceImage(
-        image, np.zeros_like(image), seen.mask, 1, time.perf_counter() - started, (note,), between=False
-    )
+    seconds, noise = time.perf_counter() - started, np.zeros_like(image)
+    return ReferenceImage(image, noise, seen.mask, 1, seconds, (note,), has_interreflection=False)
 
 
 def check_visible(mask: NDArray[np.bool_]) -> None:
-    """Raises DermisError when there is no pixel to judge."""
+    """Raise DermisError when there is no pixel to compare."""
     if not mask.any():
         expected = "a pixel that shows nothing but the head"
         refuse("the picture", expected, "there is none", "Choose a larger size or another region")

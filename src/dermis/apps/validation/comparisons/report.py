@@ -1,4 +1,4 @@
-"""A comparison as a self-contained HTML file."""
+"""Report of a comparison as a self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ Floats = NDArray[np.float64]
 _COLUMNS = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms a frame")
 
 
-def write_report(path: Path, made: Comparison) -> None:
-    """Write pictures, differences and figures; the file is complete or not there.
+def write_report(path: Path, comparison: Comparison) -> None:
+    """Write pictures, differences and errors to an HTML file, atomically.
 
     Raises DermisError when it cannot be written.
     """
     text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
-    truth = _figure("the truth", made.shown(made.truth.image))
-    figures = [_figures(made, row) for row in made.rows]
+    reference = _figure("the truth", comparison.tone_mapped(comparison.reference.image))
+    figures = [_figures(comparison, row) for row in comparison.rows]
     page = text.substitute(
-        title=html.escape(made.title),
-        against=html.escape(made.against),
-        seconds=f"{made.truth.seconds:.0f}",
-        notes=html.escape("; ".join(made.truth.notes)),
-        adapter=html.escape(made.adapter),
-        table=_table(made.rows),
-        keys=" ".join(comparison_sources(made.against, made.images)),
-        figures="\n".join([truth, *figures]),
+        title=html.escape(comparison.title),
+        against=html.escape(comparison.against),
+        seconds=f"{comparison.reference.seconds:.0f}",
+        notes=html.escape("; ".join(comparison.reference.notes)),
+        adapter=html.escape(comparison.adapter),
+        table=_table(comparison.rows),
+        keys=" ".join(comparison_sources(comparison.against, comparison.images)),
+        figures="\n".join([reference, *figures]),
     )
     with atomic_file(path) as trial:
         trial.write_text(page, encoding="utf-8")
 
 
 def cells(row: ComparisonRow) -> tuple[str, ...]:
-    """Return a row's figures as text, with standard errors where there are any."""
+    """Return the figures of a row as text, with standard errors where there are any."""
     flip = "-" if row.flip is None else f"{row.flip:.3f}"
     return (
         row.technique,
@@ -64,13 +64,13 @@ def _table(rows: tuple[ComparisonRow, ...]) -> str:
     return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 
-def _figures(made: Comparison, row: ComparisonRow) -> str:
-    image, truth = made.images[row.technique], made.truth
+def _figures(comparison: Comparison, row: ComparisonRow) -> str:
+    image, reference = comparison.images[row.technique], comparison.reference
     difference = signed_difference(
-        np.maximum(made.exposure * image, 0.0), np.maximum(made.exposure * truth.image, 0.0)
+        np.maximum(comparison.exposure * image, 0.0), np.maximum(comparison.exposure * reference.image, 0.0)
     )
-    difference = np.where(truth.mask[..., None], difference, MID_GREY)
-    pictures = {row.technique: made.shown(image), f"{row.technique}: difference": difference}
+    difference = np.where(reference.mask[..., None], difference, MID_GREY)
+    pictures = {row.technique: comparison.tone_mapped(image), f"{row.technique}: difference": difference}
     return "\n".join(_figure(caption, picture) for caption, picture in pictures.items())
 
 

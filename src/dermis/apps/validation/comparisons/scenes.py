@@ -1,4 +1,4 @@
-"""The scenes on which techniques are judged: lit from the front, through the ear, and by a laser's stripe."""
+"""Scenes of the comparisons: lit from the front, through the ear, and by a laser's stripe."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
 
 _WHITE = (3.14, 3.14, 3.14)
-_NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, from the head's centre [mm]
-_EAR_RANGE_MM = 60.0  # above and below the centre; farther below, shoulders are wider
+_NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, relative to the head's centre [mm]
+_EAR_RANGE_MM = 60.0  # above and below the centre, where the head is widest at the ears
 
 
 def _front_lights(head: Head) -> tuple[Light, ...]:
@@ -34,27 +34,31 @@ def _front_lights(head: Head) -> tuple[Light, ...]:
 
 
 def _back_lights(head: Head) -> tuple[Light, ...]:
-    """Return a lamp behind the left ear."""
+    """Return a light behind the left ear."""
     ear = _ear_position(head)
     return (SpotLight(position=(ear[0] + 150.0, 60.0, -600.0), target=ear, irradiance=(12.0, 12.0, 12.0)),)
 
 
 def _laser_lights(head: Head) -> tuple[Light, ...]:
-    """Return a vertical sheet of light over the cheek and the ear's front edge."""
+    """Return a vertical sheet of light across the cheek and the front edge of the ear."""
     ear = _ear_position(head)
-    place = (ear[0] - 12.0, ear[1], ear[2])
-    return (StripeLight(direction=(-0.55, 0.0, -1.0), position=place, irradiance=(30.0, 30.0, 30.0)),)
+    stripe_centre = (ear[0] - 12.0, ear[1], ear[2])
+    return (StripeLight(direction=(-0.55, 0.0, -1.0), position=stripe_centre, irradiance=(30.0, 30.0, 30.0)),)
 
 
-LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {"front": _front_lights, "back": _back_lights, "laser": _laser_lights}
+LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {
+    "front": _front_lights,
+    "back": _back_lights,
+    "laser": _laser_lights,
+}
 
 
 def _ear_position(head: Head) -> tuple[float, float, float]:
-    """Return the outermost point of the head's left half at the height of its ears."""
-    places = head.mesh.positions - head.centre_mm
-    off = np.abs(places[:, 1])
-    beside = places[off <= max(_EAR_RANGE_MM, float(off.min()))]
-    x, y, z = (float(c) for c in beside[beside[:, 0].argmax()])
+    """Return the leftmost point of the head at the height of its ears, relative to its centre [mm]."""
+    points = head.mesh.positions - head.centre_mm
+    height_offset = np.abs(points[:, 1])
+    at_ear_height = points[height_offset <= max(_EAR_RANGE_MM, float(height_offset.min()))]
+    x, y, z = (float(c) for c in at_ear_height[at_ear_height[:, 0].argmax()])
     return (x, y, z)
 
 
@@ -82,22 +86,22 @@ REGIONS: dict[str, Callable[[Head], Camera]] = {
 
 
 def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene:
-    """Return a head without maps or surface reflection, its skin in the profile's own colour.
+    """Return a scene of a head without maps or surface reflection, in the profile's own colour.
 
-    light, region : of LIGHTS and REGIONS
+    light, region : names in LIGHTS and REGIONS
     profile : name or file
     """
-    bare = Head(head.name, head.mesh, Maps(), head.attribution)
+    plain_head = Head(head.name, head.mesh, Maps(), head.attribution)
     skin = Skin(profile=profile, albedo="profile", specular="none", energy="none", direction="lambertian")
-    return Scene(bare, lights=LIGHTS[light](head), camera=REGIONS[region](head), skin=skin)
+    return Scene(plain_head, lights=LIGHTS[light](head), camera=REGIONS[region](head), skin=skin)
 
 
 @contextmanager
 def medium_scene(
-    head: Head, light: str, region: str, body: Medium, model: ModelName | None = None
+    head: Head, light: str, region: str, medium: Medium, model: ModelName | None = None
 ) -> Iterator[tuple[Scene, GaussianSum]]:
-    """Provide `comparison_scene` with a medium's profile, a file within the context, and the profile."""
-    profile = medium_gaussians(body, model)
+    """Provide `comparison_scene` with a medium's profile, which is a file during the context."""
+    profile = medium_gaussians(medium, model)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "profile.toml"
         write_profile(file, profile, {"model": COUNTED_MODEL if profile.from_photons else "layered"})
@@ -105,22 +109,22 @@ def medium_scene(
 
 
 def default_region(light: str) -> str:
-    """Return the region in which a light's effect is largest."""
+    """Return the region in which the effect of a light is largest."""
     return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")
 
 
 ModelName = Literal["counted", "layered", "montecarlo"]
-"""By tables of photons, by layered diffusion, or by photons one by one."""
-_PHOTONS = 2_000_000  # a channel
+"""Model of a profile: table of Monte Carlo profiles, layered diffusion, or Monte Carlo."""
+_PHOTONS = 2_000_000  # per channel
 
 
-def medium_gaussians(body: Medium, model: ModelName | None = None) -> GaussianSum:
+def medium_gaussians(medium: Medium, model: ModelName | None = None) -> GaussianSum:
     """Return six Gaussians for a medium.
 
-    model : by default tables of photons where there are some, else layered diffusion
+    model : by default the tables of Monte Carlo profiles if they have the medium, else layered diffusion
 
     Raises DermisError for a medium that has no tables.
     """
     if model == "montecarlo":
-        return fit_radial(monte_carlo_profile(body, photons=_PHOTONS), body.name)
-    return fit_radial(Tissue(body).profile(model), body.name)
+        return fit_radial(monte_carlo_profile(medium, photons=_PHOTONS), medium.name)
+    return fit_radial(Tissue(medium).profile(model), medium.name)

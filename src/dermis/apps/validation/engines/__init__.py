@@ -1,1 +1,1 @@
-"""Exported skins and heads measured in other programs, for docs/engines.md."""
+"""Measured errors of exported skins and heads in other programs."""

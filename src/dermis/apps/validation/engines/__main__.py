@@ -1,4 +1,4 @@
-"""Measure in other programs how wrong exported skins and heads are there, and write docs/engines.md."""
+"""Commands that measure exported skins and heads in other programs and write docs/engines.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Skin and heads exported to Blender, measured in Cycles itself."""
+"""Exported skin and heads in Blender, rendered by Cycles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dermis.apps.export.fitting import curve_error, fit_burley_width
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
-from dermis.apps.validation.engines.heads import TEXELS, Floats, compare_pictures, render_ours, render_cycles
+from dermis.apps.validation.engines.heads import TEXELS, Floats, compare_pictures, render_cycles, render_ours
 from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, read_results, write_results
 from dermis.base.console import print_lines
 from dermis.images.colour import encode_srgb
@@ -28,18 +28,18 @@ SCRIPT = Path(__file__).with_name("blender_script.py")
 Part = Literal["edges", "heads", "picture"]
 SKINS = "skin1", "skin2", "dj3"
 METHODS = "random-walk-skin", "random-walk", "burley"
-BIN_COUNT, COLUMNS_PER_BIN, ROW_COUNT = 12, 8, 8  # from -6 d to 6 d; columns of pixels in each, and rows of them
+BINS, BIN_COLUMNS, ROWS = 12, 8, 8  # bins from -6 d to 6 d, pixels across a bin, and rows of pixels
 SAMPLES_BY_METHOD = {"burley": 512}
 DEFAULT_SAMPLES = 1024
-SEED_COUNT = 2  # pictures of each channel, whose difference tells the noise
-HEAD_SIDE, HEAD_SAMPLES, HEAD_SEED_COUNT = 192, 32, 2  # of heads
+SEEDS = 2  # pictures per channel, whose difference gives the noise
+HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS = 192, 32, 2
 PICTURE_SIDE, PICTURE_SAMPLES = 320, 48
 METHODS_BY_VERSION = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
 TASK = BlenderTask("Cycles", "to render a half-lit plane", "See the message of Blender in brackets")
 
 
 def blender(python_45: Path, python_52: Path, *parts: Part) -> None:
-    """Measure exported skin in Cycles; writes benchmarks/results/engines_blender.json, in half an hour.
+    """Measure exported skin in Cycles and write benchmarks/results/engines_blender.json, in half an hour.
 
     Parameters
     ----------
@@ -48,24 +48,24 @@ def blender(python_45: Path, python_52: Path, *parts: Part) -> None:
     python_52:
         A Python with the module bpy of Blender 5.2.
     parts:
-        Measured alone, while the others stay as they were written [all].
+        Parts to measure; results of the others stay as they are [all].
     """
     pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
     parts = parts or get_args(Part)
-    found: JsonObject = read_results(FIGURES) if FIGURES.exists() else {}
-    found["columns_in_d"] = column_positions().reshape(BIN_COUNT, COLUMNS_PER_BIN).mean(axis=1).tolist()
+    results: JsonObject = read_results(FIGURES) if FIGURES.exists() else {}
+    results["columns_in_d"] = column_positions().reshape(BINS, BIN_COLUMNS).mean(axis=1).tolist()
     if "edges" in parts:
-        found["edges"] = list(measure_edges(pythons))
-        write_results(FIGURES, found)
+        results["edges"] = list(measure_edges(pythons))
+        write_results(FIGURES, results)
     if "heads" in parts:
-        found["heads"] = list(measure_heads(pythons))
-        write_results(FIGURES, found)
+        results["heads"] = list(measure_heads(pythons))
+        write_results(FIGURES, results)
     if "picture" in parts:
         write_picture(pythons)
 
 
 def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield the edge response of each skin by each method in each version."""
+    """Yield the edge response of each skin with each method in each version."""
     for version, python in pythons.items():
         for method in METHODS:
             for name in SKINS:
@@ -74,59 +74,65 @@ def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
 
 
 def column_positions() -> Floats:
-    """Return (BINS EACH,) distances of columns of pixels from the edge, in d."""
-    return 12.0 * (np.arange(BIN_COUNT * COLUMNS_PER_BIN) + 0.5) / (BIN_COUNT * COLUMNS_PER_BIN) - 6.0
+    """Return distances of all columns of pixels from the edge, in units of d."""
+    return 12.0 * (np.arange(BINS * BIN_COLUMNS) + 0.5) / (BINS * BIN_COLUMNS) - 6.0
 
 
 def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObject:
-    """Return the figures of one skin: measured, predicted and true."""
+    """Return measured, predicted and true edge responses of one skin."""
     subject, target = load_subject(name), TARGET.with_variant(method)
     rows, d = target.parameters(subject, version), fit_burley_width(subject.curve)
     shown = target.predicted_curve(rows, subject, version)
-    typed = target.predicted_curve(target.naive_parameters(subject, version), subject, version)
+    naive = target.predicted_curve(target.naive_parameters(subject, version), subject, version)
     samples = SAMPLES_BY_METHOD.get(method, DEFAULT_SAMPLES)
     passes = [
-        {"channel": c, "width_m": 12e-3 * d[c], "size": [BIN_COUNT * COLUMNS_PER_BIN, ROW_COUNT], "samples": samples, "seed": k}
-        for k in range(SEED_COUNT)
+        {
+            "channel": c,
+            "width_m": 12e-3 * d[c],
+            "size": [BINS * BIN_COLUMNS, ROWS],
+            "samples": samples,
+            "seed": k,
+        }
+        for k in range(SEEDS)
         for c in range(3)
     ]
-    with TemporaryDirectory() as place:
-        folder = Path(place)
+    with TemporaryDirectory() as folder_name:
+        folder = Path(folder_name)
         target.write(subject, rows, folder, version)
         (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
         run_blender(python, SCRIPT, [str(folder)], 3600.0, TASK)
-        done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
-    seen = np.array([[done["columns"][3 * k + c] for c in range(3)] for k in range(SEED_COUNT)])[..., 0]
-    means = seen.reshape(SEED_COUNT, 3, BIN_COUNT, COLUMNS_PER_BIN).mean(axis=-1)
-    wanted, true = (binned_response(curve, d) for curve in (shown, subject.curve))
-    lit = (means.mean(axis=0) * wanted).sum(axis=1) / (wanted**2).sum(axis=1)
-    measured = means.mean(axis=0) / lit[:, None]
-    noise = np.abs(means[0] - means[1]) / (2.0 * lit[:, None])
+        output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
+    columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEEDS)])[..., 0]
+    means = columns.reshape(SEEDS, 3, BINS, BIN_COLUMNS).mean(axis=-1)
+    predicted, true = (binned_response(curve, d) for curve in (shown, subject.curve))
+    radiance = (means.mean(axis=0) * predicted).sum(axis=1) / (predicted**2).sum(axis=1)
+    measured = means.mean(axis=0) / radiance[:, None]
+    noise = np.abs(means[0] - means[1]) / (2.0 * radiance[:, None])
     return {
-        "version": done["version"],
+        "version": output["version"],
         "method": method,
         "skin": name,
-        "samples": SEED_COUNT * COLUMNS_PER_BIN * ROW_COUNT * samples,
+        "samples": SEEDS * BIN_COLUMNS * ROWS * samples,
         "d_mm": d.round(4).tolist(),
         "measured": measured.round(4).tolist(),
-        "predicted": wanted.round(4).tolist(),
-        "against_predicted": np.abs(measured - wanted).max(axis=1).round(4).tolist(),
+        "predicted": predicted.round(4).tolist(),
+        "against_predicted": np.abs(measured - predicted).max(axis=1).round(4).tolist(),
         "against_true": np.abs(measured - true).max(axis=1).round(4).tolist(),
         "noise": np.sqrt((noise**2).mean(axis=1)).round(4).tolist(),
-        "energy": (np.pi * lit / subject.curve.energy).round(4).tolist(),
-        "typed_in": curve_error(subject.curve, typed).edge.round(4).tolist(),
+        "energy": (np.pi * radiance / subject.curve.energy).round(4).tolist(),
+        "typed_in": curve_error(subject.curve, naive).edge.round(4).tolist(),
         "predicted_energy": (shown.energy / subject.curve.energy).round(4).tolist(),
     }
 
 
 def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
-    """Return the (3, BINS) edge response of a curve, averaged as the columns are."""
-    each = [curve.edge_response(column_positions() * d_mm[c])[:, c].reshape(BIN_COUNT, COLUMNS_PER_BIN).mean(axis=1) for c in range(3)]
-    return np.array(each)
+    """Return the (3, BINS) edge response of a curve, averaged over the columns of each bin."""
+    columns = [curve.edge_response(column_positions() * d_mm[c])[:, c] for c in range(3)]
+    return np.asarray(np.array(columns).reshape(3, BINS, BIN_COLUMNS).mean(axis=-1))
 
 
 def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield outlines and colours of the head without hair, which both draw differently, by each method."""
+    """Yield outlines and colours of the head without hair, by version and method."""
     subject = load_subject("human").with_painted_maps(TEXELS, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)
@@ -134,23 +140,21 @@ def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
     ours = render_ours(bald, HEAD_SIDE)
     for version, python in pythons.items():
         for method in METHODS_BY_VERSION[version]:
-            pictures = render_cycles(bald, method, version, python, HEAD_SIDE, HEAD_SAMPLES, HEAD_SEED_COUNT)
-            found = {
-                "version": version,
-                "method": method,
-                "samples": HEAD_SEED_COUNT * HEAD_SAMPLES,
-                **compare_pictures(ours, np.stack(pictures)),
-            }
-            print_lines(str(found))
-            yield found
+            pictures = render_cycles(bald, method, version, python, HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS)
+            results = {"version": version, "method": method, "samples": HEAD_SEEDS * HEAD_SAMPLES}
+            results |= compare_pictures(ours, np.stack(pictures))
+            print_lines(str(results))
+            yield results
 
 
 def write_picture(pythons: dict[str, Path]) -> None:
-    """Write a picture of ours beside Cycles of each version, with hair."""
+    """Write a picture of our head beside those of Cycles, with hair."""
     subject = load_subject("human").with_painted_maps(TEXELS, "auto")
-    seen = [render_ours(subject, PICTURE_SIDE)]
+    columns = [render_ours(subject, PICTURE_SIDE)]
     for version, python in pythons.items():
-        seen += render_cycles(subject, METHODS_BY_VERSION[version][0], version, python, PICTURE_SIDE, PICTURE_SAMPLES, 1)
-    shown = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in seen]
+        columns += render_cycles(
+            subject, METHODS_BY_VERSION[version][0], version, python, PICTURE_SIDE, PICTURE_SAMPLES, 1
+        )
+    shown = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in columns]
     levels = encode_srgb(np.clip(np.concatenate(shown, axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=88)

@@ -1,7 +1,7 @@
-"""A half-lit plane of exported skin in Cycles. Blender's Python runs it by its path: THIS_FILE FOLDER.
+"""Script that renders a half-lit plane of exported skin in Cycles, run by Blender's Python: SCRIPT FOLDER.
 
-FOLDER holds skin.py, as `dermis export --to blender` writes it, and passes.json. The script adds done.json:
-Blender's version and, for each pass, the radiance of each column of pixels, lit from x = 0 on.
+FOLDER contains skin.py, as written by `dermis export --to blender`, and passes.json. The script adds
+done.json: Blender's version and, for each pass, the radiance of each column of pixels, lit for x > 0.
 """
 
 from __future__ import annotations
@@ -15,23 +15,24 @@ from typing import Any
 
 import numpy as np
 
-with suppress(ImportError):  # which only Blender's Python has
+with suppress(ImportError):  # only Blender's Python has these modules
     import bpy  # type: ignore[import-not-found,unused-ignore]
     from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
 
-SIDE_M, CARD_HEIGHT_M = 1.0, 0.002  # of the plane, and above it the card that shades half of it
+SIDE_M, CARD_HEIGHT_M = 1.0, 0.002  # half side of the plane, and height of the card that shades half of it
 
 
 def main(folder: Path) -> None:
-    found = importlib.util.spec_from_file_location("skin", folder / "skin.py")
-    skin = importlib.util.module_from_spec(found)  # type: ignore[arg-type]
-    found.loader.exec_module(skin)  # type: ignore[union-attr]
+    """Render the passes in a folder and write their results there."""
+    spec = importlib.util.spec_from_file_location("skin", folder / "skin.py")
+    skin = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
+    spec.loader.exec_module(skin)  # type: ignore[union-attr]
     skin.check_version()
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module="cycles")
     material = skin.make_skin()
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Specular IOR Level"].default_value = 0.0  # the edge below the surface alone
+    shader.inputs["Specular IOR Level"].default_value = 0.0  # light below the surface only
     rectangle(skin, material, -SIDE_M, SIDE_M, 0.0)
     card = rectangle(skin, black_material(), -SIDE_M, 0.0, CARD_HEIGHT_M)
     card.visible_camera = False
@@ -41,27 +42,28 @@ def main(folder: Path) -> None:
     camera = bpy.data.cameras.new("camera")
     camera.type, camera.sensor_fit = "ORTHO", "HORIZONTAL"
     camera.clip_start = 1e-4
-    placed = skin.add_object("camera", camera)
-    placed.matrix_world = Matrix.Translation((0.0, 0.0, 0.1))
+    camera_object = skin.add_object("camera", camera)
+    camera_object.matrix_world = Matrix.Translation((0.0, 0.0, 0.1))
     scene = bpy.context.scene
-    scene.camera = placed
+    scene.camera = camera_object
     skin.set_render(scene)
-    asked = json.loads((folder / "passes.json").read_text(encoding="utf-8"))
+    passes = json.loads((folder / "passes.json").read_text(encoding="utf-8"))
     columns = []
-    for k, one in enumerate(asked):
-        set_channel(shader, skin.DESCRIBED, one.pop("channel"))
+    for k, one in enumerate(passes):
+        set_channel(shader, skin.EXPORT, one.pop("channel"))
         columns.append(column_radiance(skin, camera, folder / f"{k}.exr", **one))
-    done = {"version": bpy.app.version_string, "columns": columns}
-    (folder / "done.json").write_text(json.dumps(done), encoding="utf-8")
+    report = {"version": bpy.app.version_string, "columns": columns}
+    (folder / "done.json").write_text(json.dumps(report), encoding="utf-8")
 
 
 def set_channel(shader: Any, described: dict[str, Any], channel: int) -> None:
-    """Give all three channels the colour and the radius of one: paths then all serve it."""
+    """Give all three channels the colour and the radius of one, so that all paths contribute to it."""
     shader.inputs["Base Color"].default_value = (*[described["colour"][channel]] * 3, 1.0)
     shader.inputs["Subsurface Radius"].default_value = [described["inputs"]["Subsurface Radius"][channel]] * 3
 
 
 def rectangle(skin: Any, material: Any, left: float, right: float, height: float) -> Any:
+    """Add a horizontal rectangle between two x coordinates at a height."""
     mesh = bpy.data.meshes.new("rectangle")
     corners = [(left, -SIDE_M), (right, -SIDE_M), (right, SIDE_M), (left, SIDE_M)]
     mesh.from_pydata([(x, y, height) for x, y in corners], [], [(0, 1, 2, 3)])
@@ -70,6 +72,7 @@ def rectangle(skin: Any, material: Any, left: float, right: float, height: float
 
 
 def black_material() -> Any:
+    """Return a black material without specular reflection."""
     material = bpy.data.materials.new("black")
     material.use_nodes = True
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
@@ -78,13 +81,15 @@ def black_material() -> Any:
     return material
 
 
-def column_radiance(skin: Any, camera: Any, path: Path, width_m: float, size: list[int], **given: int) -> Any:
-    """Return mean radiance of each column of a picture of the plane so wide, across the edge of the light."""
+def column_radiance(
+    skin: Any, camera: Any, path: Path, width_m: float, size: list[int], **parameters: int
+) -> Any:
+    """Return the mean radiance of each column of a picture of this width, across the edge of the light."""
     camera.ortho_scale = width_m
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = size
-    words = [word for name, value in given.items() for word in (f"--{name}", str(value))]
-    skin.finish(skin.options(["--", "--render", str(path), *words]))
+    arguments = [word for name, value in parameters.items() for word in (f"--{name}", str(value))]
+    skin.finish(skin.parse_options(["--", "--render", str(path), *arguments]))
     picture = bpy.data.images.load(str(path))
     pixels = np.empty(size[0] * size[1] * 4, np.float32)
     picture.pixels.foreach_get(pixels)

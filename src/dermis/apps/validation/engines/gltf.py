@@ -1,4 +1,4 @@
-"""Skins in glTF's draft of volume scattering: predicted errors, also of other readings of its parameters."""
+"""Predicted errors of skins in glTF's draft of volume scattering, with other readings of its parameters."""
 
 from __future__ import annotations
 
@@ -14,11 +14,15 @@ VERSION = TARGET.versions[-1]
 
 
 def skin_results(name: str) -> JsonObject:
-    """Return a skin's fitted parameters and their errors, also of values typed in, and of A as the colour."""
+    """Return fitted parameters of a skin and their errors.
+
+    Also the errors of parameters set without a fit, and of the albedo in place of the multiple-scattering
+    colour.
+    """
     subject = load_subject(name)
     volume = fit_volume(subject.curve, subject.albedo)
     coloured = volume_curve(volume._replace(multiscatter=subject.curve.energy))
-    found: JsonObject = {
+    results: JsonObject = {
         "albedo": [round(float(x), 4) for x in subject.curve.energy],
         "multiscatter": [round(float(x), 4) for x in volume.multiscatter],
         "mean_free_path_mm": [round(float(x), 4) for x in volume.mean_free_path_mm],
@@ -30,11 +34,11 @@ def skin_results(name: str) -> JsonObject:
             curve_error(subject.curve, target.predicted_curve(rows, subject, VERSION)).as_json()
             for rows in (target.parameters(subject, VERSION), target.naive_parameters(subject, VERSION))
         )
-        found[variant] = {"error": best, "naive_error": naive}
-    return found
+        results[variant] = {"error": best, "naive_error": naive}
+    return results
 
 
 def gltf() -> None:
-    """Compute the errors of skins by glTF's draft; writes benchmarks/results/engines_gltf.json."""
+    """Compute the errors of skins in glTF's draft and write benchmarks/results/engines_gltf.json."""
     figures = {"version": VERSION, "draft": DRAFT, "skins": {name: skin_results(name) for name in SKINS}}
     write_results(FIGURES, figures, 4)

@@ -1,6 +1,6 @@
-"""One exported head, camera and lights in dermis, Cycles, Babylon.js and Mitsuba.
+"""One exported head with its camera and lights in dermis, Cycles, Babylon.js and Mitsuba.
 
-Hair is left out, which each draws differently. Lights are parallel, as Babylon's page has them.
+Hair is left out, because each program draws it differently. Lights are parallel, as on Babylon's page.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.truths.metrics import relative_rmse
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
 from dermis.apps.validation.engines.babylon import LIBRARY, babylon_library
-from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, chromium_page, require_in_checkout, write_results
+from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, chromium_page, in_checkout, write_results
 from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import decode_srgb, encode_srgb
@@ -33,87 +33,88 @@ from dermis.scene.settings import Settings
 
 FIGURES, PICTURE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
 TEXELS, SIDE = 1024, 256
-CYCLES_SAMPLES, MITSUBA_SAMPLES, SEED_COUNT = 64, 256, 2
+CYCLES_SAMPLES, MITSUBA_SAMPLES, SEEDS = 64, 256, 2
 LIGHTS = (
     DirectionalLight(direction=(0.8, -0.5, -0.7), irradiance=(3.4, 3.3, 3.1)),
     DirectionalLight(direction=(-0.9, -0.2, -0.3), irradiance=(0.8, 0.85, 0.95)),
 )
-LIT_THRESHOLD = 0.25  # of the mean: what is darker lies in shadow
-HIGHLIGHT_RADIANCE, HIGHLIGHT_MARGIN_PX = 0.75, 9  # radiance of highlights, white skin being 1, and pixels across that they spoil
+LIT_THRESHOLD = 0.25  # of the mean light; darker pixels are in shadow
+HIGHLIGHT_RADIANCE = 0.75  # radiance above which a pixel is a highlight; white skin has 1
+HIGHLIGHT_WIDTH_PX = 9  # width of the square around a highlight that is left out
 Floats = NDArray[np.float64]
 
 
 def heads() -> None:
-    """Draw one head in all programs that are here, compare each with ours.
+    """Render one head in all installed programs and compare each with ours.
 
     Writes benchmarks/results/engines_heads.json and docs/images/engines_heads.webp. DERMIS_BLENDER_PYTHONS
     names Pythons with bpy 4.5 and 5.2, separated by a comma; DERMIS_BABYLON a folder that npm has installed
     babylonjs into. Needs Mitsuba.
     """
-    require_in_checkout(PICTURE.parent)
+    in_checkout(PICTURE.parent)
     subject = load_subject("human").with_painted_maps(TEXELS, "auto")
     assert subject.head is not None and subject.scene is not None
-    bald = replace(subject.head, hair=None, strands=None)
-    subject = replace(subject, scene=replace(subject.scene, head=bald, lights=LIGHTS))
+    hairless = replace(subject.head, hair=None, strands=None)
+    subject = replace(subject, scene=replace(subject.scene, head=hairless, lights=LIGHTS))
     ours = render_ours(subject, SIDE)
     shown, rows = [ours], []
     for name, draw in available_renderers(subject, ours).items():
         pictures = np.stack(draw())
-        found = {"program": name, **compare_pictures(ours, pictures)}
-        print_lines(str(found))
+        result = {"program": name, **compare_pictures(ours, pictures)}
+        print_lines(str(result))
         shown.append(pictures.mean(axis=0))
-        rows.append(found)
+        rows.append(result)
         write_results(FIGURES, {"heads": rows}, 4)
     levels = encode_srgb(np.clip(np.concatenate([over_grey(one) for one in shown], axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=90)
 
 
 def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[], list[Floats]]]:
-    """Return the programs that are here, each with a function that draws linear pictures (h, w, 4)."""
-    found: dict[str, Callable[[], list[Floats]]] = {}
+    """Return the installed programs, each with a function that renders linear pictures (h, w, 4)."""
+    result: dict[str, Callable[[], list[Floats]]] = {}
     named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
     for version, python in zip(("4.5", "5.2"), named, strict=False):
-        found[f"Cycles {version}"] = lambda version=version, python=python: render_cycles(  # type: ignore[misc]
-            subject, "random-walk-skin", version, Path(python), SIDE, CYCLES_SAMPLES, SEED_COUNT
+        result[f"Cycles {version}"] = lambda version=version, python=python: render_cycles(  # type: ignore[misc]
+            subject, "random-walk-skin", version, Path(python), SIDE, CYCLES_SAMPLES, SEEDS
         )
     if os.environ.get(LIBRARY):
         library = babylon_library()
-        found["Babylon.js 9.28"] = lambda: [render_babylon(subject, library, ours)] * 2
-    found["Mitsuba 3"] = lambda: render_mitsuba(subject, ours)
-    return found
+        result["Babylon.js 9.28"] = lambda: [render_babylon(subject, library, ours)] * 2
+    result["Mitsuba 3"] = lambda: render_mitsuba(subject, ours)
+    return result
 
 
 def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
     """Return the exported page's canvas in Chromium as linear light, with the alpha of ours."""
-    with TemporaryDirectory() as place, chromium_page(SIDE) as page:
-        file = Path(place) / "head.html"
+    with TemporaryDirectory() as folder_name, chromium_page(SIDE) as page:
+        file = Path(folder_name) / "head.html"
         export_skin(subject, "babylon", file, library=library)
         page.goto(file.as_uri())
         page.wait_for_selector("html[data-state]", state="attached", timeout=240_000)
         page.evaluate("document.querySelectorAll('body > :not(canvas)').forEach((one) => one.remove())")
-        seen = Image.open(io.BytesIO(page.locator("canvas").screenshot())).convert("RGB")
-    light = decode_srgb(np.asarray(seen) / 255.0)
+        frames = Image.open(io.BytesIO(page.locator("canvas").screenshot())).convert("RGB")
+    light = decode_srgb(np.asarray(frames) / 255.0)
     return np.dstack([light, np.where(light.any(axis=-1), ours[..., 3], 0.0)])
 
 
 def render_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
-    """Return the exported scene by several seeds, with the alpha of ours."""
+    """Return the exported scene rendered with several seeds, with the alpha of ours."""
     mi = load_mitsuba()
-    with TemporaryDirectory() as place, mitsuba_variant(mi, "scalar_rgb"):
-        folder = Path(place) / "head"
+    with TemporaryDirectory() as folder_name, mitsuba_variant(mi, "scalar_rgb"):
+        folder = Path(folder_name) / "head"
         export_skin(subject, "mitsuba", folder)
         scene = mi.load_file(str(folder / "scene.xml"), width=SIDE, height=SIDE, samples=MITSUBA_SAMPLES)
-        seen = [np.array(mi.render(scene, seed=k, spp=MITSUBA_SAMPLES))[..., :3] for k in range(SEED_COUNT)]
-    return [np.dstack([one, ours[..., 3]]).astype(np.float64) for one in seen]
+        frames = [np.array(mi.render(scene, seed=k, spp=MITSUBA_SAMPLES))[..., :3] for k in range(SEEDS)]
+    return [np.dstack([one, ours[..., 3]]).astype(np.float64) for one in frames]
 
 
 def over_grey(picture: Floats) -> Floats:
-    """Return a picture (h, w, 4) over black before a grey wall."""
+    """Return a picture (h, w, 4) over a grey background."""
     return np.asarray(picture[..., :3] * (picture[..., 3:] > 0) + 0.05 * (1.0 - picture[..., 3:]))
 
 
 def render_ours(subject: Subject, side: int) -> Floats:
-    """Return (h, w, 4) of ours, linear."""
+    """Return the linear picture (h, w, 4) of the frame."""
     assert subject.scene is not None
     settings = Settings(size=(side, side), atlas=TEXELS, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
@@ -122,44 +123,44 @@ def render_ours(subject: Subject, side: int) -> Floats:
 def render_cycles(
     subject: Subject, method: str, version: str, python: Path, side: int, samples: int, seeds: int
 ) -> list[Floats]:
-    """Return (h, w, 4) of Cycles, linear, for each of as many seeds."""
-    with TemporaryDirectory() as place:
-        folder = Path(place) / "head"
+    """Return linear pictures (h, w, 4) by Cycles, one per seed."""
+    with TemporaryDirectory() as folder_name:
+        folder = Path(folder_name) / "head"
         export_skin(subject, "blender", folder, version=version, variant=method)
         script = folder / "skin.py"
         text = script.read_text(encoding="utf-8")
         script.write_text(text.replace("'size': [1024, 1024]", f"'size': [{side}, {side}]"), encoding="utf-8")
-        found = []
+        result = []
         for seed in range(seeds):
             picture = folder / f"{seed}.exr"
-            words = ["--render", str(picture), "--samples", str(samples), "--seed", str(seed)]
-            command = [str(python), "-I", str(script), "--", *words]
+            options = ["--render", str(picture), "--samples", str(samples), "--seed", str(seed)]
+            command = [str(python), "-I", str(script), "--", *options]
             subprocess.run(command, check=True, capture_output=True)
-            found.append(read_image(picture).astype(np.float64))
-    return found
+            result.append(read_image(picture).astype(np.float64))
+    return result
 
 
 def compare_pictures(ours: Floats, theirs: Floats) -> JsonObject:
-    """Return outline, colours and errors of another program's pictures.
+    """Return differences of outline and colour, and errors, of another program's pictures.
 
     theirs : (seeds, h, w, 4)
     """
     mean, variance = theirs.mean(axis=0), theirs.var(axis=0, ddof=1) / len(theirs)
     a, b = ours[..., 3] > 0.5, mean[..., 3] > 0.5
-    apart = max(distance_transform_edt(~b)[a].max(), distance_transform_edt(~a)[b].max())
-    whole = (ours[..., 3] > 0.999) & (mean[..., 3] > 0.999)
+    outline_distance = max(distance_transform_edt(~b)[a].max(), distance_transform_edt(~a)[b].max())
+    covered = (ours[..., 3] > 0.999) & (mean[..., 3] > 0.999)
     light = ours[..., :3].mean(axis=-1)
-    lit = whole & (light > LIT_THRESHOLD * light[whole].mean())
-    bright = (ours[..., :3].max(axis=-1) > HIGHLIGHT_RADIANCE) | (mean[..., :3].max(axis=-1) > HIGHLIGHT_RADIANCE)
-    matte = whole & ~maximum_filter(bright, HIGHLIGHT_MARGIN_PX)
-    errors = [relative_rmse(ours[..., :3], mean[..., :3], on, variance[..., :3]) for on in (whole, matte)]
+    lit = covered & (light > LIT_THRESHOLD * light[covered].mean())
+    bright = np.maximum(ours[..., :3], mean[..., :3]).max(axis=-1) > HIGHLIGHT_RADIANCE
+    matte = covered & ~maximum_filter(bright, HIGHLIGHT_WIDTH_PX)
+    errors = [relative_rmse(ours[..., :3], mean[..., :3], on, variance[..., :3]) for on in (covered, matte)]
     return {
         "side": ours.shape[0],
-        "outline_px": float(apart),
+        "outline_px": float(outline_distance),
         "pixels_apart": int((a != b).sum()),
         "pixels": int(a.sum()),
         "lit_colour": (mean[lit][:, :3].mean(axis=0) / ours[lit][:, :3].mean(axis=0)).round(4).tolist(),
         "relative_rmse": round(float(errors[0].value), 4),
         "without_highlights": round(float(errors[1].value), 4),
-        "share_without_highlights": round(float(matte.sum() / whole.sum()), 4),
+        "share_without_highlights": round(float(matte.sum() / covered.sum()), 4),
     }

@@ -1,7 +1,7 @@
-"""Edges of light on exported skin in Mitsuba: a half-lit plane against the curve and the prediction.
+"""Edges of light on exported skin in Mitsuba: a half-lit plane against the profile and the prediction.
 
-A plane of the exported medium lies under a lamp that covers half of it and all but touches it. Seen along the
-normal, what leaves at a distance from the lamp's edge is the edge response of the profile, by reciprocity.
+A lamp covers half of a plane of the exported medium and almost touches it. By reciprocity, the radiance along
+the normal at a distance from the lamp's edge is the edge response of the profile.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ SKINS: dict[str, tuple[Boundary, ...]] = {
     "skin2": ("matched", "smooth", "rough"),
     "dj3": ("matched", "smooth"),
 }
-"""Skins with the surfaces under which each is measured."""
-_HALF_WIDTH_D, _PIXEL_COUNT, _PASS_COUNT, _SUBSAMPLES = 3.0, 8, 8, 16
-_LAMP_HEIGHT_D = 0.01  # height of the lamp, by d
+"""Skins, and the surface boundaries for which each is measured."""
+_REACH_D, _PIXELS, _PASSES, _SUBSAMPLES = 3.0, 8, 8, 16
+_LAMP_HEIGHT_D = 0.01
 _PLANE_HALF_SIDE_D = 500.0
 _BLACK_ALBEDO = 1e-9
 
@@ -45,35 +45,38 @@ _BLACK_ALBEDO = 1e-9
 def half_lit_plane(
     mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, *, black: bool = False
 ) -> MitsubaObject:
-    """Return the plane z = 0, lit where x > 0, seen along the normal within `_REACH` d of the edge.
+    """Return a scene with the plane z = 0, lit where x > 0, and an orthographic view around the edge.
 
-    The camera looks from under the surface where that sends light on along the normal anyway.
+    The camera is below the surface where the surface does not change the direction along the normal.
+
+    d_mm : width of the profile; the view spans 3 d on each side of the edge
     """
-    turn = mi.ScalarTransform4f
+    transform = mi.ScalarTransform4f
     size, height = _PLANE_HALF_SIDE_D * d_mm, _LAMP_HEIGHT_D * d_mm
     albedo = (_BLACK_ALBEDO,) * 3 if black else medium.albedo
     inside = mi.load_dict(medium_description(IsotropicMedium(medium.sigma_t, albedo)))
-    below = boundary != "rough"
-    eye = -1e-3 * height if below else 0.5 * height
-    over = turn().translate([size, 0.0, height]).rotate([1, 0, 0], 180).scale([size, size, 1.0])
-    look = turn().look_at([0, 0, eye], [0, 0, -1], [0, 1, 0]).scale([_HALF_WIDTH_D * d_mm, _HALF_WIDTH_D * d_mm, 1.0])
-    film = {"type": "hdrfilm", "width": _PIXEL_COUNT, "height": 1, "pixel_format": "rgb"}
+    camera_below = boundary != "rough"
+    eye = -1e-3 * height if camera_below else 0.5 * height
+    lamp_to_world = transform().translate([size, 0.0, height]).rotate([1, 0, 0], 180).scale([size, size, 1.0])
+    scale = [_REACH_D * d_mm, _REACH_D * d_mm, 1.0]
+    camera_to_world = transform().look_at([0, 0, eye], [0, 0, -1], [0, 1, 0]).scale(scale)
+    film = {"type": "hdrfilm", "width": _PIXELS, "height": 1, "pixel_format": "rgb"}
     sensor = {
         "type": "orthographic",
         "near_clip": 1e-9,
         "far_clip": 1e6,
-        "to_world": look,
+        "to_world": camera_to_world,
         "film": {**film, "component_format": "float32", "rfilter": {"type": "box"}},
         "sampler": {"type": "independent"},
     }
-    skin = {"type": "rectangle", "to_world": turn().scale([size, size, 1.0]), "interior": inside}
-    dark = {"type": "diffuse", "reflectance": rgb((0, 0, 0))}
-    lamp = {"type": "rectangle", "to_world": over, "bsdf": dark}
+    skin = {"type": "rectangle", "to_world": transform().scale([size, size, 1.0]), "interior": inside}
+    black_bsdf = {"type": "diffuse", "reflectance": rgb((0, 0, 0))}
+    lamp = {"type": "rectangle", "to_world": lamp_to_world, "bsdf": black_bsdf}
     return mi.load_dict(
         {
             "type": "scene",
             "integrator": {"type": "volpath", "rr_depth": 400},
-            "sensor": {**sensor, **({"medium": inside} if below else {})},
+            "sensor": {**sensor, **({"medium": inside} if camera_below else {})},
             "skin": {**skin, "bsdf": surface_description(boundary)},
             "lamp": {**lamp, "emitter": {"type": "area", "radiance": rgb((1, 1, 1))}},
         }
@@ -83,71 +86,70 @@ def half_lit_plane(
 def measured_edge(
     mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, samples: int
 ) -> tuple[Floats, Floats, float]:
-    """Return the edge response at the pixels, its standard errors, and what leaves far inside the light."""
-    built = half_lit_plane(mi, medium, boundary, d_mm)
-    each = samples // _PASS_COUNT
-    seen = np.array([np.array(mi.render(built, spp=each, seed=k))[0].mean(axis=1) for k in range(_PASS_COUNT)])
-    if boundary == "rough":  # what the surface itself reflects
-        bare = half_lit_plane(mi, medium, boundary, d_mm, black=True)
-        lit = np.array(mi.render(bare, spp=samples, seed=99))[0].mean(axis=1)
-        seen -= np.where(np.arange(_PIXEL_COUNT) >= _PIXEL_COUNT // 2, lit[_PIXEL_COUNT // 2 :].mean(), 0.0)
-    # The two sides of the edge add up to the whole, everywhere.
-    both = seen + seen[:, ::-1]
-    whole = float(both.mean())
-    response = 0.5 + 0.5 * (seen - seen[:, ::-1]) / whole
-    return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASS_COUNT), whole
+    """Return the edge response at the pixels, its standard errors, and the radiance far inside the light."""
+    plane = half_lit_plane(mi, medium, boundary, d_mm)
+    passes = [mi.render(plane, spp=samples // _PASSES, seed=k) for k in range(_PASSES)]
+    images = np.array([np.array(image)[0].mean(axis=1) for image in passes])
+    if boundary == "rough":  # subtract what the surface reflects
+        black_scene = half_lit_plane(mi, medium, boundary, d_mm, black=True)
+        lit = np.array(mi.render(black_scene, spp=samples, seed=99))[0].mean(axis=1)
+        images -= np.where(np.arange(_PIXELS) >= _PIXELS // 2, lit[_PIXELS // 2 :].mean(), 0.0)
+    # At every distance, the two sides of the edge add up to the same total.
+    both_sides = images + images[:, ::-1]
+    total = float(both_sides.mean())
+    response = 0.5 + 0.5 * (images - images[:, ::-1]) / total
+    return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASSES), total
 
 
 def pixel_averages(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
-    """Return a curve's edge response as the mean over each pixel."""
-    edges = np.linspace(-_HALF_WIDTH_D, _HALF_WIDTH_D, _PIXEL_COUNT + 1) * d_mm
-    at = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(_SUBSAMPLES) + 0.5) / _SUBSAMPLES
-    return np.asarray(curve.edge_response(at)[..., channel].mean(axis=1))
+    """Return the edge response of a curve as the mean over each pixel."""
+    edges = np.linspace(-_REACH_D, _REACH_D, _PIXELS + 1) * d_mm
+    centres = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(_SUBSAMPLES) + 0.5) / _SUBSAMPLES
+    return np.asarray(curve.edge_response(centres)[..., channel].mean(axis=1))
 
 
 def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> JsonObject:
-    """Return the figures of a skin under a surface: differences in red, green and blue."""
+    """Return edge responses of a skin under a boundary, and their errors in red, green and blue."""
     target = TARGET.with_variant(boundary)
     version = target.resolve_version(None)
     rows = target.parameters(subject, version)
-    shown, d = target.predicted_curve(rows, subject, version), fit_burley_width(subject.curve)
-    measures: dict[str, list[Any]] = {
-        key: [] for key in ("predicted", "exported", "noise", "rms", "energy", "edge")
-    }
+    predicted, d = target.predicted_curve(rows, subject, version), fit_burley_width(subject.curve)
+    keys = "predicted", "exported", "noise", "rms", "energy", "edge"
+    results: dict[str, list[Any]] = {key: [] for key in keys}
     for c in range(3):
         sigma, albedo = (get_numbers(rows, name)[c] for name in ("sigma_t", "albedo"))
         medium = IsotropicMedium((sigma,) * 3, (albedo,) * 3)
-        found, error, whole = measured_edge(mi, medium, boundary, float(d[c]), samples)
-        fault = found - pixel_averages(shown, c, float(d[c]))
-        measures["predicted"].append(float(np.abs(fault).max()))
-        measures["exported"].append(float(np.abs(found - pixel_averages(subject.curve, c, float(d[c]))).max()))
-        measures["noise"].append(float(error.mean()))
-        measures["rms"].append(float(np.sqrt((fault**2).mean())))
-        # Radiance seen from inside is larger by the index squared.
-        measures["energy"].append(whole / (BOUNDARIES[boundary] ** 2 if boundary != "rough" else 1.0))
-        measures["edge"].append([float(value) for value in found[_PIXEL_COUNT // 2 :]])
-    return {"skin": subject.name, "boundary": boundary, "d_mm": [float(x) for x in d], **measures}
+        edge, error, total = measured_edge(mi, medium, boundary, float(d[c]), samples)
+        difference = edge - pixel_averages(predicted, c, float(d[c]))
+        results["predicted"].append(float(np.abs(difference).max()))
+        results["exported"].append(float(np.abs(edge - pixel_averages(subject.curve, c, float(d[c]))).max()))
+        results["noise"].append(float(error.mean()))
+        results["rms"].append(float(np.sqrt((difference**2).mean())))
+        # Radiance inside the medium is larger by the square of the index.
+        results["energy"].append(total / (BOUNDARIES[boundary] ** 2 if boundary != "rough" else 1.0))
+        results["edge"].append([float(value) for value in edge[_PIXELS // 2 :]])
+    return {"skin": subject.name, "boundary": boundary, "d_mm": [float(x) for x in d], **results}
 
 
 def mitsuba(*, samples: int = 32000, output: Path = FIGURES, variant: str = "scalar_rgb") -> None:
-    """Measure edges of light on all skins under all surfaces and write the figures.
+    """Measure edges of light on all skins under all boundaries and write the results.
 
     Parameters
     ----------
     samples:
-        Paths through each pixel.
+        Paths per pixel.
     output:
         JSON file.
     variant:
-        Of Mitsuba.
+        Variant of Mitsuba.
     """
     mi = load_mitsuba()
-    found = []
+    edge = []
     with mitsuba_variant(mi, variant):
         for name, boundaries in SKINS.items():
             subject = load_subject(name)
-            found += [measure_skin(mi, subject, boundary, samples) for boundary in boundaries]
-    half = _PIXEL_COUNT // 2
-    at = [(k + 0.5) * _HALF_WIDTH_D / half for k in range(half)]
-    how = {"mitsuba": mi.__version__, "samples": samples, "pixels": _PIXEL_COUNT, "at_d": at}
-    write_results(output, {**how, "edges": found}, 4)
+            edge += [measure_skin(mi, subject, boundary, samples) for boundary in boundaries]
+    half = _PIXELS // 2
+    centres = [(k + 0.5) * _REACH_D / half for k in range(half)]
+    settings = {"mitsuba": mi.__version__, "samples": samples, "pixels": _PIXELS, "at_d": centres}
+    write_results(output, {**settings, "edges": edge}, 4)

@@ -1,4 +1,4 @@
-"""Skins in OpenPBR, MaterialX's profile and pbrt, by their own formulas; files checked by their libraries."""
+"""Predicted errors of skins in OpenPBR, MaterialX and pbrt, and validation of the exported files."""
 
 from __future__ import annotations
 
@@ -22,37 +22,37 @@ from dermis.base.extras import import_extra
 
 FIGURES = RESULTS / "engines_openpbr.json"
 SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"
-_MISSING_PLUGIN_ERROR = "MissingShaderIdInRegistry"  # of a plug-in that usd-core comes without
+_MISSING_PLUGIN_ERROR = "MissingShaderIdInRegistry"  # of a plug-in that usd-core does not include
 
 
 def skin_errors() -> JsonObject:
-    """Return by skin: radii, and errors as meant, as typed in, and read as a profile."""
-    found: JsonObject = {}
+    """Return radii by skin, and errors of fitted parameters, of unfitted ones, and of a profile's."""
+    results: JsonObject = {}
     for name in SKINS:
         subject = load_subject(name)
         walk = evaluate_export(subject, openpbr_target.TARGET, "1.1.1")
-        beam = evaluate_export(subject, pbrt_target.TARGET, "4")
-        profile_error_text = curve_error(subject.curve, materialx_profile(fitted_path_mm(subject), subject))
-        found[name] = {
+        pbrt = evaluate_export(subject, pbrt_target.TARGET, "4")
+        as_profile = curve_error(subject.curve, materialx_profile(fitted_path_mm(subject), subject))
+        results[name] = {
             "model": subject.model,
             "d_mm": float_list(walk.d_mm),
             "openpbr": {
-                "radius_mm": float_list(openpbr_target.parameter_radii_mm(walk.parameters, OPEN_PBR)),
+                "radius_mm": float_list(openpbr_target.get_radii_mm(walk.parameters, OPEN_PBR)),
                 "error": walk.error.as_json(),
                 "naive": walk.naive_error.as_json(),
-                "as_a_profile": profile_error_text.as_json(),
+                "as_a_profile": as_profile.as_json(),
             },
             "pbrt": {
-                "mfp_mm": float_list(get_numbers(beam.parameters, "mfp")),
-                "error": beam.error.as_json(),
-                "naive": beam.naive_error.as_json(),
+                "mfp_mm": float_list(get_numbers(pbrt.parameters, "mfp")),
+                "error": pbrt.error.as_json(),
+                "naive": pbrt.naive_error.as_json(),
             },
         }
-    return found
+    return results
 
 
 def validate_files() -> JsonObject:
-    """Return what the libraries find in documents and stages, and their versions."""
+    """Return versions of the libraries, and errors that they find in documents and stages."""
     MaterialX = import_extra("MaterialX", "checking its files")
     import_extra("pxr", "checking USD")
     from pxr import Usd, UsdValidation
@@ -61,8 +61,8 @@ def validate_files() -> JsonObject:
         export_skin("skin1", "openpbr", Path(folder) / "skin.mtlx")
         export_skin("skin1", "usd", Path(folder) / "skin.usda")
         document, library = MaterialX.createDocument(), MaterialX.createDocument()
-        places = MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath()
-        MaterialX.loadLibraries(*places, library)
+        library_paths = MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath()
+        MaterialX.loadLibraries(*library_paths, library)
         MaterialX.readFromXmlFile(document, str(Path(folder) / "skin.mtlx"))
         document.setDataLibrary(library)
         stage = Usd.Stage.Open(str(Path(folder) / "skin.usda"))
@@ -78,29 +78,29 @@ def validate_files() -> JsonObject:
 
 
 def float_list(values: ArrayLike) -> list[float]:
-    """Return plain numbers."""
+    """Return values as a flat list of floats."""
     return [float(one) for one in np.ravel(values)]
 
 
-def error_table(found: JsonObject) -> list[str]:
-    """Return a table of the largest error of an edge for each reading."""
+def error_table(results: JsonObject) -> list[str]:
+    """Return a table of the largest edge error of each skin and each reading of its parameters."""
     lines = [
         "| skin | radius [mm] | OpenPBR's walk | dmfp typed in | read as a profile | pbrt | dmfp typed in |",
         "|---|---|---|---|---|---|---|",
     ]
-    for name, one in found.items():
-        walk, beam = one["openpbr"], one["pbrt"]
-        edges = [walk["error"], walk["naive"], walk["as_a_profile"], beam["error"], beam["naive"]]
-        told = [" / ".join(f"{x:.3f}" for x in edge["edge"]) for edge in edges]
-        radius = " / ".join(f"{x:.2f}" for x in walk["radius_mm"])
-        lines.append(f"| {name} | {' | '.join([radius, *told])} |")
+    for skin, one in results.items():
+        errors = [one["openpbr"][name] for name in ("error", "naive", "as_a_profile")]
+        errors += [one["pbrt"][name] for name in ("error", "naive")]
+        cells = [" / ".join(f"{x:.3f}" for x in error["edge"]) for error in errors]
+        radius = " / ".join(f"{x:.2f}" for x in one["openpbr"]["radius_mm"])
+        lines.append(f"| {skin} | {' | '.join([radius, *cells])} |")
     return lines
 
 
 def openpbr() -> None:
-    """Compute the errors of skins, print their table; writes benchmarks/results/engines_openpbr.json.
+    """Compute and print the errors of skins, and write benchmarks/results/engines_openpbr.json.
 
-    Needs the packages usd-core and MaterialX. No renderer of these runs here.
+    Needs the packages usd-core and MaterialX. No renderer of these formats is run.
     """
     write_results(FIGURES, {"libraries": validate_files(), "skins": skin_errors()}, 4)
     print_lines(*error_table(read_results(FIGURES)["skins"]))

@@ -1,1 +1,1 @@
-"""The frame against Cycles and Mitsuba on one processor: time, noise and error, for docs/peers.md."""
+"""Comparison with other renderers, Cycles and Mitsuba, on one CPU."""

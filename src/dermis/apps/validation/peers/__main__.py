@@ -1,7 +1,7 @@
-"""Render the same head by dermis, Cycles and Mitsuba on one CPU: seconds, noise and error against the truth.
+"""Command that renders one head by dermis, Cycles and Mitsuba on one CPU and reports times and errors.
 
-About twelve minutes on two idle cores; --quick takes one or two. Needs the sample data, Mitsuba, and for
-Cycles DERMIS_BLENDER_PYTHON, a Python that has bpy. Times differ from run to run, images do not.
+It takes about twelve minutes on two idle cores, one or two with --quick. It needs the sample data, Mitsuba,
+and for Cycles a Python with bpy, named by DERMIS_BLENDER_PYTHON. Times differ from run to run, images do not.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Renderings of a scene by dermis, Cycles and Mitsuba in turns, so that a slow machine slows all of them."""
+"""Renderings of a scene by dermis, Cycles and Mitsuba in turns, so that a slow phase affects all alike."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dermis.apps.truths.cycles import CyclesPass, Method, cycles_passes
 from dermis.apps.truths.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, GPU_GEMS_3
 from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES as AS_FRAGMENTS
-from dermis.apps.validation.comparisons.scenes import medium_scene, default_region
+from dermis.apps.validation.comparisons.scenes import default_region, medium_scene
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
@@ -28,7 +28,7 @@ METHODS: tuple[Method, ...] = ("random-walk", "burley")
 
 @dataclass(frozen=True)
 class RenderVariant:
-    """One of our ways to draw skin: technique, atlas, and how skin returns light."""
+    """Variant of our renderer: technique, atlas and angular distribution of skin."""
 
     technique: str
     atlas: int = 1024
@@ -41,26 +41,26 @@ VARIANTS = {
     "Lambertian skin, atlas 1024": RenderVariant("texture-space", 1024, "lambertian"),
     "screen space": RenderVariant("screen-space", 64),
 }
-"""By their names in the table; screen space needs no atlas."""
+"""Variants by their names in the table; screen space needs no atlas."""
 GPU_GEMS_3_VARIANTS = {
     "passes of 2007 as compute": RenderVariant(GPU_GEMS_3, direction="lambertian"),
     "passes of 2007 as fragments": RenderVariant(FRAGMENT_TECHNIQUE, direction="lambertian"),
 }
-"""The structure of 2007 in our renderer, to set beside the first of ours."""
+"""Passes of GPU Gems 3 (2007) in our renderer, to compare with the first variant."""
 FIRST_SEEDS = (100, 200)
-"""Of the first pass of each turn; the passes of a turn have the following ones."""
-_PROGRESS_STEPS = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
-"""Expected time of a turn of frames and of a path through each pixel, for the progress bar."""
+"""Seeds of the first pass of each turn; further passes have the following seeds."""
+_STEPS = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
+"""Relative times of a turn of frames and of one path per pixel, for the progress bar."""
 
 
 @dataclass(frozen=True)
 class PeerPlan:
-    """What is rendered.
+    """Sizes and numbers of the renderings.
 
     side : of the image [pixel]
-    samples : of Cycles, paths through each pixel of each pass
-    paths : of Mitsuba through each pixel
-    frames : of ours in each turn, after one that is not counted
+    samples : paths per pixel of each pass of Cycles
+    paths : paths per pixel of Mitsuba
+    frames : frames of ours in each turn, after one that is not counted
     """
 
     side: int = 512
@@ -70,17 +70,15 @@ class PeerPlan:
 
     @property
     def work(self) -> int:
-        """Steps of the progress bar for one scene."""
-        each = _PROGRESS_STEPS["random-walk"] + _PROGRESS_STEPS["burley"]
-        turns = len(FIRST_SEEDS) * len(METHODS) + 2
-        return (
-            turns * _PROGRESS_STEPS["ours"] + len(FIRST_SEEDS) * sum(self.samples) * each + self.paths * _PROGRESS_STEPS["path-traced"]
-        )
+        """Return the steps of the progress bar for one scene."""
+        cycles = len(FIRST_SEEDS) * sum(self.samples) * (_STEPS["random-walk"] + _STEPS["burley"])
+        ours = (len(FIRST_SEEDS) * len(METHODS) + 2) * _STEPS["ours"]
+        return ours + cycles + self.paths * _STEPS["path-traced"]
 
 
 @dataclass
 class FrameTimes:
-    """Our frames at one setting: the image, and what each frame took [s]."""
+    """Image of one of our variants, and the times of its frames [s]."""
 
     image: NDArray[np.float32]
     seconds: list[float] = field(default_factory=list)
@@ -89,12 +87,12 @@ class FrameTimes:
 
 @dataclass
 class PeerRenders:
-    """The pictures and times of all renderers for one scene.
+    """Pictures and times of all renderers for one scene.
 
-    ours : by the names of OURS and OF_2007
-    cycles : by method, then for each seed the passes of `Plan.samples`
-    left_out : why a method is missing
-    truth_core_seconds : of Mitsuba, scene and all
+    ours : by the names of VARIANTS and GPU_GEMS_3_VARIANTS
+    cycles : by method; the passes of `PeerPlan.samples` for each seed
+    left_out : reasons for missing methods
+    reference_core_seconds : CPU time of Mitsuba, including the scene
     """
 
     light: str
@@ -102,67 +100,71 @@ class PeerRenders:
     ours: dict[str, FrameTimes]
     cycles: dict[str, list[list[CyclesPass]]]
     left_out: dict[str, str]
-    truth: PathTraced
-    truth_core_seconds: float
+    reference: PathTraced
+    reference_core_seconds: float
 
 
 def render_peers(
-    head: Head, light: str, plan: PeerPlan, renderer: Renderer, report: Callable[[int], None] = lambda work: None
+    head: Head,
+    light: str,
+    plan: PeerPlan,
+    renderer: Renderer,
+    on_progress: Callable[[int], None] = lambda work: None,
 ) -> PeerRenders:
-    """Render everything under one light, ours before, between and after the others.
+    """Render everything under one light, with our frames before, between and after the others.
 
-    report : is called with the amount of work since its last call
+    on_progress : called with the number of steps since its last call
     """
-    body = media()["skin1"].with_eta(1.0)
+    medium = media()["skin1"].with_eta(1.0)
     settings = Settings(size=(plan.side, plan.side))
     cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in METHODS}
     ours: dict[str, FrameTimes] = {}
     left_out: dict[str, str] = {}
 
-    def per_pass(done: int, of: int) -> None:
-        report(SAMPLES_PER_PASS * _PROGRESS_STEPS["path-traced"])
+    def per_pass(done: int, total: int) -> None:
+        on_progress(SAMPLES_PER_PASS * _STEPS["path-traced"])
 
-    of_scene = medium_scene(head, light, default_region(light), body)
-    with TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS), of_scene as (scene, _):
+    scene_context = medium_scene(head, light, default_region(light), medium)
+    with TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS), scene_context as (scene, _):
         for seed in FIRST_SEEDS:
             for method in METHODS:
                 _add_frames(ours, renderer, scene, plan)
-                report(_PROGRESS_STEPS["ours"])
+                on_progress(_STEPS["ours"])
                 try:
-                    cycles[method].append(_cycles_passes(scene, body, plan, settings, method, seed))
+                    cycles[method].append(_cycles_passes(scene, medium, plan, settings, method, seed))
                 except DermisError as fault:
                     left_out[method] = str(fault)
-                report(_PROGRESS_STEPS[method] * sum(plan.samples))
+                on_progress(_STEPS[method] * sum(plan.samples))
         _add_frames(ours, renderer, scene, plan)
-        report(_PROGRESS_STEPS["ours"])
-        worked = time.process_time()
-        truth = path_trace(scene, body, plan.paths, settings, use_cache=False, progress=per_pass)
-        core_seconds = time.process_time() - worked
+        on_progress(_STEPS["ours"])
+        cpu_started = time.process_time()
+        reference = path_trace(scene, medium, plan.paths, settings, use_cache=False, progress=per_pass)
+        core_seconds = time.process_time() - cpu_started
         _add_frames(ours, renderer, scene, plan)
-        report(_PROGRESS_STEPS["ours"])
-    whole = {method: turns for method, turns in cycles.items() if method not in left_out}
-    return PeerRenders(light, default_region(light), ours, whole, left_out, truth, core_seconds)
+        on_progress(_STEPS["ours"])
+    complete = {method: turns for method, turns in cycles.items() if method not in left_out}
+    return PeerRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
 
 
 def _cycles_passes(
-    scene: Scene, body: Medium, plan: PeerPlan, settings: Settings, method: Method, seed: int
+    scene: Scene, medium: Medium, plan: PeerPlan, settings: Settings, method: Method, seed: int
 ) -> list[CyclesPass]:
     """Return passes of Cycles after one that is not counted, which builds the scene."""
-    return cycles_passes(scene, body, (1, *plan.samples), settings, method=method, seed=seed)[1:]
+    return cycles_passes(scene, medium, (1, *plan.samples), settings, method=method, seed=seed)[1:]
 
 
 def _add_frames(ours: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan) -> None:
-    """Add warm frames that compute everything from scratch."""
-    for name, way in (VARIANTS | GPU_GEMS_3_VARIANTS).items():
+    """Add frames with warm caches that recompute everything."""
+    for name, variant in (VARIANTS | GPU_GEMS_3_VARIANTS).items():
         settings = Settings.model_validate(
-            {"size": (plan.side, plan.side), "technique": way.technique, "atlas": way.atlas}
+            {"size": (plan.side, plan.side), "technique": variant.technique, "atlas": variant.atlas}
         )
-        skin = Skin(**(scene.skin.model_dump() | {"direction": way.direction}))
-        turned = replace(scene, skin=skin)
-        drawn = renderer.draw(turned, settings, force=True)
+        skin = Skin(**(scene.skin.model_dump() | {"direction": variant.direction}))
+        variant_scene = replace(scene, skin=skin)
+        drawn = renderer.draw(variant_scene, settings, force=True)
         frames = ours.setdefault(name, FrameTimes(drawn.linear()))
         for _ in range(plan.frames):
-            began, worked = time.perf_counter(), time.process_time()
-            renderer.draw(turned, settings, force=True)
-            frames.seconds.append(time.perf_counter() - began)
-            frames.core_seconds.append(time.process_time() - worked)
+            started, cpu_started = time.perf_counter(), time.process_time()
+            renderer.draw(variant_scene, settings, force=True)
+            frames.seconds.append(time.perf_counter() - started)
+            frames.core_seconds.append(time.process_time() - cpu_started)

@@ -1,4 +1,4 @@
-"""The report on the peers: what is rendered, the raw figures as JSON and their Markdown."""
+"""Report on other renderers: command, JSON results and Markdown."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dermis.apps.truths.mitsuba_scene import load_mitsuba
 from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
 from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, fill_page, write_results
 from dermis.apps.validation.peers.figures import scene_results
-from dermis.apps.validation.peers.rendering import METHODS, PeerRenders, PeerPlan, render_peers
+from dermis.apps.validation.peers.rendering import METHODS, PeerPlan, PeerRenders, render_peers
 from dermis.base.atomic_write import check_output
 from dermis.base.console import note, print_lines, progress_bar
 from dermis.base.errors import DermisError, refuse
@@ -39,7 +39,7 @@ def peers(
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     adapter: str = "cpu",
 ) -> None:
-    """Measure, print Markdown, and write the raw figures and docs/peers.md.
+    """Measure all renderers, print Markdown, and write the results and docs/peers.md.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ def peers(
     side:
         Of the images [pixel; 512, or 160 with --quick].
     output:
-        JSON with the raw figures [benchmarks/results/peers.json, and docs/peers.md beside it].
+        JSON file of the results [benchmarks/results/peers.json, and docs/peers.md beside it].
     adapter:
-        On which ours runs: cpu, so that all use the same processor.
+        Adapter of dermis: cpu, so that all renderers use the same processor.
     """
     target = output or (None if quick else FIGURES)
     if target is not None:
@@ -63,18 +63,18 @@ def peers(
     plan = QUICK if quick else PeerPlan()
     plan = plan if side is None else replace(plan, side=side)
     report = compare_peers(head, lights.split(","), plan, adapter)
-    place, scenes = machine_text(report), scenes_text(report)
+    machine_line, scenes = machine_text(report), scenes_text(report)
     if target is not None:
         write_results(target, report)
     if target == FIGURES:
-        fill_page(PAGE, place=place, scenes=scenes)
-    print_lines(place, "", scenes)
+        fill_page(PAGE, machine_line=machine_line, scenes=scenes)
+    print_lines(machine_line, "", scenes)
 
 
 def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) -> JsonObject:
     """Return the whole report, ready for JSON; without Cycles its rows are left out.
 
-    Raises DermisError for unknown lights, and without Mitsuba, which gives the truth.
+    Raises DermisError for unknown lights, and without Mitsuba, which renders the reference.
     """
     for light in lights:
         if light not in SCENES:
@@ -109,18 +109,18 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
 
 
 def versions(scenes: list[PeerRenders]) -> dict[str, str]:
-    """Return the versions of everything that renders, and of Python."""
-    found = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
+    """Return the versions of Python and of everything that renders."""
+    times = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
     passes = [
         turns[0][0] for one in scenes for method in METHODS for turns in [one.cycles.get(method)] if turns
     ]
     if passes:
-        found["Blender"] = passes[0].version
-    return found | {"Python": platform.python_version()}
+        times["Blender"] = passes[0].version
+    return times | {"Python": platform.python_version()}
 
 
 def cpu_model() -> str:
-    """Return the processor's name where the system states it, else its architecture."""
+    """Return the name of the processor where the system provides it, else its architecture."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -130,14 +130,14 @@ def cpu_model() -> str:
 
 
 def scenes_text(report: JsonObject) -> str:
-    """Return a section for each light."""
+    """Return a Markdown section for each light."""
     return "\n\n".join(
         f"## {scene['light'].capitalize()}\n\n{scene_text(scene)}" for scene in report["scenes"]
     )
 
 
 def scene_text(scene: JsonObject) -> str:
-    """Return the table of one scene and the sentences that follow from it."""
+    """Return the table of one scene and sentences about it."""
     head = f"| {' | '.join(_COLUMNS)} |\n|{'---|' * len(_COLUMNS)}"
     table = [head, *(_table_line(row) for row in scene["rows"])]
     return "\n".join([*table, "", *(f"- {sentence}" for sentence in _sentences(scene))])
@@ -147,8 +147,8 @@ def machine_text(report: JsonObject) -> str:
     """Return the date, the machine and the versions of a measurement, in one line."""
     versions = ", ".join(f"{name} {version}" for name, version in report["versions"].items())
     side = report["plan"]["side"]
-    where = f"{report['cpu']}, {report['cores']} cores; ours on {report['adapter']}"
-    return f"{report['date']}, {side}x{side}, {where}; {versions}"
+    machine_description = f"{report['cpu']}, {report['cores']} cores; ours on {report['adapter']}"
+    return f"{report['date']}, {side}x{side}, {machine_description}; {versions}"
 
 
 def _table_line(row: JsonObject) -> str:
@@ -170,36 +170,36 @@ def _value(row: JsonObject, name: str) -> str:
 
 
 def _sentences(scene: JsonObject) -> list[str]:
-    said = [_random_walk_sentence(setting, found) for setting, found in scene.get("as_near", {}).items()]
-    right = "; ".join(f"{name} {error:.3f}" for name, error in scene["ours_energy_put_right"].items())
-    said.append(f"Ours, each channel scaled to the truth's energy: {right}.")
-    said += [
+    sentences = [_random_walk_sentence(setting, times) for setting, times in scene.get("as_near", {}).items()]
+    corrected = "; ".join(f"{name} {error:.3f}" for name, error in scene["ours_energy_put_right"].items())
+    sentences.append(f"Ours, each channel scaled to the truth's energy: {corrected}.")
+    sentences += [
         f"The {name} take {ratio['ratio']:.2f} times as long as the first of ours, "
         f"{ratio['core_ratio']:.2f} times by the cores' time."
         for name, ratio in scene.get("published", {}).items()
     ]
     if "burley_against_random_walk" in scene:
-        said.append(_burley_sentence(scene))
-    return said + [f"Left out: {name}. {why}" for name, why in scene["left_out"].items()]
+        sentences.append(_burley_sentence(scene))
+    return sentences + [f"Left out: {name}. {why}" for name, why in scene["left_out"].items()]
 
 
-def _random_walk_sentence(setting: str, found: dict[str, dict[str, float]]) -> str:
-    clean = f"to 5 % noise {_time_text(found['clean'])}"
-    if "same_error" not in found:
-        return f"{setting}: Cycles' random walk never comes as near, for its own bias is greater; {clean}."
-    same = found["same_error"]
+def _random_walk_sentence(setting: str, times: dict[str, dict[str, float]]) -> str:
+    clean_cost = f"to 5 % noise {_time_text(times['clean_cost'])}"
+    if "same_error" not in times:
+        return (
+            f"{setting}: Cycles' random walk never comes as near, for its own bias is greater; {clean_cost}."
+        )
+    same = times["same_error"]
     reached = "reached" if same["ratio"] >= TARGET_RATIO else "not reached"
-    return (
-        f"{setting}: Cycles' random walk comes as near in {_time_text(same)}, goal {TARGET_RATIO:.0f} {reached}; {clean}."
-    )
+    sentence = f"{setting}: Cycles' random walk comes as near in {_time_text(same)}"
+    return f"{sentence}, goal {TARGET_RATIO:.0f} {reached}; {clean_cost}."
 
 
-def _time_text(found: dict[str, float]) -> str:
-    """Return time, paths, and the ratio to our frame by the clock and by CPU time."""
-    spent = f"{found['seconds']:.3g} s ({found['samples']:.0f} paths a pixel)"
-    return (
-        f"{spent}: {_ratio_text(found['ratio'])} times our frame, {_ratio_text(found['core_ratio'])} by the cores' time"
-    )
+def _time_text(times: dict[str, float]) -> str:
+    """Return time and paths, and the ratios of elapsed and CPU time to our frame."""
+    elapsed, cpu = (_ratio_text(times[name]) for name in ("ratio", "core_ratio"))
+    cost = f"{times['seconds']:.3g} s ({times['samples']:.0f} paths a pixel)"
+    return f"{cost}: {elapsed} times our frame, {cpu} by the cores' time"
 
 
 def _ratio_text(ratio: float) -> str:
@@ -207,18 +207,18 @@ def _ratio_text(ratio: float) -> str:
 
 
 def _burley_sentence(scene: JsonObject) -> str:
-    """Return the distance of Burley's profile from the random walk, and of ours from path tracing."""
-    theirs, error = scene["burley_against_random_walk"]
+    """Return the error of Burley's profile against the random walk, and ours against path tracing."""
+    burley_error, error = scene["burley_against_random_walk"]
     ours = {
         row["setting"]: row["relrmse"]
         for row in scene["rows"]
         if row["setting"] in scene["ours_energy_put_right"]
     }
-    each = "; ".join(
-        f"{name} {found:.4f}, {'reached' if found <= theirs else 'not reached'}"
-        for name, found in ours.items()
+    verdicts = "; ".join(
+        f"{name} {times:.4f}, {'reached' if times <= burley_error else 'not reached'}"
+        for name, times in ours.items()
     )
     return (
-        f"Burley's profile is {theirs:.4f} ± {error:.4f} from the random walk; ours shall be no farther "
-        f"from path tracing: {each}."
+        f"Burley's profile is {burley_error:.4f} ± {error:.4f} from the random walk; "
+        f"ours shall be no farther from path tracing: {verdicts}."
     )

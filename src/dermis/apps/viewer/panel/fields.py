@@ -96,8 +96,8 @@ def _draw_field(
     def with_value(new_value: object) -> ViewerState:
         return make_state(**{name: new_value})
 
-    if words := field_keywords(kind, name):
-        _draw_words(session, label, value, words, with_value, style)
+    if keywords := field_keywords(kind, name):
+        _draw_keywords(session, label, value, keywords, with_value, style)
         draw_tooltip(field_help(kind, name))
         if isinstance(value, str):
             return
@@ -124,29 +124,29 @@ def _draw_field(
     elif isinstance(value, tuple) and value_range.logarithmic:
         result = imgui.slider_float3(label, list(value), value_range.low, value_range.high, "%.3g", _LOG)
         edit_value(session, label, result, lambda new: with_value(tuple(clamp(c, value_range) for c in new)))
-    elif len(words := field_choices(kind, name)) > 1:
-        combo(session, label, str(value), words, with_value, display_names=style.display_names)
+    elif len(keywords := field_choices(kind, name)) > 1:
+        combo(session, label, str(value), keywords, with_value, display_names=style.display_names)
     else:
         return
     draw_tooltip(field_help(kind, name))
 
 
-def _draw_words(
+def _draw_keywords(
     session: Session,
     label: str,
     value: object,
-    words: tuple[str, ...],
+    keywords: tuple[str, ...],
     with_value: ApplyValue,
     style: FieldStyle,
 ) -> None:
     """Draw a list of the keywords that a number or colour can be instead of a value."""
     custom_value = style.custom_value
 
-    def choose(word: str) -> ViewerState:
-        return with_value(custom_value(session) if custom_value and word == _CUSTOM else word)
+    def choose(keyword: str) -> ViewerState:
+        return with_value(custom_value(session) if custom_value and keyword == _CUSTOM else keyword)
 
     chosen = value if isinstance(value, str) else _CUSTOM
-    combo(session, f"{label} from", chosen, (*words, _CUSTOM) if custom_value else words, choose)
+    combo(session, f"{label} from", chosen, (*keywords, _CUSTOM) if custom_value else keywords, choose)
 
 
 def _field_label(name: str) -> str:

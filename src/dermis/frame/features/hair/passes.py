@@ -28,7 +28,7 @@ _MAX_ROWS, _MAX_ITERATIONS = 8, 60_000
 _HEAD_MM = 100.0  # side of a square in the picture that holds all hair of a head
 _CROWDING = 6.0  # segments in a crowded tile over the mean of all tiles
 _CLEARING_GROUPS = 256
-_RAYS_APART = 4  # of the rays to an area light one in four is traced: pictures change by 0.0002 at most
+_RAY_STRIDE = 4  # of the rays to an area light one in four is traced: pictures change by 0.0002 at most
 
 
 def draw_shadows(
@@ -90,7 +90,7 @@ def draw(
     coarse = drawn_hair_count(tables, pixel_mm)
     segments = tables.fine.all_segments() + tables.coarse.all_segments(coarse)
     knots = tables.fine.all_knots() + tables.coarse.all_knots(coarse)
-    light_constants = (*light_constants, ("RAYS_APART", _RAYS_APART))
+    light_constants = (*light_constants, ("RAY_STRIDE", _RAY_STRIDE))
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
     record = _view_record(light, strands, view, coarse)
     shared: Bindings = {"strand_view": record, "projected": tables.projected, "hairs": tables.record}

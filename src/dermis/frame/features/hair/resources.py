@@ -13,7 +13,7 @@ from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Strands, corners, weights
+from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
 
@@ -241,7 +241,7 @@ def make_strand_tables(device: Device, head: Head, buffers: StrandBuffers) -> St
         fine=fine,
         coarse=coarse,
         shadow_casters=casters,
-        centre_mm=np.zeros(3) if hair is None else hair.middle_mm(head.mesh),
+        centre_mm=np.zeros(3) if hair is None else hair.root_centre_mm(head.mesh),
         mean_width_mm=0.0 if hair is None else 2.0 * float(hair.radius_mm[:, 0].mean()),
         mean_cover=0.0 if hair is None or hair.cover is None else float(hair.cover.mean()),
     )
@@ -251,8 +251,8 @@ def _fill_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
     if int(strands.roots.quad.max()) >= len(head.mesh.quads):
         actual = f"its mesh has {len(head.mesh.quads)} quads"
         refuse(head.name, "hairs rooted in quads of its mesh", actual, "Leave its strands out")
-    rows["corner"] = corners(head.mesh, strands.roots.quad)
-    rows["weight"] = weights(strands.roots.place)
+    rows["corner"] = quad_corners(head.mesh, strands.roots.quad)
+    rows["weight"] = quad_weights(strands.roots.position)
     rows["absorption"][:, :3] = strands.absorption
     if strands.cover is not None:
         rows["absorption"][:, 3] = strands.cover

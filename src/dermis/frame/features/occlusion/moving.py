@@ -19,7 +19,7 @@ from dermis.gpu import Bindings, Buffer, CommandList, Device, Recorder, Texture,
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 from dermis.mesh.morph_targets import no_targets
-from dermis.mesh.outline import Outline, RigOutline, outline_of
+from dermis.mesh.outline import Outline, RigOutline, rig_outline
 from dermis.mesh.rig import Motion
 from dermis.mesh.subdivide import coarse_triangles
 
@@ -71,10 +71,10 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
     rotation : (3, 3) rotation of the head, which the view directions follow
     """
     axes = _view_axes() @ rotation.T
-    local = (axes.reshape(-1, 3).astype(np.float32) @ outline.columns[:3]).reshape(*axes.shape[:2], -1)
+    local = (axes.reshape(-1, 3).astype(np.float32) @ outline.homogeneous[:3]).reshape(*axes.shape[:2], -1)
     low, high = local.min(axis=2).astype(np.float64), local.max(axis=2).astype(np.float64)
     half, middle = 0.5 * (high - low) + _MARGIN_MM, 0.5 * (high + low)
-    half[:, 2] += outline.slack_mm
+    half[:, 2] += outline.margin_mm
     half[:, :2] *= SIDE / (SIDE - 2.0 * _BORDER)
     clips = np.zeros((VIEWS, 4, 4))
     clips[:, :3, :3], clips[:, :3, 3] = axes / half[..., None], -middle / half
@@ -103,7 +103,7 @@ def make_anchors(head: Head) -> RotationAnchors:
     distance2 = ((positions - head.centre_mm) ** 2).sum(axis=1)
     weight = np.exp(-distance2 / _ANCHOR_RADIUS_MM**2)[:, None]
     offsets = weight * (positions - (weight * positions).sum(axis=0) / weight.sum())
-    return RotationAnchors(points, offsets, outline_of(rig.positions_mm, no_targets(), rig.skeleton, points))
+    return RotationAnchors(points, offsets, rig_outline(rig.positions_mm, no_targets(), rig.skeleton, points))
 
 
 def head_rotation(anchors: RotationAnchors, motion: Motion) -> Floats:
@@ -113,7 +113,7 @@ def head_rotation(anchors: RotationAnchors, motion: Motion) -> Floats:
     """
     rest = anchors.outline.rest_mm.copy()
     rest[:3] = motion.positions_mm[anchors.points].T
-    posed = replace(anchors.outline, rest_mm=rest).posed(np.zeros(0, np.float32), motion.matrices)
+    posed = replace(anchors.outline, rest_mm=rest).pose(np.zeros(0, np.float32), motion.matrices)
     left, _, right = np.linalg.svd(posed.T.astype(np.float64) @ anchors.offsets)
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     return np.asarray(left @ right)

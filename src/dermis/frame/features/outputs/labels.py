@@ -65,13 +65,11 @@ def shader_constants() -> dict[str, int]:
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}
 
 
-def draw_labels(
-    graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: StageInputs, centres: Texture
-) -> None:
+def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: StageInputs) -> None:
     """Declare the pass that labels the pixels."""
     constants = ("FIELDS", buffers.fields), ("HAIRS", buffers.hair_classes is not None)
     shader = stage_program(graph.device, planes, constants)
-    bindings = inputs.bindings(shader, centres) | buffers.tables | {"hair_labels": buffers.hair_labels}
+    bindings = inputs.bindings(shader) | buffers.tables | {"hair_labels": buffers.hair_labels}
     draw_planes(graph, planes, shader, bindings)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import format_value, refuse
 from dermis.frame.features.outputs.stage_inputs import StageInputs
 from dermis.frame.programs import program, workgroup_grid
-from dermis.gpu import Buffer, Device, Recorder, Texture
+from dermis.gpu import Buffer, Device, Recorder
 from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landmark_points
 from dermis.mesh.head import Head
 
@@ -72,9 +72,9 @@ def make_landmark_buffers(device: Device, head: Head, names: tuple[str, ...]) ->
     return LandmarkBuffers(sets, table, results, len(rows))
 
 
-def draw_landmarks(graph: Recorder, buffers: LandmarkBuffers, inputs: StageInputs, centres: Texture) -> None:
+def draw_landmarks(graph: Recorder, buffers: LandmarkBuffers, inputs: StageInputs) -> None:
     """Declare the pass that computes the positions and the visibility of the landmarks."""
     shader = program(graph.device, "outputs/landmarks.wgsl", (("TOLERANCE_MM", TOLERANCE_MM),))
-    bindings = inputs.bindings(shader, centres) | {"landmarks": buffers.table}
+    bindings = inputs.bindings(shader) | {"landmarks": buffers.table}
     bindings |= {"points": inputs.shape.surface["points"], "results": buffers.results}
     graph.dispatch("outputs", shader, bindings, workgroup_grid(buffers.count))

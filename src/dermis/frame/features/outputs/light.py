@@ -78,14 +78,12 @@ def make_light_outputs(
     )
 
 
-def draw_light(
-    graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs, centres: Texture
-) -> None:
+def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
     """Declare the passes that shade the centres of pixels, and diffuse light over the picture if needed."""
     device, diffusion = graph.device, inputs.picture_diffusion
     shader = stage_program(device, planes, inputs.constants)
     layers = diffusion.layers if diffusion else no_subsurface_layers(device)
-    draw_planes(graph, planes, shader, _shading_bindings(shader, inputs, centres) | {"subsurface": layers})
+    draw_planes(graph, planes, shader, _shading_bindings(shader, inputs) | {"subsurface": layers})
     if diffusion is not None and "diffuse" in planes.channels:
         below, leaving = diffusion.diffuse()
         add = program(device, "outputs/spread.wgsl", planes.first_channel("diffuse"))
@@ -93,38 +91,32 @@ def draw_light(
     if "translucent" in planes.channels:
         transmitted = inputs.sum_transmitted(resources.transmitted)
         multiply = program(device, "outputs/transmitted.wgsl", planes.first_channel("translucent"))
-        bindings = inputs.bindings(multiply, centres) | {"transmitted": transmitted}
+        bindings = inputs.bindings(multiply) | {"transmitted": transmitted}
         draw_planes(graph, planes, multiply, bindings)
 
 
-def draw_visibility(
-    graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs, centres: Texture
-) -> None:
+def draw_visibility(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
     """Declare the pass that computes the visible fraction of each light."""
     shader, counts = stage_program(graph.device, planes, inputs.constants), resources.light_part_counts
     ends = np.zeros(_MAX_LIGHTS, np.uint32)
     ends[: len(counts)] = np.cumsum(counts)
     parts = shader.record("LightParts", count=len(counts), end=ends.reshape(-1, 4))
-    draw_planes(graph, planes, shader, _shading_bindings(shader, inputs, centres) | {"light_parts": parts})
+    draw_planes(graph, planes, shader, _shading_bindings(shader, inputs) | {"light_parts": parts})
 
 
-def draw_pigments(
-    graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs, centres: Texture
-) -> None:
+def draw_pigments(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
     """Declare the pass that reads melanin and blood."""
     shader, uniform = stage_program(graph.device, planes), resources.pigments
     record = shader.record("Pigments", uniform_pigments=uniform or (0.0, 0.0), painted=uniform is None)
-    draw_planes(graph, planes, shader, inputs.bindings(shader, centres) | {"pigments": record})
+    draw_planes(graph, planes, shader, inputs.bindings(shader) | {"pigments": record})
 
 
-def draw_thickness(
-    graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs, centres: Texture
-) -> None:
+def draw_thickness(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
     """Declare the passes that measure the thickness of the tissue below the skin."""
     assert inputs.translucency is not None and resources.thickness is not None
     measure_thickness(graph, inputs.translucency, resources.thickness)
     shader = stage_program(graph.device, planes)
-    bindings = inputs.bindings(shader, centres) | {"thickness_map": resources.thickness}
+    bindings = inputs.bindings(shader) | {"thickness_map": resources.thickness}
     draw_planes(graph, planes, shader, bindings)
 
 
@@ -154,11 +146,11 @@ def measure_thickness(graph: Recorder, translucency: Translucency, into: Texture
     graph.dispatch("outputs", shader, bindings, workgroup_grid(count))
 
 
-def _shading_bindings(shader: ComputeProgram, inputs: StageInputs, centres: Texture) -> MutableBindings:
+def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBindings:
     """Return the resources of shading with all light, whichever part of it the picture shows."""
     shade: UniformRecord = np.ndarray((), inputs.view.dtype, bytearray(inputs.view.tobytes()))
     shade["light_factors"] = 1.0
-    return inputs.bindings(shader, centres) | {"shade": shade, "scattered": inputs.scattered}
+    return inputs.bindings(shader) | {"shade": shade, "scattered": inputs.scattered}
 
 
 def _pairs(request: FrameRequest, translucency: Sequence[Translucency | None]) -> PairBuffers | None:

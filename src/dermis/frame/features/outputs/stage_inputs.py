@@ -57,6 +57,7 @@ class StageInputs:
     constants : pipeline constants of the lights, the surface and the technique
     scattered : texture of the light below the skin over the atlas, or tables of pre-integrated skin
     camera, head, visibility : views of the samples of a pixel, the triangles, and the triangle at each sample
+    centres : triangle at the centre of each pixel; `visibility` if the only sample is there
     shape : current shape of the head
     picture : textures of the finished picture
     has_hair : whether hair is drawn
@@ -75,6 +76,7 @@ class StageInputs:
     camera: Views
     head: HeadGeometry
     visibility: ViewLayers
+    centres: ViewLayers
     shape: Shape
     picture: Picture
     has_hair: bool
@@ -83,10 +85,7 @@ class StageInputs:
     picture_diffusion: PictureDiffusion | None
     sum_transmitted: Callable[[tuple[Texture, ...]], Texture]
 
-    def bindings(self, shader: ComputeProgram, centres: Texture) -> MutableBindings:
-        """Return the resources of the lighting with the record OutputCamera of surface_hit.wgsl.
-
-        centres : texture of the triangles at the centres of the pixels
-        """
+    def bindings(self, shader: ComputeProgram) -> MutableBindings:
+        """Return the resources of the lighting with those of surface_hit.wgsl."""
         camera = shader.record("OutputCamera", rays=ray_record(shader, self.view), centre=self.centre_mm)
-        return {**self.lighting, "camera": camera, "centres": centres}
+        return {**self.lighting, "camera": camera, "centres": self.centres.texture}

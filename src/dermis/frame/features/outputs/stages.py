@@ -16,11 +16,11 @@ from dermis.frame.features.shading.view import ray_record
 from dermis.frame.features.shape import shape
 from dermis.frame.features.visibility.layers import draw_layers
 from dermis.frame.projection import PIXEL_CENTRE, Views
-from dermis.gpu import Bindings, Graph, Texture
+from dermis.gpu import Bindings, Graph
 from dermis.gpu.wgsl_source import Member
 from dermis.scene.outputs import OUTPUTS, Output
 
-Stage = Callable[[Graph, Planes, Resources, StageInputs, Texture], None]
+Stage = Callable[[Graph, Planes, Resources, StageInputs], None]
 _SURFACE_CONSTANTS = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
@@ -29,21 +29,20 @@ def hair_labels(graph: Graph, resources: Resources | None, inputs: StageInputs) 
     if not _labels_hair(resources, inputs):
         return None
     assert resources is not None and resources.labels is not None
-    return resources.labels.hair_bindings(_draw_centres(graph, resources, inputs))
+    _draw_centres(graph, inputs)
+    return resources.labels.hair_bindings(inputs.centres.texture)
 
 
 def draw(graph: Graph, resources: Resources | None, inputs: StageInputs) -> None:
     """Declare the passes of all requested outputs."""
     if resources is None:
         return
-    if _labels_hair(resources, inputs):  # the centres were drawn for the labels of hair
-        centres = (resources.centres or inputs.visibility).texture
-    else:
-        centres = _draw_centres(graph, resources, inputs)
+    if not _labels_hair(resources, inputs):  # else `hair_labels` has drawn the centres
+        _draw_centres(graph, inputs)
     for planes in resources.planes:
-        STAGES[planes.stage](graph, planes, resources, inputs, centres)
+        STAGES[planes.stage](graph, planes, resources, inputs)
     if resources.landmarks:
-        draw_landmarks(graph, resources.landmarks, inputs, centres)
+        draw_landmarks(graph, resources.landmarks, inputs)
 
 
 def _labels_hair(resources: Resources | None, inputs: StageInputs) -> bool:
@@ -51,32 +50,24 @@ def _labels_hair(resources: Resources | None, inputs: StageInputs) -> bool:
     return inputs.has_hair and labels is not None and labels.hair_classes is not None
 
 
-def _draw_centres(graph: Graph, resources: Resources, inputs: StageInputs) -> Texture:
-    """Find the triangles at the centres of the pixels, unless the only sample of the picture is there."""
-    if resources.centres is None:
-        return inputs.visibility.texture
-    draw_layers(graph, "outputs", resources.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
-    return resources.centres.texture
+def _draw_centres(graph: Graph, inputs: StageInputs) -> None:
+    """Find the triangle at the centre of each pixel, unless the only sample of the picture is there."""
+    if inputs.centres is not inputs.visibility:
+        draw_layers(graph, "outputs", inputs.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
 
 
-def _geometry(
-    graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs, centres: Texture
-) -> None:
+def _geometry(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     shader = stage_program(graph.device, planes)
-    draw_planes(graph, planes, shader, inputs.bindings(shader, centres))
+    draw_planes(graph, planes, shader, inputs.bindings(shader))
 
 
-def _surface(
-    graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs, centres: Texture
-) -> None:
+def _surface(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     constants = tuple(one for one in inputs.constants if one[0] in _SURFACE_CONSTANTS)
     shader = stage_program(graph.device, planes, constants)
-    draw_planes(graph, planes, shader, inputs.bindings(shader, centres))
+    draw_planes(graph, planes, shader, inputs.bindings(shader))
 
 
-def _motion(
-    graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs, centres: Texture
-) -> None:
+def _motion(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     previous, vertices = inputs.previous, inputs.shape.vertices
     assert previous is not None
     if previous.motion is not None:
@@ -84,7 +75,7 @@ def _motion(
         shape.draw(graph, resources.previous, previous.motion)
         vertices = resources.previous.vertices
     shader = stage_program(graph.device, planes)
-    bindings = inputs.bindings(shader, centres) | {
+    bindings = inputs.bindings(shader) | {
         "previous": shader.record("Previous", rays=ray_record(shader, previous.view)),
         "previous_table": vertices["vertex_table"],
         "previous_buffer": vertices["vertex_buffer"],
@@ -92,22 +83,17 @@ def _motion(
     draw_planes(graph, planes, shader, bindings)
 
 
-def _alpha(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs, centres: Texture) -> None:
+def _alpha(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     draw_planes(graph, planes, stage_program(graph.device, planes), {"exposed": inputs.picture.exposed})
 
 
-def _label(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs, centres: Texture) -> None:
+def _label(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     assert resources.labels is not None
-    draw_labels(graph, planes, resources.labels, inputs, centres)
+    draw_labels(graph, planes, resources.labels, inputs)
 
 
-def _light_stage(draw: Callable[[Graph, Planes, light.LightOutputs, StageInputs, Texture], None]) -> Stage:
-    def stage(
-        graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs, centres: Texture
-    ) -> None:
-        draw(graph, planes, resources.light, inputs, centres)
-
-    return stage
+def _light_stage(draw: Callable[[Graph, Planes, light.LightOutputs, StageInputs], None]) -> Stage:
+    return lambda graph, planes, resources, inputs: draw(graph, planes, resources.light, inputs)
 
 
 STAGES: Registry[Stage] = Registry(

@@ -78,7 +78,7 @@ def _backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | N
     settings, environment = request.settings, request.environment
     if settings.background == "none":
         return None
-    result = memo.get(_make_result, device, settings.size)
+    result = memo.get(make_texture, device, settings.size, "rgba32float", owner="background")
     if settings.background != "environment":
         return Backdrop(result)
     if environment is None:
@@ -86,7 +86,3 @@ def _backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | N
         refuse("background environment", "an environment", "there is none", advice)
     sharp = settings.background_blur == 0.0
     return Backdrop(result, memo.get(unfiltered_panorama, device, environment.name) if sharp else None)
-
-
-def _make_result(device: Device, size: tuple[int, int]) -> Texture:
-    return make_texture(device, size, "rgba32float")

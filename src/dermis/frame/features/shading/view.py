@@ -24,7 +24,7 @@ from dermis.frame.projection import (
 from dermis.frame.technique import ProfileSplit
 from dermis.gpu import ComputeProgram, UniformRecord
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import PARTS
+from dermis.mesh.mesh import MOUTH_PARTS
 from dermis.mesh.outline import Outline
 from dermis.scene.camera import Camera, Window
 from dermis.scene.settings import Settings
@@ -90,7 +90,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
         refuse(head.name, f"at most {_MAX_MATERIALS} materials", count, "Join some groups")
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
-        colours[index, 3] = 1 + PARTS.index(material.part) if material.part else 0
+        colours[index, 3] = 1 + MOUTH_PARTS.index(material.part) if material.part else 0
     record = shade.record(
         "Shade",
         samples=settings.samples,
@@ -106,7 +106,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
     if head.eyes is not None:
         fill_eye(record["eyes"], head.eyes.look)
         record["eyes"]["material"] = head.eyes.material
-        record["eyes"]["middle_mm"] = head.eyes.middle_mm
+        record["eyes"]["middle_mm"] = head.eyes.centre_offset_mm
     return record
 
 

@@ -19,7 +19,7 @@ from dermis.gpu import (
     Texture,
     make_texture,
 )
-from dermis.mesh.eyeball import Contact
+from dermis.mesh.eyeball import LidContact
 from dermis.mesh.geometry import MIN_UV_CROSS, vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -163,7 +163,7 @@ def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.f
     template : targets that move the same points, whose order is used
     """
     number = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
-    order = template.by_point
+    order = template.point_order
     table = np.zeros((max(1, len(order)), 4), np.float32)
     table[: len(order), :3] = targets.delta_mm.take(order, axis=0)
     table[: len(order), 3] = number.take(order).view(np.float32)
@@ -178,12 +178,12 @@ def _influences(skeleton: Skeleton | None, count: int) -> Words:
     return np.ascontiguousarray(np.concatenate([skeleton.bone.astype(np.uint32), weight], axis=1))
 
 
-def _contacts(contact: Contact | None, count: int) -> Words:
+def _contacts(contact: LidContact | None, count: int) -> Words:
     """Return (p, 3) words: two points of the eyeball near each point, and the least distance from it."""
     if contact is None:
         return np.zeros((1, 3), np.uint32)
     found = np.zeros((count, 3), np.uint32)
-    clear = np.ascontiguousarray(contact.clear_mm, np.float32).view(np.uint32)
+    clear = np.ascontiguousarray(contact.min_clearance_mm, np.float32).view(np.uint32)
     found[contact.point] = np.stack([contact.apex[contact.ball], contact.back[contact.ball], clear], axis=1)
     return found
 

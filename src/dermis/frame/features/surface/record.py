@@ -83,7 +83,7 @@ def skin_record(
 
 def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Return the members of the record that no field or property of `Skin` has."""
-    energy, usual = ENERGY[skin.energy], DEFAULT_ROUGHNESS if maps.rough else 1.0
+    energy, usual = ENERGY[skin.energy], DEFAULT_ROUGHNESS if maps.has_roughness else 1.0
     return {
         "m": skin.smoothing * skin.roughness / usual,
         "f0": SKIN_F0,

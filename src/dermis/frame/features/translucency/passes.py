@@ -11,14 +11,13 @@ from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.lights.records import oblique_constants
 from dermis.frame.programs import program, workgroup_grid
-from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Recorder, Texture, UniformRecord
+from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Recorder, Texture
 from dermis.optics.gaussians import MAX_GAUSSIANS
 from dermis.optics.thin_parts import THICKNESS_ROWS, ThinParts
 
 RECEIVER_BYTES, SOURCE_BYTES = 48, 32
 """Sizes of the structs Receiver and Source of translucent_pair.wgsl."""
 
-_FACETS: Constants = (("FACETS", 1),)
 _TEAMS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
 _SINGLE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # barriers are slow on software adapters
 _SOURCE_GROUP = 64  # invocations of a workgroup, as in translucency_gather.wgsl
@@ -34,52 +33,28 @@ def make_buffer(device: Device, count: int, size: int = 4) -> Buffer:
     return device.storage_buffer(size * max(1, count))
 
 
-def draw_receivers(
+def draw_points(
     graph: Recorder,
+    role: str,
     surface: Bindings,
     cells: Cells,
-    receivers: tuple[Buffer, int],
+    table: tuple[Buffer, int],
     points: Buffer,
     facets: bool = False,
 ) -> None:
-    """Write the current positions, normals and metric of receivers.
+    """Write the current positions and normals of receivers or sources, and their metric or area.
 
-    surface : resources of geometry.wgsl, and stretch_map of the atlas
-    receivers : buffer of cells, and their number
+    role : "receiver" or "source"
+    surface : resources of geometry.wgsl and of the atlas
+    table : buffer of cells, and their number
     points : buffer to write to
-    facets : whether to take the metric from the triangles instead of the stretch map
+    facets : whether to take the metric of receivers from the triangles instead of the stretch map
     """
-    shader = program(graph.device, "translucency/translucency_receivers.wgsl", _FACETS if facets else ())
-    buffer, count = receivers
-    bindings: Bindings = {
-        "cells": _cells_record(shader, cells, count),
-        "receivers": buffer,
-        "receiver_points": points,
-    }
-    graph.dispatch("pairs", shader, {**surface, **bindings}, workgroup_grid(count))
-
-
-def draw_sources(
-    graph: Recorder, surface: Bindings, cells: Cells, sources: tuple[Buffer, int], points: Buffer
-) -> None:
-    """Write the current centres, normals and areas of sources.
-
-    surface : resources of geometry.wgsl, and the atlas
-    sources : buffer of cells, and their number
-    points : buffer to write to
-    """
-    shader = program(graph.device, "translucency/translucency_sources.wgsl")
-    buffer, count = sources
-    bindings: Bindings = {
-        "cells": _cells_record(shader, cells, count),
-        "sources": buffer,
-        "source_points": points,
-    }
-    graph.dispatch("pairs", shader, {**surface, **bindings}, workgroup_grid(count))
-
-
-def _cells_record(shader: ComputeProgram, cells: Cells, count: int) -> UniformRecord:
-    return shader.record("Cells", size=cells.size, side=cells.side, stride=cells.stride, count=count)
+    name, (buffer, count) = f"translucency/translucency_{role}s.wgsl", table
+    shader = program(graph.device, name, (("FACETS", 1),) if facets else ())
+    record = shader.record("Cells", size=cells.size, side=cells.side, stride=cells.stride, count=count)
+    own: Bindings = {"cells": record, f"{role}s": buffer, f"{role}_points": points}
+    graph.dispatch("pairs", shader, {**surface, **own}, workgroup_grid(count))
 
 
 def draw(
@@ -162,8 +137,8 @@ def sum_pairs(
 def draw_weights(graph: Recorder, thin: Translucency) -> None:
     """Compute the weights of all pairs for the current surface, and the fraction of light that is lost."""
     pairs, cells = thin.pairs, thin.pairs.cells
-    draw_receivers(graph, thin.surface, cells, pairs.receivers, thin.receiver_points)
-    draw_sources(graph, thin.surface, cells, pairs.sources, thin.source_points)
+    draw_points(graph, "receiver", thin.surface, cells, pairs.receivers, thin.receiver_points)
+    draw_points(graph, "source", thin.surface, cells, pairs.sources, thin.source_points)
     bindings: Bindings = {
         "pairs": pairs.pairs,
         "receiver_points": thin.receiver_points,

@@ -1,4 +1,4 @@
-"""glTF: a .glb whose skin scatters light by the draft extension, or lets it through by a settled one."""
+"""Export to glTF: a .glb whose skin scatters light (draft extension) or transmits it (ratified one)."""
 
 from __future__ import annotations
 
@@ -94,6 +94,7 @@ def _scatter_parameters(volume: Volume) -> Parameters:
 
 
 def _diffuse_parameters(subject: Subject, factor: float, colour: Floats) -> Parameters:
+    """Return the parameters of the variant without scattering: colours and the transmitted fraction."""
     return (
         Parameter(_BASE, floats(subject.albedo), "-", "diffuse reflectance; the mean of a colour map"),
         Parameter(_FACTOR, float(factor), "-", f"transmitted fraction at {_EAR_MM:g} mm, as of an ear"),

@@ -1,4 +1,4 @@
-"""Scene description of pbrt (version 4): millimetres, relative to the head's centre."""
+"""Directives of pbrt-v4 scene files, with positions in mm relative to the centre of the head."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ _MAX_BOUNCES = 100
 
 
 def directive(word: str, kind: str, parameters: DirectiveParameters | None = None) -> str:
-    """Return a line such as `Material "subsurface" "float eta" [ 1.4 ]`.
+    """Return a directive such as `Material "subsurface" "float eta" [ 1.4 ]`.
 
-    parameters : values by type and name: text, true or false, numbers, or arrays of them
+    parameters : values by type and name, each a text, a Boolean, numbers, or an array of numbers
     """
     texts = [f'"{key}" [ {_text(value)} ]' for key, value in (parameters or {}).items()]
     return " ".join([word, f'"{kind}"', *texts])
@@ -50,7 +50,10 @@ def _text(value: ArrayLike) -> str:
 
 
 def camera_lines(camera: Camera, file: str) -> Lines:
-    """Return camera, film and integrator: all before the world begins."""
+    """Return the directives of camera, film and integrator, which precede WorldBegin.
+
+    file : name of the image that pbrt writes
+    """
     vectors = np.concatenate([camera.position, camera.target, camera.up])
     half, shift = camera.window(1.0)
     screen = [(end + shift[axis]) * half[axis] for axis in (0, 1) for end in (-1.0, 1.0)]
@@ -70,7 +73,7 @@ def camera_lines(camera: Camera, file: str) -> Lines:
 
 
 def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
-    """Return the lights; those that pbrt has not are left out with a note."""
+    """Return the directives of the lights; unsupported ones are omitted with a note."""
     lines = Lines()
     for number, light in enumerate(supported_lights(lights, PBRT, "pbrt"), start=1):
         if PBRT[light.kind] is _unsupported:
@@ -85,7 +88,11 @@ def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lin
 
 
 def mesh_ply(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float]) -> bytes:
-    """Return a binary PLY file of some triangles, with normals and uv whose v is upwards."""
+    """Return a binary PLY file of some triangles of a mesh, with normals and texture coordinates (v upwards).
+
+    faces : (t,) mask of the triangles
+    centre_mm : origin of the file's coordinates
+    """
     vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
     uv = np.column_stack([mesh.uv[vertex, 0], 1.0 - mesh.uv[vertex, 1].astype("<f4")])
     positions = mesh.positions[vertex] - np.asarray(centre_mm)
@@ -159,4 +166,4 @@ PBRT: Registry[Callable[[Any], Lines]] = Registry(
         "stripe": _unsupported,
     },
 )
-"""Writers of a kind of light."""
+"""Functions that return the directives of a light, by its kind."""

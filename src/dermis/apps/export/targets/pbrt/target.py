@@ -1,4 +1,4 @@
-"""The curve of pbrt's material "subsurface": photon beam diffusion, in a table of albedos and radii."""
+"""Export to pbrt: fit of its subsurface material, which uses a table of photon beam diffusion."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ _BALL_DISTANCE, _BALL_FRAME = 10.0, 1.4  # camera distance and visible height, r
 
 
 class DiffusionTable(NamedTuple):
-    """What pbrt computes for an index of refraction.
+    """Cumulative profiles of pbrt's subsurface material at one index of refraction.
 
-    albedo : (n,) [-]
-    radius : (m,) [mean free paths]
-    reflectance : (n,) of each albedo [-]
-    within : (n, m) share of what enters that leaves within the radii [-]
+    albedo : (n,) single-scattering albedos
+    radius : (m,) radii [mean free paths]
+    reflectance : (n,) diffuse reflectance at each albedo
+    reflectance_within : (n, m) part of the diffuse reflectance within each radius
     """
 
     albedo: Floats
@@ -49,7 +49,7 @@ class DiffusionTable(NamedTuple):
     reflectance_within: Floats
 
     def interpolate(self, radius: ArrayLike, reflectance: float) -> Floats:
-        """Share of what enters that leaves within radii, for the albedo that pbrt finds for a reflectance."""
+        """Return the diffuse reflectance within radii [mean free paths], for a given total reflectance."""
         row = np.interp(reflectance, self.reflectance, np.arange(_ALBEDO_COUNT))
         low = int(min(row, _ALBEDO_COUNT - 2))
         first, second = self.reflectance_within[low : low + 2]
@@ -59,7 +59,7 @@ class DiffusionTable(NamedTuple):
 
 @cache
 def diffusion_table(eta: float) -> DiffusionTable:
-    """pbrt's table for isotropic scattering in a medium with an index of refraction.
+    """Return pbrt's table for isotropic scattering in a medium with an index of refraction.
 
     Source: [Habel2013] in the form of [Pharr2023]; the moments of the reflectance are exact here.
     """
@@ -73,7 +73,10 @@ def diffusion_table(eta: float) -> DiffusionTable:
 
 
 def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
-    """(m,) radiant exitance of light scattered more than once, at an extinction of 1."""
+    """Return the radiant exitance (m,) of light scattered more than once, for an extinction of 1.
+
+    radius : (m,) radii [mean free paths]
+    """
     D = (2.0 - albedo) / 3.0
     decay = np.sqrt((1.0 - albedo) / D)
     first, second = internal_moment(1, eta), internal_moment(2, eta)
@@ -92,7 +95,7 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
 
 
 def _single_scattering(radius: Floats, eta: float) -> Floats:
-    """(m,) radiant exitance of light scattered once, over the albedo, at an extinction of 1."""
+    """Return the radiant exitance (m,) of light scattered once, per unit albedo, for an extinction of 1."""
     critical_depth = radius * np.sqrt(eta**2 - 1.0)  # total internal reflection above
     depth = critical_depth + _depths()[:, None]
     path = np.hypot(radius, depth)
@@ -107,7 +110,7 @@ def _depths() -> Floats:
 
 
 def _integrate_spline(x: Floats, values: Floats) -> Floats:
-    """(n, m) integrals from the first of x, by Catmull's and Rom's splines through values (n, m)."""
+    """Return the integrals (n, m) from x[0] to each x of Catmull-Rom splines through values (n, m)."""
     slope = np.empty_like(values)
     slope[:, 1:-1] = (values[:, 2:] - values[:, :-2]) / (x[2:] - x[:-2])
     slope[:, 0] = (values[:, 1] - values[:, 0]) / (x[1] - x[0])
@@ -118,7 +121,7 @@ def _integrate_spline(x: Floats, values: Floats) -> Floats:
 
 
 class Pbrt(Target):
-    """A scene in text, with geometry and pictures beside it; millimetres."""
+    """Export to a pbrt-v4 scene in mm, with meshes and maps in files beside it."""
 
     name = "pbrt"
     title = "pbrt"
@@ -134,16 +137,16 @@ class Pbrt(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the reflectance and mean free path whose table is nearest."""
+        """Return the reflectance, and the mean free path whose table is closest to the profile."""
         path = fit_scale(subject.curve, _unit_curve(subject.albedo))
         return _parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour, and published diffuse mean free paths as mean free paths."""
+        """Return the skin's colour, and published diffuse mean free paths used as mean free paths."""
         return _parameters(subject, published_path_mm(subject), "as published, 1 / sigma_tr")
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return pbrt's table at these numbers."""
+        """Return the cumulative profile that pbrt tabulates for the parameters."""
         reflectance = np.array(get_numbers(parameters, _REFLECTANCE))
         curve = scale_lengths(_unit_curve(reflectance), get_numbers(parameters, _PATH))
         return subject.rescale_energy(curve)
@@ -159,7 +162,7 @@ class Pbrt(Target):
 
 
 def _unit_curve(reflectance: Floats) -> CumulativeProfile:
-    """Return the curve of media of these reflectances, in mean free paths."""
+    """Return the cumulative profile for (3,) reflectances, with radii in mean free paths."""
     table = diffusion_table(SKIN_ETA)
     total = np.array([table.interpolate(table.radius[-1], float(one)) for one in reflectance], np.float64)
 
@@ -184,7 +187,7 @@ def _parameters(subject: Subject, path_mm: Floats, meaning: str) -> Parameters:
 
 
 def _ball_scene(ball: Head) -> Scene:
-    """Return a ball in the middle of the picture."""
+    """Return a scene that shows a ball in the middle of the picture."""
     x, y, z = (float(one) for one in -np.array(ball.centre_mm))
     size = float(ball.mesh.size_mm[1])
     camera = Camera(position=(x, y, z + _BALL_DISTANCE * size), target=(x, y, z), frame_mm=_BALL_FRAME * size)
@@ -194,7 +197,7 @@ def _ball_scene(ball: Head) -> Scene:
 def _scene_lines(
     subject: Subject, parameters: Parameters, scene: Scene, prefix: str
 ) -> tuple[Lines, dict[str, bytes]]:
-    """Return the scene's lines, and the files beside it by name."""
+    """Return the directives of the scene, and the contents of the other files by name."""
     head = scene.head
     textures = skin_textures(subject, prefix)
     lines = ["# Written by dermis; lengths in mm relative to the head's centre"]
@@ -212,7 +215,7 @@ def _scene_lines(
 
 
 def _skin_material(parameters: Parameters, bindings: dict[str, tuple[str, str]]) -> str:
-    """Return the skin's material; an input with a map has its texture's name."""
+    """Return the directive of the skin's material, whose inputs with maps refer to textures."""
     types = {_REFLECTANCE: "rgb", _PATH: "rgb", "remaproughness": "bool"}
     values: dict[str, ArrayLike] = {}
     for one in parameters:
@@ -229,11 +232,11 @@ def _opaque_material(colour: tuple[float, float, float]) -> str:
 
 
 class Textures(NamedTuple):
-    """Maps of a scene.
+    """Textures of the skin in a pbrt scene.
 
-    lines : that make them
-    files : by name
-    driven : type of parameter, and texture or file, by the skin's parameters
+    lines : directives that define them
+    files : contents of the image files by name
+    bindings : type, and name of the texture or file, by the parameter of the material that uses it
     """
 
     lines: Lines
@@ -242,9 +245,9 @@ class Textures(NamedTuple):
 
 
 def skin_textures(subject: Subject, prefix: str) -> Textures:
-    """Return the textures of a head; none for a skin by itself.
+    """Return the textures of a head; a skin without a head has none.
 
-    prefix : of the files' names
+    prefix : prefix of the names of the files
     """
     textures = Textures([], {}, {})
     if subject.head is None:

@@ -1,1 +1,1 @@
-"""Export to a web page with three.js."""
+"""Export to a web page that draws the head with three.js."""

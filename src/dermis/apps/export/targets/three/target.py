@@ -1,4 +1,4 @@
-"""three.js: a page with the head, lit and turned, whose skin spreads no light."""
+"""Export to a web page with three.js, in which lights and head can be moved; its skin diffuses no light."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _DEFAULT_IOR = 1.5
 
 
 class Three(EnginePage):
-    """Page with three.js."""
+    """Export to a web page that draws the head with three.js."""
 
     name = "three"
     title = "three.js"
@@ -46,7 +46,7 @@ class Three(EnginePage):
     }
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the surface; there is nothing for what is below."""
+        """Return the parameters of MeshPhysicalMaterial's surface, which has no subsurface scattering."""
         return (
             *material_parameters(subject),
             Parameter("specularIntensity", 1.0, "-", "reflectance given by the index of refraction"),
@@ -54,15 +54,15 @@ class Three(EnginePage):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the index of refraction that the material begins with."""
+        """Return the same parameters with the material's default index of refraction."""
         return replace_values(self.parameters(subject, version), {"ior": _DEFAULT_IOR})
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the curve of light that leaves where it falls."""
+        """Return the profile of light that leaves the skin where it enters."""
         return CumulativeProfile.from_function(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return six modules and the map of their names."""
+        """Return the import map of the library's modules, and their sources for the page's policy."""
         files = self.library_files[version]
         if self.library_folder is None:
             imports = {file.name: file.url for file in files}

@@ -1,1 +1,1 @@
-"""Export to the HDRP of Unity: a DiffusionProfileSettings asset, and the maps of a head."""
+"""Export to Unity HDRP: a DiffusionProfileSettings asset, and the maps of a head."""

@@ -1,7 +1,7 @@
-"""Unity's HDRP: a DiffusionProfileSettings asset, and the maps of a head.
+"""Export to Unity HDRP: a DiffusionProfileSettings asset, and the maps of a head.
 
-By its source (DiffusionProfileSettings.cs) the lobe's d is the scattering colour times the multiplier, in mm
-where the world scale is the metres of a unit.
+In DiffusionProfileSettings.cs, the width d of the lobe is the scattering colour times the multiplier [mm], if
+the world scale is the length of a scene unit in metres.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
 
 _COLOUR, _MULTIPLIER, _SCALE, _IOR = "scatteringDistance", "scatteringDistanceMultiplier", "worldScale", "ior"
-_TINT, _DEPTHS = "transmissionTint", "thicknessRemap"
+_TRANSMISSION, _THICKNESS = "transmissionTint", "thicknessRemap"
 _SKIN_IOR, _MAX_THICKNESS = 1.4, 10.0  # thickness relative to the largest d
 _NAIVE_MULTIPLIER_MM = 1.0
 _BEFORE_14 = "12"
@@ -37,7 +37,7 @@ _FILE_VERSIONS = {_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version; 1 has no multip
 
 
 class Unity(Target):
-    """A diffusion profile; the albedo stays in the material's base colour."""
+    """Export to a diffusion profile of Unity HDRP; the material's base colour must be the skin's."""
 
     name = "unity"
     title = "Unity HDRP"
@@ -51,30 +51,30 @@ class Unity(Target):
     untested = True
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the colour and multiplier of the fitted lobes."""
+        """Return the scattering colour and multiplier of Burley profiles fitted to the skin."""
         d = fit_burley_width(subject.curve)
         return (
             *_distances(d, version),
             Parameter(_SCALE, 1.0, "m", "metres per scene unit"),
             Parameter(_IOR, _SKIN_IOR, "-", "of the specular reflection"),
-            Parameter(_TINT, (1.0, 1.0, 1.0), "-", "factor of light through thin parts"),
-            Parameter(_DEPTHS, (0.0, _MAX_THICKNESS * float(d.max())), "mm", "range of a thickness map"),
+            Parameter(_TRANSMISSION, (1.0, 1.0, 1.0), "-", "factor of light through thin parts"),
+            Parameter(_THICKNESS, (0.0, _MAX_THICKNESS * float(d.max())), "mm", "range of a thickness map"),
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour as the scattering colour, as the inspector advises, and multiplier 1."""
+        """Return the skin's colour as the scattering colour, as the inspector suggests, with multiplier 1."""
         colour = floats(subject.clipped_albedo())
         values: dict[str, Value] = {_COLOUR: colour, _MULTIPLIER: _NAIVE_MULTIPLIER_MM}
         return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the lobe that the engine computes from its parameters."""
+        """Return the profile that the engine computes from its parameters."""
         colour, scale = np.array(get_numbers(parameters, _COLOUR)), get_numbers(parameters, _SCALE)[0]
         multiplier = 1.0 if version == _BEFORE_14 else get_numbers(parameters, _MULTIPLIER)[0]
         return burley_curve(colour * multiplier / scale, subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the asset, and beside it the maps."""
+        """Write the asset, and the maps of a head beside it."""
         asset = self.main_file(output, subject)
         asset.write_text(asset_text(asset.stem, parameters, version), encoding="utf-8")
         maps = ((f"{asset.stem}_{role}.png", data) for role, data in subject.encode_maps().items())
@@ -82,7 +82,7 @@ class Unity(Target):
 
 
 def _distances(d_mm: Floats, version: str) -> Parameters:
-    """Return the lobes' widths, as one colour before HDRP 14 and as colour and multiplier since."""
+    """Return the widths of the lobes: a colour before HDRP 14, a colour and a multiplier since."""
     if version == _BEFORE_14:
         return (Parameter(_COLOUR, floats(d_mm), "mm", "d as a linear HDR colour"),)
     profile = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
@@ -93,10 +93,10 @@ def _distances(d_mm: Floats, version: str) -> Parameters:
 
 
 def asset_text(name: str, parameters: Parameters, version: str) -> str:
-    """Return the asset as the editor writes one; the editor gives it a hash when it is first opened."""
+    """Return the text of the asset, without the hash that the editor adds when it first opens it."""
     values = {one.name: one.value for one in parameters}
-    colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR, _TINT))
-    low, high = get_numbers(parameters, _DEPTHS)
+    colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR, _TRANSMISSION))
+    low, high = get_numbers(parameters, _THICKNESS)
     multiplier = f"    {_MULTIPLIER}: {values[_MULTIPLIER]:.6g}\n" if _MULTIPLIER in values else ""
     template = Template(Path(__file__).with_name("profile.asset").read_text("utf-8"))
     return template.substitute(

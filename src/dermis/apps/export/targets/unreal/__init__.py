@@ -1,1 +1,1 @@
-"""Export to Unreal Engine: a subsurface profile made by an editor script."""
+"""Export to Unreal Engine: a script for the editor that creates a subsurface profile."""

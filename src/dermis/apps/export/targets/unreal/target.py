@@ -1,7 +1,7 @@
-"""Unreal Engine: a Python script for the editor that makes a SubsurfaceProfile, and the maps of a head.
+"""Export to Unreal Engine: an editor script that creates a SubsurfaceProfile, and the maps of a head.
 
-By public copies of its source (SubsurfaceProfile.cpp, BurleyNormalizedSSS.cpp) the lobe's d is the mean free
-path over 0.6 s(A), where s is Burley's for perpendicular light: the scaling of searchlight profiles cancels.
+In SubsurfaceProfile.cpp and BurleyNormalizedSSS.cpp, the width d of the lobe is the mean free path over
+0.6 s(A), where s is Burley's factor for perpendicular light; the scaling of searchlight profiles cancels.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _BEFORE_58 = ("5.3", "5.4", "5.5", "5.6", "5.7")
 
 
 class Unreal(Target):
-    """A subsurface profile with Burley's kernel, for scenes in centimetres."""
+    """Export to a subsurface profile of Unreal Engine with Burley's kernel, for scenes in cm."""
 
     name = "unreal"
     title = "Unreal Engine"
@@ -44,28 +44,28 @@ class Unreal(Target):
     untested = True
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Mean free paths that the engine turns into the fitted lobes."""
+        """Return the mean free paths for which the engine computes Burley profiles fitted to the skin."""
         albedo = subject.clipped_albedo(_MIN_ALBEDO)
         profile = unreal_parameters(BurleyProfile(albedo, 1.0 / fit_burley_width(subject.curve)))
         path_cm = np.array(profile.mean_free_path_colour) * profile.mean_free_path_distance_cm
         return _parameters(albedo, path_cm, version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """The tissue's own mean free path, reduced, as the name of the field invites."""
+        """Return the reduced mean free path of the tissue, as the name of the parameter suggests."""
         path = fit_homogeneous_medium(subject.curve, subject.curve.energy).mfp_mm
         if subject.tissue is not None and subject.tissue.rgb is None:
             path = subject.tissue.medium.layers[-1].mean_free_path_mm
         return _parameters(subject.clipped_albedo(_MIN_ALBEDO), path / _MM_PER_CM, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """The lobe that the engine computes from its parameters, at the scale of its screen pass."""
+        """Return the profile that the engine's screen-space pass computes from its parameters."""
         colour = np.maximum(get_numbers(parameters, COLOUR), _MIN_ENGINE_COLOUR)
         path = _MM_PER_CM * colour * get_numbers(parameters, DISTANCE)[0] * get_numbers(parameters, SCALE)[0]
         albedo = np.array(get_numbers(parameters, ALBEDO))
         return burley_curve(path / (UNREAL_FACTOR * shape_factor(albedo)), subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """The script, and beside it the maps."""
+        """Write the script, and the maps of a head beside it."""
         file, maps = self.main_file(output, subject), subject.encode_maps()
         names = {role: f"{file.stem}_{role}.png" for role in maps}
         imported = {role: name for role, name in names.items() if role in _IMPORTED}
@@ -92,9 +92,9 @@ def _parameters(albedo: Floats, path_cm: Floats, version: str) -> Parameters:
 
 
 def _script(subject: Subject, parameters: Parameters, maps: Mapping[str, str], version: str) -> str:
-    """Return a Python script that makes the profile and imports maps that lie beside it.
+    """Return the text of a Python script that creates the profile and imports the maps beside it.
 
-    maps : names of files by role
+    maps : names of the map files by role
     """
     settings = [f"    {json.dumps(one.name)}: {_value(one.value)},  # {one.unit}\n" for one in parameters]
     files = [f"    {json.dumps(role)}: {json.dumps(name)},\n" for role, name in maps.items()]

@@ -1,1 +1,1 @@
-"""Export to USD: a stage with the head, what moves it, its hairs and its materials."""
+"""Export to USD: a stage with the head, its rig, hairs and materials."""

@@ -1,7 +1,4 @@
-"""Geometry of a head in a USD stage in metres, and what moves it.
-
-One mesh with a subset for each material, hairs as curves, blend shapes and a skeleton (UsdSkel).
-"""
+"""Geometry of a head in a USD stage in metres: mesh, hairs, blend shapes and skeleton (UsdSkel)."""
 
 from __future__ import annotations
 
@@ -26,11 +23,11 @@ METRES_PER_MM = 1e-3
 
 
 class Polygons(NamedTuple):
-    """Polygons: quads first, then triangles that are no half of one.
+    """Polygons of a mesh: its quads, then its single triangles.
 
-    sides : (f,) corners of each
-    corner : (n,) vertices of the mesh, face after face
-    material : (f,)
+    vertex_counts : (f,) 4 or 3 vertices of each polygon
+    vertices : (n,) vertex indices, polygon after polygon
+    material : (f,) material index of each polygon
     """
 
     vertex_counts: Ints
@@ -39,7 +36,7 @@ class Polygons(NamedTuple):
 
 
 def mesh_polygons(mesh: Mesh) -> Polygons:
-    """Return the polygons of a mesh whose quads are in halves."""
+    """Return the polygons of a mesh, in which two triangles of a quad are joined."""
     halves, triangles = mesh.quads, mesh.triangles
     single = np.delete(np.arange(len(triangles)), halves.ravel())
     quads = np.column_stack([triangles[halves[:, 0]], triangles[halves[:, 1]][:, 1]])
@@ -51,16 +48,16 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
 
 
 def point_vertices(mesh: Mesh) -> NDArray[np.intp]:
-    """Return a vertex of each point (p,)."""
+    """Return the (p,) index of a vertex at each point of the mesh."""
     return np.unique(mesh.point, return_index=True)[1]
 
 
 def add_mesh(
     stage: Usd.Stage, path: Sdf.Path, head: Head, deformable: DeformableMesh
 ) -> dict[int, UsdGeom.Subset]:
-    """Write the mesh at rest; return the subset of each material that is used.
+    """Add the mesh in its rest pose to the stage; return the subset of each material that it uses.
 
-    moved : the head's vertices with all morph targets at 0
+    deformable : the head's mesh with all morph targets at 0
     """
     mesh, polygons = head.mesh, mesh_polygons(head.mesh)
     vertex = point_vertices(mesh)
@@ -85,7 +82,7 @@ def add_mesh(
 
 
 def texture_coordinates(head: Head) -> Floats:
-    """Return texture coordinates (v, 2) with v downwards, those of eyes by the layout of their picture."""
+    """Return (v, 2) texture coordinates with v downwards; those of eyes refer to the eye pictures."""
     mesh, uv = head.mesh, head.mesh.uv.copy()
     if head.eyes is not None:
         frames = head.eyes.frames(head.control, head.control.rest)
@@ -96,7 +93,7 @@ def texture_coordinates(head: Head) -> Floats:
 
 
 def _add_uv(prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
-    """Write texture coordinates (v, 2) with v upwards, one for each vertex of ours."""
+    """Add (v, 2) texture coordinates of the vertices, with v upwards, to a mesh."""
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
     types, tokens = Sdf.ValueTypeNames, UsdGeom.Tokens
     primvar = UsdGeom.PrimvarsAPI(prim).CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying)
@@ -105,7 +102,7 @@ def _add_uv(prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
 
 
 def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) -> UsdGeom.BasisCurves:
-    """Write hairs at rest as lines with a width at each knot."""
+    """Add hairs in the rest pose to the stage, as linear curves with a width at each knot."""
     knots = strands.knot_positions_mm(head.mesh, head.mesh.points_mm)
     prim = UsdGeom.BasisCurves.Define(stage, path)
     count = np.full(len(knots), knots.shape[1], np.int32)
@@ -121,15 +118,15 @@ def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) ->
 
 
 def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
-    """Return places in metres."""
+    """Return positions in metres."""
     return np.ascontiguousarray(METRES_PER_MM * positions_mm.astype(np.float64), np.float32)
 
 
 def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
-    """Write blend shapes and bones beside a mesh, and how both rest.
+    """Add blend shapes and a skeleton to a mesh, and an animation with their rest pose.
 
     root : path of the UsdSkelRoot
-    mesh : the prim that they move
+    mesh : the mesh that they deform
     """
     path = root.AppendChild("skeleton")
     skeleton = UsdSkel.Skeleton.Define(stage, path)
@@ -153,7 +150,7 @@ def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: Def
 
 
 def valid_names(names: Sequence[str]) -> list[str]:
-    """Return names that a stage can have, each once: letters, digits and underscores."""
+    """Return unique names of letters, digits and underscores, as USD requires."""
     valid: list[str] = []
     for name in names:
         identifier = Tf.MakeValidIdentifier(name)
@@ -163,7 +160,7 @@ def valid_names(names: Sequence[str]) -> list[str]:
 
 
 def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
-    """Write bones and return their paths; a head without bones has one, as blend shapes need a skeleton."""
+    """Set the joints of a skeleton and return their paths; a head without bones gets one joint."""
     joints, rest, bind = ["root"], np.eye(4)[None], np.eye(4)[None]
     if skeleton is not None:
         joints = []
@@ -177,7 +174,7 @@ def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
 
 
 def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
-    """Return matrices (b, 4, 4) from bones to their parents at rest, and to the head when bound [m]."""
+    """Return (b, 4, 4) rest transforms from bones to their parents, and bind transforms to the head [m]."""
     to_file = np.diag([METRES_PER_MM, METRES_PER_MM, METRES_PER_MM, 1.0]) @ skeleton.to_head
     scale = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     enlarge, reduce = (np.diag([factor, factor, factor, 1.0]) for factor in (scale, 1.0 / scale))

@@ -1,6 +1,6 @@
 """USD stage of a head in metres, Y up.
 
-Materials are OpenPBR as nodes of MaterialX, and a preview for programs without it.
+Materials are OpenPBR as MaterialX nodes, with UsdPreviewSurface for programs that do not support them.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ _UV = "st"
 
 
 def build_stage(head: Head, name: str, definitions: Mapping[int, OpenPbrMaterial], prefix: str) -> Usd.Stage:
-    """Return the stage.
+    """Return the stage of a head.
 
-    name : what the head is called
-    looks : by the mesh's materials
-    prefix : of the maps' names, which lie beside the stage
+    name : display name of the head
+    definitions : materials by their index in the mesh
+    prefix : prefix of the file names of the maps, which are beside the stage
     """
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -85,9 +85,9 @@ def _add_hairs(stage: Usd.Stage, root: Sdf.Path, head: Head) -> None:
 def _add_material(
     stage: Usd.Stage, path: Sdf.Path, definition: OpenPbrMaterial, prefix: str
 ) -> UsdShade.Material:
-    """Write a material; return it.
+    """Add a material to the stage and return it.
 
-    prefix : of the maps' names, which lie beside the stage
+    prefix : prefix of the file names of the maps
     """
     material = UsdShade.Material.Define(stage, path)
     material.GetPrim().SetDisplayName(definition.name)
@@ -130,7 +130,7 @@ def _add_open_pbr(
 def _add_preview(
     stage: Usd.Stage, material: UsdShade.Material, definition: OpenPbrMaterial, prefix: str
 ) -> None:
-    """The preview has no scattering below the surface: its colour alone."""
+    """Add the UsdPreviewSurface of a material, which has its colour but no subsurface scattering."""
     types = Sdf.ValueTypeNames
     surface = _add_shader(stage, material, "preview", "UsdPreviewSurface")
     for key, value in definition.values.items():

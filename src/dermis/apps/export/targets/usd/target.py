@@ -1,4 +1,4 @@
-"""USD: a stage with the head, what moves it, its hairs, and OpenPBR materials as nodes of MaterialX."""
+"""Export to USD: a stage with the head, its rig and hairs, and OpenPBR materials as MaterialX nodes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "unit of all lengths, als
 
 
 class Usd(Target):
-    """A stage, alone with its maps, in a package or in a folder."""
+    """Export to a USD stage: a file with maps beside it, a .usdz package, or a folder."""
 
     name = "usd"
     title = "USD with OpenPBR"
@@ -49,23 +49,23 @@ class Usd(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the walk whose curve is nearest."""
+        """Return the parameters of OpenPBR whose random walk is closest to the profile."""
         path = fitted_path_mm(subject)
         meaning = f"longest mean free path; {profile_error_text(path, subject)}"
         return (*surface_parameters(subject, OPEN_PBR, path, meaning), _UNIT_PARAMETER)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the diffuse mean free paths of published tables, typed in as mean free paths."""
+        """Return published diffuse mean free paths used as mean free paths."""
         path = published_path_mm(subject)
         return (*surface_parameters(subject, OPEN_PBR, path, PUBLISHED_MEANING), _UNIT_PARAMETER)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the curve of the walk of these rows."""
+        """Return the cumulative profile of the random walk with the parameters."""
         colour = np.array(get_numbers(parameters, "subsurface_color"))
         return walk_curve(colour, get_radii_mm(parameters, OPEN_PBR), subject)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the stage, and the maps beside it or in the package."""
+        """Write the stage, with the maps beside it or in the package."""
         import_extra("pxr", "writing USD")
         file = self.main_file(output, subject, _BINARY)
         prefix = file_prefix(file, subject)
@@ -82,7 +82,7 @@ class Usd(Target):
 
 
 def _write(subject: Subject, parameters: Parameters, file: Path, prefix: str) -> list[Path]:
-    """Write the stage and the maps beside it; return the paths of the maps."""
+    """Write the stage, and the maps beside it; return the paths of the maps."""
     from dermis.apps.export.targets.usd.stage import build_stage
 
     maps, head = write_maps(subject, file.parent, prefix), subject.head_or_ball

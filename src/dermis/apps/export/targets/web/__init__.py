@@ -1,1 +1,1 @@
-"""Export to a web page that renders the head with WebGPU and runs without a server."""
+"""Export to a web page that renders the head with WebGPU, without a server."""

@@ -1,4 +1,4 @@
-"""Content of the page: frames of a scene in two forms, at several sizes, before and after light spreads."""
+"""Captured frames of a scene for the web page, for two kinds of adapter and several picture sizes."""
 
 from __future__ import annotations
 
@@ -38,17 +38,20 @@ TECHNIQUES = ("texture-space", "none")
 PICTURE_SIDES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures for each kind of adapter [pixel]."""
 INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
-"""Reduced quality during interaction: side [pixel], samples per pixel, and hairs merged into one."""
+"""Side [pixel], samples per pixel and merged hairs during interaction, by kind of adapter."""
 
 
 @dataclass
 class PageContent:
-    """Content of the page.
+    """Content of the web page.
 
-    forms : the description of each form's frames
-    pictures : maps as WebP
-    placed : number of a picture, number of the run of its curves, how many of its channels are colours;
-        by role, mip and layer
+    forms : description of the frames for each kind of adapter, see `dermis.frame.capture.ADAPTER_KINDS`
+    packer : bytes of buffers and textures
+    maps : maps encoded as pictures
+    pictures : WebP files, in the order of their numbers
+    picture_entries : by role, mip level and layer: number of the picture, number of the byte run of its value
+        curves, and number of its colour channels
+    poster : picture shown until the page renders
     """
 
     forms: dict[str, Json] = field(default_factory=dict)
@@ -59,7 +62,7 @@ class PageContent:
     poster: NDArray[np.uint8] | None = None
 
     def add_picture(self, key: PictureKey) -> tuple[int, int, int]:
-        """Add a picture and its curves once; return its entry of `picture_entries`."""
+        """Add a picture and its curves unless present; return its entry of `picture_entries`."""
         if key not in self.picture_entries:
             picture = self.maps.pictures[key]
             curves = self.packer.add(np.ascontiguousarray(picture.curves).view(np.uint8).reshape(-1))
@@ -70,11 +73,12 @@ class PageContent:
 
 @dataclass(frozen=True)
 class PageRequest:
-    """Request for the content of a page.
+    """Scene and settings from which the content of a page is built.
 
-    settings : of all frames, but for size and technique
-    sizes : sides of the pictures of each form, see `PICTURE_SIDES`; forms that are left out are not built
-    moving : what is drawn while hands move, see `INTERACTIVE_QUALITY`; forms that are left out draw all
+    settings : settings of all frames; size and technique are replaced
+    sizes : sides of the pictures of each kind of adapter, see `PICTURE_SIDES`; without sizes, it is not
+        supported
+    interactive : quality during interaction by kind of adapter, see `INTERACTIVE_QUALITY`; full if absent
     """
 
     scene: Scene
@@ -85,7 +89,7 @@ class PageRequest:
     interactive: dict[str, tuple[int, int, int]] = field(default_factory=dict)
 
     def frames(self, form: str) -> Iterator[tuple[Settings, int]]:
-        """Yield a form's frames: settings, and how many coarse hairs become one, 0 for frames at rest."""
+        """Yield the settings of each frame, and how many hairs are merged into one (0 at full quality)."""
         for technique in TECHNIQUES:
             for side in self.sizes[form]:
                 yield self.settings_for(side, technique), 0
@@ -94,9 +98,9 @@ class PageRequest:
                 yield self.settings_for(side, technique).model_copy(update={"samples": samples}), merged_hairs
 
     def settings_for(self, side: int, technique: str = TECHNIQUES[0]) -> Settings:
-        """Return the settings of a frame; before light spreads it does not pass between surfaces either.
+        """Return the settings of a frame; without diffusion it has no interreflection either.
 
-        Every layout has links of its own: those of a second one would be 0.6 MB of the page.
+        Links between surfaces for a second layout would add 0.6 MB to the page.
         """
         diffusion = {"technique": technique, "interreflection": technique == TECHNIQUES[0]}
         return self.settings.model_copy(update={"size": (side, side), **diffusion})
@@ -105,9 +109,9 @@ class PageRequest:
 def build_content(
     request: PageRequest, on_renderer: Callable[[Renderer, Scene, Settings], None] | None = None
 ) -> PageContent:
-    """Return the scene for the page.
+    """Return the content of the page.
 
-    look : called with each form's renderer, whose maps are then those that the page decodes
+    on_renderer : called with each kind's renderer, whose maps are by then those that the page decodes
     """
     content = PageContent()
     for form in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
@@ -122,6 +126,7 @@ def build_content(
 
 
 def _build_form(content: PageContent, renderer: Renderer, request: PageRequest, form: str) -> Json:
+    """Return the description of the frames for one kind of adapter."""
     capture, frames, slider_changes = FrameCapture(renderer.device), list[NamedFrame](), list[Json]()
     base: FrameInputs | None = None
     for settings, merged_hairs in request.frames(form):
@@ -152,7 +157,7 @@ def _frame_changes(
     base: FrameInputs,
     frame: NamedFrame,
 ) -> Json:
-    """Return the changes of a frame at each dial's nodes."""
+    """Return the changes of a frame at the nodes of each slider."""
     capture = FrameCapture(renderer.device)
 
     def changes(inputs: FrameInputs | None) -> Json | None:
@@ -168,7 +173,7 @@ def _frame_changes(
 
 
 def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int, int, int]]]:
-    """Return the pictures and curves of the layers of a map's mips."""
+    """Return the picture entries of each mip level and layer of a map."""
     layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == map_.role)
     return [[content.add_picture((map_.role, mip, k)) for k in range(layers)] for mip in range(map_.mips)]
 
@@ -176,7 +181,7 @@ def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int,
 def _colour_maps(
     content: PageContent, renderer: Renderer, request: PageRequest, picture_maps: PictureMaps
 ) -> Json:
-    """Return the number of the colour map, and its picture and curves at nodes of dials that change it."""
+    """Return the number of the colour map, and its picture entries at nodes of sliders that change it."""
     number = next((k for k, one in picture_maps.items() if one.role == "colour_map"), None)
     if number is None:
         return {}
@@ -192,7 +197,7 @@ def _colour_maps(
 def _colour_entry(
     content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, name: str
 ) -> tuple[int, int, int] | None:
-    """Return the picture of a node's colour map, None where it is the same as at rest."""
+    """Return the picture entry of the colour map at a slider's node; None if it is unchanged."""
     if scene is None:
         return None
     if (name, 0, 0) not in content.maps.pictures:
@@ -206,7 +211,7 @@ def _colour_entry(
 
 
 def _interaction(scene: Scene, inputs: FrameInputs) -> Json:
-    """Return the camera, the lights that can be dragged, and the outline that shadow maps are fitted to."""
+    """Return the camera, the lights that can be dragged, and the outline that shadow maps must enclose."""
     camera, settings = scene.camera, inputs.settings
     projection, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
     return {
@@ -218,7 +223,7 @@ def _interaction(scene: Scene, inputs: FrameInputs) -> Json:
             "half": list(projection.window.half),
             "shift": list(projection.window.shift),
         },
-        "samples": inputs.camera_views.places.tolist(),
+        "samples": inputs.camera_views.sample_positions.tolist(),
         "outline": np.asarray(outline.points_mm, np.float32).round(3).ravel().tolist(),
         "slack": outline.margin_mm,
         "middle": list(outline.centre_mm),
@@ -228,7 +233,7 @@ def _interaction(scene: Scene, inputs: FrameInputs) -> Json:
 
 
 def _movable_light(light: Light) -> Json | None:
-    """Return a light that has a position and one shadow map; None for others, which cannot be moved."""
+    """Return the description of a spot light with shadows; None for other lights, which cannot be dragged."""
     if not isinstance(light, SpotLight) or not light.shadows:
         return None
     return {"position": list(light.position), "target": list(light.target), "softness": light.softness_mm}

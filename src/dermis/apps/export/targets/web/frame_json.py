@@ -1,4 +1,4 @@
-"""Description of captured frames as the player reads it."""
+"""JSON description of captured frames, which the page's player reads."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ _TABLES = "triangle_table", "triangle_buffer"
 
 @dataclass(frozen=True)
 class NamedFrame:
-    """A captured frame with its name and picture.
+    """Captured frame with its name and output picture.
 
-    picture : what it fills
-    fewer : of a frame that is drawn while hands move, how many coarse hairs became one; else 0
+    picture : output of the frame
+    size : width and height of the picture [pixel]
+    merged_hairs : number of coarse hairs merged into one during interaction; 0 at full quality
     """
 
     name: str
@@ -32,9 +33,11 @@ class NamedFrame:
 
 
 class PictureMap(NamedTuple):
-    """A map whose first mips come as pictures.
+    """Map whose first mip levels are stored as pictures.
 
-    halving : passes that fill the other mips; None where these come as texels
+    role : binding of the map in shaders
+    mips : number of mip levels stored as pictures
+    mip_passes : passes that compute the other levels on the device; None if these are stored as texels
     """
 
     role: str
@@ -44,7 +47,7 @@ class PictureMap(NamedTuple):
 
 PictureMaps = dict[int, PictureMap]
 QuantisedBuffers = dict[int, tuple[float, ...]]
-"""Buffers of floats that are multiples of steps."""
+"""Steps of the columns of quantised float buffers, by the index of the buffer."""
 
 
 def describe_frames(
@@ -54,9 +57,9 @@ def describe_frames(
     steps: QuantisedBuffers,
     packer: Packer,
 ) -> Json:
-    """Return the description of frames; the bytes that it names by number are in the packer.
+    """Return the description of frames, whose bytes are added to the packer and referred to by number.
 
-    Resources of zeros, which new ones are, have no content.
+    New resources are filled with zeros, so content of zeros is not stored.
     """
     pictures = [
         [capture.resource(one.picture.bytes), capture.resource(one.picture.exposed)] for one in frames
@@ -68,34 +71,36 @@ def describe_frames(
             contents[number] = [packer.add_floats(floats, steps[number])]
             continue
         _, pictured, mip_passes = picture_maps.get(number, PictureMap("", 0, None))
-        mips = [] if mip_passes else _mips(capture, number)[pictured:]
+        mips = [] if mip_passes else _mip_bytes(capture, number)[pictured:]
         if any(one.any() for one in mips):
-            add = packer.add if number not in tables else _in_parts(packer)
+            add = packer.add if number not in tables else _column_packer(packer)
             contents[number] = [-1] * pictured + [add(one) for one in mips]
     return {
         "shaders": capture.shaders,
-        "programs": [_program(one) for one in capture.programs],
-        "resources": [_camel(one) for one in capture.resources],
-        "structs": {name: _struct(dtype) for name, dtype in capture.structs.items()},
+        "programs": [_program_json(one) for one in capture.programs],
+        "resources": [_camel_keys(one) for one in capture.resources],
+        "structs": {name: _struct_json(dtype) for name, dtype in capture.structs.items()},
         "contents": contents,
-        "frames": [_frame(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
-        "halved": {k: _passes(one.mip_passes, packer) for k, one in picture_maps.items() if one.mip_passes},
+        "frames": [_frame_json(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
+        "halved": {
+            k: _passes_json(one.mip_passes, packer) for k, one in picture_maps.items() if one.mip_passes
+        },
     }
 
 
-def _in_parts(packer: Packer) -> Callable[[Bytes], int]:
-    """Return a function that packs each of three columns, one below the other, its own way."""
+def _column_packer(packer: Packer) -> Callable[[Bytes], int]:
+    """Return a function that packs a table's three columns, stored one after the other, separately."""
     return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mips(capture: FrameCapture, number: int) -> list[Bytes]:
-    """Return a buffer's bytes, or a texture's mip by mip, each with all its layers."""
+def _mip_bytes(capture: FrameCapture, number: int) -> list[Bytes]:
+    """Return the bytes of a buffer, or of each mip level of a texture with all its layers."""
     parts, layers = capture.read_content(number), capture.resources[number].get("size")
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
 
-def _frame(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
+def _frame_json(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
     records = [(struct, packer.add(record.tobytes())) for struct, record in one.captured.records]
     return {
         "name": one.name,
@@ -103,56 +108,56 @@ def _frame(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
         "moving": one.merged_hairs > 0,
         "picture": picture[0],
         "linear": picture[1],
-        "views": {stage: _views(one.captured, stage) for stage in ("visibility", "shadows")},
-        "passes": _passes(one.captured, packer),
+        "views": {stage: _view_record(one.captured, stage) for stage in ("visibility", "shadows")},
+        "passes": _passes_json(one.captured, packer),
         "records": records,
     }
 
 
-def _views(captured: CapturedFrame, stage: str) -> int:
-    """Return the record by which a stage's passes see the head, -1 for none."""
+def _view_record(captured: CapturedFrame, stage: str) -> int:
+    """Return the index of the record with the view matrices of a stage's passes; -1 for none."""
     views = [k for k, (struct, _) in enumerate(captured.records) if struct == "Views"]
     records = (-1 - k for one in captured.passes if one.stage == stage for k in one.bound if k < 0)
     return next((k for k in records if k in views), -1)
 
 
-def _passes(captured: CapturedFrame, packer: Packer) -> list[Json]:
-    """Return a frame's passes; a write of the host has its buffer and the number of its bytes."""
+def _passes_json(captured: CapturedFrame, packer: Packer) -> list[Json]:
+    """Return the passes of a frame; data that the host writes is replaced by its buffer and byte run."""
     hosts = ((one, one.written) for one in captured.passes)
     return [{**vars(one), "written": host and (host[0], packer.add(host[1]))} for one, host in hosts]
 
 
-def _program(one: Json) -> Json:
-    return {**one, "bindings": [(index, name, _camel(entry)) for index, name, entry in one["bindings"]]}
+def _program_json(one: Json) -> Json:
+    return {**one, "bindings": [(index, name, _camel_keys(entry)) for index, name, entry in one["bindings"]]}
 
 
-def _struct(dtype: np.dtype[Any]) -> Json:
-    """Return its size, and of each member the offset and the number of floats [4 bytes]."""
-    members = {name: _member(kind, offset) for name, (kind, offset, *_) in (dtype.fields or {}).items()}
+def _struct_json(dtype: np.dtype[Any]) -> Json:
+    """Return the size of a struct [bytes], and of each member the offset and size in words of 4 bytes."""
+    members = {name: _member_json(kind, offset) for name, (kind, offset, *_) in (dtype.fields or {}).items()}
     return {"size": dtype.itemsize, "members": members}
 
 
-def _member(kind: np.dtype[Any], offset: int) -> list[int] | Json:
+def _member_json(kind: np.dtype[Any], offset: int) -> list[int] | Json:
     base = kind.base
     if base.fields is None:
         return [offset // 4, kind.itemsize // 4]
-    return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct(base)["members"]}
+    return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct_json(base)["members"]}
 
 
-def _camel(value: object) -> object:
-    """Return a description with names of members as WebGPU spells them."""
+def _camel_keys(value: object) -> object:
+    """Return a nested description with keys in camel case, as WebGPU requires."""
     if isinstance(value, dict):
-        return {_spelt(name): _camel(one) for name, one in value.items()}
+        return {_camel_case(name): _camel_keys(one) for name, one in value.items()}
     return value
 
 
-def _spelt(name: str) -> str:
+def _camel_case(name: str) -> str:
     first, *others = name.split("_")
     return first + "".join(word.title() for word in others)
 
 
 def read_before_written(capture: FrameCapture, captured_frames: list[CapturedFrame]) -> list[int]:
-    """Return the numbers of textures and buffers that some pass reads before any writes it, in order."""
+    """Return the sorted indices of resources that some pass reads before any pass writes them."""
     found: set[int] = set()
     for captured in captured_frames:
         written: set[int] = set()
@@ -169,7 +174,7 @@ def read_before_written(capture: FrameCapture, captured_frames: list[CapturedFra
 def resources_bound_as(
     capture: FrameCapture, captured_frames: list[CapturedFrame], names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Return the resources that are bound by some names."""
+    """Return the resources bound under one of the given names, with that name."""
     found: dict[int, str] = {}
     for captured in captured_frames:
         for one in (each for each in captured.passes if each.program is not None):
@@ -179,19 +184,19 @@ def resources_bound_as(
 
 
 def base_resource(capture: FrameCapture, number: int) -> int:
-    """Return the texture of a view; other resources themselves."""
+    """Return the index of a view's texture; other resources return their own index."""
     return int(capture.resources[number].get("of", number))
 
 
 def read_resources(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
-    """Yield the resources that a pass may read."""
+    """Yield the indices of the resources that a pass may read."""
     yield from (k for k, entry in _entries(capture, one) if _reads(entry))
     if one.raster and one.raster["indices"] >= 0:
         yield int(one.raster["indices"])
 
 
 def written_resources(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
-    """Yield the resources that a pass writes."""
+    """Yield the indices of the resources that a pass writes."""
     if one.written:
         yield one.written[0]
     yield from (k for k, entry in _entries(capture, one) if _writes(entry))
@@ -214,5 +219,5 @@ def _writes(entry: Json) -> bool:
 
 
 def _is_written(capture: FrameCapture, number: int, written: set[int]) -> bool:
-    """Return whether a pass has written a resource, or any part of it."""
+    """Return whether any part of a resource has been written."""
     return any(base_resource(capture, k) == base_resource(capture, number) for k in written)

@@ -1,4 +1,4 @@
-"""Maps of captured frames as pictures: eight bits a channel, along a curve of each channel's own."""
+"""Maps of captured frames stored as WebP pictures, with 8 bits per channel and a value curve per channel."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from dermis.mesh.maps import Maps
 
 Halves = NDArray[np.float16]
 PictureKey = tuple[str, int, int]
-"""Role, mip level and layer."""
+"""Role, mip level and layer of a picture."""
 MIN_SIDE = 64
-"""Side of the smallest map that becomes a picture [texels]."""
+"""Minimum side of a map that is stored as a picture [texel]."""
 _WEBP_QUALITY = 88
 _STEPS = 256
 _COLOUR_CHANNELS = 3
@@ -35,11 +35,11 @@ _COLOUR_CHANNELS = 3
 
 @dataclass(frozen=True)
 class Picture:
-    """Layer of a map.
+    """One layer of a map, encoded as a picture.
 
-    data : WebP; of maps that are no colours grey, one channel below the other
-    curves : (c, 256) value of each of a channel's steps
-    texels : (h, w, c) decoded picture
+    data : WebP file; channels of maps other than colours are stacked below each other in grey
+    curves : (c, 256) value of each of the 256 levels of a channel
+    texels : (h, w, c) texels as they are decoded
     """
 
     data: bytes
@@ -48,13 +48,12 @@ class Picture:
 
 
 def encode_picture(texels: Halves, colours: bool) -> Picture:
-    """Return a map as a picture.
+    """Return texels (h, w, c) encoded as a picture.
 
-    texels : (h, w, c)
-    colours : whether the first three channels are seen as a colour; those after it are one number each
+    colours : whether the first three channels are a colour; further channels are then constant
     """
-    curves = np.stack([_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
-    steps = np.stack([_steps(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
+    curves = np.stack([_value_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
+    steps = np.stack([_nearest_steps(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
     image = steps[..., :_COLOUR_CHANNELS] if colours else steps.transpose(2, 0, 1).reshape(-1, steps.shape[1])
     data = _encode_webp(image)
     levels = _decode_webp(data)
@@ -67,16 +66,16 @@ def encode_picture(texels: Halves, colours: bool) -> Picture:
     return Picture(data, curves.astype(np.float16), decoded.astype(np.float16))
 
 
-def _curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return values (256,) from the least to the largest, closer together near 0."""
+def _value_curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (256,) increasing values between the extremes of `values`, with smaller steps near 0."""
     limits = np.array([values.min(), values.max()])
     first, last = np.sign(limits) * np.sqrt(np.abs(limits))
     root = np.linspace(first, last, _STEPS)
     return np.asarray(np.sign(root) * root * root)
 
 
-def _steps(values: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return the nearest step of the curve to each value."""
+def _nearest_steps(values: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return the index of the value of a curve that is nearest to each of `values`."""
     midpoints = 0.5 * (curve[1:] + curve[:-1])
     return np.searchsorted(midpoints, values.astype(np.float64)).astype(np.uint8)
 
@@ -90,7 +89,7 @@ def _encode_webp(image: NDArray[np.uint8]) -> bytes:
 
 
 def _decode_webp(data: bytes) -> NDArray[np.uint8]:
-    """(h, w, 3)"""
+    """Return the (h, w, 3) pixels of a WebP file."""
     from PIL import Image
 
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
@@ -104,22 +103,22 @@ _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughnes
 
 @dataclass
 class MapPictures:
-    """Pictures of maps.
+    """Pictures of all maps.
 
-    A texture whose mips the device can halve comes with the first alone.
+    Only the first mip level is stored if the device can compute the others.
     """
 
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether a map is the one of its picture."""
+        """Return whether texels equal those from which the picture of a role was encoded."""
         return bool(np.array_equal(self._encoded_texels[role], texels))
 
     def replace_textures(
         self, renderer: Renderer, capture: FrameCapture, captured_frames: list[CapturedFrame]
     ) -> PictureMaps:
-        """Encode new maps and decode them into the captured textures; return these by number."""
+        """Replace the textures of maps by their decoded pictures, and return these by index."""
         maps = {}
         for number, role in _picture_textures(capture, captured_frames).items():
             texture, description = capture.resource_at(number), capture.resources[number]
@@ -133,7 +132,7 @@ class MapPictures:
         return maps
 
     def _layers(self, capture: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
-        """Return a mip (l, h, w, c) as it is decoded."""
+        """Return the (l, h, w, c) decoded texels of a mip level."""
         layers = read_texels(capture, number, mip)
         for layer, texels in enumerate(layers):
             if (role, mip, layer) not in self.pictures:
@@ -143,7 +142,7 @@ class MapPictures:
 
 
 def with_reduced_maps(head: Head, max_side: int) -> Head:
-    """Return the head with its maps of files halved until none has a longer side [texels]."""
+    """Return the head with its maps halved until no side is longer than `max_side` [texel]."""
     maps = head.maps
     if not isinstance(maps, Maps):
         return head
@@ -161,7 +160,7 @@ def _reduce_map(values: NDArray[np.float32], max_side: int) -> NDArray[np.float3
 def quantise_hairs(
     renderer: Renderer, capture: FrameCapture, captured_frames: list[CapturedFrame]
 ) -> QuantisedBuffers:
-    """Round the places of hairs on a device; of each buffer of them the steps of its columns."""
+    """Quantise the hair knots in the device's buffers; return the step of each column by buffer."""
     buffers = resources_bound_as(capture, captured_frames, ("knots",))
     for number in buffers:
         knots = capture.read_content(number)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
@@ -171,7 +170,7 @@ def quantise_hairs(
 
 
 def read_texels(capture: FrameCapture, number: int, mip: int) -> NDArray[np.float16]:
-    """Return the texels (l, h, w, c) of a texture of halves."""
+    """Return the (l, h, w, c) texels of a mip level of a half-float texture."""
     width, height, layers = capture.resources[number]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
     parts = capture.read_content(number)[mip * layers : (mip + 1) * layers]
@@ -179,7 +178,7 @@ def read_texels(capture: FrameCapture, number: int, mip: int) -> NDArray[np.floa
 
 
 def _picture_textures(capture: FrameCapture, captured_frames: list[CapturedFrame]) -> dict[int, str]:
-    """Return textures of halves bound as maps, large enough for pictures, with their roles."""
+    """Return half-float textures that are bound as maps and large enough for pictures, with their roles."""
     return {
         number: role
         for number, role in resources_bound_as(capture, captured_frames, _MAP_ROLES).items()

@@ -1,4 +1,4 @@
-"""Numbers packed for one gzip: differences from row to row, byte column by byte column, see packed.js."""
+"""Compression of buffers: rows are differenced and split into byte planes before gzip (see packed.js)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WORDS = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 
 
 class Packer:
-    """Gathers runs of bytes; the same bytes come once."""
+    """Collector of byte runs for one compressed file, in which equal runs are stored once."""
 
     def __init__(self) -> None:
         self.runs: list[ByteRun] = []
@@ -33,21 +33,21 @@ class Packer:
         self._end = 0
 
     def add(self, data: Bytes | bytes, layouts: Iterable[tuple[int, int, int]] | None = None) -> int:
-        """The number of a run of bytes.
+        """Add a run of bytes and return its number.
 
-        ways : bytes of a word, words of a row, how often rows are subtracted; the best is taken
+        layouts : bytes per word, words per row, and order of the differences; the best of them is used
         """
         raw = np.frombuffer(data, np.uint8)
         return self._add(raw, list(layouts or _possible_layouts(len(raw))), ())
 
     def add_parts(self, parts: Iterable[Bytes]) -> int:
-        """The number of a run of bytes that is joined from others, each packed its own way."""
+        """Add a run that concatenates other runs, each with its own layout, and return its number."""
         numbers = tuple(self.add(one) for one in parts)
         self.runs.append((0, sum(self.runs[k][1] for k in numbers), 0, 0, 0, numbers))
         return len(self.runs) - 1
 
     def add_floats(self, values: NDArray[np.float32], steps: tuple[float, ...]) -> int:
-        """The number of (n, c) floats that are multiples of steps, c powers of two; see `quantise`."""
+        """Add (n, c) floats that are multiples of (c,) steps, powers of two, and return their number."""
         words = np.rint(values / np.array(steps)).astype(np.int32)
         layouts = [(4, len(steps), order) for order in _ORDERS]
         return self._add(words.view(np.uint8).reshape(-1), layouts, steps)
@@ -64,17 +64,17 @@ class Packer:
         return self._run_numbers[key]
 
     def compress(self) -> bytes:
-        """All of it."""
+        """Return all runs as one gzip file."""
         return gzip.compress(b"".join(self._data), 9, mtime=0)
 
 
 def quantise(values: NDArray[np.float32], steps: tuple[float, ...]) -> NDArray[np.float32]:
-    """(n, c) floats as multiples of steps."""
+    """Return (n, c) floats rounded to multiples of (c,) steps."""
     return np.asarray(np.rint(values / np.array(steps)) * np.array(steps), np.float32)
 
 
 def encode_seven_bits(data: bytes) -> str:
-    """Bytes as letters of seven bits, those that cannot stand in a page 256 higher, see packed.js."""
+    """Return bytes as text of 7 bits per character; code points that HTML would change are 256 higher."""
     bits = np.unpackbits(np.frombuffer(data, np.uint8))
     bits = np.concatenate([bits, np.zeros(-len(bits) % 7, np.uint8)])
     codes = np.packbits(bits.reshape(-1, 7), axis=1)[:, 0] >> 1
@@ -82,7 +82,11 @@ def encode_seven_bits(data: bytes) -> str:
 
 
 def byte_planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
-    """Of rows of words, or their differences, all the first bytes before all the second, and so on."""
+    """Return the bytes of rows of words: all first bytes, then all second bytes, and so on.
+
+    word, row : bytes per word and words per row
+    order : how often differences between rows are taken first
+    """
     words = raw.view(_WORDS[word]).copy()
     for _ in range(order):
         words[row:] -= words[:-row].copy()
@@ -96,7 +100,7 @@ def _possible_layouts(size: int) -> Iterable[tuple[int, int, int]]:
 
 
 def _best_layout(raw: Bytes, layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
-    """The way that packs some of the bytes best."""
+    """Return the layout with which a sample of the bytes compresses best."""
     sample = raw
     if len(raw) > _SAMPLE_COUNT * _SAMPLE_BYTES:
         starts = [k * (len(raw) - _SAMPLE_BYTES) // (_SAMPLE_COUNT - 1) for k in range(_SAMPLE_COUNT)]

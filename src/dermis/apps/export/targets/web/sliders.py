@@ -1,4 +1,4 @@
-"""Dials of the page: what each turns, by the differences that it makes in a frame's numbers."""
+"""Sliders of the page, as changes in the records and buffers of a captured frame."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from dermis.scene.model import Scene
 
 Floats = NDArray[np.float32]
 _EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown": "full-frown"}
-"""Expressions at the upper end of sliders, by the slider's name."""
+"""Expression at the upper end of a slider, by the slider's name."""
 _ROUGHNESS_FACTORS = (0.5, 1.0, 1.7)
 PIGMENT_FACTORS = (0.4, 1.0, 3.0)
-"""Factors of the person's melanin and blood at the nodes of their sliders."""
+"""Factors of a person's melanin and blood at the nodes of their sliders."""
 
 
 @dataclass(frozen=True)
 class Slider:
-    """Something to turn.
+    """Slider of the page that interpolates a frame between nodes.
 
-    values : of its nodes, increasing; `default_value` is the one that the frame was taken with
-    scenes : for each node the scene, None at rest
-    moves : whether only the head's motion differs
+    values : increasing values of the nodes, among them `default_value`, at which the frame was captured
+    scenes : scene of each node; None for the default
+    changes_pose_only : whether the scenes differ from the default in the head's pose only
     """
 
     name: str
@@ -47,7 +47,11 @@ class Slider:
 def node_inputs(
     slider: Slider, prepare: Callable[[Scene], FrameInputs], base: FrameInputs
 ) -> Iterator[FrameInputs | None]:
-    """Yield what a frame reads at each node, None at rest."""
+    """Yield the frame inputs of each node of a slider; None for the default.
+
+    prepare : returns the frame inputs of a scene
+    base : frame inputs of the default
+    """
     for scene in slider.scenes:
         if scene is None:
             yield None
@@ -59,11 +63,11 @@ def node_inputs(
 
 
 def node_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
-    """Return the changes of a node in records and buffers: first word, and differences as floats.
+    """Return the changes of a node's records and buffers: index, first word, and run of the differences.
 
-    Whole numbers stay those of the base, as do the pairs of places that light passes between.
+    Integers are not compared: those of the base are used, also as indices of interreflection links.
 
-    DermisError : its passes are others
+    DermisError : the node's frame has different passes
     """
     stages = [[one.stage for one in captured.passes] for captured in (base, node)]
     if stages[0] != stages[1]:
@@ -76,14 +80,14 @@ def node_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Js
 
 
 def _floats(record: UniformRecord) -> Floats:
-    """Return a record as floats, 0 where it has whole numbers."""
+    """Return the words of a record as floats, with 0 in place of integers."""
     floats = np.frombuffer(record.tobytes(), "<f4").copy()
     floats[~_is_float(record.dtype)] = 0.0
     return floats
 
 
 def _is_float(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
-    """Return which words of a record are floats."""
+    """Return the mask of the words of a record that are floats."""
     is_float = np.zeros(dtype.itemsize // 4, np.bool_)
     for member, offset, *_ in (dtype.fields or {}).values():
         words = slice(offset // 4, (offset + member.itemsize) // 4)
@@ -116,7 +120,7 @@ def _differences(
 
 
 def scene_sliders(scene: Scene) -> tuple[Slider, ...]:
-    """Return a scene's dials: expressions where the head has them, pigments where skin is painted."""
+    """Return the sliders of a scene: pigments of painted skin, roughness, and expressions."""
     return (*_pigment_sliders(scene), _roughness_slider(scene), *_expression_sliders(scene))
 
 
@@ -138,7 +142,7 @@ def _expression_sliders(scene: Scene) -> list[Slider]:
 
 
 def _pigment_sliders(scene: Scene) -> list[Slider]:
-    """Return the dials of melanin and blood, which change the spread of light and the painted colour."""
+    """Return sliders of melanin and blood, which change both the diffusion and the painted colour."""
     pigments, maps = scene.skin.pigments, scene.head.maps
     if pigments is None or not isinstance(maps, PaintedMaps) or scene.skin.albedo != "map":
         return []

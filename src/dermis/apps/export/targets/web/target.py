@@ -1,4 +1,4 @@
-"""HTML file that holds a recorded head and the player of its frames."""
+"""Export to a web page that holds captured frames of a head and the WebGPU player that draws them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MODULES = (
     "hands",
     "page",
 )
-"""Modules of the player, each after those that it imports."""
+"""Modules of the player, each after the modules that it imports."""
 _HERE = Path(__file__).parent
 _IMPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
@@ -46,9 +46,9 @@ _MAX_MAP_SIDE = 1024
 
 
 def page_html(content: PageContent, sliders: tuple[Slider, ...], title: str, note: str) -> str:
-    """Return the text of the page.
+    """Return the HTML of the page.
 
-    title, note : any text, which is escaped
+    title, note : plain text, which is escaped
     """
     scene = {
         "forms": content.forms,
@@ -71,7 +71,7 @@ def page_html(content: PageContent, sliders: tuple[Slider, ...], title: str, not
 
 
 def player_script() -> str:
-    """Return the player's modules as one script."""
+    """Return the modules of the player joined into one script."""
     return "".join(
         _EXPORT.sub("", _IMPORT.sub("", (_HERE / f"{name}.js").read_text("utf-8"))) for name in MODULES
     )
@@ -86,7 +86,7 @@ def _webp(picture: NDArray[np.uint8]) -> bytes:
 
 
 class Web(Target):
-    """Page that needs no library, no server and no network."""
+    """Export to a web page that needs no library, server or network."""
 
     name = "web"
     title = "WebGPU"
@@ -94,12 +94,12 @@ class Web(Target):
     suffixes = (".html",)
     limitations = (
         "The page renders square pictures with an atlas of 512 texels. Maps have at most 1024 texels per "
-        "side, 8 bits per channel and WebP compression. Expressions move the skin without folds and flushing, "
-        "and sliders interpolate between a few values. Hairs keep the width of the first view."
+        "side, 8 bits per channel and WebP compression. Expressions move skin without folds and flushing. "
+        "Sliders interpolate between a few values. Hairs keep the width of the first view."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the Gaussians that spread light."""
+        """Return the sum of Gaussians with which the page diffuses light."""
         profile = self._profile(subject)
         return (
             Parameter("atlas", _ATLAS_SIDE, "texel", "side of the map in which light is diffused"),
@@ -111,11 +111,11 @@ class Web(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the same: there is nothing to type."""
+        """Return the same parameters, as users of the page cannot set any."""
         return self.parameters(subject, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the curve of the sum of Gaussians."""
+        """Return the cumulative profile of the sum of Gaussians."""
         _, variance, *weight = (np.array(get_numbers(parameters, one.name)) for one in parameters)
         return gaussian_curve(variance, np.stack(weight, axis=1), subject.curve.energy)
 

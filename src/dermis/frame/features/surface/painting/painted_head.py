@@ -14,27 +14,27 @@ from dermis.gpu import CommandList, Device, download, make_texture
 from dermis.human.skin.painted import MAX_SIDE, MIN_SIDE, PaintedMaps
 from dermis.human.skin.surface import painted_surface
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import FALLING, RIM, EyePictures
+from dermis.mesh.eyeball import UV_FALLOFF, UV_RIM, EyeTextures
 from dermis.mesh.head import Head
 
 SIDE = 1024
 """Side of the pictures [texels]; a texel of the iris is 0.025 mm wide."""
 
 
-def eye_pictures(device: Device, look: EyeLook, side: int = SIDE) -> EyePictures:
+def eye_pictures(device: Device, look: EyeLook, side: int = SIDE) -> EyeTextures:
     """Return pictures of an eye as seen along its axis through the cornea."""
     shader = program(device, "surface/painting/eye_pictures.wgsl")
-    picture = shader.record("EyePicture", rim=RIM, falling=FALLING)
+    picture = shader.record("EyePicture", rim=UV_RIM, falling=UV_FALLOFF)
     fill_eye(picture["eye"], look)
     made = {name: make_texture(device, (side, side), "rgba32float") for name in ("colours", "normals")}
     frame = CommandList(device, timed=False)
     frame.compute("paint", shader, {"picture": picture, **made}, (side, side))
     frame.submit()
     colours, normals = (download(device, texture)[..., :3] for texture in made.values())
-    return EyePictures(np.ascontiguousarray(colours, np.float32), np.ascontiguousarray(normals, np.float32))
+    return EyeTextures(np.ascontiguousarray(colours, np.float32), np.ascontiguousarray(normals, np.float32))
 
 
-def painted_head(device: Device, head: Head, side: int) -> tuple[Head, EyePictures | None]:
+def painted_head(device: Device, head: Head, side: int) -> tuple[Head, EyeTextures | None]:
     """Return the result of `with_painted_maps`, and pictures of the eyes if they are modelled."""
     eyes = None if head.eyes is None else eye_pictures(device, head.eyes.look)
     return with_painted_maps(device, head, side), eyes

@@ -11,8 +11,7 @@ from dermis.atlas.translucency.cells import TILE_CELLS, TILE_MARGIN_TEXELS, Cell
 from dermis.frame.features.translucency.passes import (
     RECEIVER_BYTES,
     SOURCE_BYTES,
-    draw_receivers,
-    draw_sources,
+    draw_points,
     make_buffer,
 )
 from dermis.frame.programs import program, workgroup_grid
@@ -170,7 +169,7 @@ def _expand_ranges(first: Index, chosen: Index) -> tuple[Index, Index]:
     return numbers, position
 
 
-def draw_points(
+def draw_candidates(
     passes: SearchPasses, surface: Bindings, cells: Cells, candidates: CandidateCells
 ) -> Bindings:
     """Return the buffers of the positions of receivers and sources, by their names in the shaders.
@@ -181,8 +180,10 @@ def draw_points(
     receiver_points = make_buffer(device, len(candidates.receiver), RECEIVER_BYTES)
     source_points = make_buffer(device, len(candidates.source), SOURCE_BYTES)
     receivers = upload_receivers(device, cells, candidates.receiver)
-    draw_receivers(commands, surface, cells, receivers, receiver_points, facets=True)
-    draw_sources(commands, surface, cells, upload_sources(device, cells, candidates.source), source_points)
+    draw_points(commands, "receiver", surface, cells, receivers, receiver_points, facets=True)
+    draw_points(
+        commands, "source", surface, cells, upload_sources(device, cells, candidates.source), source_points
+    )
     return {"receiver_points": receiver_points, "source_points": source_points}
 
 
@@ -260,7 +261,7 @@ def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable |
     count = len(candidates.receiver)
     if max(4 * words, RECEIVER_BYTES * count) > device.max_storage_bytes:
         return None
-    points = draw_points(passes, surface, cells, candidates)
+    points = draw_candidates(passes, surface, cells, candidates)
     hits, counts = make_buffer(device, words), make_buffer(device, count)
     hit_bindings = {**ranges, "partners": tile_pairs.partners, "hits": hits}
     passes.add("hits", count, {**hit_bindings, **points, "tiles": tile_pairs.bounds, "counts": counts})

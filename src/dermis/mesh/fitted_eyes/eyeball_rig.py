@@ -1,0 +1,161 @@
+"""What moves the eyeballs that replace a file's: the bones and the targets that moved those."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Doubles, Floats, Index, Ints
+from dermis.mesh.rig import INFLUENCES, BoneRotation, MorphTargets, Rig, RigidFollowers, Skeleton
+from dermis.mesh.rotations import matrix_angles, rigid_motion
+
+_ROOT, _NAMES = "scene", ("eye.L", "eye.R")
+_MAX_OTHER_FOLLOWERS = 0.05
+"""Of the points that follow a bone: with more beside the eye's, it is the head's and not the eye's."""
+_MIN_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02
+
+
+class Eyeball(NamedTuple):
+    """An eyeball that replaces one of a file.
+
+    centre : (3,) [mm]
+    points : (n, 3) control points [mm]
+    replaced : (m,) indices of the control points of the file's eyeball
+    """
+
+    centre: Doubles
+    points: Doubles
+    replaced: Index
+
+
+def with_eyeballs(rig: Rig, eyeballs: Sequence[Eyeball]) -> Rig:
+    """The rig with eyeballs after all its points, which follow what moved those that they replace."""
+    skeleton, bones = _with_eye_bones(rig, eyeballs)
+    first = len(rig.positions_mm) + np.cumsum([0, *(len(one.points) for one in eyeballs)])
+    rotations, targets = list(rig.bone_rotations), rig.targets
+    for eyeball, bone, begin in zip(eyeballs, bones, first, strict=False):
+        origin = np.array(skeleton.origin_mm[bone])
+        own, shifts = _rigid_targets(rig, eyeball, skeleton.names[bone], origin)
+        rotations += own
+        targets = _with_shifts(targets, shifts, begin + np.arange(len(eyeball.points)))
+    followers = [
+        RigidFollowers(
+            one.replaced.astype(np.int32), np.arange(begin, begin + len(one.points), dtype=np.int32)
+        )
+        for one, begin in zip(eyeballs, first, strict=False)
+    ]
+    positions = np.concatenate([rig.positions_mm, *(one.points for one in eyeballs)]).astype(np.float32)
+    return replace(
+        rig,
+        positions_mm=positions,
+        targets=targets,
+        skeleton=skeleton,
+        bone_rotations=tuple(rotations),
+        rigid_followers=(*rig.rigid_followers, *followers),
+    )
+
+
+def _with_eye_bones(rig: Rig, eyeballs: Sequence[Eyeball]) -> tuple[Skeleton, list[int]]:
+    """The skeleton with a bone for each eyeball, its own where the file has one, and their numbers."""
+    skeleton = rig.skeleton or _single_bone(len(rig.positions_mm))
+    bones = _eye_bones(skeleton, eyeballs)
+    for k, eyeball in enumerate(eyeballs):
+        if bones[k] < 0:
+            parent = int(np.argmax(_follower_counts(skeleton, eyeball)))
+            name = next(name for name in (_NAMES[k], f"fitted {_NAMES[k]}") if name not in skeleton.names)
+            skeleton, bones[k] = _with_bone(skeleton, name, parent, eyeball.centre), len(skeleton.names)
+    for eyeball, bone in zip(eyeballs, bones, strict=True):
+        count = len(eyeball.points)
+        weight = np.tile(np.eye(1, INFLUENCES, dtype=np.float32), (count, 1))
+        index = np.zeros((count, INFLUENCES), np.int32)
+        index[:, 0] = bone
+        skeleton = replace(
+            skeleton,
+            bone=np.concatenate([skeleton.bone, index]),
+            weight=np.concatenate([skeleton.weight, weight]),
+        )
+    return skeleton, bones
+
+
+def _single_bone(count: int) -> Skeleton:
+    """One bone that all points follow."""
+    identity = np.eye(4)[None]
+    bone, weight = np.zeros((count, INFLUENCES), np.int32), np.zeros((count, INFLUENCES), np.float32)
+    weight[:, 0] = 1.0
+    return Skeleton((_ROOT,), np.array([-1], np.int32), identity, identity, np.eye(4), bone, weight)
+
+
+def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[Eyeball]) -> list[int]:
+    """The bone that moves each eyeball and nothing else, -1 where there is none."""
+    count, bones = len(skeleton.names), list[int]()
+    total = np.bincount(skeleton.bone.ravel(), skeleton.weight.ravel(), minlength=count)
+    for eyeball in eyeballs:
+        own = _follower_counts(skeleton, eyeball)
+        bone = int(np.argmax(own))
+        others = total[bone] - own[bone]
+        bones.append(bone if others <= _MAX_OTHER_FOLLOWERS * own[bone] else -1)
+    return bones
+
+
+def _follower_counts(skeleton: Skeleton, eyeball: Eyeball) -> Doubles:
+    """(b,) how many points of the replaced eyeball follow each bone."""
+    bone, weight = skeleton.bone[eyeball.replaced], skeleton.weight[eyeball.replaced]
+    return np.bincount(bone.ravel(), weight.ravel(), len(skeleton.names)).astype(np.float64)
+
+
+def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -> Skeleton:
+    """The skeleton with a bone more, which rests at a place in the head's space [mm]."""
+    to_head = np.eye(4)
+    to_head[:3, 3] = origin_mm
+    world = np.linalg.inv(skeleton.to_head) @ to_head
+    return replace(
+        skeleton,
+        names=(*skeleton.names, name),
+        parent=np.append(skeleton.parent, parent).astype(np.int32),
+        local=np.concatenate([skeleton.local, (skeleton.inverse_bind[parent] @ world)[None]]),
+        inverse_bind=np.concatenate([skeleton.inverse_bind, np.linalg.inv(world)[None]]),
+    )
+
+
+def _rigid_targets(
+    rig: Rig, eyeball: Eyeball, bone: str, origin_mm: Doubles
+) -> tuple[list[BoneRotation], dict[int, Doubles]]:
+    """Turns of a bone as targets turn the replaced eyeball, and by number how far they shift it [mm]."""
+    rest = rig.positions_mm[eyeball.replaced].astype(np.float64)
+    deltas = rig.targets.dense(eyeball.replaced, len(rig.positions_mm)).astype(np.float64)
+    rotations, shifts = list[BoneRotation](), dict[int, Doubles]()
+    for index, delta in enumerate(deltas):
+        if np.abs(delta).max(initial=0.0) < _MIN_SHIFT_MM:
+            continue
+        matrix, _ = rigid_motion(rest, rest + delta)
+        x, y, z = matrix_angles(matrix)
+        if np.linalg.norm((x, y, z)) < _MIN_DEGREES:
+            matrix = np.eye(3)
+        else:
+            rotations.append(BoneRotation(rig.targets.names[index], bone, (x, y, z)))
+        centre = rest.mean(axis=0)
+        shift = delta.mean(axis=0) - (matrix - np.eye(3)) @ (centre - origin_mm)
+        if np.linalg.norm(shift) > _MIN_SHIFT_MM:
+            shifts[index] = shift
+    return rotations, shifts
+
+
+def _with_shifts(targets: MorphTargets, shifts: dict[int, Doubles], points: Index) -> MorphTargets:
+    """The targets that shift some points more, all of them alike."""
+    if not shifts:
+        return targets
+    point, delta, count = list[Ints](), list[Floats](), [0]
+    for index in range(len(targets.names)):
+        indices = [targets.point[targets.rows(index)]]
+        deltas = [targets.delta_mm[targets.rows(index)]]
+        if index in shifts:
+            indices.append(points.astype(np.int32))
+            deltas.append(np.tile(shifts[index].astype(np.float32), (len(points), 1)))
+        point += indices
+        delta += deltas
+        count.append(sum(map(len, indices)))
+    first = np.cumsum(count).astype(np.int32)
+    return replace(targets, first=first, point=np.concatenate(point), delta_mm=np.concatenate(delta))
