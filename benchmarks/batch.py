@@ -47,7 +47,7 @@ _FROM, _TO = 0.25, 0.9  # of the images: processes that start, and those that ha
 _STILL = {"light": {"kind": "studio"}, "environment": {"name": "none"}, "background": {"kind": "gradient"}}
 _DISK_BYTES = 1 << 28
 _MOST_STEPS = 40
-_SHARDS = 10  # of each worker, where only whole shards are told of
+_SHARDS = 10  # of each worker, because progress is reported by complete shards
 MARKS = 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000
 """Images of a worker after which its memory is read."""
 

@@ -85,7 +85,7 @@ def main(
 
 def table(report: JsonObject) -> str:
     """Return the rows as a Markdown table."""
-    head = "| renderer | setting | s an image, by the clock | of all cores | noise |\n|---|---|---|---|---|"
+    head = "| renderer | setting | seconds per image, wall time | CPU time | noise |\n|---|---|---|---|---|"
     return "\n".join([head, *map(_line, report["rows"])])
 
 

@@ -50,10 +50,10 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
-LONGEST_S = 150.0
+MAX_DURATION_S = 150.0
 
 
-def run_time_s(words: list[str], longest_s: float = LONGEST_S) -> float:
+def run_time_s(words: list[str], longest_s: float = MAX_DURATION_S) -> float:
     """Return the run time of a program [s], whose notes are printed.
 
     Raises DermisError with its last output if it failed or took too long.

@@ -20,7 +20,7 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
-from dermis.apps.validation.benchmarks.cases import Case, case_scenes, case_settings, test_pose, with_test_rig
+from dermis.apps.validation.benchmarks.cases import Case, case_scenes, case_settings, pose_at_moment, with_test_rig
 from dermis.apps.validation.benchmarks.measure import CPU_FRAME_COUNTS, FrameCounts, sequence_ms, stage_ms
 from dermis.apps.validation.pages import JsonObject
 from dermis.base.atomic_write import atomic_file, check_output
@@ -154,7 +154,7 @@ def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int
     scene, settings = case_scenes(case, head, folder, 1)[0], case_settings(case)
     moving, taken = with_test_rig(head, case.targets), list[tuple[int, float, float]]()
     for number in range(frames):
-        posed = replace(scene, head=moving, pose=test_pose(moving, number))
+        posed = replace(scene, head=moving, pose=pose_at_moment(moving, number))
         renderer.draw(posed, settings, timed=False)
         if number * _SAMPLES // frames >= len(taken):
             taken.append((number, resident_mb(), allocated_bytes() / 1e6))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer
-from dermis.apps.inverse.unmixing.skin_model import SkinModel, Third, skin_model, solve, weights_of
+from dermis.apps.inverse.unmixing.skin_model import SkinModel, ThirdUnknown, skin_model, solve_pigments, inverse_variances
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.truths.slab_mc import monte_carlo_profile
 from dermis.apps.validation.pages import JsonObject, write_results
@@ -101,10 +101,10 @@ def known(skin: SkinParameters) -> list[JsonObject]:
     m, b = skins()
     colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
     model = skin_model(skin)
-    plain = solve(model, colours, 1e-3)
+    plain = solve_pigments(model, colours, 1e-3)
     random = np.random.default_rng(SEED)
     noisy = colours * (1.0 + NOISE * random.standard_normal((TRIALS, *colours.shape)))
-    found = solve(model, noisy.reshape(-1, 3), NOISE)
+    found = solve_pigments(model, noisy.reshape(-1, 3), NOISE)
     melanin, blood, stated = (one.reshape(TRIALS, -1) for one in (found.melanin, found.blood, found.blood_sd))
     least = bound(model, m, b, colours)
     back = model.colours(plain.melanin, plain.blood)
@@ -131,9 +131,9 @@ def known(skin: SkinParameters) -> list[JsonObject]:
 
 def bound(model: SkinModel, m: Floats, b: Floats, colours: Floats) -> Floats:
     """Return the relative Cramér-Rao bound of blood without a prior, for noise alone."""
-    found = np.stack([np.sqrt(m), np.sqrt(b), np.full(len(m), model.usual)], axis=-1)
-    slopes = model.read(found)[1][:, :, :2]
-    weighed = np.einsum("tci,tc,tcj->tij", slopes, weights_of(colours, NOISE), slopes)
+    found = np.stack([np.sqrt(m), np.sqrt(b), np.full(len(m), model.prior_mean)], axis=-1)
+    slopes = model.evaluate(found)[1][:, :, :2]
+    weighed = np.einsum("tci,tc,tcj->tij", slopes, inverse_variances(colours, NOISE), slopes)
     return np.asarray(2.0 * np.sqrt(np.linalg.inv(weighed)[:, 1, 1] / b))
 
 
@@ -145,8 +145,8 @@ def model_error_cases() -> JsonObject:
         "epidermis of 0.07 mm for 0.05": {"epidermis_mm": 0.07},
     }
     m, b = skins(SEED + 1)
-    usual = (m > 0.005) & (m < 0.2) & (b > 0.003) & (b < 0.05)
-    m, b = m[usual], b[usual]
+    prior_mean = (m > 0.005) & (m < 0.2) & (b > 0.003) & (b < 0.05)
+    m, b = m[prior_mean], b[prior_mean]
     results = {}
     for name, other in cases.items():
         skin = replace(DEFAULT_SKIN, **other)
@@ -155,8 +155,8 @@ def model_error_cases() -> JsonObject:
     return results
 
 
-def _off(third: Third, colours: Floats, m: Floats, b: Floats) -> dict[str, float]:
-    found = solve(skin_model(DEFAULT_SKIN, third), colours, NOISE)
+def _off(third: ThirdUnknown, colours: Floats, m: Floats, b: Floats) -> dict[str, float]:
+    found = solve_pigments(skin_model(DEFAULT_SKIN, third), colours, NOISE)
     ratios = {"melanin": found.melanin / m, "blood": found.blood / b}
     left = delta_e_2000(colours, colours / found.residual)
     return {name: float(np.median(one)) for name, one in ratios.items()} | {"delta_e": float(np.median(left))}
@@ -169,7 +169,7 @@ def counted() -> list[JsonObject]:
         pigments = {"melanin": m, "blood": b}
         tissue = load_tissue("spectral", pigments=pigments)
         colour = monte_carlo_profile(tissue.medium, tissue.rgb, _PHOTONS, seed=SEED).total[None]
-        found = solve(skin_model(), colour, NOISE)
+        found = solve_pigments(skin_model(), colour, NOISE)
         own = skin_model().colours(np.array([m]), np.array([b]))
         results.append(
             {
@@ -192,7 +192,7 @@ def supplied(folder: Path) -> list[JsonObject]:
     m, b = (table[name].astype(np.float64) for name in ("f_mel", "f_blood"))
     colours = np.stack([table[f"lin_{channel}"] for channel in "RGB"], axis=-1)
     model = skin_model(replace(DEFAULT_SKIN, eumelanin=1.0, epidermis_mm=0.06))
-    found, forward = solve(model, colours, NOISE), delta_e_2000(model.colours(m, b), colours)
+    found, forward = solve_pigments(model, colours, NOISE), delta_e_2000(model.colours(m, b), colours)
     left = delta_e_2000(colours / found.residual, colours)
     results = []
     for low, high in pairwise(BANDS):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.validation.benchmarks.cases import test_pose, with_test_rig
+from dermis.apps.validation.benchmarks.cases import pose_at_moment, with_test_rig
 from dermis.apps.validation.pages import JsonObject
 from dermis.apps.viewer.navigation import drag_light, orbit
 from dermis.apps.viewer.state import ViewerState, validated_copy
@@ -200,7 +200,7 @@ MOTIONS: dict[str, Motion] = {
         lambda state: state.with_skin(profile=PIGMENTED).with_pigments(melanin=0.05),
         lambda state, k: state.with_pigments(melanin=0.05 + 0.01 * _to_and_fro(k)),
     ),
-    "expression": Motion(_with_targets, lambda state, k: state.with_pose(test_pose(state.scene.head, k))),
+    "expression": Motion(_with_targets, lambda state, k: state.with_pose(pose_at_moment(state.scene.head, k))),
     "exposure": Motion(_same, lambda state, k: state.with_settings(exposure=1.0 + 0.2 * _to_and_fro(k))),
 }
 

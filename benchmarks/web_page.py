@@ -111,7 +111,7 @@ def main(
         rows["frame in motion"] = timed(page, MOVE, FRAMES)
         size = page.evaluate("dermis.player.frame.size")
         for name, (wall, processor) in rows.items():
-            sys.stdout.write(f"{name}: {wall:.2f} s by the clock, {processor:.2f} s of the processor\n")
+            sys.stdout.write(f"{name}: {wall:.2f} s wall time, {processor:.2f} s CPU time\n")
         sys.stdout.write(
             f"{file.stat().st_size / 1e6:.1f} MB, picture {size}, load {os.getloadavg()[0]:.1f}\n"
         )

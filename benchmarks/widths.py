@@ -18,7 +18,7 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 import dermis
-from dermis.apps.inverse.unmixing.profile_widths import widths_of
+from dermis.apps.inverse.unmixing.profile_widths import profile_mixture
 from dermis.apps.inverse.unmixing.skin_model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.truths.two_media import strip_transfer
@@ -134,7 +134,7 @@ def grid(adapter: str) -> JsonObject:
     """Return the width errors that remain with three profiles, over a grid of melanin and blood."""
     m, b = np.meshgrid(np.geomspace(0.01, 0.15, 64), np.geomspace(0.002, 0.06, 64))
     colours = skin_model().colours(m.ravel(), b.ravel()).reshape(64, 64, 3)
-    return widths_of(unmix(colours, adapter=adapter)).summary()
+    return profile_mixture(unmix(colours, adapter=adapter)).summary()
 
 
 def cost(adapter: str, atlas: int) -> JsonObject:
@@ -154,7 +154,7 @@ def cost(adapter: str, atlas: int) -> JsonObject:
 
 
 def _frame_ms(renderer: Renderer, scene: dermis.Scene, settings: dermis.Settings, number: int) -> float:
-    """Return the time of a frame with new light, by the clock of the device if it has one [ms]."""
+    """Return the time of a frame with new light, measured by the device if possible [ms]."""
     bright = 3.0 + 0.01 * number
     lamp = dermis.PointLight(position=(-300, 300, 700), irradiance=(bright, bright, bright))
     drawn = renderer.draw(replace(scene, lights=(lamp,)), settings, timed="whole")

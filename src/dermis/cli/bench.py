@@ -50,6 +50,8 @@ def bench(
         auto (the scan lee_perry_smith if it has been downloaded, else human), or any HEAD of `dermis render`.
     output:
         HTML report with plots to write.
+    as_json:
+        Print one JSON object with all timings.
     """
     from dermis.apps.validation.benchmarks.cases import PRESETS
     from dermis.apps.validation.benchmarks.report import as_json as to_json
@@ -82,8 +84,8 @@ def _report_lines(benchmark: Benchmark) -> list[str]:
     from dermis.apps.validation.benchmarks.report import (
         COLUMNS,
         cells,
-        skipped_lines,
         published_text,
+        skipped_lines,
         stage_table,
         summary,
     )

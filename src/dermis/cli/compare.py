@@ -112,6 +112,8 @@ def compare(
         Paths per pixel, for path-traced and cycles. [default: 64]
     output:
         HTML report to write; for specular the folder of the plots.
+    as_json:
+        Print one JSON object with the measured values.
     """
     named = drop_none(against=against, techniques=techniques, light=light, region=region)
     options = named | drop_none(medium=medium, model=model, samples=samples) | sizes | skin | shape

@@ -21,11 +21,16 @@ def doctor(*, adapter: AdapterOption = "auto", as_json: JsonOption = False) -> i
 
     Exits with 0 if everything works and with 2 if not.
 
-    Examples:
+    For example:
 
         dermis doctor
 
         dermis doctor --adapter cpu --json
+
+    Parameters
+    ----------
+    as_json:
+        Print one JSON object with all results.
     """
     report = examine(adapter)
     print_report(as_json, report, lambda: _report_lines(report))

@@ -83,10 +83,10 @@ def export(
         server]
     map_side:
         Side of the painted maps, a power of two from 256 to 4096 [texel].
-    adapter:
-        Adapter that paints the maps: auto, cpu or part of a name.
     naive:
         Also print the values that result from copying the numbers without conversion.
+    as_json:
+        Print one JSON object with the parameters and errors.
     """
     from dermis.apps.export.run import export_skin
 

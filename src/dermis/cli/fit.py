@@ -72,8 +72,8 @@ def fit(
         Length of the longer side of the photograph during the fit [pixel].
     atlas:
         Side of the atlas of the rendered frames [texel].
-    adapter:
-        Adapter to compute on: auto, cpu or part of a name.
+    as_json:
+        Print one JSON object with the estimates and their uncertainties.
     """
     from dermis.apps.inverse.fitting.fit import fit as fitted
     from dermis.apps.inverse.fitting.result import SUMMARY, save_fit

@@ -47,6 +47,8 @@ def gallery(
         Side of a panel, 32 to 2048 [pixel]. [default: 448]
     output:
         Folder of the pictures and the page, created if necessary.
+    as_json:
+        Print one JSON object with the pictures and their timings.
     """
     from dermis.apps.gallery.page import write_page
     from dermis.apps.gallery.script import draw_pictures, find_scripts, write_panels

@@ -122,10 +122,10 @@ def head(
         uv layout: own (most texels for the face) or hm08 (of MakeHuman, for its skin textures).
     subdivide:
         Levels of subdivision, 0 to 3; each makes the file four times larger. [default: 1]
-    adapter:
-        Adapter that paints the maps: auto, cpu or part of a name.
     list_targets:
         Print the names of the MakeHuman shape targets and exit.
+    as_json:
+        Print one JSON object with the parameters of the person and the size of the file.
     """
     from dermis.base.atomic_write import check_output
     from dermis.frame.features.surface.painting.painted_head import painted_head

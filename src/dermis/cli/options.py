@@ -46,9 +46,7 @@ def _to_colour(_: type, tokens: Sequence[Token]) -> tuple[float, float, float]:
     return parse_colour(tokens[0].value, str(tokens[0].keyword))
 
 
-JsonOption = Annotated[
-    bool, Parameter(name="--json", negative="", show_default=False, help="Print one JSON object.")
-]
+JsonOption = Annotated[bool, Parameter(name="--json", negative="", show_default=False)]
 AdapterOption = Annotated[
     str,
     Parameter(

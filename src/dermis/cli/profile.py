@@ -128,6 +128,8 @@ def profile(
         Plot to write (.png, .svg or .pdf): r R(r) of each channel and its fit.
     check:
         Add Monte Carlo results with error bars to the plot.
+    as_json:
+        Print one JSON object with the profile, its fits and errors.
     """
     from dermis.cli.profile_report import Report, draw_plot, gaussian_fit, other_fit
     from dermis.optics.diffusion.models import error_against_photons, known_error

@@ -81,10 +81,10 @@ def unmix(
         Treat slow changes of brightness as shading and divide by them; written as shading.exr.
     widths:
         Also write three diffusion profiles and their mixing map, for `dermis render --profile-map`.
-    adapter:
-        Adapter to compute on: auto, cpu or part of a name.
+    as_json:
+        Print one JSON object with statistics of the maps.
     """
-    from dermis.apps.inverse.unmixing.profile_widths import save_mixture, profile_mixture
+    from dermis.apps.inverse.unmixing.profile_widths import profile_mixture, save_mixture
     from dermis.apps.inverse.unmixing.unmix import SUMMARY, save_maps
     from dermis.apps.inverse.unmixing.unmix import unmix as unmixed
     from dermis.base.atomic_write import check_folder
